@@ -19,12 +19,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.app.session.bridge import SessionBridge
 from study_app.app.session.garbage_collection import collecting_here
-from study_app.app.session.session_windows import (
-    connect_windows,
-    make_cockpit,
-    make_participant_window,
-    show_windows,
-)
+from study_app.app.session.session_windows import connect_windows, make_cockpit, make_participant_window, show_windows
 from study_app.app.session.termination import ended_from_outside
 from study_app.devices.rig import open_rig, study_settings
 from study_app.errors import SessionError, StudyError

@@ -85,10 +85,7 @@ class MainController(QObject):
                 "help": self._help,
             },
             theme=theme_named(self.machine.settings.theme),
-            prepares={
-                "lab": self.lab_and_designer.prepare_lab,
-                "designer": self.lab_and_designer.prepare_designer,
-            },
+            prepares={"lab": self.lab_and_designer.prepare_lab, "designer": self.lab_and_designer.prepare_designer},
         )
         self.loop = QEventLoop()
         self.code = 0

@@ -241,10 +241,7 @@ class ResultsController(QObject):
         self._blocks = found.blocks
         nothing = Trouble("No figures", "This study has no questionnaire.", "Refresh", "again")
         self._show(
-            trials=found.trials,
-            doubts=found.doubts,
-            colours=found.colours,
-            trouble=None if found.blocks else nothing,
+            trials=found.trials, doubts=found.doubts, colours=found.colours, trouble=None if found.blocks else nothing
         )
 
     def _take_figure(self, drawn: FigureDrawn) -> None:

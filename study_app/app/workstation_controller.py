@@ -73,10 +73,7 @@ def described(settings: MachineSettings, participant: QScreen, operator: QScreen
     shown = screen_shown(participant)
     frames = {"frames": LOCKED if has_card() else BY_CLOCK}
     measured = settings.describe(shown.name, shown.width_px, shown.width_mm)
-    return {
-        "participant": describe_screen(participant) | frames | measured,
-        "operator": describe_screen(operator),
-    }
+    return {"participant": describe_screen(participant) | frames | measured, "operator": describe_screen(operator)}
 
 
 class WorkstationController(QObject):

@@ -15,15 +15,7 @@ from study_app.haptics.model.effects import EFFECTS, NAMED
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.overrides import override_all
 from study_app.haptics.model.scene import Scene
-from study_app.lab.parameters import (
-    AUTO,
-    AXES,
-    ON,
-    parameter,
-    read,
-    the_liquid,
-    value_of,
-)
+from study_app.lab.parameters import AUTO, AXES, ON, parameter, read, the_liquid, value_of
 
 _HALF_HAND_M: Final = 0.05
 _KINDS: Final = ("kind", "law")

@@ -39,16 +39,8 @@ _P = Parameter
 _CHOICES: Final = {
     it.name: it
     for it in (
-        _P(
-            "region.kind",
-            "Region",
-            choices=(("everywhere", "Everywhere"), ("box", "Box"), ("cylinder", "Cylinder")),
-        ),
-        _P(
-            "velocity.kind",
-            "Estimator",
-            choices=tuple((it.name, it.label) for it in ESTIMATORS if it.of_device),
-        ),
+        _P("region.kind", "Region", choices=(("everywhere", "Everywhere"), ("box", "Box"), ("cylinder", "Cylinder"))),
+        _P("velocity.kind", "Estimator", choices=tuple((it.name, it.label) for it in ESTIMATORS if it.of_device)),
         _P(
             "knee.law",
             "Knee law",

@@ -194,9 +194,7 @@ class Block(Table):
                 raise PydanticCustomError("part", "a main block needs a part: 1, 2, …", {"place": "part"})
         elif self.compares is not None:
             raise PydanticCustomError(
-                "compares",
-                "a {phase} block compares nothing: leave it out",
-                {"phase": self.phase, "place": "compares"},
+                "compares", "a {phase} block compares nothing: leave it out", {"phase": self.phase, "place": "compares"}
             )
         elif self.code_prefix is not None:
             raise PydanticCustomError(

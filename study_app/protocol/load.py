@@ -332,10 +332,7 @@ def located(faults: Iterable[Fault], places: Places) -> tuple[Problem, ...]:
     """Return faults as problems with their lines, in the order of the lines."""
     problems = [
         replace(
-            problem,
-            place=_shortened(problem.place),
-            message=_shortened(problem.message),
-            hint=_shortened(problem.hint),
+            problem, place=_shortened(problem.place), message=_shortened(problem.message), hint=_shortened(problem.hint)
         )
         for problem in (fault.located(places) for fault in faults)
     ]

@@ -69,12 +69,7 @@ def position(family: Family, share: float) -> float:
 
 
 def success(
-    family: Family,
-    u: ArrayLike,
-    threshold: ArrayLike,
-    width: ArrayLike,
-    guess: ArrayLike,
-    lapse: ArrayLike,
+    family: Family, u: ArrayLike, threshold: ArrayLike, width: ArrayLike, guess: ArrayLike, lapse: ArrayLike
 ) -> Floats:
     """Return ψ, the probability of success, of the shape to which the arguments broadcast."""
     guess, lapse = np.asarray(guess, float), np.asarray(lapse, float)

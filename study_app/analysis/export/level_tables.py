@@ -27,11 +27,7 @@ _OF_THRESHOLD: Final = (
 )  # fmt: skip
 TYPES: Final = {"text": "string", "number": "Float64", "integer": "Int64", "flag": "boolean"}
 
-TRACKS: Final = (
-    *(_BY_NAME[name] for name in (*_OF_TRIAL, *_OF_BLOCK)),
-    *JUDGED,
-    *OF_TRACKS,
-)
+TRACKS: Final = (*(_BY_NAME[name] for name in (*_OF_TRIAL, *_OF_BLOCK)), *JUDGED, *OF_TRACKS)
 
 
 def level_tables(study: Study) -> Iterator[Delivered]:

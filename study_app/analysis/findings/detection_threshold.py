@@ -78,9 +78,7 @@ def _figure(drawing: Drawing) -> Picture | None:
         f"{curve}{dashed}"
     )
     return drawing.picture(
-        TITLE,
-        caption,
-        lambda **own: psychometric_curve.draw(threshold, lowest, counts=("",), **own).figure,
+        TITLE, caption, lambda **own: psychometric_curve.draw(threshold, lowest, counts=("",), **own).figure
     )
 
 

@@ -79,11 +79,7 @@ def document(study: Study, results: Results, texts: Mapping[str, Any], failures:
     """Return everything as JSON; ``texts`` are the findings in words. A part that fails is null."""
     parts: dict[str, Callable[[], Any]] = {
         "versions": versions,
-        "study": lambda: {
-            **head(study),
-            "blinded": not study.revealed,
-            "key_opened": list(reveals_of(study.folder)),
-        },
+        "study": lambda: {**head(study), "blinded": not study.revealed, "key_opened": list(reveals_of(study.folder))},
         "sessions": lambda: sessions(study),
         "exclusions": lambda: [asdict(one) for one in study.exclusions],
         "doubts": lambda: [{"file": _within(study, doubt.path), "what": doubt.what} for doubt in study.doubts],

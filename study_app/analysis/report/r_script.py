@@ -155,11 +155,7 @@ def r_script(study: Study, results: Results) -> str:
     table = f"study-{study.name}_description-responses_data.csv"
     calls = [line for found in results.blocks if found.n for line in _calls(found)]
     of_levels, compared = level_lines(study, results.levels)
-    start = START.format(
-        table=table,
-        exact=EXACT_UP_TO,
-        numeric=TEXTS if study.protocol_format > 1 else NUMBERS,
-    )
+    start = START.format(table=table, exact=EXACT_UP_TO, numeric=TEXTS if study.protocol_format > 1 else NUMBERS)
     of_sites = list(_site_calls(results))
     compared += 2 * len(of_sites)
     stated = "".join(f"# {line}\n" for line in credit_lines(study))

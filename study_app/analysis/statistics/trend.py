@@ -137,11 +137,7 @@ def _interval(correlations: Array, seed: int | None) -> tuple[Interval | None, s
 
 
 def step_down(
-    values: ArrayLike,
-    delays_ms: Sequence[float],
-    direction: Direction = "increasing",
-    *,
-    alpha: float = 0.05,
+    values: ArrayLike, delays_ms: Sequence[float], direction: Direction = "increasing", *, alpha: float = 0.05
 ) -> StepDown:
     """Drop the longest delay as long as a trend is shown over those that are left.
 

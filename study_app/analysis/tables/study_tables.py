@@ -25,13 +25,7 @@ from study_app.analysis.tables.compared_blocks import Block, Kind, Setting, sett
 from study_app.analysis.tables.excluded_rows import check_there, with_excluded
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.planned_analysis import Decided
-from study_app.analysis.tables.session_files import (
-    Session,
-    estimators_of,
-    mean_dynamics,
-    read_session,
-    read_tables,
-)
+from study_app.analysis.tables.session_files import Session, estimators_of, mean_dynamics, read_session, read_tables
 from study_app.errors import AnalysisError, StoreError
 from study_app.protocol.forms.kinds import STATEMENT
 from study_app.store.blinded import blinding

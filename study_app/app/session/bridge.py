@@ -63,12 +63,7 @@ class SessionBridge(QObject):
     diagnose_asked = Signal()
 
     def __init__(
-        self,
-        parts: Parts,
-        participant: ParticipantWindow,
-        operator: OperatorWindow,
-        *,
-        refresh_hz: float = 60.0,
+        self, parts: Parts, participant: ParticipantWindow, operator: OperatorWindow, *, refresh_hz: float = 60.0
     ) -> None:
         super().__init__()
         self.parts = parts

@@ -48,10 +48,7 @@ if TYPE_CHECKING:
 CANCELLED = 130
 BUG = 1
 OPENING_PATIENCE_S = 20.0
-NOT_EXAMINED = (
-    "There is nothing to diagnose",
-    "This device has no diagnosis.",
-)
+NOT_EXAMINED = ("There is nothing to diagnose", "This device has no diagnosis.")
 
 
 class LiveSession(QObject):

@@ -201,10 +201,7 @@ def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, rig: Rig)
         lateness_limit_s=protocol.limits.lateness_ms / 1000,
         device_name=described.title,
         device_icon=described.icon,
-        device_rows=(
-            ("Priority", str(rig.servo.describe()["priority"]).partition(" (")[0]),
-            *_calibration(rig.device),
-        ),
+        device_rows=(("Priority", str(rig.servo.describe()["priority"]).partition(" (")[0]), *_calibration(rig.device)),
     )
 
 

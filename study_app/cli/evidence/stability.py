@@ -47,9 +47,7 @@ if TYPE_CHECKING:
 @click.option("--seed", default="stability", show_default=True, help="Seed of the cases.")
 @click.option("--cases", type=click.IntRange(1), metavar="N", help="Only simulate N cases of each group.")
 @click.option(
-    "--only",
-    metavar="TEXT",
-    help='Only simulate groups with this text in their name, such as "non-Newtonian".',
+    "--only", metavar="TEXT", help='Only simulate groups with this text in their name, such as "non-Newtonian".'
 )
 @takes_workers
 def stability(

@@ -29,12 +29,7 @@ LOAD = click.Choice(("none", "gui", "gui+cpu"))
 
 @click.command()
 @click.option(
-    "--seconds",
-    type=float,
-    default=10.0,
-    show_default=True,
-    metavar="S",
-    help="Time for each loop, or for each delay.",
+    "--seconds", type=float, default=10.0, show_default=True, metavar="S", help="Time for each loop, or for each delay."
 )
 @click.option(
     "--load", type=LOAD, default="none", show_default=True, help="Also paint both windows; also keep all cores busy."

@@ -24,12 +24,6 @@ def _probe() -> list[Backend]:
 
 DEVICES: Final = (
     DeviceDescriptor(
-        name="spacemouse",
-        title="SpaceMouse",
-        icon="mouse",
-        kind="seen",
-        degrees_of_freedom=3,
-        open=_open,
-        probe=_probe,
+        name="spacemouse", title="SpaceMouse", icon="mouse", kind="seen", degrees_of_freedom=3, open=_open, probe=_probe
     ),
 )

@@ -17,11 +17,7 @@ from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 WORKSPACE_M: Final = (0.05, 0.05, 0.05)
 FORCE_LIMIT_N: Final = 8.0
 _SILENT_NS: Final = 40_000_000  # after 50 ms without a new position the servo ends the force
-_ENDED: Final = {
-    exchange.ERROR: "error",
-    exchange.BAD_NUMBER: "not-finite",
-    exchange.FORCE_OFF: "force-off",
-}
+_ENDED: Final = {exchange.ERROR: "error", exchange.BAD_NUMBER: "not-finite", exchange.FORCE_OFF: "force-off"}
 
 
 class Functions(Protocol):

@@ -13,16 +13,7 @@ from typing import Any
 import numpy as np
 
 from study_app.devices.force_dimension.device import FORCE_LIMIT_N, WORKSPACE_M, ForceDimensionDevice, Functions
-from study_app.devices.force_dimension.exchange import (
-    BUTTONS,
-    FILL,
-    FUNCTIONS,
-    PUSH,
-    PUSH_ALL,
-    STOP,
-    TIMEGUARD,
-    VECTOR,
-)
+from study_app.devices.force_dimension.exchange import BUTTONS, FILL, FUNCTIONS, PUSH, PUSH_ALL, STOP, TIMEGUARD, VECTOR
 from study_app.devices.force_dimension.library import FORCE, FORCE_OFF_CAUSE
 from study_app.devices.scripted import TREMOR_M, ScriptedDevice
 from study_app.errors import DeviceError
@@ -30,12 +21,7 @@ from study_app.haptics.kernels.c_functions import READ, READ_NEW, WRITE, c_funct
 from study_app.haptics.model.layout import COMMAND, MEASURED_VELOCITY, READING, new_command, new_reading, records
 
 NO_FAULT, FAULT_ERROR, FAULT_NAN, FAULT_FORCE_OFF, FAULT_TIMEGUARD = range(5)
-FAULTS = {
-    "error": FAULT_ERROR,
-    "nan": FAULT_NAN,
-    "force-off": FAULT_FORCE_OFF,
-    "time-guard": FAULT_TIMEGUARD,
-}
+FAULTS = {"error": FAULT_ERROR, "nan": FAULT_NAN, "force-off": FAULT_FORCE_OFF, "time-guard": FAULT_TIMEGUARD}
 _VELOCITY_THRESHOLD = 2  # its cause in dhdc.h 3.17.5, line 202
 
 EMULATED = np.dtype(

@@ -155,10 +155,7 @@ class ExcludeQuestion(Question):
 class EndQuestion(Question):
     """Whether, and why, the session ends now."""
 
-    STATUSES = (
-        ("withdrawn", "The participant withdrew"),
-        ("aborted", "Another reason"),
-    )
+    STATUSES = (("withdrawn", "The participant withdrew"), ("aborted", "Another reason"))
 
     def __init__(self, parent: QWidget, theme: Theme, answers: str) -> None:
         super().__init__(

@@ -192,11 +192,7 @@ class Choice(Themed, QComboBox):
         painter.drawControl(QStyle.ControlElement.CE_ComboBoxLabel, option)
         self.setToolTip(whole if shown != whole else "")
         draw_icon(
-            painter,
-            "chevron_down",
-            QRectF(self.width() - 30, self.height() / 2 - 8, 16, 16),
-            self.theme.text2,
-            2.0,
+            painter, "chevron_down", QRectF(self.width() - 30, self.height() / 2 - 8, 16, 16), self.theme.text2, 2.0
         )
 
 

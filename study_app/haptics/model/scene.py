@@ -108,8 +108,7 @@ class Accuracy(Frozen):
     """What ``effects = "auto"`` may leave out: up to a share of the force, or a force if that is greater."""
 
     relative: Annotated[
-        float,
-        within(0, 1, "a share of the force", what="Largest omitted share of the force, or of the force limit."),
+        float, within(0, 1, "a share of the force", what="Largest omitted share of the force, or of the force limit.")
     ] = 0.05
     absolute_n: Annotated[
         float, within(0, 20, "the force limit is at most 20 N", what="Largest omitted force, if that is greater [N].")

@@ -17,12 +17,7 @@ from study_app.haptics.kernels.passivity import log_acted, log_delivery
 from study_app.haptics.kernels.tick import tick
 from study_app.haptics.kernels.vector import copy, distance, square
 from study_app.haptics.model.effects import local_wake, wake
-from study_app.haptics.model.layout import (
-    LIMITER_STOP,
-    STATUS_DEVICE_LOST,
-    Record,
-    records,
-)
+from study_app.haptics.model.layout import LIMITER_STOP, STATUS_DEVICE_LOST, Record, records
 
 PLACE = np.dtype(
     [

@@ -66,14 +66,7 @@ class LoopThread:
     """
 
     def __init__(
-        self,
-        driver: Driver,
-        clock: Clock,
-        rest: Scene,
-        elements: int,
-        telemetry: Telemetry,
-        *,
-        real_time: bool = True,
+        self, driver: Driver, clock: Clock, rest: Scene, elements: int, telemetry: Telemetry, *, real_time: bool = True
     ) -> None:
         self.clock = clock
         self._driver = driver  # both kept alive: the loop has nothing but addresses of theirs

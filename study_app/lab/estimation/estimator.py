@@ -183,12 +183,7 @@ class OnlineEstimator:
             kept, self._dropped = kept.part(oldest), True
         self._kept = [kept]
         search = WakeSearch(
-            self._scene,
-            self.names,
-            kept,
-            self._rate_hz,
-            from_rest=not self._dropped,
-            memory_s=self._memory_s,
+            self._scene, self.names, kept, self._rate_hz, from_rest=not self._dropped, memory_s=self._memory_s
         )
         from_values = values_of(self._scene) | (self._known or {})
         start = round(from_values["length"]), from_values["scaling"]

@@ -18,14 +18,7 @@ from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.keyed import Key, keyed_stream
 from study_app.protocol.trials.method import Heard, TrackSetting
 from study_app.protocol.trials.stimuli import Stimulated
-from study_app.protocol.trials.tracks import (
-    Track,
-    condition_of,
-    design_of,
-    method_of,
-    stimulus_of,
-    track_of,
-)
+from study_app.protocol.trials.tracks import Track, condition_of, design_of, method_of, stimulus_of, track_of
 
 STANDARD_ALONE: Final = 1
 """The arrangement of a noise trial, in a design that has any."""
@@ -146,13 +139,7 @@ class _Draws:
 
 
 def due_of(
-    protocol: Protocol,
-    block: Block,
-    track: Track,
-    arrangement: int,
-    level: float | None,
-    *,
-    catch: bool = False,
+    protocol: Protocol, block: Block, track: Track, arrangement: int, level: float | None, *, catch: bool = False
 ) -> Due:
     """Return what a trial of a track presents at a level (None: conditions are compared), in an arrangement."""
     presented = design_of(protocol, block).arrangements[arrangement]

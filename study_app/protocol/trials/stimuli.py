@@ -58,8 +58,7 @@ class Condition(Table):
         default=None, description="The item of analysis.names that names it correctly; left out: none does."
     )
     ball: Literal["shown", "hidden"] = Field(
-        default="shown",
-        description="shown: the ball is always drawn; hidden: it is drawn only during a task's lead.",
+        default="shown", description="shown: the ball is always drawn; hidden: it is drawn only during a task's lead."
     )
     force_delay_ms: Annotated[float, within(0, force_link.MOST_DELAY_MS, "a later force pushes the hand")] = Field(
         default=0, description="Delay of the force [ms]; what is drawn is not delayed by it."

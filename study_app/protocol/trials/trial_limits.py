@@ -23,8 +23,7 @@ class Limits(Table):
         default=25, description="95th percentile of achieved − requested delay [ms]."
     )
     frame_gap_ms: Annotated[float, within(1, 1000, "no screen is faster, and 1 s is a failure")] = Field(
-        default=250,
-        description="Longest time before the first frame or between two, or before the trial's end [ms].",
+        default=250, description="Longest time before the first frame or between two, or before the trial's end [ms]."
     )
     withheld_percent: Annotated[float, within(0.01, 100, "a share of the force; none withheld at all is rare")] = Field(
         default=5, description="Share of the force that passivity controller and slew limit withhold [%]."

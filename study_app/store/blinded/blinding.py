@@ -88,10 +88,7 @@ def sealed_hash(folder: Path) -> str | None:
 
 
 def open_or_draw_key(
-    folder: Path,
-    protocol: Protocol,
-    random: Callable[[], float] | None = None,
-    files: Mapping[str, str] = NO_FILES,
+    folder: Path, protocol: Protocol, random: Callable[[], float] | None = None, files: Mapping[str, str] = NO_FILES
 ) -> Key:
     """Return the study's key; draw and seal it where there is none.
 

@@ -139,10 +139,7 @@ class SimulatedStudy:
         """Describe the study, so that its folder is known for what it is from the first session on."""
         self._opening = open_alone(self.folder.path)
         write_description(
-            self.folder,
-            self.protocol.study,
-            self.protocol.format,
-            intervals=bool(self.protocol.design_questions),
+            self.folder, self.protocol.study, self.protocol.format, intervals=bool(self.protocol.design_questions)
         )
         return self
 

@@ -303,11 +303,7 @@ EXCLUSIONS: tuple[Column, ...] = (
     Column("excluded_at", "time", "Time of the decision."),
 )
 
-TABLES: dict[str, tuple[Column, ...]] = {
-    "responses": RESPONSES,
-    "trials": TRIALS,
-    "participants": PARTICIPANTS,
-}
+TABLES: dict[str, tuple[Column, ...]] = {"responses": RESPONSES, "trials": TRIALS, "participants": PARTICIPANTS}
 
 
 def tables_of(protocol_format: int) -> dict[str, tuple[Column, ...]]:

@@ -46,10 +46,7 @@ OF_TRACKS: Final[tuple[Column, ...]] = (
     optional(
         "reversal", "flag", "true if the up–down track changed its direction here; n/a where the method has no steps."
     ),
-    replace(
-        _BY_NAME["setting"],
-        description="The level that the participant set, from level_asked on.",
-    ),
+    replace(_BY_NAME["setting"], description="The level that the participant set, from level_asked on."),
 )
 """What a row of tracks has in addition to the trial it is about."""
 

@@ -134,10 +134,5 @@ def _case(liquid_id: str, speed_mps: float, profile: VelocityProfile = STOPPING)
     scene = load_scene(shipped_file(PROTOCOL), liquid_id)
     (liquid,) = scene.liquids
     return Case(
-        liquid_id,
-        liquid.density_kg_m3,
-        liquid.viscosity_pa_s or math.nan,
-        scene.body.diameter_m,
-        speed_mps,
-        profile,
+        liquid_id, liquid.density_kg_m3, liquid.viscosity_pa_s or math.nan, scene.body.diameter_m, speed_mps, profile
     )

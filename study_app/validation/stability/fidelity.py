@@ -59,10 +59,7 @@ class Fidelity(NamedTuple):
 
 
 def fidelities(
-    names: Sequence[str] | None = None,
-    loops: Sequence[tuple[float, int]] = LOOPS,
-    *,
-    executor: Executor | None = None,
+    names: Sequence[str] | None = None, loops: Sequence[tuple[float, int]] = LOOPS, *, executor: Executor | None = None
 ) -> tuple[Fidelity, ...]:
     """Measure liquids (by default all) in each of the loops, by an executor or here."""
     in_turn = map if executor is None else executor.map

@@ -38,11 +38,7 @@ def plant(name: str, protocol: Protocol) -> Planted | PlantedExponent:
 
 
 def methods_alone(
-    one: Planted | PlantedExponent,
-    studies: int,
-    seed: int,
-    executor: Executor,
-    progress: Callable[[int], object],
+    one: Planted | PlantedExponent, studies: int, seed: int, executor: Executor, progress: Callable[[int], object]
 ) -> tuple[list[Verdict], float]:
     """Return the verdicts of many studies of equal observers, and the spread of studies of `PEOPLE`.
 

@@ -117,10 +117,7 @@ class Timed:
         return tuple(
             Limit(level, said, held)
             for said, held in (
-                (
-                    f"median {above_us:+.1f} µs against the bare loop (at most +{MEDIAN_US:g} µs)",
-                    above_us <= MEDIAN_US,
-                ),
+                (f"median {above_us:+.1f} µs against the bare loop (at most +{MEDIAN_US:g} µs)", above_us <= MEDIAN_US),
                 (f"p99 {ratio:.2f} times the bare loop's (at most {TAIL_RATIO:g})", ratio <= TAIL_RATIO),
                 (late, thread.late_share >= FEWER_LATE * servo.late_share),
                 (f"a tick took {took_us:.1f} µs at p99 (at most {BUSY_US:g} µs)", took_us <= BUSY_US),

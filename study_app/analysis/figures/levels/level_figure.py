@@ -174,13 +174,7 @@ def _line(
     heights = np.array([_height(found, one.value) for one in points])
     if found.own_units and points:
         heights += np.mean([_height(found, one.value) for one in shown if one.participant is None]) - heights.mean()
-    axes.plot(
-        [places[_where(one)] for one in points],
-        heights,
-        color=style.PARTICIPANT,
-        linewidth=0.5,
-        alpha=0.7,
-    )
+    axes.plot([places[_where(one)] for one in points], heights, color=style.PARTICIPANT, linewidth=0.5, alpha=0.7)
 
 
 def _curve(axes: Axes, found: LevelsFound, one: ThresholdFound, colour: str) -> None:

@@ -25,10 +25,7 @@ FIGURES: Final[tuple[tuple[str, Callable[[LevelsFound], object], Draw], ...]] = 
 
 
 def level_pictures(
-    study: Study,
-    levels: Sequence[LevelsFound],
-    forms: Sequence[str] = style.FORMATS,
-    failures: Failures | None = None,
+    study: Study, levels: Sequence[LevelsFound], forms: Sequence[str] = style.FORMATS, failures: Failures | None = None
 ) -> Iterator[Picture]:
     """Draw every figure of every block that has one, in each of ``forms``.
 

@@ -127,10 +127,7 @@ def _published(axes: Axes, points: Sequence[tuple[float | None, float]], sheet: 
 
 
 def _frame(
-    axes: Axes,
-    group: Sequence[Point],
-    own: Sequence[Sequence[Point]],
-    published: Sequence[tuple[float | None, float]],
+    axes: Axes, group: Sequence[Point], own: Sequence[Sequence[Point]], published: Sequence[tuple[float | None, float]]
 ) -> None:
     """Draw logarithmic axes: the standards below, round fractions at the left."""
     values = [value for points in own for _, value, _, _ in points]

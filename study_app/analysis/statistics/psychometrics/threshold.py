@@ -79,13 +79,7 @@ class _Found:
     dispersion: float
 
 
-def noticed(
-    values: ArrayLike,
-    levels: Sequence[float],
-    *,
-    alpha: float = 0.05,
-    seed: int = 1,
-) -> Threshold:
+def noticed(values: ArrayLike, levels: Sequence[float], *, alpha: float = 0.05, seed: int = 1) -> Threshold:
     """Return the threshold of raw answers: `NOTICED_FROM` or more means noticed, NaN is missing.
 
     Parameters

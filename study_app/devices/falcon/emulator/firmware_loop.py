@@ -12,16 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.devices.falcon.emulator.arm import count, saturate, stop, strain
-from study_app.devices.falcon.emulator.faults import (
-    CORRUPT,
-    DELAY,
-    DROP,
-    DUPLICATE,
-    STALL,
-    TRUNCATE,
-    draw,
-    strikes,
-)
+from study_app.devices.falcon.emulator.faults import CORRUPT, DELAY, DROP, DUPLICATE, STALL, TRUNCATE, draw, strikes
 from study_app.devices.falcon.emulator.ftdi_bridge import answer
 from study_app.devices.falcon.wire import constants
 from study_app.devices.simulated.hand import REACH, move_hand

@@ -17,15 +17,7 @@ if TYPE_CHECKING:
     from study_app.devices.falcon.transport.bulk_calls import BulkCalls
 from study_app.devices.falcon.transport.usb import PyUsbTransport
 
-__all__ = [
-    "FalconLost",
-    "FalconNotFound",
-    "PyUsbTransport",
-    "Transport",
-    "UsbFailure",
-    "open_transport",
-    "usb_failure",
-]
+__all__ = ["FalconLost", "FalconNotFound", "PyUsbTransport", "Transport", "UsbFailure", "open_transport", "usb_failure"]
 
 
 class Transport(Protocol):

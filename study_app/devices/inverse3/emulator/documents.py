@@ -29,11 +29,7 @@ FACTORY_CONFIG: Final[dict[str, Any]] = {
     "home_return": {"enabled": False},
     "preset": "defaults",
     "basis": {"permutation": "XYZ"},
-    "mount": {
-        "position": dict(_UNIT),
-        "rotation": {"w": 1, "x": 0, "y": 0, "z": 0},
-        "scale": {"x": 1, "y": 1, "z": 1},
-    },
+    "mount": {"position": dict(_UNIT), "rotation": {"w": 1, "x": 0, "y": 0, "z": 0}, "scale": {"x": 1, "y": 1, "z": 1}},
     "filters": {"force_gate": {"gain": 0.3}, "damping": {"scalar": 0.0}},
 }
 STATUS: Final = {"calibrated": True, "in_use": False, "power_supply": True, "ready": True, "started": True}

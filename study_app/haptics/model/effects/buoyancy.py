@@ -22,11 +22,5 @@ def _fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str,
 PARAMETERS: Fields = (("lift_n", FLOAT),)  # ρ V g
 
 EFFECT = Effect(
-    name="buoyancy",
-    label="Buoyancy",
-    bit=BIT,
-    bound_n=_bound_n,
-    exerted_n=_bound_n,
-    parameters=PARAMETERS,
-    fill=_fill,
+    name="buoyancy", label="Buoyancy", bit=BIT, bound_n=_bound_n, exerted_n=_bound_n, parameters=PARAMETERS, fill=_fill
 )

@@ -144,9 +144,7 @@ EFFECT = Effect(
     start=_start,
     controls=(
         Parameter(
-            "current.kind",
-            "Current",
-            choices=(("uniform", "Uniform"), ("channel", "Channel"), ("vortex", "Vortex")),
+            "current.kind", "Current", choices=(("uniform", "Uniform"), ("channel", "Channel"), ("vortex", "Vortex"))
         ),
         Parameter("current.velocity_mps", "Speed", "m/s", -5.0, 5.0),
         Parameter("current.centre_m", "Centre", "m", -1.0, 1.0, factor=1e3, shown_unit="mm", decimals=0),

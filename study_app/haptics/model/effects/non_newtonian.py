@@ -152,10 +152,7 @@ EFFECT = Effect(
     parameters=PARAMETERS,
     state=STATE,
     fill=_fill,
-    start=lambda kind, _centre_m, _reach_m: {
-        "kind": kind or "herschel-bulkley",
-        **_START[kind or "herschel-bulkley"],
-    },
+    start=lambda kind, _centre_m, _reach_m: {"kind": kind or "herschel-bulkley", **_START[kind or "herschel-bulkley"]},
     controls=(
         Parameter(
             "non_newtonian.kind",
