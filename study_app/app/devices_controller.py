@@ -31,13 +31,6 @@ class DevicesController(QObject):
     """Looks at the machine when it is asked, one look at a time, and shows what was found.
 
     ``looked`` comes with what was found of every device; ``troubled(title, sentence)`` where one could not look.
-
-    Parameters
-    ----------
-    workstation
-        What is set for this machine.
-    look
-        What looks, as ``devices.backends.backends`` does.
     """
 
     looked = Signal(object)

@@ -33,8 +33,6 @@ class LabAndDesigner(QObject):
 
     Parameters
     ----------
-    machine
-        What is set for this machine, with the lab's device.
     results
         Folder that holds the studies' folders; it need not exist.
     """

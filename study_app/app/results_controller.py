@@ -63,10 +63,6 @@ class ResultsController(QObject):
     ----------
     results
         Folder that holds the studies' folders; it need not exist.
-    opener
-        What opens a file or folder for the operator.
-    start_worker
-        Starts a process that reads and evaluates.
     """
 
     def __init__(

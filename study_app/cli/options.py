@@ -65,13 +65,7 @@ RESULTS = click.option(
 
 
 def exclude_each_other(**given: object) -> None:
-    """Refuse options, by name, of which more than one is given (neither None nor False).
-
-    Raises
-    ------
-    click.UsageError
-        Names those given.
-    """
+    """Refuse options, by name, of which more than one is given (neither None nor False)."""
     names = [f"--{name}" for name, value in given.items() if value is not None and value is not False]
     if len(names) > 1:
         raise click.UsageError(f"{' and '.join(names)} exclude each other: give one of them")
@@ -102,13 +96,7 @@ def takes_session(function: Command) -> Command:
 
 
 def study_at(named: str | None, results: Path | None) -> Path:
-    """Return a study's folder: a path, or the name of one in the workspace.
-
-    Raises
-    ------
-    click.UsageError
-        None is named, or two are.
-    """
+    """Return a study's folder: a path, or the name of one in the workspace."""
     from study_app.workspace import workspace
 
     if (named is None) == (results is None):

@@ -21,14 +21,7 @@ from study_app.workers.server import Send, Stop
 
 @dataclass(frozen=True, slots=True)
 class Examination:
-    """Which device to examine.
-
-    Parameters
-    ----------
-    name : which device, as ``--device`` takes it
-    options : values of its options, by name
-    faults : of an emulated one
-    """
+    """Which device to examine: ``name`` as ``--device`` takes it, its options, and ``faults`` of an emulated one."""
 
     name: str
     options: Mapping[str, str | Path]

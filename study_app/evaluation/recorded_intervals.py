@@ -44,16 +44,8 @@ class Step:
 def steps_of(protocol: Protocol, key: Key, started: Line, lines: Sequence[Line]) -> tuple[Step, ...]:
     """Return the steps of an interval that a force depends on, in order; none where no level was set.
 
-    Parameters
-    ----------
-    protocol : Protocol
-        The study.
-    key : Key
-        Its opened key.
-    started : mapping
-        The line on the trial's beginning, opened; of a trial of intervals with the ``interval``.
-    lines : sequence of mapping
-        The session's journal.
+    ``started`` is the opened line on the trial's beginning, of a trial of intervals with the ``interval``; ``lines`` is
+    the session's journal.
     """
     if "interval" not in started:
         return ()
@@ -89,12 +81,7 @@ def places_of(samples: Any, steps: Sequence[Step]) -> list[tuple[int, Scene]]:
 def interval_samples(samples: Any, duration_s: float) -> Any:
     """Return the samples of an interval's task from those of its recording, which begins before it and ends after it.
 
-    Parameters
-    ----------
-    samples : recarray of ``layout.SAMPLE`` (n,)
-        The recording.
-    duration_s : float
-        How long the task took, as the journal has it [s].
+    ``duration_s`` is how long the task took, as the journal has it.
     """
     own = samples[samples["scene"] == samples["scene"][-1]]
     believed = own[own["limiters"] & LIMITER_GLITCH == 0]
@@ -105,18 +92,10 @@ def interval_samples(samples: Any, duration_s: float) -> Any:
 def delivered_again(
     protocol: Protocol, presented: Stimulated, started: Mapping[str, Any], samples: Any, ended: Mapping[str, Any]
 ) -> Delivered:
-    """Return what an interval delivered, by its recording.
+    """Return what an interval delivered, by the samples of its recording.
 
-    Parameters
-    ----------
-    protocol : Protocol
-        The study.
-    presented : Stimulated
-        What the interval presented.
-    started, ended : mapping
-        The opened lines on the beginning of the trial, with the ``interval``, and on the interval's end.
-    samples : recarray of ``layout.SAMPLE`` (n,)
-        The recording.
+    ``started`` and ``ended`` are the opened lines on the beginning of the trial, with the ``interval``, and on the
+    interval's end.
     """
     block = protocol.blocks[started["block"]]
     adjusted = design_of(protocol, block).adjusts and started["interval"] == len(started["arrangement"])

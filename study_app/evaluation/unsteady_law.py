@@ -55,10 +55,6 @@ def unsteady_n(
         Velocities (n, 3) [m/s, scene]; the body begins as if it had always moved at the first.
     acceleration_mps2 : Floats
         Their derivatives (n, 3) [m/s²].
-    interval_s : Floats
-        Times (n,) since the tick before [s].
-    constants : Constants
-        Of the law; by default those of the program.
     """
     liquid, diameter_m = scene.liquids[0], scene.body.diameter_m
     density_kg_m3, viscosity_pa_s = liquid.density_kg_m3, liquid.viscosity_pa_s or math.nan

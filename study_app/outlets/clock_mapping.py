@@ -16,13 +16,6 @@ class ClockMapping:
     A reading of the other clock between two of the servo's bounds the offset. Bounds of later readings are intersected
     with those before; where they have nothing in common, the clocks drifted apart and the newest hold. Use it from one
     thread.
-
-    Parameters
-    ----------
-    now_ns : callable
-        The servo's clock [ns].
-    other_s : callable
-        The other clock [s].
     """
 
     def __init__(self, now_ns: Callable[[], int], other_s: Callable[[], float]) -> None:

@@ -83,8 +83,6 @@ def marker_of(event: str, t_s: float, origin_ns: int, fields: Mapping[str, Any])
 
     Parameters
     ----------
-    event : str
-        The journal's name of it.
     t_s : float
         When it happened on the session's clock [s].
     origin_ns : int

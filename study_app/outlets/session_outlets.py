@@ -83,19 +83,7 @@ def open_sink(address: str, now_ns: Callable[[], int]) -> Sink:
 
 
 class Outlets:
-    """What a session sends to other programs; `mark` never waits.
-
-    Parameters
-    ----------
-    addresses : sequence of str
-        Where markers go.
-    samples : SampleChoice
-        Whether samples are streamed.
-    servo : SampledServo
-        The servo, its clock and its samples.
-    blinding : str
-        That of the study: "double" or "single".
-    """
+    """What a session sends to other programs: markers to sinks, by their addresses, and samples; `mark` never waits."""
 
     def __init__(self, addresses: Sequence[str], samples: SampleChoice, servo: SampledServo, blinding: str) -> None:
         self._failed: dict[str, str] = {}

@@ -39,8 +39,6 @@ class Camera:
     ----------
     source : str
         ``v4l2:/dev/video0``, ``avfoundation:0``, ``dshow:video=NAME``, or an URL.
-    now_ns : callable
-        The servo's clock [ns].
     holds_s : float
         Frames up to this old are asked for [s].
 

@@ -21,11 +21,6 @@ PATIENCE_S: Final = 5.0
 class Footage:
     """A video file as a source.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-
     Raises
     ------
     VideoError

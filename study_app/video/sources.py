@@ -32,14 +32,10 @@ class Videos:
 
     Parameters
     ----------
-    protocol : Protocol
-        The study.
     folder : Path
         Where its file is; footage is relative to it.
     camera : str
         The camera of this machine, as in `camera.Camera`; "" for the usual one of the system.
-    now_ns : callable
-        The servo's clock [ns].
     """
 
     def __init__(self, protocol: Protocol, folder: Path, camera: str, now_ns: Callable[[], int]) -> None:

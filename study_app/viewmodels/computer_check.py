@@ -21,18 +21,8 @@ def computer_checks(
 ) -> tuple[Check, ...]:
     """Return what is to be said of a computer.
 
-    Parameters
-    ----------
-    facts : Facts
-        Measured with the simulated hand.
-    protocol : Protocol
-        Whose limits apply.
-    devices : sequence of Backend
-        What the probes found.
-    cache : Path or None
-        The folder of compiled code, None where nothing can be stored.
-    compiled : int
-        How many functions had to be compiled for the measurement.
+    ``facts`` were measured with the simulated hand, for which ``compiled`` functions had to be compiled; the protocol's
+    limits apply; ``cache`` is the folder of compiled code, None where nothing can be stored.
     """
     of_servo = {check.name: check for check in checks(facts, protocol)}
     found = [of_servo[name] for name in OF_THE_COMPUTER]

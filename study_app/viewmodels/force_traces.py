@@ -56,13 +56,7 @@ def force_rows(protocol: Protocol, forces: ForceFigures | None) -> tuple[tuple[s
 
 
 class Forces:
-    """Takes telemetry as it comes; of every 20 ms it keeps the strongest force, so that no peak is missed.
-
-    Parameters
-    ----------
-    limit_n
-        Largest force on the hand [N].
-    """
+    """Takes telemetry as it comes; of every 20 ms it keeps the strongest force, so that no peak is missed."""
 
     def __init__(self, limit_n: float) -> None:
         self.limit_n = limit_n

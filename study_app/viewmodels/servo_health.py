@@ -51,14 +51,7 @@ class Tile:
 class ServoHealth:
     """Takes telemetry and painted frames as they come; gives figures, a histogram and traces when asked.
 
-    ``overruns`` is the servo's own count, set by whoever asks it.
-
-    Parameters
-    ----------
-    rate_hz
-        Ticks a second that the servo was asked for.
-    refresh_hz
-        Frames a second that the participant's screen says it shows.
+    Rates are what was asked for; ``overruns`` is the servo's own count, set by whoever asks it.
     """
 
     def __init__(self, rate_hz: float, refresh_hz: float = 60.0) -> None:

@@ -29,8 +29,6 @@ class WorkerClient(Generic[Order, Answer]):
     task : str
         The function that carries out an order (see `study_app.workers.server.Task`), as "package.module:function".
         The process alone imports it. Orders and answers are pickled.
-    name : str
-        Of the process.
     background : bool
         Whether the process gets the lowest priority.
 

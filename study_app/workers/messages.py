@@ -19,10 +19,7 @@ class Refused:
 class Crashed:
     """The process ended before it had carried out the order.
 
-    Parameters
-    ----------
-    exit_code : int or None
-        Of the process: negative where a signal ended it, 1 where the terminal shows an exception.
+    ``exit_code`` is negative where a signal ended it, 1 where the terminal shows an exception.
     """
 
     exit_code: int | None

@@ -69,11 +69,6 @@ class ProcessExecutor(CancellingExecutor):
 
     They end with the executor, or with its program. When one ends unexpectedly, its pool is replaced, and the cases
     under way are computed again. One thread owns the pool; futures of cancelled cases are never the pool's own.
-
-    Parameters
-    ----------
-    workers : int
-        How many processes.
     """
 
     def __init__(self, workers: int) -> None:

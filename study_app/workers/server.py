@@ -35,7 +35,6 @@ def serve(orders: Connection, answers: Connection, task: str, *, background: boo
 
     Parameters
     ----------
-    orders, answers : Connection
     task : str
         The function that carries out an order (see `Task`), as "package.module:function". It is imported here.
     background : bool

@@ -16,15 +16,7 @@ from study_app.protocol.trials.stimuli import Stimulus
 
 
 def settings(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SettingFound]:
-    """Yield the group's settings at each standard, followed by those of its participants; none of other designs.
-
-    Parameters
-    ----------
-    block : LevelBlock
-        A block whose key is open.
-    opened : DataFrame
-        The rows of `tracks`.
-    """
+    """Yield the group's settings at each standard, followed by those of its participants; none of other designs."""
     stimulus = block.stimulus
     if stimulus is None or not block.design.adjusts:
         return

@@ -34,13 +34,6 @@ def estimated_exponents(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Exp
     """Yield the exponent of the group, followed by those of the participants with answers at two levels or more.
 
     Trials of one requested level are at the mean of their delivered levels.
-
-    Parameters
-    ----------
-    block : LevelBlock
-        A block whose key is open.
-    opened : DataFrame
-        The rows of `tracks`.
     """
     if block.design.reply != "number":
         return

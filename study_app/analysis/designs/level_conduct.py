@@ -15,17 +15,7 @@ TRIAL = ["participant", "session", "trial"]
 
 
 def level_conduct(block: LevelBlock, opened: pd.DataFrame, intervals: pd.DataFrame) -> Iterator[LevelConduct]:
-    """Yield the conduct of a block at each standard.
-
-    Parameters
-    ----------
-    block : LevelBlock
-        A block of levels whose key is open.
-    opened : DataFrame
-        The rows of `tracks`.
-    intervals : DataFrame
-        The intervals of all attempts, of the same sessions.
-    """
+    """Yield the conduct of a block at each standard; ``intervals`` are those of all attempts, of the same sessions."""
     if block.stimulus is None:
         return
     own = opened[(opened["block"] == block.id) & opened["analysed"]]

@@ -22,16 +22,7 @@ def psychometric_bands(
 ) -> Mapping[str, Array]:
     """Return the band of each participant, shape (3, k): u, and the ends of the pointwise band there.
 
-    Parameters
-    ----------
-    block : LevelBlock
-        A block of levels whose key is open, of one standard.
-    opened : DataFrame
-        The rows of `tracks`.
-    people : tuple of str
-        The participants.
-    ends : tuple of float
-        The smallest and the largest u.
+    The block has one standard; ``ends`` are the smallest and the largest u.
     """
     assumed, stimulus = block.assumed, block.stimulus
     if assumed is None or stimulus is None:

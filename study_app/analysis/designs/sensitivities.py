@@ -27,15 +27,7 @@ Z_95: Final = 1.959964
 
 
 def sensitivities(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SensitivityFound]:
-    """Yield the group's sensitivity at each standard, to each condition or at each level, then its participants'.
-
-    Parameters
-    ----------
-    block : LevelBlock
-        A block whose key is open.
-    opened : DataFrame
-        The rows of `tracks`.
-    """
+    """Yield the group's sensitivity at each standard, to each condition or at each level, then its participants'."""
     rows = opened[(opened["block"] == block.id) & opened["analysed"] & opened["response"].notna()]
     match block.design.reply:
         case "choice":

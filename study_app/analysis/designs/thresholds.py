@@ -61,15 +61,7 @@ def counts_of(stimulus: Stimulus, rows: pd.DataFrame) -> Counts:
 
 
 def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdFound]:
-    """Yield the group's threshold of each standard, followed by those of its participants.
-
-    Parameters
-    ----------
-    block : LevelBlock
-        A block whose key is open.
-    opened : DataFrame
-        The rows of `tracks`.
-    """
+    """Yield the group's threshold of each standard, followed by those of its participants."""
     assumed, stimulus = block.assumed, block.stimulus
     if assumed is None or stimulus is None:
         return

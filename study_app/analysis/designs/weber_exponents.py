@@ -31,8 +31,6 @@ def weber_exponents(thresholds: Sequence[ThresholdFound], level_kind: str) -> It
 
     Parameters
     ----------
-    thresholds : sequence of ThresholdFound
-        Those of one block.
     level_kind : str
         What a level is. A JND is weber × standard, or the difference itself; a value has none.
     """

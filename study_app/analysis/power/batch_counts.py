@@ -36,7 +36,6 @@ def count(plan: Plan, sizes: Sequence[int], seed: int, batch: int, studies: int)
 
     Parameters
     ----------
-    sizes : numbers of participants
     batch : number of the batch, from 0
     studies : how many of its studies, at most ``BATCH``
     """

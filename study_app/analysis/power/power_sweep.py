@@ -13,19 +13,9 @@ from study_app.analysis.power.plan import Plan
 def sweep(
     plan: Plan, sizes: Sequence[int], studies: int, seed: int, executor: Executor
 ) -> Iterator[tuple[int, Counts]]:
-    """Yield after every batch how many studies were simulated so far, and what was counted in them all.
+    """Yield after every batch how many studies of each size were simulated so far, and what was counted in them all.
 
-    Parameters
-    ----------
-    plan : Plan
-    sizes : sequence of int
-        Numbers of participants.
-    studies : int
-        How many studies of each size.
-    seed : int
-        Of all randomness; every batch draws from a stream of its own, so the counts do not depend on the executor.
-    executor : concurrent.futures.Executor
-        Counts the batches.
+    Every batch draws from a stream of its own, so the counts do not depend on the executor.
     """
     starts = range(0, studies, BATCH)
     sizes_of_batches = [min(BATCH, studies - first) for first in starts]

@@ -36,17 +36,7 @@ PrecisionPlans: TypeAlias = Mapping[str, Mapping[int, Plan]]
 
 @dataclass(frozen=True)
 class Case:
-    """A batch of studies of one block with so many trials for each standard.
-
-    Attributes
-    ----------
-    block : str
-        Id of the block.
-    plan : ThresholdPlan or MeanPlan
-        What is simulated.
-    seed : tuple of int
-        Of its draws.
-    """
+    """A batch of studies of one block with so many trials for each standard."""
 
     block: str
     plan: Plan
@@ -112,12 +102,7 @@ def plans(protocol: Protocol, trials: Sequence[int]) -> PrecisionPlans:
 def study_batch(case: Case, sizes: Sequence[int]) -> Found:
     """Return what the studies of a batch find.
 
-    Parameters
-    ----------
-    case : Case
-        The batch.
-    sizes : sequence of int
-        Numbers of participants, ascending; smaller studies have the first participants of the largest.
+    ``sizes`` ascend; smaller studies have the first participants of the largest.
     """
     plan, rng, people = case.plan, np.random.default_rng(case.seed), sizes[-1]
     if not isinstance(plan, ThresholdPlan):
@@ -179,18 +164,8 @@ def sweep(
 ) -> Iterator[tuple[int, dict[tuple[str, int], Found]]]:
     """Yield after every round of batches how many studies were simulated so far, and what was found in them all.
 
-    Parameters
-    ----------
-    planned : mapping
-        From `plans`.
-    sizes : sequence of int
-        Numbers of participants, ascending.
-    studies : int
-        How many studies for each block and number of trials.
-    seed : int
-        Of all randomness; every batch draws from a seed of its own, so the numbers do not depend on the executor.
-    executor : concurrent.futures.Executor
-        Simulates the batches.
+    ``studies`` is how many there are for each block and number of trials; ``sizes`` ascend. Every batch draws from a
+    seed of its own, so the numbers do not depend on the executor.
     """
     keys = [(block, trials) for block, of_trials in planned.items() for trials in of_trials]
     rounds = math.ceil(studies / BATCH)

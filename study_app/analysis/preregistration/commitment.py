@@ -25,10 +25,6 @@ class Commitment:
 
     Attributes
     ----------
-    study, version : str
-        Name and version of the protocol.
-    protocol_hash : str
-        SHA-256 of its source, in hexadecimal.
     participants : int or None
         How many are planned.
     precision : float or None

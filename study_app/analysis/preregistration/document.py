@@ -22,10 +22,6 @@ def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = 
 
     Parameters
     ----------
-    protocol : Protocol
-        The study.
-    protocol_hash : str
-        SHA-256 of its source.
     power : str, optional
         The Markdown that ``liquid-study power`` wrote.
     """

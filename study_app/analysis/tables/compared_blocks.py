@@ -133,8 +133,6 @@ def main_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[Block, ..
     ----------
     protocol : mapping
         The protocol as a receipt holds it: without conditions, blocks with their codes.
-    key : Key, optional
-        The key, once it was opened.
     """
     asked = [protocol["blocks"][step] for step in every_step_of(protocol) if step in protocol["blocks"]]
     return tuple(

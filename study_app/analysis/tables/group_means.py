@@ -20,14 +20,7 @@ By: TypeAlias = Literal["group", "site"]
 class GroupMean:
     """Answers of one group, or site, to one statement on one setting; each participant's mean counts once.
 
-    Attributes
-    ----------
-    n : int
-        How many participants answered.
-    mean : float
-        Mean of the participants' means, in points of the scale.
-    sd : float or None
-        Standard deviation between participants; None for one participant.
+    ``mean`` is in points of the scale; ``sd``, between participants, is None for one participant.
     """
 
     block: str

@@ -72,14 +72,7 @@ class LevelBlock:
 
 
 def level_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[LevelBlock, ...]:
-    """Return the blocks with a design of the protocol in a receipt, in the order of the session.
-
-    Parameters
-    ----------
-    protocol : mapping
-        The protocol as the receipt holds it.
-    key : Key, optional
-        The key, once it was opened.
+    """Return the blocks with a design of the protocol in a receipt, in the order of the session; ``key`` is open.
 
     Raises
     ------

@@ -38,13 +38,7 @@ class Lab(Protocol):
 
 
 class LabEstimation(QObject):
-    """An estimation next to the lab: `poll` with each frame, `shown` for its view, `close` as the lab is left.
-
-    Parameters
-    ----------
-    place : the lab's widgets, whose requests it takes
-    lab : whose selected setting it estimates and changes
-    """
+    """An estimation for the lab's selected setting: `poll` with each frame, `shown` for its view, `close` to end."""
 
     def __init__(self, place: LabPlace, lab: Lab) -> None:
         super().__init__()

@@ -21,15 +21,7 @@ T = TypeVar("T")
 
 
 class Camera:
-    """Takes pictures into a folder.
-
-    Parameters
-    ----------
-    to
-        The folder; it must exist.
-    progress
-        Is given a line for every picture.
-    """
+    """Takes pictures into a folder, which must exist; ``progress`` is given a line for every picture."""
 
     def __init__(self, to: Path, progress: Callable[[str], object]) -> None:
         self._to, self._progress = to, progress

@@ -51,10 +51,6 @@ class SessionBridge(QObject):
 
     Parameters
     ----------
-    parts
-        The session's machinery.
-    participant, operator
-        The two windows, made and not yet connected.
     refresh_hz
         Frames a second of the participant's screen.
     """

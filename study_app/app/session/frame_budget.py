@@ -38,7 +38,6 @@ class FrameBudget:
     Parameters
     ----------
     works : what is to be done and how often [s], the most urgent first
-    now_ns : the clock of frames
     """
 
     def __init__(

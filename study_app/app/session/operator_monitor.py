@@ -15,8 +15,6 @@ class OperatorMonitor:
 
     Parameters
     ----------
-    parts
-        The session's machinery.
     refresh_hz
         Frames a second of the participant's screen.
     """

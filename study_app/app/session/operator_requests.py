@@ -21,12 +21,8 @@ class OperatorRequests(QObject):
 
     Parameters
     ----------
-    parts : the session's machinery
-    runner : gets the events
-    participant, operator : the two windows
     strip : the state in the participant's window, if both windows share one screen
     fail : is called with every exception of a request; ends in zero force
-    parent : owns this object
     """
 
     def __init__(

@@ -71,8 +71,6 @@ def regularity(samples: Any, rate_hz: float) -> Regularity:
     ----------
     samples : (n,) recarray
         Of ``layout.SAMPLE``.
-    rate_hz : float
-        Nominal ticks a second.
 
     Returns
     -------
@@ -139,15 +137,6 @@ def motion_under_force(stretches: Sequence[Any], axis: int, rate_hz: float) -> M
     ----------
     stretches : sequence of (n,) recarray
         Of ``layout.SAMPLE``, each without a gap, with the force of an excitation as ``device_force_n``.
-    axis : int
-        0, 1 or 2.
-    rate_hz : float
-        Nominal ticks a second.
-
-    Returns
-    -------
-    Motion
-        What was fitted.
     """
     step_s = 1.0 / rate_hz
     prepared = [_prepared(samples, axis, step_s) for samples in stretches]
@@ -207,20 +196,7 @@ def _prepared(samples: Any, axis: int, step_s: float) -> _Prepared:
 
 
 def gain_of(sent_n: Sequence[float], shown_g: Sequence[float]) -> Gain:
-    """Return the straight line through what a scale showed [g] over the forces that were sent [N].
-
-    Parameters
-    ----------
-    sent_n : sequence of float
-        At least two different forces.
-    shown_g : sequence of float
-        As many readings.
-
-    Returns
-    -------
-    Gain
-        Its slope and offset, and what it leaves.
-    """
+    """Return the straight line through what a scale showed [g] over the forces that were sent [N], two or more."""
     asked, shown_n = np.asarray(sent_n, float), np.asarray(shown_g, float) * 1e-3 * GRAVITY_MPS2
     line = np.column_stack([asked, np.ones_like(asked)])
     (slope, offset_n), *_ = np.linalg.lstsq(line, shown_n, rcond=None)

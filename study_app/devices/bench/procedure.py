@@ -116,21 +116,10 @@ def run_bench(
 
     Parameters
     ----------
-    device : Device
-        Opened.
-    ask : callable
-        Asks the operator.
     progress : callable
         Is given what happens, a line at a time.
-    durations : Durations, optional
-        Of the parts.
     clock : Clock, optional
         Default: the system's.
-
-    Returns
-    -------
-    Found
-        What was measured.
 
     Raises
     ------

@@ -13,13 +13,6 @@ def asks_hand(device: Any, progress: Callable[[str], object]) -> Ask:
     """Return what asks the hand of a device that moves by itself: it lets go, or is the scale.
 
     The hand is the device's ``hand``, or the device itself: with ``held`` and the motors' ``force_n``.
-
-    Parameters
-    ----------
-    device : Device
-        A simulated one.
-    progress : callable
-        Is given what is asked for.
     """
     hand = getattr(device, "hand", device)
 

@@ -50,12 +50,7 @@ _READING, _COMMAND = int(_fields["reading"][1]), int(_fields["command"][1])
 
 
 class EmulatedFunctions:
-    """The library's functions, emulated, with one device.
-
-    Parameters
-    ----------
-    hand : the simulated device whose handle it is
-    """
+    """The library's functions, emulated, with one device, whose handle is that of ``hand``."""
 
     def __init__(self, hand: ScriptedDevice) -> None:
         self.memory = records(EMULATED, 1)

@@ -32,7 +32,6 @@ def examine(
     Parameters
     ----------
     name : "inverse3", "inverse3:…" or "inverse3-emulated"
-    options : none is known
     faults : of an emulated one: words of ``emulator.faults.FAULTS``
     progress : is given what to do, a line at a time
     seconds : how long it is run

@@ -141,8 +141,6 @@ def open_session(messages: Messages, link: Link, wanted_id: str = "") -> Session
 
     Parameters
     ----------
-    messages : over an upgraded link
-    link : which says the time
     wanted_id : of the device; "": the first that the service lists
 
     Raises

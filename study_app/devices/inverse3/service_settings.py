@@ -76,7 +76,6 @@ def differing(config: Mapping[str, Any], required: Mapping[str, Any]) -> list[st
 
     Parameters
     ----------
-    config : a snapshot of the configuration
     required : `SESSION_SCOPED` or `DEVICE_GLOBAL`
     """
     return list(_differing("", config, required))

@@ -49,7 +49,6 @@ class SimulatedDevice(HandOrders, Device):
 
     Parameters
     ----------
-    handle : record of ``plant.HANDLE``
     workspace_m : half extents of the end stops [m]
     force_limit_n : the greatest force it may be asked for [N]
     """

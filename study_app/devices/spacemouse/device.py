@@ -41,7 +41,6 @@ class SpaceMouseDevice(PointedDevice):
     workspace_m : half extents of where the handle reaches [m]
     force_limit_n : the greatest force it may be asked for [N]
     hid : the module to talk through; None: hidapi's, loaded when it is opened
-    now_s : a clock [s]
     """
 
     name = "spacemouse"

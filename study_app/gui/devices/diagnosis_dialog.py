@@ -38,12 +38,8 @@ class DiagnosisDialog(QDialog):
 
     Parameters
     ----------
-    parent, theme
-        The window it belongs to, and its colours.
     name
         Which device: as ``--device`` takes it.
-    options
-        Values of its options, by name.
     note
         What else should be known, in a sentence.
     begin

@@ -20,15 +20,7 @@ LOCKED, BY_CLOCK = "locked to the screen's swaps", "by the clock"
 
 
 class Frames(QObject):
-    """Asks for a frame once a refresh: ``due`` comes when one is to be drawn.
-
-    Parameters
-    ----------
-    refresh_hz
-        Refreshes a second that the screen says it has.
-    now_ns
-        The clock of deadlines and swaps.
-    """
+    """Asks for a frame once a refresh of the screen: ``due`` comes when one is to be drawn."""
 
     due = Signal()
 

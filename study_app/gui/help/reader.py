@@ -60,13 +60,7 @@ def _face(used: QFont) -> QTextCharFormat:
 
 
 class PageReader(Themed, QTextBrowser):
-    """A page; ``page_asked(name, anchor)`` where a link leads to another one. Other links open outside the program.
-
-    Parameters
-    ----------
-    folder
-        Where pages and pictures are.
-    """
+    """A page; ``page_asked(name, anchor)`` where a link leads to another one. Other links open outside the program."""
 
     page_asked = Signal(str, str)
 

@@ -24,13 +24,7 @@ ENTERS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
 
 class HelpPlace(Place):
-    """The documentation; ``open_page`` goes to one of its pages.
-
-    Parameters
-    ----------
-    folder
-        Where pages and pictures are; default: those of the program.
-    """
+    """The documentation; ``open_page`` goes to one of its pages."""
 
     def __init__(self, folder: Path | None = None) -> None:
         super().__init__()

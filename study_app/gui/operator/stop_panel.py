@@ -55,10 +55,7 @@ class StopButton(Themed, QPushButton):
 class StopPanel(Card):
     """The button under a line that says whether there is force, with the way back after a stop.
 
-    Parameters
-    ----------
-    felt
-        Whether the device exerts force; of one that is only seen the line says so.
+    Of a device that exerts none (``felt``) the line says so.
     """
 
     stop_asked = Signal()

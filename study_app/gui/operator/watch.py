@@ -10,17 +10,7 @@ from study_app.store.progress import Progress
 
 
 class WatchedJournal:
-    """Passes everything on to the store, and folds what it has kept into ``progress``.
-
-    Parameters
-    ----------
-    store
-        The open session.
-    progress
-        The progress before the first event.
-    clock
-        Seconds since the session's origin.
-    """
+    """Passes everything on to the store, and folds what it has kept into ``progress``."""
 
     def __init__(self, store: JournalPort, progress: Progress, clock: Callable[[], float]) -> None:
         self.progress = progress

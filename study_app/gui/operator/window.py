@@ -40,16 +40,12 @@ class OperatorWindow(QMainWindow):
 
     Parameters
     ----------
-    study
-        Name for the window's title.
     lateness_limit_s
         The protocol's limit of the 99th percentile of lateness [s].
     reach_m
         Half of the longest edge of the tank [m], for the scale of the position plot.
     pointer
         Whether positions are of the mouse pointer.
-    felt
-        Whether the device exerts force.
     force_limit_n
         Largest force on the hand [N] in a single-blind study; None where the force is hidden.
     """

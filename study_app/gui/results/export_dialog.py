@@ -37,10 +37,6 @@ class WriteDialog(QDialog):
 
     Parameters
     ----------
-    title, explanation
-        What is written.
-    go_on
-        The words on the button.
     to
         The folder that is suggested.
     extras

@@ -101,15 +101,7 @@ def trial_words(trial: TrialRecord) -> str:
 
 
 class SessionPage(QDialog):
-    """One session in full, read in a thread; ``changed`` comes when something was left out or taken back.
-
-    Parameters
-    ----------
-    facts
-        The session.
-    opener
-        What opens a folder for the operator.
-    """
+    """One session in full, read in a thread; ``changed`` comes when something was left out or taken back."""
 
     changed = Signal()
 

@@ -115,8 +115,6 @@ class SessionsTable(QWidget):
 
     Parameters
     ----------
-    columns
-        What the rows show.
     none
         The sentence in place of rows where there are none.
     """

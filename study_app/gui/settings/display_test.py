@@ -44,8 +44,6 @@ class DisplayTest(QWidget):
         Which screen it is, for the heading.
     refresh_hz
         How often it shows a frame, as the system says.
-    now_ns
-        The clock.
     least_s
         So long frames are counted before anything is said of them.
     """

@@ -65,8 +65,6 @@ def font(role: TypeRole, *, scale: float = 1.0, weight: int | None = None, tabul
 
     Parameters
     ----------
-    role : str
-        A step of `TYPE`.
     scale : float
         Factor on the size, for pages that grow with their window.
     weight, tabular : int, bool, optional

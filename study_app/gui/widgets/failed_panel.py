@@ -62,14 +62,9 @@ class FailedPanel(Themed, QWidget):
 
 
 class Panels(QObject):
-    """Draws panels, and switches one off for good where it raises.
+    """Draws panels, each with its name, and switches one off for good where it raises.
 
     ``failed(name, error)`` comes once for each panel.
-
-    Parameters
-    ----------
-    names
-        The panels, and what each is called.
     """
 
     failed = Signal(str, object)

@@ -143,12 +143,8 @@ class TracePlot(Plot):
 
     Parameters
     ----------
-    span_s
-        Seconds shown.
     reach
         Values from −reach to reach are shown; where a curve goes beyond, the plot widens.
-    names
-        What the curves are called.
     """
 
     def __init__(self, span_s: float, reach: float, names: Sequence[str] = NAMES) -> None:

@@ -78,12 +78,8 @@ class Table(Themed, QTableView):
 
     Parameters
     ----------
-    model
-        What it shows.
     widths
         Of each column the share of the width and the least width [px].
-    name
-        What a screen reader calls it.
     """
 
     opened = Signal(QModelIndex)

@@ -55,8 +55,6 @@ class LiquidModel:
     ----------
     scene : Scene
         With one liquid, whose effects are named or chosen by the gate.
-    rate_hz : float
-        Of the rows.
 
     Raises
     ------

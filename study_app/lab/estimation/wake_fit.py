@@ -75,8 +75,6 @@ class WakeSearch:
         With one liquid; it holds what is not searched.
     names : sequence of str
         Of ``liquid_model.NAMES``, the drag coefficient among them.
-    rows : Rows
-        The newest rows, of ``rate_hz``.
     from_rest : bool
         Whether the stream began with the first of the rows.
     memory_s : float

@@ -12,12 +12,7 @@ from study_app.outlets.streaming import MARKERS, close_outlet, library, stream_i
 
 
 class MarkerStream:
-    """An outlet of markers.
-
-    Parameters
-    ----------
-    now_ns : callable
-        The servo's clock [ns].
+    """An outlet of markers, timed by the servo's clock.
 
     Raises
     ------

@@ -32,8 +32,6 @@ class ParallelPort:
     ----------
     place : str
         Its device file, such as ``/dev/parport0``.
-    ioctl : callable, optional
-        What controls it, `fcntl.ioctl` by default.
 
     Raises
     ------

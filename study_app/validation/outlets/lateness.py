@@ -54,7 +54,6 @@ def compare(
 
     Parameters
     ----------
-    seconds : for each
     ending : is set by whoever wants no more
     """
     grants = granted()

@@ -54,13 +54,7 @@ class Streamed:
 def stream(
     seconds: float, *, ending: threading.Event, progress: Callable[[str], object] = lambda _line: None
 ) -> Streamed:
-    """Stream a servo at 1 kHz, and twenty markers a second, to a listener in another process.
-
-    Parameters
-    ----------
-    seconds : how long
-    ending : is set by whoever wants no more
-    """
+    """Stream a servo at 1 kHz, and twenty markers a second, to a listener in another process."""
     servo = Servo(PlayedHand())
     servo.prepare()
     sink = SinkThread(open_sink("lsl", servo.now_ns))

@@ -100,7 +100,6 @@ def measure(
     Parameters
     ----------
     port : address of a port; "virtual" for a pair of virtual ones, whose other end another process reads
-    seconds : how long
     ending : is set by whoever wants no more
 
     Raises

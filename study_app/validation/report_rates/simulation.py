@@ -41,18 +41,8 @@ def validate(
     """Yield after every batch how many studies were simulated so far in all, and the rates of them.
 
     Cells with an undecided rate are continued with as many further studies, up to ``ROUNDS`` times as many in all. A
-    continued cell counts all of its rates on, those that hold included.
-
-    Parameters
-    ----------
-    studies : int
-        Of each cell.
-    executor : concurrent.futures.Executor
-        Counts the batches; what is counted does not depend on it.
-    seed : int
-        Of all randomness; every batch draws from a stream of its own.
-    progress : callable
-        Is called with a line for each cell that is continued.
+    continued cell counts all of its rates on, those that hold included; ``progress`` is called with a line for it.
+    Every batch draws from a stream of its own, so what is counted does not depend on the executor.
     """
     counts = cell_counts(simulation, sizes)
     done, total = 0, dict[tuple[str, int, str], Rate]()

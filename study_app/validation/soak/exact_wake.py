@@ -69,12 +69,7 @@ def wake_of(scene: Scene) -> Wake | None:
 
 
 class Ledger:
-    """The wake of one scene from its first sample on.
-
-    Parameters
-    ----------
-    scene : a scene whose `wake_of` is one
-    """
+    """The wake of one scene, whose `wake_of` is one, from its first sample on."""
 
     def __init__(self, scene: Scene) -> None:
         wake = wake_of(scene)

@@ -69,16 +69,9 @@ class Swept:
 def run_sweep(
     cases: Sequence[Case], others: Sequence[Group], executor: Executor, progress: Progress | None = None
 ) -> Swept:
-    """Judge the sweep's cases with safety off and on, and the other groups with it.
+    """Judge the sweep's cases with safety off and on, and the other groups with it, by an executor.
 
-    Parameters
-    ----------
-    cases : sequence of Case
-    others : sequence of Group
-    executor : concurrent.futures.Executor
-        Judges the cases; the verdicts do not depend on it.
-    progress : callable, optional
-        Is called with the number of verdicts so far and the number of all.
+    ``progress`` is called with the number of verdicts so far and the number of all.
     """
     began = time.perf_counter()
     planned = [(case, safe) for safe in (False, True) for case in cases]

@@ -40,18 +40,9 @@ POINTS: Final = 64
 
 @dataclass(frozen=True, slots=True)
 class PlantedExponent:
-    """A block of magnitude estimation and the exponent of its observers.
+    """A study's main block of magnitude estimation, and the exponent of its observers.
 
-    Attributes
-    ----------
-    name : str
-        The study.
-    protocol : Protocol
-        The study's protocol.
-    block : Block
-        Its main block of magnitude estimation.
-    resistances : tuple of float
-        Of each level, ascending: mean force over RMS speed at the pace [N·s/m].
+    ``resistances`` are those of each level, ascending: mean force over RMS speed at the pace [N·s/m].
     """
 
     name: str
@@ -113,19 +104,7 @@ class ExponentsFound:
 
 
 def simulate_estimates(one: PlantedExponent, number: int, seed: int, people: int = PEOPLE) -> ExponentsFound:
-    """Return what a study of equal observers finds; ``number`` names its draws.
-
-    Parameters
-    ----------
-    one : PlantedExponent
-        What is planted.
-    number : int
-        Number of the study.
-    seed : int
-        Of all randomness.
-    people : int
-        Number of participants.
-    """
+    """Return what a study of ``people`` equal observers finds; ``number`` names its draws."""
     random = stream(seed, f"validate/{one.name}/{number}").random
     key = Key(draw_key(one.protocol, random), draw_secret(random))
     return found_of([_exponent(one, key, f"P{person:03d}", seed) for person in range(1, people + 1)])

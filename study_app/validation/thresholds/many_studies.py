@@ -42,18 +42,7 @@ def methods_alone(
 ) -> tuple[list[Verdict], float]:
     """Return the verdicts of many studies of equal observers, and the spread of studies of `PEOPLE`.
 
-    Parameters
-    ----------
-    one : Planted or PlantedExponent
-        What is planted.
-    studies : int
-        How many.
-    seed : int
-        Of all randomness.
-    executor : concurrent.futures.Executor
-        Simulates the studies.
-    progress : callable
-        Called with the number of finished studies.
+    ``progress`` is called with the number of finished studies.
     """
 
     def counted(of_executor: Iterator[Found]) -> list[Found]:

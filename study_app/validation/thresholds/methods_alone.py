@@ -38,15 +38,7 @@ COLUMNS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class StudyFound:
-    """What the analysis of one simulated study found, in the order of the standards.
-
-    Attributes
-    ----------
-    group : tuple of tuple of float
-        Of each standard threshold, low and high of the group.
-    own : tuple of tuple of tuple of float
-        Likewise of each participant.
-    """
+    """Threshold, low and high of each standard that the analysis found: the group's, and each person's (``own``)."""
 
     group: tuple[tuple[float, float, float], ...]
     own: tuple[tuple[tuple[float, float, float], ...], ...]
@@ -67,18 +59,7 @@ def simulate(
 ) -> StudyFound:
     """Return what a study of equal observers finds; ``number`` names its draws.
 
-    Parameters
-    ----------
-    one : Planted
-        What is planted.
-    number : int
-        Number of the study.
-    seed : int
-        Of all randomness.
-    people : int
-        Number of participants.
-    observers : sequence of Observer, optional
-        Participants who differ, in place of ``people`` equal ones.
+    ``observers`` differ, and take part in place of ``people`` equal ones.
     """
     random = stream(seed, f"validate/{one.name}/{number}").random
     key = Key(draw_key(one.protocol, random), draw_secret(random))

@@ -76,10 +76,6 @@ class Compared:
 
     Attributes
     ----------
-    people : int
-        How many there are.
-    seed : int
-        Of all randomness.
     detected_ms : tuple of float
         Threshold of the group in the forced choice, low and high [ms].
     rated : tuple of Rated
@@ -103,15 +99,7 @@ def people_of(count: int, seed: int) -> tuple[Person, ...]:
 
 
 def compare(count: int, seed: int) -> Compared:
-    """Return what ``count`` people detect and rate as noticed.
-
-    Parameters
-    ----------
-    count : int
-        Number of people, three or more.
-    seed : int
-        Of all randomness.
-    """
+    """Return what ``count`` people, three or more, detect and rate as noticed."""
     people = people_of(count, seed)
     both = [(criterion_s, 0.0) for criterion_s in CRITERIA_S] + [(MEAN_CRITERION_S, ADAPTED_S)]
     return Compared(count, seed, detected(people, seed), tuple(rated(people, *one, seed) for one in both))
@@ -129,8 +117,6 @@ def rated(people: Sequence[Person], criterion_s: float, adapted_s: float, seed: 
 
     Parameters
     ----------
-    people : sequence of Person
-        Who rates.
     criterion_s : float
         Mean criterion [s]; people keep their distances from the mean.
     adapted_s : float

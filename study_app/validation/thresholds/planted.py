@@ -24,19 +24,7 @@ and 15 ms of a force (Rank et al. 2010)."""
 
 @dataclass(frozen=True, slots=True)
 class Planted:
-    """A block of thresholds and what its observers tell apart.
-
-    Attributes
-    ----------
-    name : str
-        The study.
-    protocol : Protocol
-        The study's protocol.
-    block : Block
-        Its main block with an adaptive method.
-    observer : Observer
-        Who answers.
-    """
+    """A study's main block with an adaptive method, and the observer who answers."""
 
     name: str
     protocol: Protocol

@@ -48,17 +48,7 @@ class Rehearsed:
 
 
 def rehearsed(one: Planted | PlantedExponent, source: bytes, seed: int) -> Rehearsed:
-    """Rehearse `PEOPLE` participants in a temporary folder and return what they show.
-
-    Parameters
-    ----------
-    one : Planted or PlantedExponent
-        What is planted.
-    source : bytes
-        The source of its protocol.
-    seed : int
-        Of all randomness.
-    """
+    """Rehearse `PEOPLE` participants in a temporary folder, from the source of a protocol; return what they show."""
     with tempfile.TemporaryDirectory() as place:
         file, folder = Path(place) / f"{one.name}.toml", Path(place) / "study"
         file.write_bytes(source)
@@ -84,14 +74,7 @@ def _recovered(one: Planted | PlantedExponent, study: Study) -> tuple[float, ...
 def judged(one: Planted | PlantedExponent, found: Rehearsed, spread: float) -> Iterator[Verdict]:
     """Yield the verdicts on rehearsed participants.
 
-    Parameters
-    ----------
-    one : Planted or PlantedExponent
-        What is planted.
-    found : Rehearsed
-        From `rehearsed`.
-    spread : float
-        Standard deviation of ln threshold, or of the exponent, over studies of `PEOPLE`.
+    ``spread`` is the standard deviation of ln threshold, or of the exponent, over studies of `PEOPLE`.
     """
     yield Verdict(
         one.name,

@@ -71,7 +71,6 @@ def time_devices(
 
     Parameters
     ----------
-    seconds : for each device
     names : of the devices, the scripted hand first
     ending : is set by whoever wants no more
 

@@ -51,10 +51,8 @@ def state_message(
 
     Parameters
     ----------
-    status : of the device
     buttons : of the wireless grip: a is bit 0
     full : its configuration, for an inventory or a full state
-    session_id : of the connection
     """
 
     def vector(name: str) -> dict[str, str]:

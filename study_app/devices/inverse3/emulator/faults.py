@@ -46,13 +46,7 @@ FAULTS: Final = (*OF_OPENING, *OF_TIME, *OF_STREAM)
 
 
 def faulty_bytes(fault: str, message: dict[str, Any]) -> bytes:
-    """Return what is sent in place of a state.
-
-    Parameters
-    ----------
-    fault : of `OF_STREAM`
-    message : the state, with the words of ``SLOTS`` for its numbers
-    """
+    """Return what is sent for a fault of `OF_STREAM` in place of a state, whose numbers are the words of ``SLOTS``."""
     device = message["inverse3"][0]
     if fault == "no-position":
         del device["state"]["cursor_position"]
