@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QButtonGroup, QLabel, QWidget
 
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Rule
 from study_app.gui.widgets.controls import ActionButton, Radio
 from study_app.gui.widgets.labels import label, set_ink
@@ -43,33 +44,15 @@ class DeviceRow(QWidget):
         self.report.setAccessibleName(f"Bench report of {shown.title}")
         self.report.clicked.connect(lambda: self.report_asked.emit(self._report))
         self._report: Path | None = None
-        head = QHBoxLayout()
-        head.setSpacing(10)
+        head = hbox(spacing=10)
         if not shown.choosable:
             head.addSpacing(INSET)
-        head.addWidget(self.title)
-        head.addStretch()
-        head.addWidget(self.chip)
-        words = QVBoxLayout()
-        words.setSpacing(4)
-        for line in (self.can, self.why, self.by, self.bench):
-            words.addWidget(line)
-        words.addStretch()
-        below = QHBoxLayout()
-        below.setContentsMargins(INSET, 0, 0, 0)
-        below.setSpacing(16)
-        below.addLayout(words, 1)
-        buttons = QVBoxLayout()
-        buttons.setSpacing(8)
-        buttons.addWidget(self.diagnose)
-        buttons.addWidget(self.report)
-        buttons.addStretch()
+        add_parts(head, self.title, STRETCH, self.chip)
+        words = vbox(self.can, self.why, self.by, self.bench, STRETCH, spacing=4)
+        below = hbox((words, 1), spacing=16, margins=(INSET, 0, 0, 0))
+        buttons = vbox(self.diagnose, self.report, STRETCH, spacing=8)
         below.addLayout(buttons)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 6, 0, 6)
-        column.setSpacing(2)
-        column.addLayout(head)
-        column.addLayout(below)
+        vbox(head, below, spacing=2, margins=(0, 6, 0, 6), parent=self)
         self.show_device(shown)
         self.show_bench(None)
 

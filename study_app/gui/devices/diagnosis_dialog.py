@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QDialog, QFileDialog, QHBoxLayout, QProgressBar, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QFileDialog, QProgressBar, QWidget
 
 from study_app.devices.doctor_report import Report, lines
 from study_app.devices.doctor_worker import ExaminationClient, start_examination
@@ -17,6 +17,7 @@ from study_app.errors import StoreError
 from study_app.gui.devices.failure_rows import FindingRow
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import apply_theme
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Card, Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
@@ -95,40 +96,27 @@ class DiagnosisDialog(QDialog):
         self.examine()
 
     def _lay_out(self, title: str) -> None:
-        words = QVBoxLayout()
-        words.setSpacing(4)
-        words.addWidget(label(f"Diagnose {title}", "title_dense"))
-        words.addWidget(self.step)
-        head = QHBoxLayout()
-        head.setSpacing(14)
-        head.addWidget(self.sign, 0, Qt.AlignmentFlag.AlignTop)
-        head.addLayout(words, 1)
-        self._list = QVBoxLayout()
-        self._list.setContentsMargins(0, 0, 0, 0)
-        self._list.setSpacing(2)
-        self._list.addStretch()
+        words = vbox(label(f"Diagnose {title}", "title_dense"), self.step, spacing=4)
+        head = hbox((self.sign, 0, Qt.AlignmentFlag.AlignTop), (words, 1), spacing=14)
+        self._list = vbox(STRETCH, spacing=2, margins=0)
         inside = QWidget()
         inside.setLayout(self._list)
         self.area = scrolled(inside)
         card = Card(padding=10, gap=0)
         card.column.addWidget(self.area)
-        foot = QHBoxLayout()
-        foot.setSpacing(12)
-        foot.addWidget(self.close_button)
-        foot.addStretch()
-        foot.addWidget(self.support)
-        foot.addWidget(self.copy)
-        foot.addWidget(self.again)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(28, 24, 28, 20)
-        column.setSpacing(12)
-        column.addLayout(head)
-        column.addWidget(self.bar)
-        column.addWidget(self.note)
-        column.addWidget(self.seen)
-        column.addWidget(card, 1)
-        column.addWidget(Rule())
-        column.addLayout(foot)
+        foot = hbox(self.close_button, STRETCH, self.support, self.copy, self.again, spacing=12)
+        vbox(
+            head,
+            self.bar,
+            self.note,
+            self.seen,
+            (card, 1),
+            Rule(),
+            foot,
+            spacing=12,
+            margins=(28, 24, 28, 20),
+            parent=self,
+        )
 
     def _connect(self) -> None:
         self.close_button.clicked.connect(self.reject)

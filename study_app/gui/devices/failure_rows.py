@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QLineEdit, QWidget
 
 from study_app.devices.doctor_report import Finding, State
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed, apply_theme_within
+from study_app.gui.widgets.boxes import hbox, vbox
 from study_app.gui.widgets.cards import Chip
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label
@@ -42,11 +43,7 @@ class Paste(QWidget):
         self.copy.setAccessibleName("Copy command")
         self.copy.setAutoDefault(False)
         self.copy.clicked.connect(self._copy)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 4, 0, 0)
-        row.setSpacing(8)
-        row.addWidget(self.field, 1)
-        row.addWidget(self.copy)
+        hbox((self.field, 1), self.copy, spacing=8, margins=(0, 4, 0, 0), parent=self)
 
     def _copy(self) -> None:
         QGuiApplication.clipboard().setText(self.field.text())
@@ -71,16 +68,8 @@ class FindingRow(Themed, QWidget):
         number.setFixedWidth(22)
         number.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.words = label("", "body", wraps=True)
-        head = QHBoxLayout()
-        head.setSpacing(12)
-        head.addWidget(number)
-        head.addWidget(self.words, 1)
-        head.addWidget(self.chip)
-        head.addWidget(self.more)
-        self._column = QVBoxLayout(self)
-        self._column.setContentsMargins(10, 4, 8, 4)
-        self._column.setSpacing(4)
-        self._column.addLayout(head)
+        head = hbox(number, (self.words, 1), self.chip, self.more, spacing=12)
+        self._column = vbox(head, spacing=4, margins=(10, 4, 8, 4), parent=self)
         self.show_waiting()
 
     def show_waiting(self) -> None:

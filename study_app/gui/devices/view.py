@@ -11,12 +11,13 @@ from pathlib import Path
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QFileDialog, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QFileDialog, QVBoxLayout, QWidget
 
 from study_app.devices.descriptor import DeviceOption
 from study_app.gui.devices.device_rows import LEAST_WORDS, DeviceList
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, Card, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
@@ -45,13 +46,8 @@ class OptionCard(Card):
         self.forget = ActionButton("", "Forget", height=38)
         self.choose.clicked.connect(self._choose)
         self.forget.clicked.connect(lambda: self.chosen.emit(None))
-        buttons = QHBoxLayout()
-        buttons.setSpacing(12)
-        buttons.addWidget(self.choose, 1)
-        buttons.addWidget(self.forget)
-        self.column.addWidget(about)
-        self.column.addWidget(self.file)
-        self.column.addLayout(buttons)
+        buttons = hbox((self.choose, 1), self.forget, spacing=12)
+        add_parts(self.column, about, self.file, buttons)
         self._path = ""
         self.show_file(None)
 
@@ -121,35 +117,16 @@ class DevicesPlace(Place):
         titles.setSpacing(4)
         titles.addWidget(label("Devices", "title"))
         titles.addWidget(label("New sessions use the selected device.", "body", "text2", wraps=True))
-        head = QHBoxLayout()
-        head.setContentsMargins(SHADOW, 0, SHADOW, 0)
-        head.addLayout(titles, 1)
-        head.addWidget(self.refresh)
-        lists = QVBoxLayout()
-        lists.setSpacing(18)
-        lists.addWidget(self.people)
-        lists.addWidget(self.simulated)
-        lists.addStretch()
-        column = QVBoxLayout()
-        column.setSpacing(18)
-        for card in self.options.values():
-            column.addWidget(card)
-        column.addWidget(self.help)
-        column.addStretch()
+        head = hbox((titles, 1), self.refresh, margins=(SHADOW, 0, SHADOW, 0))
+        lists = vbox(self.people, self.simulated, STRETCH, spacing=18)
+        column = vbox(*self.options.values(), self.help, STRETCH, spacing=18)
         self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._body.setSpacing(18)
-        self._body.addLayout(lists, 1)
-        self._body.addLayout(column)
+        add_parts(self._body, (lists, 1), column)
         inside = QWidget()
-        page = QVBoxLayout(inside)
-        page.setContentsMargins(30, 30, 30, 22)
-        page.setSpacing(20)
-        page.addLayout(head)
-        page.addLayout(self._body, 1)
+        vbox(head, (self._body, 1), spacing=20, margins=(30, 30, 30, 22), parent=inside)
         self._area = scrolled(inside)
-        row = QVBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.addWidget(self._area)
+        vbox(self._area, margins=0, parent=self)
 
     def enter(self) -> None:
         """Look at the machine again: something may have been plugged in."""

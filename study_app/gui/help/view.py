@@ -6,11 +6,12 @@ from pathlib import Path
 
 from PySide6.QtCore import QEvent, QObject, QSize, Qt
 from PySide6.QtGui import QKeyEvent, QKeySequence, QShortcut
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLineEdit, QListWidget, QListWidgetItem, QVBoxLayout
+from PySide6.QtWidgets import QFrame, QLineEdit, QListWidget, QListWidgetItem
 
 from study_app import documentation
 from study_app.gui.help.reader import PageReader
 from study_app.gui.theme.theme import Theme, font
+from study_app.gui.widgets.boxes import hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
@@ -63,19 +64,9 @@ class HelpPlace(Place):
         pages.column.addWidget(self.nothing)
         pages.column.addWidget(self.list, 1)
         page.column.addWidget(self.reader, 1)
-        head = QHBoxLayout()
-        head.setContentsMargins(SHADOW, 0, SHADOW, 0)
-        head.addWidget(label("Help", "title"), 1)
-        head.addWidget(self.back)
-        body = QHBoxLayout()
-        body.setSpacing(14)
-        body.addWidget(pages)
-        body.addWidget(page, 1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(24, 24, 24, 18)
-        column.setSpacing(14)
-        column.addLayout(head)
-        column.addLayout(body, 1)
+        head = hbox((label("Help", "title"), 1), self.back, margins=(SHADOW, 0, SHADOW, 0))
+        body = hbox(pages, (page, 1), spacing=14)
+        vbox(head, (body, 1), spacing=14, margins=(24, 24, 24, 18), parent=self)
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""

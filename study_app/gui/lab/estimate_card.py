@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Final
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from study_app.gui.lab.measurement_cards import LINE, ReadingCard
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import STRETCH, hbox
 from study_app.gui.widgets.controls import ActionButton, Choice, Toggle
 from study_app.gui.widgets.labels import Clamped, Elided, figures, label, set_ink
 from study_app.viewmodels.estimation import OFF, PARAMETERS, Choices, EstimateRow
@@ -47,11 +48,7 @@ class EstimateCard(ReadingCard):
         self.follow.setFont(font("label"))
         self.follow.setToolTip("Apply estimates as they come, slowly, within the slope and force limits")
         self._inside = QWidget()
-        buttons = QHBoxLayout()
-        buttons.setSpacing(10)
-        buttons.addWidget(self.apply)
-        buttons.addWidget(self.follow)
-        buttons.addStretch()
+        buttons = hbox(self.apply, self.follow, STRETCH, spacing=10)
         column = self.content
         column.addWidget(self.source)
         inner = QGridLayout(self._inside)

@@ -8,10 +8,11 @@ from typing import Final
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QSize
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from study_app.gui.lab.lab_plots import DASH, LIMIT, A, B, CurvePlot, PlotCard
 from study_app.gui.theme.theme import LIGHT, Theme
+from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.labels import Elided
 from study_app.gui.widgets.live_plots import Plot, draw_quickly, number
 from study_app.haptics.model.scene import Scene
@@ -110,11 +111,7 @@ class FlowCurveRow(QWidget):
         super().__init__()
         self.stress, self.force = FlowCurveCard(), SteadyForceCard()
         self._shown: tuple[Scene, Scene, float] | None = None
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(gap)
-        row.addWidget(self.stress, 1)
-        row.addWidget(self.force, 1)
+        hbox((self.stress, 1), (self.force, 1), spacing=gap, margins=0, parent=self)
         self.hide()
 
     def show_view(self, view: LabView) -> None:

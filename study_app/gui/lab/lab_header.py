@@ -10,8 +10,8 @@ from study_app.gui.lab.side_switch import SideSwitch
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.compact_stop import CompactStop
-from study_app.gui.widgets.controls import ActionButton, Choice, IconButton, Toggle
+from study_app.gui.widgets.boxes import add_parts, hbox
+from study_app.gui.widgets.controls import ActionButton, Choice, CompactStop, IconButton, Toggle
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.lab import Choices, LabView
 
@@ -97,8 +97,7 @@ class LabHeader(Themed, QWidget):
             self._right: (self.undo, self.redo, self.stop, self.save),
         }
         for row, inside in parts.items():
-            for part in inside:
-                row.addWidget(part)
+            add_parts(row, *inside)
         self._left.setSpacing(16)
         self._grid.setColumnStretch(2, 1)
 
@@ -151,7 +150,5 @@ class LabHeader(Themed, QWidget):
 
 
 def _row() -> QHBoxLayout:
-    row = QHBoxLayout()
-    row.setContentsMargins(0, 0, 0, 0)
-    row.setSpacing(10)
+    row = hbox(spacing=10, margins=0)
     return row

@@ -9,12 +9,13 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QSize
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QStackedLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QStackedLayout, QWidget
 
 from study_app.gui.lab.parameter_form import HIDDEN
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.accessible import describe_plot
+from study_app.gui.widgets.boxes import vbox
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.live_plots import MINUS, Plot, draw_quickly, number, pen
@@ -173,11 +174,7 @@ class PlotCard(Card):
         self.plot, self.legend = plot, Legend()
         describe_plot(plot, title, sentence)
         shown = QWidget()
-        column = QVBoxLayout(shown)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(2)
-        column.addWidget(self.legend)
-        column.addWidget(plot, 1)
+        vbox(self.legend, (plot, 1), spacing=2, margins=0, parent=shown)
         self.stack = QStackedLayout()
         self.stack.addWidget(shown)
         self.stack.addWidget(MaskedPanel(HIDDEN, "A trace would reveal which is which."))

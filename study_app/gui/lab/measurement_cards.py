@@ -6,11 +6,12 @@ from typing import Literal
 
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QStackedLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QStackedLayout, QVBoxLayout, QWidget
 
 from study_app.gui.lab.parameter_form import HIDDEN
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed, apply_theme_within
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Bar, Card, Icon, Rule
 from study_app.gui.widgets.labels import Elided, figures, label, set_ink
 from study_app.gui.widgets.masked_panel import MaskedPanel
@@ -33,9 +34,7 @@ class ReadingCard(Card):
         super().__init__(title, aside, padding=15, gap=6)
         self.aside = aside
         self._shown = QWidget()
-        self.content = QVBoxLayout(self._shown)
-        self.content.setContentsMargins(0, 0, 0, 0)
-        self.content.setSpacing(4)
+        self.content = vbox(spacing=4, margins=0, parent=self._shown)
         self.stack = QStackedLayout()
         self.stack.addWidget(self._shown)
         self.stack.addWidget(MaskedPanel(HIDDEN, why))
@@ -62,12 +61,7 @@ class CostLine(QWidget):
         self.ns = figures("", "label")
         self.ns.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.ns.setMinimumWidth(56)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(10)
-        row.addWidget(self.name)
-        row.addWidget(self.bar, 1)
-        row.addWidget(self.ns)
+        hbox(self.name, (self.bar, 1), self.ns, spacing=10, margins=0, parent=self)
         self.setFixedHeight(LINE)
 
     def show_cost(self, cost: CostRow, most_ns: float) -> None:
@@ -94,12 +88,7 @@ class AbsentLine(QWidget):
         self.name = label("", "label", "text2")
         self.why = Elided("small", "text2")
         self.why.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(8)
-        row.addWidget(Icon("minus", "text3", 14))
-        row.addWidget(self.name)
-        row.addWidget(self.why, 1)
+        hbox(Icon("minus", "text3", 14), self.name, (self.why, 1), spacing=8, margins=0, parent=self)
         self.setFixedHeight(LINE - 3)
 
     def show_cost(self, cost: CostRow) -> None:
@@ -115,23 +104,15 @@ class CostCard(ReadingCard):
         super().__init__("Cost per tick", label("", "small", "text2"), "Costs would reveal which is which.")
         self.lines: list[CostLine] = []
         self.absent: list[AbsentLine] = []
-        self._costs = QVBoxLayout()
-        self._costs.setSpacing(0)
-        self._absent = QVBoxLayout()
-        self._absent.setSpacing(0)
+        self._costs = vbox(spacing=0)
+        self._absent = vbox(spacing=0)
         self.sum_name = label("Sum", "label")
         self.sum_name.setFont(font("label", weight=600))
         self.sum = figures("", "label")
         self.sum.setFont(font("label", weight=600, tabular=True))
         self.sum.setAlignment(Qt.AlignmentFlag.AlignRight)
-        whole = QHBoxLayout()
-        whole.addWidget(self.sum_name)
-        whole.addWidget(self.sum, 1)
-        self.content.addLayout(self._costs)
-        self.content.addWidget(Rule())
-        self.content.addLayout(whole)
-        self.content.addLayout(self._absent)
-        self.content.addStretch()
+        whole = hbox(self.sum_name, (self.sum, 1))
+        add_parts(self.content, self._costs, Rule(), whole, self._absent, STRETCH)
         self.stack.widget(1).setMinimumHeight(COST_HEIGHT)  # of the hidden page: the lines may need more
 
     def show_view(self, view: LabView) -> None:
@@ -172,8 +153,7 @@ class ErrorCard(ReadingCard):
         self._grid.setColumnStretch(0, 1)
         self._grid.setVerticalSpacing(2)
         self.lines: list[tuple[Elided, QLabel]] = []
-        self.content.addLayout(self._grid)
-        self.content.addStretch()
+        add_parts(self.content, self._grid, STRETCH)
         self.stack.widget(0).setMinimumHeight(ERROR_HEIGHT)
 
     def show_view(self, view: LabView) -> None:
@@ -213,12 +193,7 @@ class LimiterLine(Themed, QWidget):
         self.count = figures("0", "label", "text2")
         self.count.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.count.setMinimumWidth(40)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(34, 0, 10, 0)
-        row.setSpacing(6)
-        row.addWidget(self.name, 1)
-        row.addWidget(self.word)
-        row.addWidget(self.count)
+        hbox((self.name, 1), self.word, self.count, spacing=6, margins=(34, 0, 10, 0), parent=self)
         self.setFixedHeight(LINE + 2)
 
     def show_limiter(self, limiter: Limiter) -> None:
@@ -262,11 +237,8 @@ class LimiterCard(ReadingCard):
         why = "Limiters would reveal which is which."
         super().__init__("Limiters", label("ticks, last 10 s", "small", "text2"), why)
         self.lines: list[LimiterLine] = []
-        self._lines = QVBoxLayout()
-        self._lines.setContentsMargins(-8, 0, -8, 0)
-        self._lines.setSpacing(0)
-        self.content.addLayout(self._lines)
-        self.content.addStretch()
+        self._lines = vbox(spacing=0, margins=(-8, 0, -8, 0))
+        add_parts(self.content, self._lines, STRETCH)
 
     def show_view(self, view: LabView) -> None:
         """Show the limiters, each always in the same place."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QStackedLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QStackedLayout, QWidget
 
 from study_app.gui.lab.parameter_rows import ParameterRow, SwitchRow, row_for
 from study_app.gui.lab.side_switch import Badge
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import Clamped, label
@@ -26,19 +27,12 @@ class SectionBlock(QWidget):
         super().__init__()
         self.rows: dict[str, ParameterRow] = {}
         self.count = label("", "small", "text2")
-        head = QHBoxLayout()
-        head.addWidget(label(title, "strong", heading=True))
-        head.addStretch()
-        head.addWidget(self.count)
+        head = hbox(label(title, "strong", heading=True), STRETCH, self.count)
         self._grid = QGridLayout()
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setHorizontalSpacing(8)
         self._grid.setVerticalSpacing(2)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 8, 0, 8)
-        column.setSpacing(4)
-        column.addLayout(head)
-        column.addLayout(self._grid)
+        vbox(head, self._grid, spacing=4, margins=(0, 8, 0, 8), parent=self)
 
     def show_section(self, section: FormSection) -> list[ParameterRow]:
         """Show the section's rows; return those that came new."""
@@ -116,31 +110,16 @@ class FormPanel(Card):
         self._lay_out()
 
     def _lay_out(self) -> None:
-        head = QHBoxLayout()
-        head.setSpacing(8)
-        head.addWidget(self.badge)
-        head.addWidget(self.liquid, 1)
-        head.addWidget(self.copy)
+        head = hbox(self.badge, (self.liquid, 1), self.copy, spacing=8)
         inside = QWidget()
-        self._column = QVBoxLayout(inside)
-        self._column.setContentsMargins(0, 0, 6, 0)
-        self._column.setSpacing(0)
+        self._column = vbox(spacing=0, margins=(0, 0, 6, 0), parent=inside)
         self.area = scrolled(inside)
         whole = QWidget()
-        column = QVBoxLayout(whole)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(8)
-        column.addLayout(head)
-        column.addWidget(Rule())
-        column.addWidget(self.area, 1)
-        foot = QHBoxLayout()
-        foot.setSpacing(8)
-        foot.addWidget(self.open, 1)
-        foot.addWidget(self.use, 1)
+        column = vbox(head, Rule(), (self.area, 1), spacing=8, margins=0, parent=whole)
+        foot = hbox((self.open, 1), (self.use, 1), spacing=8)
         column.addWidget(Rule())
         column.addWidget(self.said)  # above the buttons, which stay in their place when it appears
-        column.addWidget(self.back)
-        column.addLayout(foot)
+        add_parts(column, self.back, foot)
         self.hidden = MaskedPanel(HIDDEN, "Parameters would reveal which is which.")
         self._stack = QStackedLayout()
         self._stack.addWidget(whole)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Icon
 from study_app.gui.widgets.controls import Choice, Toggle
 from study_app.gui.widgets.labels import label
@@ -30,23 +31,19 @@ class ParameterRow(QWidget):
         super().__init__()
         self.parameter = parameter
         self._refused = ""
-        self.line = QHBoxLayout()
-        self.line.setContentsMargins(0, 0, 0, 0)
-        self.line.setSpacing(GAP)
+        self.line = hbox(spacing=GAP, margins=0)
         self.sign = Icon("warning", "bad", 14)
         self.why = label("", "small", "bad", wraps=True)
         self._below = QWidget()
-        below = QHBoxLayout(self._below)
-        below.setContentsMargins(0, 0, 0, 4)
-        below.setSpacing(6)
-        below.addWidget(self.sign, 0, Qt.AlignmentFlag.AlignTop)
-        below.addWidget(self.why, 1)
+        hbox(
+            (self.sign, 0, Qt.AlignmentFlag.AlignTop),
+            (self.why, 1),
+            spacing=6,
+            margins=(0, 0, 0, 4),
+            parent=self._below,
+        )
         self._below.hide()
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addLayout(self.line)
-        column.addWidget(self._below)
+        vbox(self.line, self._below, spacing=0, margins=0, parent=self)
 
     @property
     def refused(self) -> str:
@@ -84,10 +81,7 @@ class NumberRow(ParameterRow):
         self.field.setFixedWidth(FIELD_WIDTH)
         unit = label(parameter.shown_unit, "small", "text2")
         unit.setFixedWidth(UNIT_WIDTH)
-        self.line.addWidget(self.name)
-        self.line.addWidget(self.slider, 1)
-        self.line.addWidget(self.field)
-        self.line.addWidget(unit)
+        add_parts(self.line, self.name, (self.slider, 1), self.field, unit)
         words = f"{parameter.label}, {parameter.shown_unit}".rstrip(", ")
         self.slider.setAccessibleName(words)
         self.field.setAccessibleName(words)
@@ -185,8 +179,7 @@ class ChoiceRow(ParameterRow):
         for value, words in parameter.choices:
             self.choice.addItem(words, value)
         self.choice.activated.connect(self._choose)
-        self.line.addWidget(self.name)
-        self.line.addWidget(self.choice, 1)
+        add_parts(self.line, self.name, (self.choice, 1))
 
     def show_row(self, row: FormRow) -> None:
         """Show which it is; changed ones are bold with an accent edge."""
@@ -221,8 +214,7 @@ class SwitchRow(ParameterRow):
         self.toggle = Toggle(parameter.label)
         self.toggle.setFont(font("label"))
         self.toggle.clicked.connect(self._switch)
-        self.line.addWidget(self.toggle)
-        self.line.addStretch()
+        add_parts(self.line, self.toggle, STRETCH)
 
     def show_row(self, row: FormRow) -> None:
         """Show whether it is on; changed ones are bold."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
 
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import hbox
 from study_app.lab.ab_comparison import Side
 from study_app.viewmodels.lab import SIDES, LabView
 
@@ -119,9 +120,7 @@ class SideSwitch(Themed, QWidget):
         super().__init__()
         self.setFixedHeight(HEIGHT)
         self.segments = {side: Segment(side) for side in SIDES}
-        row = QHBoxLayout(self)
-        row.setContentsMargins(4, 4, 34, 4)
-        row.setSpacing(2)
+        row = hbox(spacing=2, margins=(4, 4, 34, 4), parent=self)
         for segment in self.segments.values():
             segment.clicked.connect(lambda _on, it=segment: None if it.isChecked() else self.switched.emit())
             row.addWidget(segment)

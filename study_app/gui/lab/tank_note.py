@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QObject, QTimer, Signal
-from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QWidget
+from PySide6.QtWidgets import QProgressBar, QWidget
 
+from study_app.gui.widgets.boxes import add_parts, hbox
 from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Ink, label
@@ -35,15 +36,8 @@ class TankNote(Card):
         self.bar.setRange(0, 0)
         self.bar.setTextVisible(False)
         self.bar.setFixedHeight(6)
-        row = QHBoxLayout()
-        row.setSpacing(10)
-        row.addWidget(self.sign)
-        row.addWidget(self.words, 1)
-        row.addWidget(self.cancel)
-        row.addWidget(self.fade_in)
-        row.addWidget(self.dismiss)
-        self.column.addLayout(row)
-        self.column.addWidget(self.bar)
+        row = hbox(self.sign, (self.words, 1), self.cancel, self.fade_in, self.dismiss, spacing=10)
+        add_parts(self.column, row, self.bar)
         self.cancel.clicked.connect(self.cancel_asked)
         self.fade_in.clicked.connect(self.fade_in_asked)
         self.dismiss.clicked.connect(self._put_away)

@@ -21,6 +21,7 @@ from study_app.gui.lab.parameter_form import FormPanel
 from study_app.gui.lab.side_switch import KEY
 from study_app.gui.lab.tank_note import TankNote
 from study_app.gui.theme.theme import SPACE
+from study_app.gui.widgets.boxes import vbox
 from study_app.gui.widgets.cards import SHADOW, scrolled
 from study_app.gui.widgets.escape_key import EscapeAnywhere
 from study_app.gui.widgets.main_view import Place
@@ -125,11 +126,7 @@ class LabPlace(Place):
         self._body.addWidget(self.area, 0, 1)
         self._body.addWidget(self._side_area, 0, 2)
         self._body.setColumnStretch(1, 1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addWidget(self.header)
-        column.addLayout(self._body, 1)
+        vbox(self.header, (self._body, 1), spacing=0, margins=0, parent=self)
 
     def _arrange(self, *, wide: bool) -> None:
         """Place the right column next to the middle, or under it where there is no room."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QLineEdit, QSizePolicy, QWidget
+from PySide6.QtWidgets import QButtonGroup, QLineEdit, QSizePolicy, QWidget
 
 from study_app.gui.theme.theme import Theme, font
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton, Radio
 from study_app.gui.widgets.dialogs import Question
@@ -34,19 +35,11 @@ class Actions(Card):
         self.close_session = ActionButton("check", "Close session", role="primary")
         self._resumes = False
         self._signs = True
-        row = QHBoxLayout()
-        row.setSpacing(10)
-        row.addWidget(self.pause)
-        row.addWidget(self.repeat)
-        row.addWidget(self.exclude)
-        row.addStretch()
-        row.addWidget(self.end)
-        row.addWidget(self.close_session)
+        row = hbox(self.pause, self.repeat, self.exclude, STRETCH, self.end, self.close_session, spacing=10)
         for button in (self.pause, self.repeat, self.exclude, self.end, self.close_session):
             button.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)  # its padding gives way
         self.close_session.hide()
-        self.column.addLayout(row)
-        self.column.addWidget(self.hint)
+        add_parts(self.column, row, self.hint)
         self.pause.clicked.connect(self._pause_or_resume)
         self.repeat.clicked.connect(self.repeat_asked)
         self.exclude.clicked.connect(self.exclude_asked)

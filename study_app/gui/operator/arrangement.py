@@ -12,7 +12,7 @@ from typing import Literal
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QWidget
 
 from study_app.gui.operator.actions import Actions
 from study_app.gui.operator.banner import Banner
@@ -22,6 +22,7 @@ from study_app.gui.operator.notes import NotesCard
 from study_app.gui.operator.session_header import Header
 from study_app.gui.operator.steps_card import NARROW, SLIM, WIDTH, Rail
 from study_app.gui.operator.stop_panel import StopPanel
+from study_app.gui.widgets.boxes import vbox
 from study_app.gui.widgets.cards import Card, scrolled
 from study_app.viewmodels.operator import NOTES_SHOWN
 
@@ -75,28 +76,17 @@ class Arrangement(QWidget):
         self._middle.setSpacing(GAP)
         for column in (0, 1):
             self._middle.setColumnStretch(column, 1)
-        side = QVBoxLayout()
-        side.setContentsMargins(0, 0, 0, 0)
-        side.setSpacing(GAP)
-        side.addWidget(p.device)
-        side.addWidget(p.notes, 1)
+        side = vbox(p.device, (p.notes, 1), spacing=GAP, margins=0)
         self.middle_area = scrolled(self._middle)
         self.side_area = scrolled(side)
         self.side_area.setFixedWidth(SIDE)
-        right = QVBoxLayout()
-        right.setSpacing(GAP)
-        right.addWidget(self.side_area, 1)
-        right.addWidget(p.stop)
+        right = vbox((self.side_area, 1), p.stop, spacing=GAP)
         self._body = QGridLayout()
         self._body.setVerticalSpacing(GAP)
         self._body.addLayout(right, 0, 2, 2, 1)
         self._body.setColumnStretch(1, 1)
         self._body.setRowStretch(0, 1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(0)
-        layout.addWidget(p.header)
-        layout.addLayout(self._body, 1)
+        vbox(p.header, (self._body, 1), spacing=0, margins=0, parent=self)
         self._arrange(QSize(1600, 900))
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QVBoxLayout, QWidget
 
 from study_app.gui.theme.theme import TypeRole, font
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Bar
 from study_app.gui.widgets.labels import Elided, figures, label
 from study_app.viewmodels.number_words import minutes
@@ -37,15 +38,9 @@ class Now(QWidget):
         self._words, self._time = QWidget(), QWidget()
         words = _column(self._words, self.part, self.heading, self.setting)
         words.addStretch()
-        row = QHBoxLayout()
-        row.addWidget(self.elapsed_word)
-        row.addStretch()
-        row.addWidget(self.elapsed)
+        row = hbox(self.elapsed_word, STRETCH, self.elapsed)
         time = _column(self._time)
-        time.addLayout(row)
-        time.addWidget(self.bar)
-        time.addWidget(self.least)
-        time.addStretch()
+        add_parts(time, row, self.bar, self.least, STRETCH)
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setHorizontalSpacing(24)
@@ -142,9 +137,5 @@ class Tally(QWidget):
 
 
 def _column(inside: QWidget, *widgets: QWidget) -> QVBoxLayout:
-    column = QVBoxLayout(inside)
-    column.setContentsMargins(0, 0, 0, 0)
-    column.setSpacing(6)
-    for widget in widgets:
-        column.addWidget(widget)
+    column = vbox(*widgets, spacing=6, margins=0, parent=inside)
     return column

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel
+from PySide6.QtWidgets import QGridLayout, QLabel
 
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
 from study_app.gui.widgets.cards import Card, Chip, Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
@@ -29,19 +30,13 @@ class DeviceCard(Card):
         self.diagnose.clicked.connect(self.diagnose_asked)
         self._most = ALL_ROWS
         self._view: DeviceView | None = None
-        row = QHBoxLayout()
-        row.setSpacing(10)
-        row.addWidget(self.icon)
-        row.addWidget(self.name)
-        row.addStretch()
-        row.addWidget(self.chip)
+        row = hbox(self.icon, self.name, STRETCH, self.chip, spacing=10)
         self.column.addLayout(row)
         self._grid = QGridLayout()
         self._grid.setVerticalSpacing(8)
         self._grid.setHorizontalSpacing(12)
         self._grid.setColumnStretch(1, 1)
-        self.column.addLayout(self._grid)
-        self.column.addWidget(self.diagnose)
+        add_parts(self.column, self._grid, self.diagnose)
         self.rows: list[tuple[QLabel, Elided]] = []
 
     def show_rows(self, most: int) -> None:

@@ -8,6 +8,7 @@ from PySide6.QtGui import QColor
 
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.widgets.accessible import describe_plot
+from study_app.gui.widgets.boxes import add_parts
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.live_plots import (
@@ -153,9 +154,7 @@ class ForceCard(Card):
         super().__init__("Force", aside, padding=16, gap=2)
         self.plot = ForcePlot(limit_n)
         self.wake = WakePlot()
-        self.column.addWidget(self.plot, 5)
-        self.column.addWidget(label("Wake speed, m/s in the scene", "small", "text2"))
-        self.column.addWidget(self.wake, 3)
+        add_parts(self.column, (self.plot, 5), label("Wake speed, m/s in the scene", "small", "text2"), (self.wake, 3))
         for plot in (self.plot, self.wake):
             plot.setMinimumHeight(48)
         span = f"over the last {TRACE_WINDOW_S:.0f} s"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QWidget
 
+from study_app.gui.widgets.boxes import STRETCH, hbox
 from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.labels import Elided, Ink, figures, label
 from study_app.viewmodels.operator import OperatorView
@@ -27,16 +28,9 @@ class TileCard(Card):
         self.sign = Icon("ring", "text3", 14)
         self.line = Elided("small", "text2")
         self.column.addWidget(self.title)
-        row = QHBoxLayout()
-        row.setSpacing(6)
-        row.addWidget(self.value)
-        row.addWidget(self.unit)
-        row.addStretch()
+        row = hbox(self.value, self.unit, STRETCH, spacing=6)
         self.column.addLayout(row)
-        below = QHBoxLayout()
-        below.setSpacing(8)
-        below.addWidget(self.sign)
-        below.addWidget(self.line, 1)
+        below = hbox(self.sign, (self.line, 1), spacing=8)
         self.column.addLayout(below)
 
     def show_tile(self, tile: Tile) -> None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QPlainTextEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QPlainTextEdit, QWidget
 
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Clamped, Elided, figures, label
@@ -52,30 +53,17 @@ class NotesCard(Card):
         self._head = QWidget()
         head = QHBoxLayout(self._head)
         head.setContentsMargins(0, 0, 0, 0)
-        head.addWidget(label("Notes and marks", "card"))
-        head.addStretch()
-        head.addWidget(label("stored in the journal", "small", "text2"))
+        add_parts(head, label("Notes and marks", "card"), STRETCH, label("stored in the journal", "small", "text2"))
         self.lines = [_NoteRow(newest=number == 0) for number in range(NOTES_SHOWN)]
         self.none = label("No notes yet.", "label", "text2")
         self._list = QWidget()
-        rows = QVBoxLayout(self._list)
-        rows.setContentsMargins(0, 0, 0, 0)
-        rows.setSpacing(6)
-        for widget in (self.none, *self.lines):
-            rows.addWidget(widget)
-        rows.addStretch()
+        vbox(self.none, *self.lines, STRETCH, spacing=6, margins=0, parent=self._list)
         self.field = NoteField()
         self.hint = label("Press Enter to store it with the time", "small", "text3")
         self.add = ActionButton("pen", "Add note", key="N")
         self.mark = ActionButton("flag", "Mark", key="M")
-        self.column.addWidget(self._head)
-        self.column.addWidget(self._list)
-        self.column.addWidget(self.field, 1)
-        self.column.addWidget(self.hint)
-        buttons = QHBoxLayout()
-        buttons.setSpacing(12)
-        buttons.addWidget(self.add, 1)
-        buttons.addWidget(self.mark, 1)
+        add_parts(self.column, self._head, self._list, (self.field, 1), self.hint)
+        buttons = hbox((self.add, 1), (self.mark, 1), spacing=12)
         self.column.addLayout(buttons)
         self.field.entered.connect(self._keep)
         self.add.clicked.connect(self._add)
@@ -130,8 +118,7 @@ class _NoteRow(QWidget):
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(8)
         row.addWidget(self.sign, 0, Qt.AlignmentFlag.AlignTop)
-        row.addWidget(self.time, 0, Qt.AlignmentFlag.AlignTop)
-        row.addWidget(self.text, 1)
+        add_parts(row, (self.time, 0, Qt.AlignmentFlag.AlignTop), (self.text, 1))
 
     def show_note(self, kind: str, at: str, text: str) -> None:
         """Show a note or mark."""

@@ -6,6 +6,7 @@ from PySide6.QtCore import QSize, Qt
 
 from study_app.gui.operator.force_plots import FIELD
 from study_app.gui.widgets.accessible import describe_plot
+from study_app.gui.widgets.boxes import add_parts
 from study_app.gui.widgets.cards import Card, Chip
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.live_plots import LatenessPlot, TracePlot
@@ -22,8 +23,7 @@ class LatenessCard(Card):
         describe_plot(self.plot, "Tick lateness", "Histogram of how late the ticks of the last minute began, in µs.")
         axes = label("lateness, µs (log), ticks per bin (log)", "small", "text2")
         axes.setAlignment(Qt.AlignmentFlag.AlignHCenter)
-        self.column.addWidget(self.plot, 1)
-        self.column.addWidget(axes)
+        add_parts(self.column, (self.plot, 1), axes)
 
     def show_health(self, health: ServoHealth) -> None:
         """Draw the ticks as of now."""

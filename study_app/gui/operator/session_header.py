@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QPushButton, QVBoxLayout, QWidget
 
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Chip, Logo
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, figures
@@ -117,20 +118,12 @@ class Header(Themed, QWidget):
         self._lay_out()
 
     def _lay_out(self) -> None:
-        row = QHBoxLayout(self)
-        row.setContentsMargins(24, 8, 24, 8)
-        row.setSpacing(12)
-        row.addWidget(Logo())
-        row.addLayout(_column(self.study, self.who))
-        row.addSpacing(8)
-        for chip in (self.state, self.blind, self.saved):
-            row.addWidget(chip)
+        row = hbox(Logo(), _column(self.study, self.who), 8, spacing=12, margins=(24, 8, 24, 8), parent=self)
+        add_parts(row, self.state, self.blind, self.saved)
         row.addStretch(1)
-        row.addLayout(_column(self.clock, self.expected))
-        row.addLayout(_column(self.bar, self.trials))
-        row.addSpacing(8)
-        row.addWidget(self.page)
-        row.addWidget(self.theme_button)
+        add_parts(
+            row, _column(self.clock, self.expected), _column(self.bar, self.trials), 8, self.page, self.theme_button
+        )
 
     def show_view(self, view: OperatorView) -> None:
         """Show the session's head."""
@@ -157,10 +150,5 @@ class Header(Themed, QWidget):
 
 
 def _column(*widgets: QWidget) -> QVBoxLayout:
-    column = QVBoxLayout()
-    column.setSpacing(2)
-    column.addStretch()
-    for widget in widgets:
-        column.addWidget(widget)
-    column.addStretch()
+    column = vbox(STRETCH, *widgets, STRETCH, spacing=2)
     return column

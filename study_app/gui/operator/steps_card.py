@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from study_app.gui.operator.current_step import Now, Tally
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Rule, scrolled
 from study_app.gui.widgets.labels import Elided, figures, set_ink
 from study_app.viewmodels.operator import OperatorView, StepRow
@@ -29,10 +30,7 @@ class StepLine(Themed, QWidget):
         self.first = self.last = False
         self.name = Elided("body")
         self.note = figures("", "label", "text2")
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(37, 0, 0, 0)
-        layout.addWidget(self.name, 1)
-        layout.addWidget(self.note)
+        layout = hbox((self.name, 1), self.note, margins=(37, 0, 0, 0), parent=self)
         self._layout = layout
         self.setMinimumHeight(LEAST_ROW_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
@@ -103,14 +101,11 @@ class Rail(Card):
         self.lines: list[StepLine] = []
         self._slim = False
         self._steps = QWidget()
-        self._steps_column = QVBoxLayout(self._steps)
-        self._steps_column.setSpacing(0)
+        self._steps_column = vbox(spacing=0, parent=self._steps)
         self._steps_column.addStretch(1)
         self.steps_area = scrolled(self._steps)
         self._rules = Rule(), Rule()
-        self.column.addWidget(self._rules[0])
-        self.column.addWidget(self.steps_area, 1)
-        self.column.addWidget(self._rules[1])
+        add_parts(self.column, self._rules[0], (self.steps_area, 1), self._rules[1])
         self.take_back()
 
     def take_back(self) -> None:

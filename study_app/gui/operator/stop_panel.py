@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QStyle, QStyleOptionButton, QStylePainter
+from PySide6.QtWidgets import QPushButton, QSizePolicy, QStyle, QStyleOptionButton, QStylePainter
 
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
 from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
@@ -71,19 +72,12 @@ class StopPanel(Card):
         # Pressed, not clicked: the force goes with the finger's first touch.
         self.stop.pressed.connect(self.stop_asked)
         self.fade_in.clicked.connect(self.fade_in_asked)
-        row = QHBoxLayout()
-        row.setContentsMargins(6, 0, 0, 0)
-        row.setSpacing(10)
-        row.addWidget(self.sign)
-        row.addWidget(self.word)
-        row.addStretch()
-        row.addWidget(self.fade_in)
+        row = hbox(self.sign, self.word, STRETCH, self.fade_in, spacing=10, margins=(6, 0, 0, 0))
         keep = self.fade_in.sizePolicy()
         keep.setRetainSizeWhenHidden(True)
         self.fade_in.setSizePolicy(keep)
         self.fade_in.hide()
-        self.column.addLayout(row)
-        self.column.addWidget(self.stop, 1)
+        add_parts(self.column, row, (self.stop, 1))
 
     def show_view(self, view: OperatorView) -> None:
         """Say whether the force is on."""

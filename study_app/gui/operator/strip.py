@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from study_app.gui.operator.session_header import OTHER_WINDOW, shown_state
 from study_app.gui.theme.theme import PARTICIPANT
 from study_app.gui.theme.themed import Themed, apply_theme_within
+from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.cards import Chip
-from study_app.gui.widgets.compact_stop import CompactStop
-from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.controls import ActionButton, CompactStop
 from study_app.gui.widgets.labels import Elided
 from study_app.viewmodels.operator import OperatorView
 
@@ -36,11 +36,7 @@ class Strip(Themed, QWidget):
         self.stop = CompactStop("Stop playing") if played else CompactStop()
         self.operator.clicked.connect(self.operator_asked)
         self.stop.pressed.connect(self.stop_asked)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(16, 4, 8, 4)
-        row.setSpacing(12)
-        row.addWidget(self.state)
-        row.addWidget(self.where, 1)
+        row = hbox(self.state, (self.where, 1), spacing=12, margins=(16, 4, 8, 4), parent=self)
         for button in (self.operator, self.stop):
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             row.addWidget(button)

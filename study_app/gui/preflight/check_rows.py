@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Bar
 from study_app.gui.widgets.labels import Ink, figures, label
 from study_app.session.preflight import Check
@@ -41,29 +42,20 @@ class CheckRow(Themed, QWidget):
         value = figures(check.value, "body", "text" if check.verdict == "ok" else ink)
         value.setFont(font("body", weight=600, tabular=True, scale=0.97))
         value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        row = QHBoxLayout()
-        row.setSpacing(14)
-        row.addWidget(name)
-        said = QVBoxLayout()
-        said.setSpacing(6)
-        said.addStretch()
-        said.addWidget(about)
+        row = hbox(name, spacing=14)
+        said = vbox(STRETCH, about, spacing=6)
         if check.share is not None:
             share = Bar(height=6)
             share.setFixedWidth(BAR)
             share.show_share(min(1.0, check.share))
             said.addWidget(share, 0, Qt.AlignmentFlag.AlignLeft)
         said.addStretch()
-        row.addLayout(said, 1)
-        row.addWidget(value)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(LEFT, 0, 24, 0 if check.verdict == "ok" else 14)
-        column.setSpacing(0)
+        add_parts(row, (said, 1), value)
         self._head = holder = QWidget()
         holder.setMinimumHeight(ROW_HEIGHT)
         row.setContentsMargins(0, 4, 0, 4)
         holder.setLayout(row)
-        column.addWidget(holder)
+        column = vbox(holder, spacing=0, margins=(LEFT, 0, 24, 0 if check.verdict == "ok" else 14), parent=self)
         if check.advice:
             advice = label(check.advice, "label", "text", wraps=True)
             advice.setFont(font("label", weight=500))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QProgressBar, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QProgressBar, QScrollArea, QWidget
 
 from study_app.gui.preflight.check_rows import CheckRow
 from study_app.gui.theme.theme import Theme
 from study_app.gui.theme.themed import apply_theme_within
+from study_app.gui.widgets.boxes import STRETCH, add_parts, vbox
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.dialogs import Question
 from study_app.gui.widgets.labels import label
@@ -35,16 +36,11 @@ class ComputerWindow(Question):
         self.bar.setTextVisible(False)
         self.bar.setFixedHeight(8)
         inside = QWidget()
-        self._rows = QVBoxLayout(inside)
-        self._rows.setContentsMargins(0, 0, 0, 0)
-        self._rows.setSpacing(0)
-        self._rows.addStretch()
+        self._rows = vbox(STRETCH, spacing=0, margins=0, parent=inside)
         area = QScrollArea()
         area.setWidgetResizable(True)
         area.setWidget(inside)
-        self.column.addWidget(self.state)
-        self.column.addWidget(self.bar)
-        self.column.addWidget(area, 1)
+        add_parts(self.column, self.state, self.bar, (area, 1))
         again = ActionButton("", "Close", role="primary")
         self.add_buttons("Check again", again)
         self.back.clicked.disconnect(self.reject)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
+from study_app.gui.widgets.boxes import hbox, vbox
 from study_app.gui.widgets.controls import Choice, Number
 from study_app.gui.widgets.labels import label
 from study_app.session.masking import LOUDEST_DB, MEANS, QUIETEST_DB, USUAL_DB, Masking
@@ -23,13 +24,8 @@ class MaskingQuestion(QWidget):
         self.noise_db.setSuffix(" dB")
         self.noise_db.setVisible(False)
         self.means.currentIndexChanged.connect(lambda: self.noise_db.setVisible(self._is_noise))
-        row = QHBoxLayout()
-        row.addWidget(self.means, 1)
-        row.addWidget(self.noise_db)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(label("Motors masked?", "label", "text2"))
-        column.addLayout(row)
+        row = hbox((self.means, 1), self.noise_db)
+        vbox(label("Motors masked?", "label", "text2"), row, margins=0, parent=self)
 
     @property
     def _is_noise(self) -> bool:

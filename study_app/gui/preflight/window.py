@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QAccessible, QCloseEvent, QKeyEvent
-from PySide6.QtWidgets import QAbstractSlider, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QAbstractSlider, QGridLayout, QLabel, QWidget
 
 from study_app.gui.preflight.check_rows import CheckRow
 from study_app.gui.preflight.masking_question import MaskingQuestion
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.theme.themed import apply_theme, apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import describe_plot, give_role
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label
@@ -69,38 +70,16 @@ class PreflightWindow(QWidget):
         self.start.setFocus()
 
     def _lay_out(self) -> None:
-        titles = QVBoxLayout()
-        titles.setSpacing(4)
-        titles.addWidget(label("Ready to begin?", "title_dense"))
-        titles.addWidget(self.who)
-        head = QHBoxLayout()
-        head.addLayout(titles, 1)
-        head.addWidget(self.chip, 0, Qt.AlignmentFlag.AlignVCenter)
+        titles = vbox(label("Ready to begin?", "title_dense"), self.who, spacing=4)
+        head = hbox((titles, 1), (self.chip, 0, Qt.AlignmentFlag.AlignVCenter))
         inside = QWidget()
-        left = QVBoxLayout(inside)
-        left.setContentsMargins(0, 0, 0, 0)
-        left.addWidget(self.checks)
-        left.addStretch()
+        vbox(self.checks, STRETCH, margins=0, parent=inside)
         area = self._area = scrolled(inside)
-        middle = QHBoxLayout()
-        middle.setSpacing(20)
-        middle.addWidget(area, 1)
-        middle.addWidget(self._beside())
-        foot = QHBoxLayout()
-        foot.setSpacing(16)
-        foot.addWidget(self.cancel)
-        foot.addWidget(self.again)
+        middle = hbox((area, 1), self._beside(), spacing=20)
+        foot = hbox(self.cancel, self.again, spacing=16)
         self.note = label(NOTHING_YET, "label", "text2")
-        foot.addWidget(self.note)
-        foot.addStretch()
-        foot.addWidget(self.start)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(32, 22, 32, 20)
-        column.setSpacing(16)
-        column.addLayout(head)
-        column.addLayout(middle, 1)
-        column.addWidget(Rule())
-        column.addLayout(foot)
+        add_parts(foot, self.note, STRETCH, self.start)
+        vbox(head, (middle, 1), Rule(), foot, spacing=16, margins=(32, 22, 32, 20), parent=self)
 
     def _beside(self) -> QWidget:
         """Return the column next to the checks: how late the servo is, and what will run."""
@@ -116,11 +95,7 @@ class PreflightWindow(QWidget):
             self.runs.column.addWidget(self.masking)
         side = QWidget()
         side.setFixedWidth(ASIDE)
-        column = QVBoxLayout(side)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(14)
-        column.addWidget(lateness, 1)
-        column.addWidget(self.runs)
+        vbox((lateness, 1), self.runs, spacing=14, margins=0, parent=side)
         return side
 
     def show_view(self, view: PreflightView) -> None:

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QDialog, QFileDialog, QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QFileDialog, QLineEdit, QWidget
 
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import apply_theme
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Bar
 from study_app.gui.widgets.controls import ActionButton, Check
 from study_app.gui.widgets.labels import label, set_ink
@@ -93,35 +94,17 @@ class WriteDialog(QDialog):
         self.cancel.clicked.connect(self.reject)
 
     def _lay_out(self, title: str, why_not: Sequence[str]) -> None:
-        column = QVBoxLayout(self)
-        column.setContentsMargins(28, 24, 28, 24)
-        column.setSpacing(12)
-        column.addWidget(label(title, "title_dense"))
-        column.addWidget(self.said)
+        column = vbox(label(title, "title_dense"), self.said, spacing=12, margins=(28, 24, 28, 24), parent=self)
         self._form = QWidget()
-        form = QVBoxLayout(self._form)
-        form.setContentsMargins(0, 0, 0, 0)
-        form.setSpacing(6)
-        for check in self.extras.values():
-            form.addWidget(check)
+        form = vbox(*self.extras.values(), spacing=6, margins=0, parent=self._form)
         for sentence in why_not:
             form.addWidget(label(sentence, "small", "text2", wraps=True))
-        form.addSpacing(4)
-        form.addWidget(label("Folder", "label", "text2"))
-        where = QHBoxLayout()
-        where.setSpacing(10)
-        where.addWidget(self.to, 1)
-        where.addWidget(self.choose)
-        form.addLayout(where)
-        form.addWidget(label("Existing files will be overwritten.", "small", "text2"))
-        column.addWidget(self._form)
-        column.addWidget(self.bar)
-        foot = QHBoxLayout()
-        foot.addWidget(self.cancel)
-        foot.addStretch()
-        foot.addWidget(self.go_on)
-        column.addSpacing(6)
-        column.addLayout(foot)
+        add_parts(form, 4, label("Folder", "label", "text2"))
+        where = hbox((self.to, 1), self.choose, spacing=10)
+        add_parts(form, where, label("Existing files will be overwritten.", "small", "text2"))
+        add_parts(column, self._form, self.bar)
+        foot = hbox(self.cancel, STRETCH, self.go_on)
+        add_parts(column, 6, foot)
 
     def show_progress(self, what: str, share: float) -> None:
         """Say what is being done and how far it is."""

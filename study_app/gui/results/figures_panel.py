@@ -6,11 +6,12 @@ from collections.abc import Mapping
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QSizePolicy, QWidget
 
 from study_app.gui.results.figure_view import FigureView
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Bar, Card
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
@@ -44,8 +45,7 @@ class FigureCard(Card):
         self._title = label("", "card")
         self.column.addWidget(self._title)
         self._place = QHBoxLayout()
-        self.column.addLayout(self._place)
-        self.column.addWidget(self.caption)
+        add_parts(self.column, self._place, self.caption)
         self.more.setParent(self)  # in the corner that figures leave free
         self.show_figure(figure, colours)
 
@@ -102,12 +102,7 @@ class WorkLine(Card):
         self.again = ActionButton("", "Go on", height=36)
         self.stop.clicked.connect(self.stop_asked)
         self.again.clicked.connect(self.again_asked)
-        row = QHBoxLayout()
-        row.setSpacing(16)
-        row.addWidget(self.words, 1)
-        row.addWidget(self.bar, 1)
-        row.addWidget(self.stop)
-        row.addWidget(self.again)
+        row = hbox((self.words, 1), (self.bar, 1), self.stop, self.again, spacing=16)
         self.column.addLayout(row)
 
     def show_going(self, going: Going | None, *, untested: bool) -> None:
@@ -139,13 +134,8 @@ class TroubleCard(Card):
         self.bar.setMaximumWidth(420)
         self.button = ActionButton("", "", height=40)
         self.button.clicked.connect(lambda: self.asked.emit(self._remedy))
-        row = QHBoxLayout()
-        row.addWidget(self.button)
-        row.addStretch()
-        self.column.addWidget(self.title)
-        self.column.addWidget(self.sentence)
-        self.column.addWidget(self.bar)
-        self.column.addLayout(row)
+        row = hbox(self.button, STRETCH)
+        add_parts(self.column, self.title, self.sentence, self.bar, row)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
 
     def show_trouble(self, trouble: Trouble) -> None:
@@ -181,12 +171,7 @@ class FiguresPanel(QScrollArea):
         self.work.stop_asked.connect(lambda: self.asked.emit("stop"))
         self.work.again_asked.connect(lambda: self.asked.emit("read"))
         self._inside = QWidget()
-        self._column = QVBoxLayout(self._inside)
-        self._column.setContentsMargins(0, 0, 0, 0)
-        self._column.setSpacing(GAP - 2 * SHADOW)
-        self._column.addWidget(self.trouble)
-        self._column.addWidget(self.work)
-        self._column.addStretch()
+        self._column = vbox(self.trouble, self.work, STRETCH, spacing=GAP - 2 * SHADOW, margins=0, parent=self._inside)
         self.trouble.hide()
         self.work.hide()
         self.setWidgetResizable(True)

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from datetime import datetime
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLineEdit, QScrollArea, QSizePolicy, QWidget
 
 from study_app.gui.sessions.sessions_table import SessionsTable
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Rule
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import label
@@ -47,10 +48,7 @@ class SessionsCard(Card):
         self.head = label("", "label")
         self.head.setFont(font("label", weight=600, tabular=True))
         self.why = label("", "small", "text2", wraps=True)
-        filters = QHBoxLayout()
-        filters.setSpacing(8)
-        filters.addWidget(self.search, 1)
-        filters.addWidget(self.state, 1)
+        filters = hbox((self.search, 1), (self.state, 1), spacing=8)
         self.details = IconButton("file", "Details of the selected session", size=36, role="plain")
         self.details.setEnabled(False)
         self.details.clicked.connect(self.rows.open_chosen)
@@ -59,16 +57,9 @@ class SessionsCard(Card):
         self.version.setEnabled(False)
         self.version.clicked.connect(self.rows.ask_for_version)
         self.rows.chosen_changed.connect(self._enable)
-        filters.addWidget(self.details)
-        filters.addWidget(self.version)
-        self.column.addLayout(filters)
-        self.column.addWidget(self.rows, 1)
-        self.column.addWidget(Rule())
-        foot = QVBoxLayout()
-        foot.setContentsMargins(10, 2, 10, 0)
-        foot.setSpacing(2)
-        foot.addWidget(self.head)
-        foot.addWidget(self.why)
+        add_parts(filters, self.details, self.version)
+        add_parts(self.column, filters, (self.rows, 1), Rule())
+        foot = vbox(self.head, self.why, spacing=2, margins=(10, 2, 10, 0))
         self.column.addLayout(foot)
         self.search.textChanged.connect(self._filter)
         self.state.currentIndexChanged.connect(self._filter)
@@ -121,10 +112,7 @@ class ExclusionsCard(Card):
         self.leave_out.clicked.connect(self.leave_out_asked)
         self.open.clicked.connect(self.list_asked)
         inside = QWidget()
-        self._rows = QVBoxLayout(inside)
-        self._rows.setContentsMargins(0, 0, 0, 0)
-        self._rows.setSpacing(8)
-        self._rows.addStretch()
+        self._rows = vbox(STRETCH, spacing=8, margins=0, parent=inside)
         self.area = QScrollArea()
         self.area.setWidgetResizable(True)
         self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -132,11 +120,8 @@ class ExclusionsCard(Card):
         self.area.setAccessibleName("Excluded")
         self.area.setMinimumHeight(96)
         self.lines: list[QWidget] = []
-        self.column.addWidget(self.none)
-        self.column.addWidget(self.area, 1)
-        foot = QHBoxLayout()
-        foot.addStretch()
-        foot.addWidget(self.open)
+        add_parts(self.column, self.none, (self.area, 1))
+        foot = hbox(STRETCH, self.open)
         self.column.addLayout(foot)
         self.show_left_out(())
 
@@ -168,15 +153,10 @@ class ExclusionsCard(Card):
 def _line(one: LeftOut, back: ActionButton) -> QWidget:
     """Return one decision: what, why, who and when."""
     made = QWidget()
-    column = QVBoxLayout(made)
-    column.setContentsMargins(0, 0, 6, 0)
-    column.setSpacing(0)
     what = label(one.what, "label", wraps=True)
     what.setFont(font("label", weight=600))
-    head = QHBoxLayout()
-    head.addWidget(what, 1)
-    head.addWidget(back)
-    column.addLayout(head)
+    head = hbox((what, 1), back)
+    column = vbox(head, spacing=0, margins=(0, 0, 6, 0), parent=made)
     why = label(one.reason, "label", "text2", wraps=True)
     why.setFont(font("label", weight=400))
     column.addWidget(why)

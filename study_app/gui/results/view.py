@@ -7,7 +7,7 @@ from typing import Final
 
 from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QDialog, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QDialog, QWidget
 
 from study_app.gui.results.export_dialog import Extra, WriteDialog
 from study_app.gui.results.figures_panel import FiguresPanel
@@ -16,6 +16,7 @@ from study_app.gui.sessions.decision_dialogs import LeaveOutDialog, TakeBackDial
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import remove_widget
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, Chip, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import label
@@ -95,41 +96,23 @@ class ResultsPlace(Place):
 
     def _lay_out(self) -> None:
         self._chips_there = QWidget()
-        self._chips = QHBoxLayout(self._chips_there)
-        self._chips.setContentsMargins(0, 0, 0, 0)
-        self._chips.setSpacing(8)
-        self._head = QHBoxLayout()
-        self._head.setContentsMargins(SHADOW, 0, SHADOW, 0)
-        self._head.setSpacing(12)
-        self._head.addWidget(label("Results", "title"))
-        self._head.addWidget(self.study)
-        self._head.addStretch()
-        for button in (self.unblind, self.export, self.report):
-            self._head.addWidget(button)
-        self._below = QHBoxLayout()
-        self._below.setContentsMargins(SHADOW, 0, SHADOW, 0)
+        self._chips = hbox(spacing=8, margins=0, parent=self._chips_there)
+        self._head = hbox(label("Results", "title"), self.study, STRETCH, spacing=12, margins=(SHADOW, 0, SHADOW, 0))
+        add_parts(self._head, self.unblind, self.export, self.report)
+        self._below = hbox(margins=(SHADOW, 0, SHADOW, 0))
         self._left = QBoxLayout(QBoxLayout.Direction.TopToBottom)
         self._left.setSpacing(12 - 2 * SHADOW)
-        self._left.addWidget(self.sessions, 3)
-        self._left.addWidget(self.exclusions, 1)
+        add_parts(self._left, (self.sessions, 3), (self.exclusions, 1))
         self._panel = QWidget()
         self._panel.setLayout(self._left)
         self._left.setContentsMargins(0, 0, 0, 0)
         self._row = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._row.setSpacing(16 - 2 * SHADOW)
-        self._row.addWidget(self._panel)
-        self._row.addWidget(self.figures, 1)
+        add_parts(self._row, self._panel, (self.figures, 1))
         inside = QWidget()
-        page = QVBoxLayout(inside)
-        page.setContentsMargins(24, 20, 24, 18)
-        page.setSpacing(12)
-        page.addLayout(self._head)
-        page.addLayout(self._below)
-        page.addLayout(self._row, 1)
+        vbox(self._head, self._below, (self._row, 1), spacing=12, margins=(24, 20, 24, 18), parent=inside)
         self.area = scrolled(inside)
-        whole = QVBoxLayout(self)
-        whole.setContentsMargins(0, 0, 0, 0)
-        whole.addWidget(self.area)
+        vbox(self.area, margins=0, parent=self)
 
     def hand_to(self, folder: Path) -> None:
         """Suggest another folder to write into from now on."""

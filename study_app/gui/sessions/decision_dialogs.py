@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLineEdit, QWidget
+from PySide6.QtWidgets import QGridLayout, QLineEdit, QWidget
 
 from study_app.gui.theme.theme import Theme, font
+from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.cards import Icon
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.dialogs import Question
@@ -73,10 +74,8 @@ class UnblindDialog(Decision):
             "report. This cannot be undone. Your name, the reason and the time are stored with the data.",
         )
         if running:
-            row = QHBoxLayout()
-            row.setSpacing(10)
             many = "1 session is" if running == 1 else f"{running} sessions are"
-            row.addWidget(Icon("warning", "warn", 20), 0, Qt.AlignmentFlag.AlignTop)
+            row = hbox((Icon("warning", "warn", 20), 0, Qt.AlignmentFlag.AlignTop), spacing=10)
             warns = label(
                 f"{many} not complete. Operators of the remaining sessions will no longer be blind.",
                 "label",

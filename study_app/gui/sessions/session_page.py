@@ -16,6 +16,7 @@ from study_app.gui.sessions.motion_plots import MotionPlot
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import apply_theme, apply_theme_within, remove_widget
 from study_app.gui.widgets.background import Background
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
@@ -149,9 +150,7 @@ class SessionPage(QDialog):
         head.setSpacing(12)
         kind = f"  ·  {self.facts.kind}" if self.facts.kind else ""
         head.addWidget(label(f"{self.facts.name}  ·  {self.facts.study}{kind}", "title_dense"))
-        head.addWidget(self.status)
-        head.addWidget(self.validity)
-        head.addStretch()
+        add_parts(head, self.status, self.validity, STRETCH)
         left, right = QVBoxLayout(), QVBoxLayout()
         trials = Card("Trials", padding=16, gap=8)
         trials.column.addWidget(self.trials, 1)
@@ -166,9 +165,7 @@ class SessionPage(QDialog):
         files = Card("Files", self.folder, padding=16, gap=8)
         self.files.setFont(font("small", tabular=True))
         files.column.addWidget(self.files)
-        for card in (out, notes, files):
-            right.addWidget(card)
-        right.addStretch()
+        add_parts(right, out, notes, files, STRETCH)
         page = QWidget()
         page.setLayout(right)
         right.setContentsMargins(0, 0, 0, 0)
@@ -178,21 +175,9 @@ class SessionPage(QDialog):
         area.setFixedWidth(372)
         area.setWidget(page)
         area.setAccessibleName("Exclusions, notes and files")
-        body = QHBoxLayout()
-        body.setSpacing(8)
-        body.addLayout(left, 1)
-        body.addWidget(area)
-        foot = QHBoxLayout()
-        foot.addStretch()
-        foot.addWidget(self.close_button)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(24, 20, 24, 18)
-        column.setSpacing(8)
-        column.addLayout(head)
-        column.addWidget(self.about)
-        column.addWidget(self.limits)
-        column.addLayout(body, 1)
-        column.addLayout(foot)
+        body = hbox((left, 1), area, spacing=8)
+        foot = hbox(STRETCH, self.close_button)
+        vbox(head, self.about, self.limits, (body, 1), foot, spacing=8, margins=(24, 20, 24, 18), parent=self)
 
     def _show(self, record: SessionRecord | StoreError) -> None:
         """Show what was read, or why it cannot be read."""
@@ -230,8 +215,7 @@ class SessionPage(QDialog):
             line = QWidget()
             row = QHBoxLayout(line)
             row.setContentsMargins(0, 0, 0, 0)
-            row.addWidget(label(f"{what}: {one.reason} ({one.rule_or_person})", "label", wraps=True), 1)
-            row.addWidget(back)
+            add_parts(row, (label(f"{what}: {one.reason} ({one.rule_or_person})", "label", wraps=True), 1), back)
             apply_theme_within(line, self._theme)
             self._out.addWidget(line)
             self.lines.append(line)

@@ -7,9 +7,10 @@ from datetime import datetime
 from typing import Any
 
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, Qt, Signal
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import vbox
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.row_table import BELOW_ROLE, CARE_ROLE, CHIP_ROLE, MARGIN, Index, Table
 from study_app.viewmodels.session.columns import Column, answers_words, incidents, status_chip, validity_chip
@@ -129,11 +130,7 @@ class SessionsTable(QWidget):
         self.table = Table(self.model, [(column.width, column.least) for column in columns], "Sessions")
         self.none = label(none, "body", "text2", wraps=True)
         self.none.setContentsMargins(MARGIN, MARGIN, MARGIN, MARGIN)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addWidget(self.none)
-        column.addWidget(self.table, 1)
+        vbox(self.none, (self.table, 1), spacing=0, margins=0, parent=self)
         self.table.opened.connect(lambda index: self.opened.emit(self.model.shown[index.row()]))
         self.table.clicked.connect(self._click)
         self.table.selectionModel().selectionChanged.connect(lambda *_changes: self.chosen_changed.emit())

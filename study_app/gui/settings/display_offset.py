@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QWidget
 
 from study_app.gui.settings.measured_number import LEAST_WORDS
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Icon
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import label
@@ -63,22 +64,9 @@ class OffsetForm(QWidget):
             grid.addWidget(field, 1, column)
         grid.setColumnStretch(2, 1)
         grid.setColumnStretch(3, 2)
-        trouble = QHBoxLayout()
-        trouble.setSpacing(6)
-        trouble.addWidget(self.sign, 0, Qt.AlignmentFlag.AlignTop)
-        trouble.addWidget(self.why, 1)
-        foot = QHBoxLayout()
-        foot.setSpacing(12)
-        foot.addWidget(self.keep)
-        foot.addWidget(self.forget)
-        foot.addStretch()
-        column_ = QVBoxLayout(self)
-        column_.setContentsMargins(0, 0, 0, 0)
-        column_.setSpacing(8)
-        column_.addWidget(self.said)
-        column_.addLayout(grid)
-        column_.addLayout(trouble)
-        column_.addLayout(foot)
+        trouble = hbox((self.sign, 0, Qt.AlignmentFlag.AlignTop), (self.why, 1), spacing=6)
+        foot = hbox(self.keep, self.forget, STRETCH, spacing=12)
+        vbox(self.said, grid, trouble, foot, spacing=8, margins=0, parent=self)
 
     def show_offset(self, offset: DisplayOffset | None, screen: str) -> None:
         """Show what was measured; of another screen than ``screen`` it is said so."""

@@ -19,6 +19,7 @@ from study_app.gui.settings.measured_number import LEAST_WORDS
 from study_app.gui.settings.pixel_patterns import GreyRamp, LineField
 from study_app.gui.theme.theme import PARTICIPANT
 from study_app.gui.theme.themed import apply_theme
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label
 from study_app.gui.widgets.number_field import NumberField, write_number
@@ -87,22 +88,12 @@ class DisplayTest(QWidget):
         self.report_timer.timeout.connect(self.show_figures)
 
     def _lay_out(self, screen_words: str) -> None:
-        titles = QVBoxLayout()
-        titles.setSpacing(2)
-        titles.addWidget(label("Display test", "title"))
-        titles.addWidget(label(screen_words, "body", "text2"))
-        head = QHBoxLayout()
-        head.addLayout(titles)
-        head.addStretch()
-        head.addWidget(self.leave, 0, Qt.AlignmentFlag.AlignTop)
+        titles = vbox(label("Display test", "title"), label(screen_words, "body", "text2"), spacing=2)
+        head = hbox(titles, STRETCH, (self.leave, 0, Qt.AlignmentFlag.AlignTop))
         column = QVBoxLayout(self)
         column.setContentsMargins(40, 32, 40, 32)
         column.setSpacing(18)
-        column.addLayout(head)
-        column.addLayout(self._figures())
-        column.addWidget(GreyRamp(), 2)
-        column.addLayout(self._fields(), 3)
-        column.addLayout(self._foot())
+        add_parts(column, head, self._figures(), (GreyRamp(), 2), (self._fields(), 3), self._foot())
 
     def _figures(self) -> QGridLayout:
         """Return the live figures, a name over each."""
@@ -118,8 +109,7 @@ class DisplayTest(QWidget):
 
     def _fields(self) -> QBoxLayout:
         """Return the fields of lines, and what to look for in them."""
-        row = QHBoxLayout()
-        row.setSpacing(16)
+        row = hbox(spacing=16)
         for thick in (1, 2):
             for standing in (True, False):
                 row.addWidget(LineField(thick, standing=standing), 2)
@@ -139,22 +129,14 @@ class DisplayTest(QWidget):
         """Return the patch's interval and the offset, left of where the patch is."""
         toggling = QVBoxLayout()
         toggling.setSpacing(6)
-        toggling.addWidget(label("Photodiode's patch", "card"))
-        toggling.addWidget(label("Interval, ms", "label", "text2"))
-        toggling.addWidget(self.interval)
+        add_parts(toggling, label("Photodiode's patch", "card"), label("Interval, ms", "label", "text2"), self.interval)
         self.why = label("", "label", "bad", wraps=True)
-        toggling.addWidget(self.why)
-        toggling.addStretch()
-        measured = QVBoxLayout()
-        measured.setSpacing(6)
-        measured.addWidget(label("Display offset", "card"))
-        measured.addWidget(self.offset)
-        measured.addStretch()
+        add_parts(toggling, self.why, STRETCH)
+        measured = vbox(label("Display offset", "card"), self.offset, STRETCH, spacing=6)
         row = QHBoxLayout()
         row.setContentsMargins(0, 0, 120, 0)  # the patch's corner is free
         row.setSpacing(48)
-        row.addLayout(toggling)
-        row.addLayout(measured, 1)
+        add_parts(row, toggling, (measured, 1))
         return row
 
     def _connect(self) -> None:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import hbox, vbox
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.gui.widgets.number_field import NumberField, write_number
 
@@ -27,18 +28,11 @@ class Measure(QWidget):
         named = label(name, "label", "text")
         named.setBuddy(self.field)
         self.below = label("", "small", "text2", wraps=True)
-        row = QHBoxLayout()
-        row.setSpacing(8)
-        row.addWidget(named, 1)
-        row.addWidget(self.field)
+        row = hbox((named, 1), self.field, spacing=8)
         behind = label(unit, "label", "text2")
         behind.setFixedWidth(28)
         row.addWidget(behind)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(2)
-        column.addLayout(row)
-        column.addWidget(self.below)
+        vbox(row, self.below, spacing=2, margins=0, parent=self)
         self.below.setFont(font("small"))
         self.below.setMinimumWidth(LEAST_WORDS)
         self.field.entered.connect(self._take)

@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QLineEdit
 
 from study_app.gui.settings.measured_number import LEAST_WORDS
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import add_parts
 from study_app.gui.widgets.cards import Card, Rule
 from study_app.gui.widgets.controls import Choice, Toggle
 from study_app.gui.widgets.labels import label, set_ink
@@ -45,8 +46,7 @@ class OutletsCard(Card):
         self.markers.clicked.connect(lambda on: self.changed.emit("lsl_markers", on))
         self.samples.activated.connect(lambda _index: self.changed.emit("lsl_samples", self.samples.currentData()))
         self.triggers.editingFinished.connect(self._take)
-        for part in (self.markers, named[0], self.samples, Rule(), named[1], self.triggers, self.below):
-            self.column.addWidget(part)
+        add_parts(self.column, self.markers, named[0], self.samples, Rule(), named[1], self.triggers, self.below)
 
     def show_settings(self, settings: MachineSettings) -> None:
         """Show what is set."""

@@ -7,11 +7,9 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import (
     QButtonGroup,
     QFileDialog,
-    QHBoxLayout,
     QLabel,
     QLineEdit,
     QSizePolicy,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -20,6 +18,7 @@ from study_app.gui.display.screens import ScreenShown
 from study_app.gui.settings.display_offset import OffsetForm
 from study_app.gui.settings.measured_number import LEAST_WORDS, Measure
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Rule
 from study_app.gui.widgets.controls import ActionButton, Choice, Radio, Toggle
 from study_app.gui.widgets.labels import Elided, label
@@ -46,18 +45,11 @@ class ScreensCard(Card):
         self.test = ActionButton("screen", "Display test …", height=38)
         self.identify.clicked.connect(self.identify_asked)
         self.test.clicked.connect(self.test_asked)
-        self._rows = QVBoxLayout()
-        self._rows.setSpacing(8)
+        self._rows = vbox(spacing=8)
         self._group: QButtonGroup | None = None
         self._shown: tuple[ScreenShown, ...] = ()
-        buttons = QHBoxLayout()
-        buttons.setSpacing(12)
-        buttons.addWidget(self.identify)
-        buttons.addWidget(self.test)
-        buttons.addStretch()
-        self.column.addLayout(self._rows)
-        self.column.addWidget(self.note)
-        self.column.addLayout(buttons)
+        buttons = hbox(self.identify, self.test, STRETCH, spacing=12)
+        add_parts(self.column, self._rows, self.note, buttons)
 
     def show_screens(self, screens: tuple[ScreenShown, ...], chosen: int, missing: str) -> None:
         """Show screens; ``chosen`` is the participant's number, ``missing`` the name of one that is not there."""
@@ -98,17 +90,10 @@ def _screen_row(screen: ScreenShown) -> tuple[QWidget, Radio]:
     name = Elided("label", "text2")
     name.show_text(screen.name)
     name.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-    head = QHBoxLayout()
-    head.addWidget(radio)
-    head.addWidget(name, 1)
+    head = hbox(radio, (name, 1))
     row = QWidget()
-    column = QVBoxLayout(row)
-    column.setContentsMargins(0, 0, 0, 0)
-    column.setSpacing(0)
-    column.addLayout(head)
-    below = QHBoxLayout()
-    below.setContentsMargins(30, 0, 0, 0)
-    below.addWidget(about)
+    column = vbox(head, spacing=0, margins=0, parent=row)
+    below = hbox(about, margins=(30, 0, 0, 0))
     column.addLayout(below)
     return row, radio
 
@@ -161,8 +146,7 @@ class SeenCard(Card):
         self.said.setMinimumWidth(LEAST_WORDS)
         self.distance.entered.connect(lambda value: self.changed.emit("viewing_distance_mm", value))
         self.width_mm.entered.connect(lambda value: self.changed.emit("screen_width_mm", value))
-        for part in (self.distance, self.width_mm, self.sample, self.said):
-            self.column.addWidget(part)
+        add_parts(self.column, self.distance, self.width_mm, self.sample, self.said)
 
     def show_settings(self, settings: MachineSettings, screen: ScreenShown) -> None:
         """Show what is set, and what follows for this screen."""
@@ -204,9 +188,7 @@ class OffsetCard(Card):
         self.patch = Toggle("Square for a photodiode in the tank's corner")
         self.patch.setFont(font("body"))
         self.patch.clicked.connect(lambda on: self.changed.emit("photodiode", on))
-        self.column.addWidget(self.form)
-        self.column.addWidget(Rule())
-        self.column.addWidget(self.patch)
+        add_parts(self.column, self.form, Rule(), self.patch)
 
 
 class SessionsCard(Card):
@@ -233,10 +215,7 @@ class SessionsCard(Card):
             ("Workspace, the folder of protocols and results", self.folder, self.change),
         ):
             self.column.addWidget(_named(name, field))
-            row = QHBoxLayout()
-            row.setSpacing(8)
-            row.addWidget(field, 1)
-            row.addWidget(button)
+            row = hbox((field, 1), button, spacing=8)
             self.column.addLayout(row)
         self.camera = QLineEdit()
         self.camera.setFont(font("body"))
@@ -245,8 +224,7 @@ class SessionsCard(Card):
         self.camera.setPlaceholderText(USUAL)
         self.camera.setAccessibleName("Camera of conditions that show one")
         self.camera.editingFinished.connect(lambda: self.changed.emit("camera", self.camera.text().strip()))
-        self.column.addWidget(_named("Camera of conditions that show one", self.camera))
-        self.column.addWidget(self.camera)
+        add_parts(self.column, _named("Camera of conditions that show one", self.camera), self.camera)
 
     def show_settings(self, settings: MachineSettings, folder: str) -> None:
         """Show what is set; ``folder`` is the workspace."""
@@ -277,8 +255,7 @@ class WindowsCard(Card):
         self.theme_choice.activated.connect(lambda _index: self.changed.emit("theme", self.theme_choice.currentData()))
         self.sound.clicked.connect(lambda on: self.changed.emit("sound", on))
         self.column.addWidget(_named("Theme of the operator's windows", self.theme_choice))
-        self.column.addWidget(self.theme_choice)
-        self.column.addWidget(self.sound)
+        add_parts(self.column, self.theme_choice, self.sound)
 
     def show_settings(self, settings: MachineSettings) -> None:
         """Show what is set."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QGuiApplication, QKeySequence, QResizeEvent, QShortcut
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QWidget
 
 from study_app.gui.display.screens import ScreenShown, screens_shown
 from study_app.gui.settings.display_test import DisplayTest
@@ -16,6 +16,7 @@ from study_app.gui.settings.screen_numbers import ScreenNumber, identify
 from study_app.gui.settings.setting_cards import OffsetCard, ScreensCard, SeenCard, SessionsCard, WindowsCard
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
@@ -54,40 +55,20 @@ class MachinePlace(Place):
         self._connect()
 
     def _lay_out(self) -> None:
-        titles = QVBoxLayout()
-        titles.setSpacing(4)
-        titles.addWidget(label("This machine", "title"))
+        titles = vbox(label("This machine", "title"), spacing=4)
         about = "Settings of this computer and its screens, independent of every study. Changes are saved immediately."
         titles.addWidget(label(about, "body", "text2", wraps=True))
-        head = QHBoxLayout()
-        head.setContentsMargins(SHADOW, 0, SHADOW, 0)
-        head.setSpacing(16)
-        head.addLayout(titles, 1)
-        head.addWidget(self.check)
-        head.addWidget(self.undo)
+        head = hbox((titles, 1), self.check, self.undo, spacing=16, margins=(SHADOW, 0, SHADOW, 0))
         self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._body.setSpacing(18)
         for cards in ((self.screens, self.seen, self.outlets), (self.offset, self.sessions, self.windows)):
-            column = QVBoxLayout()
-            column.setSpacing(18)
-            for card in cards:
-                column.addWidget(card)
-            column.addStretch()
+            column = vbox(*cards, STRETCH, spacing=18)
             self._body.addLayout(column, 1)
-        foot = QHBoxLayout()
-        foot.setContentsMargins(SHADOW, 0, SHADOW, 0)
-        foot.addWidget(self.kept_in)
+        foot = hbox(self.kept_in, margins=(SHADOW, 0, SHADOW, 0))
         inside = QWidget()
-        page = QVBoxLayout(inside)
-        page.setContentsMargins(30, 30, 30, 22)
-        page.setSpacing(20)
-        page.addLayout(head)
-        page.addLayout(self._body, 1)
-        page.addLayout(foot)
+        vbox(head, (self._body, 1), foot, spacing=20, margins=(30, 30, 30, 22), parent=inside)
         self._area = scrolled(inside)
-        row = QVBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.addWidget(self._area)
+        vbox(self._area, margins=0, parent=self)
 
     def _connect(self) -> None:
         for card in (self.seen, self.sessions, self.windows, self.offset, self.outlets):

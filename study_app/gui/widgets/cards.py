@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QHBoxLayout, QLayout, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLayout, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.theme.icons import draw_icon, draw_logo
 from study_app.gui.theme.theme import RADIUS_CARD, RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import STRETCH, hbox
 from study_app.gui.widgets.labels import Ink, label
 from study_app.viewmodels.tones import Tone
 
@@ -29,9 +30,7 @@ class Card(Themed, QWidget):
         self.column.setSpacing(gap)
         if title:
             self.heading = label(title, "card")
-            row = QHBoxLayout()
-            row.addWidget(self.heading)
-            row.addStretch()
+            row = hbox(self.heading, STRETCH)
             if aside is not None:
                 row.addWidget(aside)
             self.column.addLayout(row)

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import (
     QLabel,
     QPushButton,
     QRadioButton,
+    QSizePolicy,
     QSpinBox,
     QStyle,
     QStyledItemDelegate,
@@ -22,6 +23,8 @@ from PySide6.QtWidgets import (
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed
+
+STOP_HEIGHT = 44
 
 
 class PressedByEnter(QPushButton):
@@ -114,6 +117,45 @@ class ActionButton(Themed, PressedByEnter):
         painter.setPen(ink)
         painter.setFont(self._key_font)
         painter.drawText(cap, Qt.AlignmentFlag.AlignCenter, self._cap)
+
+
+class CompactStop(Themed, QPushButton):
+    """Stop force, in the force stop's own colour; it acts when pressed, not when released, and is never disabled.
+
+    Where the stop ends more than the force, ``words`` say so.
+    """
+
+    def __init__(self, words: str = "Stop force") -> None:
+        super().__init__()
+        self.words = words
+        self.setProperty("role", "stop")
+        self.setAccessibleName(f"{words}. Holding Esc does the same.")
+        self.setToolTip(f"{words} (or hold Esc)")
+        self.setFixedHeight(STOP_HEIGHT)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self._font = font("strong", scale=0.96)
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for octagon and words."""
+        return QSize(round(QFontMetricsF(self._font).horizontalAdvance(self.words)) + 62, STOP_HEIGHT)
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the same: it is never cut."""
+        return self.sizeHint()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the button, its octagon and its words."""
+        painter = QStylePainter(self)
+        option = QStyleOptionButton()
+        self.initStyleOption(option)
+        painter.drawControl(QStyle.ControlElement.CE_PushButtonBevel, option)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        ink = QColor(self.theme.on_stop)
+        draw_icon(painter, "stop", QRectF(17, self.height() / 2 - 10, 20, 20), ink, 2.0)
+        painter.setPen(ink)
+        painter.setFont(self._font)
+        painter.drawText(QRectF(46, 0, self.width() - 46, self.height()), Qt.AlignmentFlag.AlignVCenter, self.words)
 
 
 class IconButton(Themed, PressedByEnter):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QWidget
 
 from study_app.gui.theme.theme import Theme
 from study_app.gui.theme.themed import apply_theme
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
 
@@ -17,10 +18,7 @@ class Question(QDialog):
         super().__init__(parent)
         self.setWindowTitle(title)
         self.setModal(False)
-        self.column = QVBoxLayout(self)
-        self.column.setContentsMargins(28, 24, 28, 24)
-        self.column.setSpacing(12)
-        self.column.addWidget(label(title, "title_dense"))
+        self.column = vbox(label(title, "title_dense"), spacing=12, margins=(28, 24, 28, 24), parent=self)
         said = label(explanation, "body", "text2", wraps=True)
         said.setMinimumWidth(420)
         self.column.addWidget(said)
@@ -33,12 +31,8 @@ class Question(QDialog):
         self.go_on.clicked.connect(self.accept)
         self.back.setAutoDefault(False)
         self.go_on.setDefault(True)
-        row = QHBoxLayout()
-        row.addWidget(self.back)
-        row.addStretch()
-        row.addWidget(self.go_on)
-        self.column.addSpacing(8)
-        self.column.addLayout(row)
+        row = hbox(self.back, STRETCH, self.go_on)
+        add_parts(self.column, 8, row)
         apply_theme(self, self._theme)
 
 
@@ -50,9 +44,6 @@ class Notice(Question):
         self.close_button = ActionButton("", "Close", role="primary")
         self.close_button.clicked.connect(self.accept)
         self.close_button.setDefault(True)
-        row = QHBoxLayout()
-        row.addStretch()
-        row.addWidget(self.close_button)
-        self.column.addSpacing(8)
-        self.column.addLayout(row)
+        row = hbox(STRETCH, self.close_button)
+        add_parts(self.column, 8, row)
         apply_theme(self, theme)
