@@ -83,21 +83,10 @@ class Follow(Table):
 
     def target_m(self, t_s: float) -> Point:
         """Return where the target is ``t_s`` after the task began, hand frame [m]; before it in the middle."""
-        ramp, _ = self._ramp(t_s)
-        return self.amplitude_m * ramp * math.sin(2 * math.pi * self.frequency_hz * t_s), 0.0, 0.0
+        return self.amplitude_m * self._ramp(t_s) * math.sin(2 * math.pi * self.frequency_hz * t_s), 0.0, 0.0
 
-    def target_mps(self, t_s: float) -> float:
-        """Return the target's velocity along its axis ``t_s`` after the task began [m/s]."""
-        ramp, change_per_s = self._ramp(t_s)
-        rate_per_s = 2 * math.pi * self.frequency_hz
-        angle = rate_per_s * t_s
-        return self.amplitude_m * (change_per_s * math.sin(angle) + ramp * rate_per_s * math.cos(angle))
-
-    def _ramp(self, t_s: float) -> tuple[float, float]:
-        """Return the ramp r, 0 … 1, and its change [1/s]."""
+    def _ramp(self, t_s: float) -> float:
+        """Return the ramp r, 0 … 1."""
         if t_s <= 0:
-            return 0.0, 0.0
-        if t_s >= self.lead_s:
-            return 1.0, 0.0
-        angle = math.pi * t_s / self.lead_s
-        return (1 - math.cos(angle)) / 2, math.pi / (2 * self.lead_s) * math.sin(angle)
+            return 0.0
+        return 1.0 if t_s >= self.lead_s else (1 - math.cos(math.pi * t_s / self.lead_s)) / 2
