@@ -12,7 +12,7 @@ from study_app.haptics.model.scene import Effect, Everywhere, Scene
 
 def with_wake(scene: Scene, **changes: Any) -> Scene:
     """Return the scene with other parameters of its wake."""
-    wake = _wake(scene).model_copy(update=changes)
+    wake = scene.liquids[0].wake.model_copy(update=changes)
     return scene.model_copy(update={"liquids": (scene.liquids[0].model_copy(update={"wake": wake}),)})
 
 
@@ -32,7 +32,3 @@ def _only(scene: Scene, liquid: Any) -> Scene:
     """Return the scene with one liquid, that is everywhere and does not flow by itself."""
     alone = liquid.model_copy(update={"region": Everywhere(), "current": None})
     return scene.model_copy(update={"liquids": (alone,)})
-
-
-def _wake(scene: Scene) -> Any:
-    return scene.liquids[0].wake

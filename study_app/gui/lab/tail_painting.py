@@ -80,7 +80,7 @@ def paint_tail(painter: QPainter, places: TailPlaces) -> None:
     painter.setBrush(Qt.BrushStyle.NoBrush)
     for shade, points in places.runs:
         ink, width = shade_style(shade)
-        painter.setPen(_round(ink, width))
+        painter.setPen(QPen(ink, width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin))
         painter.drawPolyline(points)
     for place, turn, shade in places.heads:
         ink, width = shade_style(shade)
@@ -157,10 +157,6 @@ def _pixels(camera: Camera, x: Floats, y: Floats, z: Floats) -> Floats:
 
 def _points(pixels: Floats) -> list[QPointF]:
     return [QPointF(across, down) for across, down in pixels.tolist()]
-
-
-def _round(ink: QColor, width: float) -> QPen:
-    return QPen(ink, width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin)
 
 
 def _inside(box: Box) -> tuple[tuple[float, float], ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from study_app.evaluation.scene_variants import _only, _wake, with_effects, with_wake
+from study_app.evaluation.scene_variants import _only, with_effects, with_wake
 from study_app.haptics.model.effects.drag import REFERENCE
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.laws.drag_laws import Law
@@ -76,7 +76,7 @@ def numerical(scene: Scene) -> tuple[tuple[Rung, ...], Rung]:
 
 def _lists(exact: Scene) -> list[Rung]:
     """Return what else a wake could be: lists, shorter or coarser ones, none."""
-    length = _wake(exact).length
+    length = exact.liquids[0].wake.length
     half, quarter = max(1, length // 2), max(1, length // 4)
     rungs: list[Rung] = [
         ListRung("O(N) compiled", "O(N) compiled", "list", exact),

@@ -54,7 +54,7 @@ def cases() -> Mapping[Case, tuple[Limit, str, Trial]]:
     ):
         found[words, n] = ("at least 93 %", COVERS, _covered(n, spread_ms, never))
     for sd in (0.7, 1.0, 1.5):
-        n = _needed(sd)
+        n = participants_needed(np.rint(sd * np.random.default_rng(1).normal(size=2000)), BOUND, 0.05) or 0
         words = f"whole-number differences about 0, SD {sd:g}, printed n {n}"
         found[words, n] = ("at least 77 %", "called equivalent", _equal(n, sd))
         found[words, n - 1] = ("at most 83 %", "called equivalent", _equal(n - 1, sd))
@@ -99,8 +99,3 @@ def _equal(n: int, sd: float) -> Trial:
         return tost(np.rint(sd * rng.normal(size=n)), BOUND).verdict == "equivalent"
 
     return trial
-
-
-def _needed(sd: float) -> int:
-    """Return how many participants the report prints for differences that spread so."""
-    return participants_needed(np.rint(sd * np.random.default_rng(1).normal(size=2000)), BOUND, 0.05) or 0

@@ -58,7 +58,7 @@ class PlantedExponent:
     @property
     def resistance_exponent(self) -> float:
         """The slope of ln resistance over the logarithm of the level, by least squares."""
-        return _slope(self.levels, self.resistances)
+        return float(np.polyfit(np.log(self.levels), np.log(self.resistances), 1)[0])
 
     @property
     def observer(self) -> Observer:
@@ -165,7 +165,3 @@ def recovered_exponent(one: PlantedExponent, exponents: Sequence[float], spread:
         f"{EXPONENT:g} ± {SPREADS} SD ({SPREADS * spread:.3f})",
         abs(mean - EXPONENT) <= SPREADS * spread,
     )
-
-
-def _slope(levels: Sequence[float], values: Sequence[float]) -> float:
-    return float(np.polyfit(np.log(levels), np.log(values), 1)[0])

@@ -59,10 +59,6 @@ def section(found: LevelsFound, pictures: Sequence[Picture], estimator: str | No
     yield from withheld(found)
 
 
-def _unit(found: LevelsFound) -> str:
-    return f" [{found.unit}]" if found.unit else ""
-
-
 def _time_cells(numbers: Mapping[str, Any]) -> list[str]:
     low, high = numbers["q1"], numbers["q3"]
     return [str(numbers["n"]), number(numbers["median"]), "–" if low is None else f"{number(low)} – {number(high)}"]
@@ -88,7 +84,7 @@ def _of_group(found: LevelsFound) -> str:
 
 def _columns(found: LevelsFound) -> Iterator[tuple[str, str]]:
     """Yield the columns that say what was presented: heading, and field of the answers."""
-    unit = _unit(found)
+    unit = f" [{found.unit}]" if found.unit else ""
     if any(one.standard is not None for one in found.of_group):
         yield f"Standard{unit}", "standard"
     if found.level_kind not in {None, "value"}:

@@ -196,7 +196,7 @@ def _sensitivities(found: LevelsFound) -> str:
             "Participant",
             "n",
             *(("d′", "95 % interval") if measured else ()),
-            *((_criterion_name(found),) if biased else ()),
+            *(("k" if found.design == "samedifferent" else "c",) if biased else ()),
             *(f"“{answer.replace('_', ' ')}”" for answer in (answers[:1] if len(answers) == 2 else answers)),
         ),
         [
@@ -246,10 +246,6 @@ def _where(one: SensitivityFound) -> str:
         return one.comparison.replace("_", " ")
     value = one.level if one.standard is None else one.standard
     return "–" if value is None else f"{value:.4g}"
-
-
-def _criterion_name(found: LevelsFound) -> str:
-    return "k" if found.design == "samedifferent" else "c"
 
 
 def _interval(one: SensitivityFound) -> str:
