@@ -131,9 +131,9 @@ def _of_statements(
     study: Protocol, sizes: tuple[int, ...], studies: int, seed: int, show: ShowProgress, executor: Executor
 ) -> Iterator[Powers]:
     """Yield the power of the tests of statements, from ever more studies."""
+    from study_app.analysis.power.batch_counts import sweep
     from study_app.analysis.power.plan import plan
     from study_app.analysis.power.power_curves import powers
-    from study_app.analysis.power.power_sweep import sweep
     from study_app.session.simulated.trial_features import condition_features
 
     show("simulating every condition")

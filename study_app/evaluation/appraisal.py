@@ -30,7 +30,7 @@ class Errors:
     ``wake`` is the largest difference as a share of Σ|e|/S, ``force_n`` that of the forces [N]; None where there is no
     reference. ``lag_s`` is how late the velocity filter is on a motion that speeds up evenly. ``left_out`` are effects
     that were not compared. ``withheld`` is the share of the force that safety withholds in the stroke that was asked
-    about (``evaluation.fastest``), None without one.
+    about (``evaluation.appraisal_measurement``), None without one.
     """
 
     wake: float | None

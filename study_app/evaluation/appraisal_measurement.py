@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -9,12 +10,14 @@ import numpy as np
 from study_app.evaluation import reference_model
 from study_app.evaluation.appraisal import Costs, EffectCost, Errors
 from study_app.evaluation.cost import measure
+from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.effects import NAMED
 from study_app.haptics.model.gate import calls_for, resolve
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.paths import path
 from study_app.haptics.model.scene import Effect, Everywhere, Knee, Scene
-from study_app.haptics.runtime.offline import simulate
+from study_app.haptics.runtime.offline import samples_along, simulate
+from study_app.protocol.trials.tasks.stroke import Stroke
 
 BATCHES: Final = 60
 RAMP_MPS2: Final = 2.0
@@ -24,6 +27,7 @@ _MOTIONS: Final = (
     ("reverse", {"revolutions": 1.0, "against_s": 0.7, "rest_s": 0.5}),
     ("zigzag", {"leg_s": 0.25, "legs": 8.0}),
 )
+LASTS_S: Final = 2.0
 
 
 def costs(scene: Scene, *, batches: int = BATCHES) -> Costs:
@@ -81,3 +85,18 @@ def _difference(scene: Scene, motion: Motion) -> tuple[float, float]:
     apart_mps = float(np.linalg.norm(wake_mps - true.wake_mps, axis=1).max())
     share = apart_mps / largest_mps if largest_mps > 0 else 0.0
     return share, float(np.linalg.norm(force_n - true.force_n, axis=1).max())
+
+
+def withheld_share(scene: Scene, stroke: Stroke, dynamics: Dynamics) -> float:
+    """Return Σ|F_a - F_b| / Σ|F_a| along a stroke that is imposed on the position, from rest; 0 without a force.
+
+    The stroke is centred on the device's origin, and the loop is that of a device of these ``dynamics``.
+    F_a is the force after slope limit and norm clamp, F_b what passivity controller and slew limit leave of it.
+    """
+    t_s = np.arange(round(LASTS_S * scene.rate_hz)) / scene.rate_hz
+    along_m = scene.scale * stroke.amplitude_m * np.cos(2.0 * math.pi * stroke.frequency_hz * t_s)
+    still = np.zeros_like(t_s)
+    position_m = np.add(scene.origin_m, np.column_stack((along_m, still, still)))
+    samples = samples_along(scene, Motion(t_s, position_m), dynamics)
+    permitted_n = float(samples["permitted_n"].sum())
+    return float(samples["withheld_n"].sum()) / permitted_n if permitted_n > 0.0 else 0.0

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from study_app.evaluation.appraisal import Costs, Errors
-from study_app.evaluation.fastest import withheld_share
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.trials.tasks.stroke import Stroke
@@ -44,11 +43,11 @@ def appraise(question: Question, send: Send, stop: Stop) -> Errors | None:
     """
     if stop():
         return None
-    from study_app.evaluation.appraisal_measurement import costs, errors  # noqa: PLC0415 - the compiler: only in that process
+    from study_app.evaluation import appraisal_measurement as measured  # noqa: PLC0415 - the compiler: only in that process
 
-    send(costs(question.scene))
+    send(measured.costs(question.scene))
     if stop():
         return None
     stroke = question.stroke
-    share = withheld_share(question.scene, stroke, question.dynamics) if stroke is not None else None
-    return replace(errors(question.scene), withheld=share)
+    share = measured.withheld_share(question.scene, stroke, question.dynamics) if stroke is not None else None
+    return replace(measured.errors(question.scene), withheld=share)

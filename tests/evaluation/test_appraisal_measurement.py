@@ -15,8 +15,8 @@ if numba.config.DISABLE_JIT:
 from study_app.errors import StudyError
 from study_app.evaluation import appraisal_measurement
 from study_app.evaluation.appraisal import Costs
+from study_app.evaluation.appraisal_measurement import withheld_share
 from study_app.evaluation.appraisal_worker import Question, appraise, start_appraisal_worker
-from study_app.evaluation.fastest import withheld_share
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.liquid import Box
 from study_app.haptics.model.motion import Motion

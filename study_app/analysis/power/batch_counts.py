@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
+from functools import partial
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -135,3 +137,20 @@ def _family(block: Planned, decided: Decided, ps: Array, places: Sequence[int]) 
     if not primary.all():
         found[:, ~primary] = permutation_tests.false_discovery(ps[:, ~primary], decided.alpha)
     return found
+
+
+def sweep(
+    plan: Plan, sizes: Sequence[int], studies: int, seed: int, executor: Executor
+) -> Iterator[tuple[int, Counts]]:
+    """Yield after every batch how many studies of each size were simulated so far, and what was counted in them all.
+
+    Every batch draws from a stream of its own, so the counts do not depend on the executor.
+    """
+    starts = range(0, studies, BATCH)
+    sizes_of_batches = [min(BATCH, studies - first) for first in starts]
+    counted = executor.map(partial(count, plan, tuple(sizes), seed), range(len(starts)), sizes_of_batches)
+    done, total = 0, Counts()
+    for many, numbers in zip(sizes_of_batches, counted, strict=True):
+        done += many
+        total = {what: total.get(what, 0) + number for what, number in numbers.items()}
+        yield done, total

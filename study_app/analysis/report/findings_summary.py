@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from study_app.analysis.figures.levels.level_figure import level_words, with_unit
 from study_app.analysis.findings import all_findings
-from study_app.analysis.report.answers.level_findings import level_findings
 from study_app.analysis.report.answers.level_limits import level_limits
 from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.results.item_test import Tested
-from study_app.analysis.results.words import counted, lead, listed, missing, name, short
+from study_app.analysis.results.level_results import ExponentFound, LevelsFound, ThresholdFound
+from study_app.analysis.results.words import counted, lead, listed, missing, name, number, short
 from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.tables.study_tables import Study
 
@@ -122,3 +123,33 @@ def _mixed_up(found: BlockFound, results: Results) -> Iterator[str]:
                     f"{lead(found)}: {name(found, code)} came at place {place} for everybody, so that what it did "
                     "cannot be distinguished from the effect of that place."
                 )
+
+
+def level_findings(found: LevelsFound) -> Iterator[str]:
+    """Yield the findings of a block with n and interval; none while the key is sealed."""
+    for one in found.thresholds:
+        if one.participant is None:
+            where = "" if one.standard is None else f", standard {with_unit(found, one.standard)}"
+            percent = "" if found.guess_rate is None else f" at {50 * (1 + found.guess_rate):.3g} % {found.counts}"
+            if one.compared is not None:
+                percent += f", {one.compared:.3g} at {found.compared_percent:g} %"
+            yield (
+                f"{found.title}{where}: threshold {one.threshold:.3g}{percent} ({level_words(found)}; "
+                f"{_interval(one, 3)}; {counted(one.n, 'participant')})."
+            )
+    for exponent in found.exponents:
+        if exponent.participant is None:
+            meaning = "; 1 is Weber’s law, 0 a constant JND" if found.thresholds else f" over {found.quantity}"
+            yield (
+                f"{found.title}: {found.exponent_name} {number(exponent.exponent)} ({_interval(exponent)}; "
+                f"{counted(exponent.n, 'participant')}){meaning}."
+            )
+    if (found.thresholds or found.exponents) and found.published:
+        yield f"{found.title}: published values: {'; '.join(one.in_words() for one in found.published)}."
+
+
+def _interval(one: ThresholdFound | ExponentFound, digits: int | None = None) -> str:
+    if one.low is None or one.high is None:
+        return "no interval"
+    low, high = (number(end) if digits is None else f"{end:.{digits}g}" for end in (one.low, one.high))
+    return f"95 % interval {low} to {high}"

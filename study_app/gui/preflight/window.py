@@ -7,15 +7,15 @@ from PySide6.QtGui import QAccessible, QCloseEvent, QKeyEvent
 from PySide6.QtWidgets import QAbstractSlider, QGridLayout, QLabel, QWidget
 
 from study_app.gui.preflight.check_rows import CheckRow
-from study_app.gui.preflight.masking_question import MaskingQuestion
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.theme.themed import apply_theme, apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import describe_plot, give_role
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Rule, scrolled
-from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.controls import ActionButton, Choice, Number
 from study_app.gui.widgets.labels import figures, label
 from study_app.gui.widgets.live_plots import LatenessPlot
+from study_app.session.masking import LOUDEST_DB, MEANS, QUIETEST_DB, USUAL_DB, Masking
 from study_app.viewmodels.preflight import WAITING, PreflightView, histogram
 
 FULL, LEAST = QSize(1200, 800), QSize(1024, 640)
@@ -178,3 +178,29 @@ class PreflightWindow(QWidget):
         if not self._done:
             self._done = True
             self.cancelled.emit()
+
+
+class MaskingQuestion(QWidget):
+    """A choice, and for noise its level in dB."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.means = Choice()
+        self.means.setAccessibleName("Motors masked?")
+        for means, words in MEANS.items():
+            self.means.addItem(words, means)
+        self.noise_db = Number(QUIETEST_DB, LOUDEST_DB, USUAL_DB)
+        self.noise_db.setAccessibleName("Level of the noise in dB")
+        self.noise_db.setSuffix(" dB")
+        self.noise_db.setVisible(False)
+        self.means.currentIndexChanged.connect(lambda: self.noise_db.setVisible(self._is_noise))
+        row = hbox((self.means, 1), self.noise_db)
+        vbox(label("Motors masked?", "label", "text2"), row, margins=0, parent=self)
+
+    @property
+    def _is_noise(self) -> bool:
+        return bool(self.means.currentData() == "noise")
+
+    def answer(self) -> Masking:
+        """Return what was chosen."""
+        return Masking(self.means.currentData(), self.noise_db.value() if self._is_noise else None)

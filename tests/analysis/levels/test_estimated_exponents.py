@@ -17,8 +17,8 @@ from study_app.analysis.designs.estimated_exponents import estimate_slope, estim
 from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.export.export import export
 from study_app.analysis.report.answers import level_section
-from study_app.analysis.report.answers.level_findings import level_findings
 from study_app.analysis.report.answers.level_methods import level_methods
+from study_app.analysis.report.findings_summary import level_findings
 from study_app.analysis.report.write_report import report
 from study_app.analysis.tables.study_tables import load_study
 from study_app.analysis.tables.tracks import tracks

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from study_app.analysis.designs.level_summaries import levels_found
-from study_app.analysis.report.answers.level_findings import level_findings
 from study_app.analysis.report.answers.level_limits import level_limits
 from study_app.analysis.report.answers.level_methods import level_methods
 from study_app.analysis.report.answers.threshold_section import section
+from study_app.analysis.report.findings_summary import level_findings
 from study_app.analysis.results.level_results import (
     ExponentFound,
     LevelAnswers,

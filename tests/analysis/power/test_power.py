@@ -18,12 +18,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.power import power_sweep
-from study_app.analysis.power.batch_counts import BATCH, EFFECTS, FULL, Counts, count
+from study_app.analysis.power import batch_counts
+from study_app.analysis.power.batch_counts import BATCH, EFFECTS, FULL, Counts, count, sweep
 from study_app.analysis.power.plan import Plan, plan
 from study_app.analysis.power.power_curves import Curve, Powers, interval, powers
 from study_app.analysis.power.power_files import write
-from study_app.analysis.power.power_sweep import sweep
 from study_app.analysis.power.power_tables import COLUMNS, power_csv, power_markdown
 from study_app.analysis.power.simulated_studies import people
 from study_app.analysis.statistics.trend import step_down
@@ -319,7 +318,7 @@ def test_the_command_ended_by_the_user_writes_what_it_has(
         yield counted
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(power_sweep, "sweep", until)
+    monkeypatch.setattr(batch_counts, "sweep", until)
     monkeypatch.setattr(
         "study_app.session.simulated.trial_features.condition_features", lambda protocol, **_: felt_in(protocol)
     )
@@ -336,7 +335,7 @@ def test_an_interrupt_ends_the_workers_too() -> None:
     program = textwrap.dedent(
         """
         import signal
-        from study_app.analysis.power.power_sweep import sweep
+        from study_app.analysis.power.batch_counts import sweep
         from study_app.workers.executors import Workers, open_executor
         from tests.analysis.power.test_power import planned
         if __name__ == "__main__":

@@ -37,8 +37,7 @@ from study_app.validation.report_rates.known_effects import (
     answers,
     simulated,
 )
-from study_app.validation.report_rates.rate_tables import markdown, table
-from study_app.validation.report_rates.rates import Limit, Rate
+from study_app.validation.report_rates.rates import Limit, Rate, markdown, table
 from study_app.validation.report_rates.simulation import validate
 from study_app.validation.report_rates.study_rates import CLAIMED, LOST, Cell, count, truth
 from study_app.workers.executors import Workers, open_executor
