@@ -203,11 +203,12 @@ class DesignerHeader(QWidget):
         if source == NEW:
             self.new_asked.emit()
         elif source == OPEN:
-            self._open_file()
+            self.open_file()
         elif source != self.state.chosen:
             self.study_asked.emit(source)
 
-    def _open_file(self) -> None:
+    def open_file(self) -> None:
+        """Ask for a file and open it."""
         chosen, _ = QFileDialog.getOpenFileName(self, "Open study", "", "Protocols (*.toml)")
         if chosen:
             self.study_asked.emit(chosen)

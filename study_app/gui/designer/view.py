@@ -24,11 +24,10 @@ from study_app.gui.designer.problem_steps import ProblemSteps
 from study_app.gui.designer.problems import ProblemsCard
 from study_app.gui.designer.prompts import DeleteCard, Prompt
 from study_app.gui.designer.selected_elements import SelectedElements
-from study_app.gui.designer.shortcuts import make_shortcuts
 from study_app.gui.designer.tab_order import go_on
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
-from study_app.gui.widgets.main_view import Place
+from study_app.gui.widgets.main_view import Place, make_shortcuts
 from study_app.viewmodels.designer.addable import Addable
 from study_app.viewmodels.designer.designer_view import DesignerView, HeaderState
 from study_app.viewmodels.designer.keys import tip
@@ -177,7 +176,7 @@ class DesignerPlace(Place):
                 "rename": self._rename,
                 "up": lambda: self.elements.move_by(-1), "down": lambda: self.elements.move_by(1),
                 "new": lambda: None if self.stack.currentIndex() else self._ask(self.new_asked),
-                "save": save, "undo": undo, "redo": redo, "keys": self.keys.switch,
+                "open": self.header.open_file, "save": save, "undo": undo, "redo": redo, "keys": self.keys.switch,
             },
         )  # fmt: skip
 

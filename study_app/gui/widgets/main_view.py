@@ -1,11 +1,15 @@
-"""What a place of the main window is: a part that fills it, entered and left."""
+"""What a place of the main window is: a part that fills it, entered and left, with shortcuts of its own."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import Signal
+from collections.abc import Callable, Mapping
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.theme.themed import Themed
+from study_app.viewmodels.designer.keys import keys_of
 
 
 class Place(Themed, QWidget):
@@ -32,3 +36,12 @@ def last_focused(part: QWidget) -> QWidget | None:
     """Return what in a part had the keyboard last, if it is shown and enabled."""
     last = part.focusWidget()
     return last if last not in {None, part} and last.isVisible() and last.isEnabled() else None
+
+
+def make_shortcuts(place: QWidget, acts: Mapping[str, Callable[[], object]]) -> None:
+    """Let the keys of actions act anywhere in the window while the place is shown."""
+    for action, act in acts.items():
+        for keys in keys_of(action):
+            made = QShortcut(QKeySequence(keys), place)
+            made.setContext(Qt.ShortcutContext.WindowShortcut)
+            made.activated.connect(act)

@@ -60,6 +60,7 @@ KEYS: Final = (
     Keys("paste", "Paste", ("Ctrl+V",), 1, LISTS),
     Keys("several", "Select several", ("Shift+Up", "Shift+Down"), 1, LISTS),
     Keys("new", "New study …", ("Ctrl+N",), 2),
+    Keys("open", "Open file …", ("Ctrl+O",), 2),
     Keys("save", "Save", ("Ctrl+S",), 2),
     Keys("undo", "Undo", ("Ctrl+Z",), 2),
     Keys("redo", "Redo", ("Ctrl+Shift+Z", "Ctrl+Y"), 2),

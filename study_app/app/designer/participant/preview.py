@@ -26,9 +26,9 @@ from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.outline import title_of
 from study_app.gui.designer.pane.right_pane import PanePage
 from study_app.gui.designer.participant.participant_tab import ParticipantTab
-from study_app.gui.designer.shortcuts import make_shortcuts
 from study_app.gui.designer.view import DesignerPlace
 from study_app.gui.display.screens import choose_screens
+from study_app.gui.widgets.main_view import make_shortcuts
 from study_app.protocol.forms.show_if import Value
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial
