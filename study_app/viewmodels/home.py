@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from functools import lru_cache, partial
 from pathlib import Path
+from typing import Final
 
 from study_app.authoring.drafts import draft_files, draft_of, unsaved_files
-from study_app.authoring.edited_study import read
-from study_app.authoring.outline import study_title
+from study_app.authoring.edited_study import Study
+from study_app.authoring.fields import label_of
+from study_app.authoring.kept_settings import kept_original
+from study_app.authoring.outline import study_title, title_of
+from study_app.authoring.versions.changes import changes
 from study_app.errors import ProtocolError, StudyError
 from study_app.protocol.load import at_hand, is_scene_file, load, parse
 from study_app.protocol.model import Protocol
@@ -26,17 +31,29 @@ from study_app.store.journals import journal
 from study_app.store.progress import progress_of
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.workstation import recent_protocols
+from study_app.viewmodels.designer.problem_rows import element_of
 from study_app.viewmodels.extent import counted_each, extent_of
 from study_app.viewmodels.session.stages import operator_language, step_title
 from study_app.viewmodels.sessions import SessionFacts, counted, started_words
 from study_app.workspace import workspace
+
+NAMED_AT_MOST: Final = 3
+"""So many elements with edits that were not saved are named."""
+
+
+@dataclass(frozen=True, slots=True)
+class DraftNote:
+    """What is said of a draft that was not saved, and when it was kept, as ISO 8601."""
+
+    words: str
+    kept_at: str
 
 
 @dataclass(frozen=True, slots=True)
 class StudyFacts:
     """A protocol as a card shows it; ``source`` is the name or path it is loaded by.
 
-    ``draft`` says that there is a draft of it that was not saved, "" where there is none.
+    ``origin`` says where it is from ("Shipped study", "Copy of demo"), ``draft`` what of it was not saved, if anything.
     """
 
     source: str
@@ -47,7 +64,8 @@ class StudyFacts:
     extent: str
     duration: str
     needs: str
-    draft: str = ""
+    origin: str
+    draft: DraftNote | None = None
 
     @property
     def name(self) -> str:
@@ -62,25 +80,27 @@ class StudyFacts:
 
 @dataclass(frozen=True, slots=True)
 class BrokenFacts:
-    """A protocol file that cannot be used, and the first thing wrong with it; ``draft`` as of `StudyFacts`."""
+    """A protocol file that cannot be used, and the first thing wrong with it; the rest as of `StudyFacts`."""
 
     source: str
     problem: str
-    draft: str = ""
+    origin: str
+    draft: DraftNote | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class DraftFacts:
-    """A study that was never saved: the path of its file, its title, and what is said of its draft."""
+    """A study that was never saved: the path of its file, its title, and the rest as of `StudyFacts`."""
 
     source: str
     title: str
-    draft: str
+    origin: str
+    draft: DraftNote
 
 
 def sources() -> tuple[str, ...]:
-    """Return the studies at hand: recent files, then names in the workspace and of those that ship; no liquid files."""
-    names = sorted(at_hand(), key=lambda name: (name != "rek2024", name == "demo", name))
+    """Return the studies at hand: recent files, then names in the workspace, then those that ship; no liquid files."""
+    names = sorted(at_hand(), key=lambda name: (is_shipped(name), name != "rek2024", name == "demo", name))
     found = dict.fromkeys((*recent_protocols(), *names))
     return tuple(source for source in found if not holds_liquids_alone(source))
 
@@ -99,15 +119,19 @@ def file_states(opened: Iterable[str]) -> frozenset[tuple[Path, int, int]]:
 
 
 def read_studies(opened: Iterable[str]) -> tuple[StudyFacts | BrokenFacts | DraftFacts, ...]:
-    """Return what is said of each study at hand, ``opened`` ones first, those that were never saved last."""
-    found = [study_facts(source) for source in dict.fromkeys((*opened, *sources()))]
-    return (*found, *(_of_draft(file) for file in unsaved_files(workspace().protocols)))
+    """Return what is said of each study at hand: drafts first, the newest first of all, then ``opened`` ones."""
+    drafts = (_of_draft(file) for file in unsaved_files(workspace().protocols))
+    found = (*filter(None, drafts), *(study_facts(source) for source in dict.fromkeys((*opened, *sources()))))
+    return tuple(sorted(found, key=lambda it: 0.0 if it.draft is None else -_seconds(it.draft.kept_at)))
 
 
-def _of_draft(file: Path) -> DraftFacts:
+def _of_draft(file: Path) -> DraftFacts | None:
     draft = draft_of(file)
-    title = "" if draft is None else study_title(read(draft.text.encode(), file.parent).document)
-    return DraftFacts(str(file), title or file.stem, draft_words(file))
+    if draft is None:  # it was saved meanwhile
+        return None
+    title = study_title(Study(draft.text, file.parent).document)
+    note = DraftNote(f"Draft of {time_words(draft.kept_at)}, never saved", draft.kept_at)
+    return DraftFacts(str(file), title or file.stem, origin_of(str(file)), note)
 
 
 def holds_liquids_alone(source: str) -> bool:
@@ -136,6 +160,17 @@ def is_shipped(source: str) -> bool:
         return False
 
 
+def origin_of(source: str) -> str:
+    """Return where a study is from: "Shipped study", "Copy of demo" or "Own study"."""
+    if is_shipped(source):
+        return "Shipped study"
+    with suppress(ProtocolError):
+        file = Path(source) if Path(source).suffix == ".toml" else find(source)
+        if original := kept_original(file):
+            return f"Copy of {original}"
+    return "Own study"
+
+
 def study_facts(source: str) -> StudyFacts | BrokenFacts:
     """Load the protocol ``source`` and say what a researcher chooses by."""
     try:
@@ -143,7 +178,7 @@ def study_facts(source: str) -> StudyFacts | BrokenFacts:
     except ProtocolError as error:
         count = len(error.problems)
         others = f". Open it in the designer to see all {count} problems." if count > 1 else ""
-        return BrokenFacts(source, f"{error.problems[0]}{others}", _draft_words_of(source))
+        return BrokenFacts(source, f"{error.problems[0]}{others}", origin_of(source), _draft_note(source))
     language = operator_language(protocol)
     extent = extent_of(protocol)
     return StudyFacts(
@@ -161,34 +196,51 @@ def study_facts(source: str) -> StudyFacts | BrokenFacts:
         ),
         duration=f"about {extent.minutes}",
         needs=f"Haptic device or mouse; at most {protocol.device.force_limit_n:g} N",
-        draft=_draft_words_of(source),
+        origin=origin_of(source),
+        draft=_draft_note(source),
     )
 
 
-def draft_words(file: Path) -> str:
-    """Return what is said of a draft that was not saved: "Draft of today 14:02, not saved"; "" where there is none."""
-    draft = draft_of(file)
+def _draft_note(source: str) -> DraftNote | None:
+    """Return what is said of a draft: "Draft of today 14:02, not saved: Water"; None where all of it is saved."""
+    with suppress(ProtocolError, OSError):
+        file = find(source)
+        draft, content = None if is_shipped(source) else draft_of(file), file.read_bytes()
+        if draft is not None and draft.text.encode() != content:
+            edited = _edited(content.decode("utf-8", "replace"), Study(draft.text, file.parent))
+            return DraftNote(f"Draft of {time_words(draft.kept_at)}, not saved{edited}", draft.kept_at)
+    return None
+
+
+def _edited(saved: str, study: Study) -> str:
+    """Return the elements in which a study differs from its file, in words: ": Water, Welcome and 2 more"."""
     try:
-        saved = draft is None or draft.text.encode() == file.read_bytes()
-    except OSError:
-        saved = False
-    return "" if draft is None or saved else f"Draft of {time_words(draft.kept_at)}, not saved"
-
-
-def _draft_words_of(source: str) -> str:
-    with suppress(ProtocolError):
-        return "" if is_shipped(source) else draft_words(find(source))
-    return ""
+        found = changes(saved, study)
+    except ValueError:  # the text of one of them is not TOML
+        return ""
+    places = (one.path for one in found if one.path)
+    titles = dict.fromkeys(
+        label_of(path[1]) if path[0] == "study" and len(path) > 1 else title_of(study.document, element_of(study, path))
+        for path in places
+    )
+    named, more = list(titles)[:NAMED_AT_MOST], len(titles) - NAMED_AT_MOST
+    return f": {', '.join(named) or 'comments, order or notation'}{f' and {more} more' if more > 0 else ''}"
 
 
 def time_words(moment: str) -> str:
     """Return when a draft was kept: "today 14:02", "2026-11-20 14:02"."""
-    try:
-        kept = datetime.fromisoformat(moment).astimezone()
-    except ValueError:
+    if not (seconds := _seconds(moment)):
         return "an unknown time"
-    today = kept.date() == datetime.now().astimezone().date()
-    return f"today {kept:%H:%M}" if today else f"{kept:%Y-%m-%d %H:%M}"
+    kept, now = (datetime.fromtimestamp(at).astimezone() for at in (seconds, time.time()))
+    return f"today {kept:%H:%M}" if kept.date() == now.date() else f"{kept:%Y-%m-%d %H:%M}"
+
+
+def _seconds(moment: str) -> float:
+    """Return a moment as seconds since 1970; 0 where it cannot be read."""
+    try:
+        return datetime.fromisoformat(moment).timestamp()
+    except ValueError:
+        return 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,10 +309,12 @@ def place_words(protocol: Protocol, schedule: Schedule, step: int) -> str:
 
 
 def held(found: Iterable[SessionFacts], study: str) -> str:
-    """Return how many sessions of a study there are: "4 sessions, 3 complete, 1 excluded"."""
-    own = [session for session in found if session.study == study and not session.simulated and not session.pilot]
-    if not own:
-        return "no participant yet"
+    """Return how many sessions of a study there are: "4 sessions, 3 complete, 1 excluded, 2 pilots"."""
+    of_study = [session for session in found if session.study == study]
+    own = [session for session in of_study if not session.kind]
+    pilots = sum(session.kind == "pilot" for session in of_study)
     complete = sum(session.status == "completed" for session in own)
     excluded = sum(session.excluded is not None for session in own)
-    return f"{counted(len(own), 'session')}, {complete} complete" + (f", {excluded} excluded" if excluded else "")
+    words = [f"{counted(len(own), 'session')}, {complete} complete" if own else "no participant yet"]
+    words += [f"{excluded} excluded"] * bool(excluded) + [counted(pilots, "pilot")] * bool(pilots)
+    return ", ".join(words)

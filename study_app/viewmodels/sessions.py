@@ -21,7 +21,8 @@ from study_app.store.tables.participants import participants_at_once
 
 Kind: TypeAlias = Literal["", "pilot", "simulated", "sample"]
 KINDS: dict[Kind, str] = {"": "Participants", "pilot": "Pilot", "simulated": "Simulated", "sample": "Sample"}
-"""What sessions are, with the words for a filter; simulated are rehearsals and sessions on simulated devices."""
+"""What sessions are, with the words for a filter; simulated are rehearsals and sessions on simulated devices, but no
+pilots."""
 SAMPLE = "sample-"
 
 
@@ -60,11 +61,14 @@ class SessionFacts:
     def kind(self) -> Kind:
         """What it is where it is not a participant's: "sample", "simulated", "pilot", else nothing.
 
-        Samples are the simulated sessions that ship with the program, in a folder whose name begins with "sample-".
+        Samples are the simulated sessions that ship with the program, in a folder whose name begins with "sample-". A
+        pilot stays one where its first steps or its device were simulated.
         """
-        if self.simulated:
-            return "sample" if self.folder.parents[2].name.startswith(SAMPLE) else "simulated"
-        return "pilot" if self.pilot else ""
+        if self.simulated and self.folder.parents[2].name.startswith(SAMPLE):
+            return "sample"
+        if self.pilot:
+            return "pilot"
+        return "simulated" if self.simulated else ""
 
     @property
     def needs_care(self) -> bool:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
 import pytest
 
+from study_app.authoring.drafts import Draft, draft_files, keep
+from study_app.authoring.kept_settings import begin_settings
 from study_app.errors import ProtocolError
 from study_app.protocol.load import load, source_bytes
 from study_app.protocol.orders.schedule import PageStep, build_schedule
@@ -21,6 +24,7 @@ from study_app.viewmodels.home import (
     held,
     holds_liquids_alone,
     interrupted,
+    read_studies,
     sources,
     study_facts,
 )
@@ -32,7 +36,7 @@ from tests.protocol.groups.grouped import GROUPS, STUDY
 pytestmark = pytest.mark.slow
 
 
-def start(results, participant, status=None, *, simulated=False):
+def start(results, participant, status=None, *, simulated=False, pilot=False):
     protocol = load("demo")
     store = begin(
         results / "demo",
@@ -46,6 +50,7 @@ def start(results, participant, status=None, *, simulated=False):
             device={"name": "scripted"},
             screens={},
             simulated=simulated,
+            pilot=pilot,
         ),
     )
     if status is None:
@@ -225,6 +230,14 @@ def test_simulated_sessions_are_not_counted_as_held(tmp_path):
     assert found[0].simulated
 
 
+@pytest.mark.parametrize("simulated", [False, True])
+def test_a_pilot_counts_as_one_also_where_its_first_steps_were_simulated(tmp_path, simulated):
+    start(tmp_path, "P001", "completed", simulated=simulated, pilot=True)
+    (found,) = sessions(tmp_path, {})
+    assert found.kind == "pilot"
+    assert held([found], "demo") == "no participant yet, 1 pilot"
+
+
 def test_held_sessions_are_counted_with_their_ends(tmp_path):
     start(tmp_path, "P001", "completed")
     start(tmp_path, "P002")
@@ -272,6 +285,32 @@ def test_a_session_whose_journal_tells_nothing_is_still_listed(tmp_path):
     found = sessions(tmp_path, {})
     assert [(one.participant, one.status) for one in found] == [("P001", "damaged"), ("P002", "completed")]
     assert found[0].answers == 0
+
+
+def test_drafts_come_first_the_newest_of_all_and_a_copy_names_its_original(tmp_path, monkeypatch):
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    protocols = tmp_path / "protocols"
+    protocols.mkdir()
+    text = source_bytes("demo").decode()
+    for number, name in enumerate(("saved", "older", "newer", "broken")):
+        file, own = protocols / f"{name}.toml", text.replace('name = "demo"', f'name = "{name}"')
+        file.write_text(own if name != "broken" else own.replace("format = ", "form = "), encoding="utf-8")
+        keep(file, Draft(own.replace("force_limit_n = 6", "force_limit_n = 5") if number else own, ""))
+    keep(protocols / "fresh.toml", Draft('[study]\ntitle = "Fresh"\n', ""))
+    for name, at in (("older", "2026-11-20T08:00:00+01:00"), ("newer", "2026-11-20T08:30:00+00:00")):
+        (kept,) = (file for file in draft_files() if f"{name}.toml" in file.read_text(encoding="utf-8"))
+        kept.write_text(json.dumps(json.loads(kept.read_bytes()) | {"kept_at": at}), encoding="utf-8")
+    begin_settings(protocols / "older.toml", "demo")
+    found = read_studies(())
+    assert [(Path(it.source).stem, it.origin) for it in found[2:5]] == [
+        ("newer", "Own study"),
+        ("older", "Copy of demo"),
+        ("saved", "Own study"),
+    ]
+    assert {Path(it.source).stem for it in found[:2]} == {"fresh", "broken"}
+    assert found[3].draft.words.endswith(", not saved: Device")
+    assert [it.draft for it in found[4:]] == [None] * len(found[4:])
+    assert {it.origin for it in found[5:]} == {"Shipped study"}
 
 
 def test_the_extent_of_a_study_with_groups_is_a_range(tmp_path):

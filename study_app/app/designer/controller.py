@@ -27,7 +27,7 @@ from study_app.app.designer.versions.known_runs import KnownRuns
 from study_app.app.designer.versions.renaming import Renaming
 from study_app.authoring.drafts import draft_of
 from study_app.authoring.edited_study import read
-from study_app.authoring.kept_settings import forget_settings
+from study_app.authoring.kept_settings import begin_settings
 from study_app.authoring.names import renamed
 from study_app.authoring.new_study import NO_ANSWERS, Answers, answered, template
 from study_app.authoring.study_facts import facts
@@ -143,16 +143,16 @@ class DesignerController(QObject):
         """Begin a study under a name, as a copy of a template ("template:NAME") or of another study."""
         try:
             if source.startswith("template:"):
-                study = template(source.removeprefix("template:"))
+                study, copy_of = template(source.removeprefix("template:")), ""
             else:
                 file = find(source)
-                study = read(file.read_bytes(), file.parent)
+                study, copy_of = read(file.read_bytes(), file.parent), file.stem
             opened = open_new(answered(study, answers), name)
         except StudyError as error:
             self.place.refuse_new(f"{error}.")
             return
         self.saving.leave()
-        forget_settings(opened.file)
+        begin_settings(opened.file, copy_of)
         opened.note_edit(0.0)
         self._take(opened)
         self.saving.leave()

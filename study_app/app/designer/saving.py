@@ -14,7 +14,7 @@ from study_app.app.designer.open_study import OpenStudy, why_read_only
 from study_app.app.designer.versions.comparison import Comparison, compare, newest, version_of
 from study_app.app.designer.versions.file_watch import FileWatch
 from study_app.app.designer.versions.known_runs import KnownRuns
-from study_app.authoring.kept_settings import forget_settings
+from study_app.authoring.kept_settings import begin_settings
 from study_app.authoring.versions.contents import ChangedOutsideError, kept_versions
 from study_app.authoring.versions.runs import Standing, check_version
 from study_app.authoring.writer.refused import Refused
@@ -178,7 +178,7 @@ class Saving(QObject):
             return
         self.write_draft(at_once=True)
         self.place.close_prompt()
-        forget_settings(made.file)
+        begin_settings(made.file, opened.file.stem)
         self.continued.emit(made)
         self._write(made)
 

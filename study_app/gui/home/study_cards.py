@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TypeAlias
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import remove_widget
@@ -16,43 +17,82 @@ from study_app.viewmodels.home import BrokenFacts, DraftFacts, StudyFacts
 
 LEAST_WIDTH = 330
 GAP = 18
-LEAST_HEIGHT = 252
-ABOUT_LINES = 3
+TITLE_LINES, ABOUT_LINES = 2, 2
+Facts: TypeAlias = StudyFacts | BrokenFacts | DraftFacts
 
 
-class EditButton(IconButton):
-    """The pen of a card: edits a study, or makes a copy of one that ships with the program."""
+class FileCard(Card):
+    """A study: its title, where it is from, and its draft where one was not saved; ``edit`` carries its facts.
 
-    def __init__(self, title: str, *, shipped: bool = False) -> None:
-        word = "Make a copy" if shipped else "Edit"
-        super().__init__("copy" if shipped else "pen", f"{word} of {title}" if shipped else f"{word} {title}", word,
-                         size=36, role="plain")  # fmt: skip
+    Parameters
+    ----------
+    facts
+        What is said of it.
+    title
+        What it is called; of two lines at most.
+    copies
+        Whether it is not edited but copied.
+    first
+        Whether its draft is the one that was edited last.
+    sign
+        An icon before the title, "" for none.
+    """
+
+    edit = Signal(object)
+
+    def __init__(self, facts: Facts, title: str, *, copies: bool = False, first: bool = False, sign: str = "") -> None:
+        super().__init__(padding=20, gap=8)
+        self.facts = facts
+        self.title = Clamped(title, TITLE_LINES, "card", steady=False)
+        self.title.setFont(font("card", scale=1.12))
+        head = QHBoxLayout()
+        head.setSpacing(8)
+        if sign:
+            head.addWidget(Icon(sign, "warn", 20), 0, Qt.AlignmentFlag.AlignTop)
+        head.addWidget(self.title, 1)
+        self.origin = Elided("small", "text2")
+        self.origin.show_text(f"{facts.origin}  ·  {Path(facts.source).stem}.toml")
+        names = QVBoxLayout()
+        names.setSpacing(2)
+        names.addLayout(head)
+        names.addWidget(self.origin)
+        top = QHBoxLayout()
+        top.addLayout(names, 1)
+        self.column.addLayout(top)
+        self.draft = label("" if facts.draft is None else f"{facts.draft.words}.", "small", "warn", wraps=True)
+        self.pen: ActionButton | IconButton
+        if facts.draft is None:
+            word, name = ("Make a copy", f"Make a copy of {title}") if copies else ("Edit", f"Edit {title}")
+            self.pen = IconButton("copy" if copies else "pen", name, word, size=36, role="plain")
+            top.addWidget(self.pen, 0, Qt.AlignmentFlag.AlignTop)
+            self.draft.hide()
+        else:
+            self.pen = ActionButton("pen", "Continue", role="primary" if first else "", height=38)
+            self.pen.setAccessibleName(f"Continue {title}, {Path(facts.source).stem}")
+            row = QHBoxLayout()
+            row.setSpacing(12)
+            row.addWidget(self.draft, 1, Qt.AlignmentFlag.AlignTop)
+            row.addWidget(self.pen, 0, Qt.AlignmentFlag.AlignTop)
+            self.column.addLayout(row)
+        self.pen.clicked.connect(lambda: self.edit.emit(facts))
 
 
-class StudyCard(Card):
-    """One protocol; ``new_session``, ``rehearsal`` and ``edit`` carry its facts.
+class StudyCard(FileCard):
+    """A study that can be run; ``new_session`` and ``rehearsal`` carry its facts.
 
-    ``shipped`` says that it ships with the program: it is not edited but copied.
+    ``shipped`` says that it ships with the program, ``first`` that it is what one most likely goes on with.
     """
 
     new_session = Signal(object)
     rehearsal = Signal(object)
-    edit = Signal(object)
 
     def __init__(self, facts: StudyFacts, *, first: bool, shipped: bool = False) -> None:
-        super().__init__(padding=20, gap=8)
-        self.facts = facts
-        title = Elided("card")
-        title.setFont(font("card", scale=1.12))
-        title.show_text(facts.title)
-        self.pen = EditButton(facts.title, shipped=shipped)
-        self.pen.clicked.connect(lambda: self.edit.emit(facts))
-        head = QHBoxLayout()
-        head.addWidget(title, 1)
-        head.addWidget(self.pen)
-        self.column.addLayout(head)
-        self.draft = _say_draft(self, facts.draft)
-        self.column.addWidget(Clamped(facts.description or facts.title, ABOUT_LINES, "body", "text2"))
+        super().__init__(facts, facts.title, copies=shipped, first=first)
+        self.facts: StudyFacts = facts
+        if facts.draft is None:
+            self.column.addWidget(Clamped(facts.description or facts.title, ABOUT_LINES, "body", "text2"))
+        else:
+            self.draft.setText(f"{facts.draft.words}. Sessions use the saved file.")
         self.column.addStretch()
         time = f"{facts.duration}  ·  {facts.languages}"
         for icon, words in (("layers", facts.extent), ("clock", time), ("device", facts.needs)):
@@ -62,11 +102,8 @@ class StudyCard(Card):
             row.addWidget(label(words, "body"), 1)
             self.column.addLayout(row)
         self.held = label("", "label", "text2")
-        below = QHBoxLayout()
-        below.addWidget(self.held, 1)
-        below.addWidget(label(facts.file_name, "label", "text2"))
-        self.column.addLayout(below)
-        self.new = ActionButton("plus", "New session", role="primary" if first else "")
+        self.column.addWidget(self.held)
+        self.new = ActionButton("plus", "New session", role="primary" if first and facts.draft is None else "")
         self.rehearse = ActionButton("fast_forward", "Rehearse")
         self.new.setAccessibleName(f"New session of {facts.title}, {facts.file_name}")
         self.rehearse.setAccessibleName(f"Rehearse {facts.title}, {facts.file_name}")
@@ -77,48 +114,22 @@ class StudyCard(Card):
         buttons.addWidget(self.new, 1)
         buttons.addWidget(self.rehearse, 1)
         self.column.addLayout(buttons)
-        self.setMinimumHeight(LEAST_HEIGHT)
 
 
-class BrokenCard(Card):
-    """A protocol file that cannot be used, and why, or a study without a file; ``edit`` carries its facts."""
+class BrokenCard(FileCard):
+    """A protocol file that cannot be used, and why, or a study without a file."""
 
-    edit = Signal(object)
-
-    def __init__(self, facts: BrokenFacts | DraftFacts) -> None:
-        super().__init__(padding=22, gap=10)
-        self.facts = facts
-        title = Elided("card")
-        title.show_text(facts.source if isinstance(facts, BrokenFacts) else facts.title)
-        row = QHBoxLayout()
-        row.addWidget(Icon("warning", "warn", 20))
-        row.addWidget(title, 1)
-        self.pen = EditButton(facts.source)
-        self.pen.clicked.connect(lambda: self.edit.emit(facts))
-        row.addWidget(self.pen)
-        self.column.addLayout(row)
-        self.draft = _say_draft(self, facts.draft, of_draft=isinstance(facts, DraftFacts))
-        words = "This file cannot be used." if isinstance(facts, BrokenFacts) else "This study was never saved."
-        self.column.addWidget(label(words, "strong", "warn"))
-        said = label(_why(facts), "label", "text2", wraps=True)
+    def __init__(self, facts: BrokenFacts | DraftFacts, *, first: bool = False) -> None:
+        if isinstance(facts, DraftFacts):
+            super().__init__(facts, facts.title, first=first)
+            why = f"{Path(facts.source).name} is written when it is saved."
+        else:
+            super().__init__(facts, Path(facts.source).stem, first=first, sign="warning")
+            self.column.addWidget(label("This file cannot be used.", "strong", "warn"))
+            why = facts.problem
+        said = label(why, "label", "text2", wraps=True)
         said.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.column.addWidget(said, 1)
-        self.setMinimumHeight(LEAST_HEIGHT)
-
-
-def _say_draft(card: Card, words: str, *, of_draft: bool = False) -> QLabel:
-    """Add a line about the draft of a study, where there is one; everything else on a card is of the saved file."""
-    saved = words and f"{words}. This card shows the saved file."
-    made = label(words if of_draft else saved, "small", "warn", wraps=True)
-    card.column.addWidget(made)
-    made.setVisible(bool(words))
-    return made
-
-
-def _why(facts: BrokenFacts | DraftFacts) -> str:
-    if isinstance(facts, BrokenFacts):
-        return facts.problem
-    return f"{Path(facts.source).name} is written when it is saved."
 
 
 class CardGrid(QWidget):
@@ -131,7 +142,20 @@ class CardGrid(QWidget):
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setSpacing(GAP)
         self._across = 0
-        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+
+    @property
+    def row_height(self) -> int:
+        """The height of the first row of cards at the width that they have."""
+        wide = (self.width() + GAP) // self._across - GAP if self._across else 0
+        first = self.cards[: self._across]
+        return max((max(card.heightForWidth(wide), card.sizeHint().height()) for card in first), default=0)
+
+    @property
+    def whole_height(self) -> int:
+        """The height of all rows at the width that they have."""
+        grows = self._grid.hasHeightForWidth()
+        return self._grid.totalHeightForWidth(self.width()) if grows else self._grid.totalSizeHint().height()
 
     def show_cards(self, cards: list[QWidget]) -> None:
         """Show these cards in place of those before."""
@@ -143,6 +167,7 @@ class CardGrid(QWidget):
 
     def arrange(self, width: int) -> None:
         """Place the cards for a window that leaves them ``width``; a lone card does not stretch over it."""
+        self.setFixedWidth(width)
         least = max([LEAST_WIDTH, *(card.minimumSizeHint().width() for card in self.cards)])
         across = max(1, (width + GAP) // (least + GAP))
         if across == self._across:
@@ -152,6 +177,7 @@ class CardGrid(QWidget):
         self._across = across
         for index, card in enumerate(self.cards):
             self._grid.addWidget(card, index // across, index % across)
+            card.show()  # at once, or it has no height yet
         for column in range(min(across, max(2, len(self.cards)))):
             self._grid.setColumnStretch(column, 1)
         self._grid.activate()  # at once, or what is above keeps the room of the arrangement before

@@ -7,11 +7,10 @@ from datetime import datetime
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import TypeAlias
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QFileDialog, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QFileDialog, QHBoxLayout, QLayout, QVBoxLayout, QWidget
 
 from study_app.devices.registry import descriptor_of
 from study_app.errors import StudyError
@@ -22,20 +21,20 @@ from study_app.gui.home.rehearsal_dialog import RehearsalDialog
 from study_app.gui.home.resume_banner import ResumeBanner
 from study_app.gui.home.sessions_card import SessionsCard
 from study_app.gui.home.sidebar import DeviceCard, LabCard
-from study_app.gui.home.study_cards import BrokenCard, CardGrid, StudyCard
+from study_app.gui.home.study_cards import BrokenCard, CardGrid, Facts, StudyCard
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
-from study_app.gui.widgets.main_view import Place
+from study_app.gui.widgets.main_view import Place, make_shortcuts
 from study_app.session.request import resumed
 from study_app.store.workstation import DEFAULTS, MachineSettings
+from study_app.viewmodels.designer.keys import key_cap, with_key
 from study_app.viewmodels.devices.list_view import DeviceShown, looking
 from study_app.viewmodels.extent import extent_of
 from study_app.viewmodels.home import (
-    BrokenFacts,
     DraftFacts,
     Interrupted,
     StudyFacts,
@@ -49,9 +48,13 @@ from study_app.viewmodels.home import (
 from study_app.viewmodels.sessions import SessionFacts, sessions
 from study_app.workspace import workspace
 
-Facts: TypeAlias = StudyFacts | BrokenFacts | DraftFacts
 STACKED_BELOW = 1080
 COLUMN_PX = 326
+MARGIN, BAR_PX = 28, 12
+NEXT_ROW_PX = 52
+"""So much of the second row of cards is seen at least, which says that there is one."""
+CARDS_SHARE, BELOW_SHARE = 4, 3
+"""How the cards and the sessions share the height."""
 
 
 class HomePlace(Place):
@@ -92,11 +95,15 @@ class HomePlace(Place):
         self.sessions = SessionsCard()
         self.device = DeviceCard()
         self.lab = LabCard()
-        self.open_protocol = ActionButton("file", "Open protocol …")
-        self.new_study = ActionButton("plus", "New study …")
+        self.open_protocol = ActionButton("file", "Open protocol …", cap=key_cap("open"))
+        self.new_study = ActionButton("plus", "New study …", cap=key_cap("new"))
         self.folder = Elided("label", "text2")
         self.waiting = label("Reading studies …", "card", "text2")
+        for button, action in ((self.open_protocol, "open"), (self.new_study, "new")):
+            button.setToolTip(with_key(button.text(), action))
+            button.setAccessibleName(button.toolTip())
         self._lay_out()
+        make_shortcuts(self, {"open": self.open_protocol.click, "new": self.new_study.click})
         self.open_protocol.clicked.connect(self._open_protocol)
         self.new_study.clicked.connect(lambda: self.new_asked.emit(""))
         self.banner.resume_asked.connect(self._resume)
@@ -134,7 +141,7 @@ class HomePlace(Place):
         titles = QVBoxLayout()
         titles.setSpacing(4)
         titles.addWidget(label("Studies", "title"))
-        titles.addWidget(label("Choose a protocol to start a session, or resume an interrupted one.", "body", "text2"))
+        titles.addWidget(label("Start a session, or resume an interrupted one.", "body", "text2"))
         titles.addWidget(self.folder)
         head = QHBoxLayout()
         head.setContentsMargins(SHADOW, 0, SHADOW, 0)
@@ -153,21 +160,26 @@ class HomePlace(Place):
         self._below.addLayout(self._beside)
         self.below = QWidget()
         self.below.setLayout(self._below)
+        self.cards_area = scrolled(self.grid)
         inside = QWidget()
-        page = QVBoxLayout(inside)
-        page.setContentsMargins(28, 20, 28, 12)
+        page = self._page = QVBoxLayout(inside)
         page.setSpacing(14)
-        page.addLayout(head)
-        page.addWidget(self.banner)
+        page.addLayout(_beside_bar(head))
+        page.addLayout(_beside_bar(self.banner))
         page.addWidget(self.waiting, 1, Qt.AlignmentFlag.AlignCenter)
-        page.addWidget(self.grid)
-        page.addWidget(self.below, 1)
+        page.addWidget(self.cards_area, CARDS_SHARE)
+        page.addLayout(_beside_bar(self.below), BELOW_SHARE)
         self.area = scrolled(inside)
         row = QVBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.addWidget(self.area)
         self.below.hide()  # until the cards are there, which would move it
-        self.area.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOn)  # else it would move the buttons
+        self.area.verticalScrollBar().rangeChanged.connect(lambda _least, most: self._keep_margin(most > 0))
+        self._keep_margin(bar=False)
+
+    def _keep_margin(self, bar: bool) -> None:
+        """Put a bar that comes into the margin: it moves nothing."""
+        self._page.setContentsMargins(MARGIN, 20, MARGIN - BAR_PX * (1 + bar), 12)
 
     @property
     def reading(self) -> bool:
@@ -190,7 +202,6 @@ class HomePlace(Place):
         if read != self._facts:
             self._show_facts(read)
         self.below.show()
-        self.area.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAsNeeded)
         self.show_sessions()
 
     def _show_unread(self, error: Exception) -> None:
@@ -202,19 +213,18 @@ class HomePlace(Place):
     def _show_facts(self, shown: tuple[Facts, ...]) -> None:
         self._facts = shown
         cards: list[QWidget] = []
+        next_step = next((it for it in shown if it.draft is not None or isinstance(it, StudyFacts)), None)
         for facts in self._facts:
-            if not isinstance(facts, StudyFacts):
-                broken = BrokenCard(facts)
-                broken.edit.connect(lambda facts: self.edit_asked.emit(facts.source))
-                cards.append(broken)
-                continue
-            ships = is_shipped(facts.source)
-            first = not any(isinstance(other, StudyCard) for other in cards)
-            card = StudyCard(facts, first=first, shipped=ships)
+            ships, first = is_shipped(facts.source), facts is next_step
+            card: StudyCard | BrokenCard
+            if isinstance(facts, StudyFacts):
+                card = StudyCard(facts, first=first, shipped=ships)
+                card.new_session.connect(self.ask_for_session)
+                card.rehearsal.connect(self.ask_for_rehearsal)
+            else:
+                card = BrokenCard(facts, first=first)
             asked = self.new_asked if ships else self.edit_asked
             card.edit.connect(lambda facts, asked=asked: asked.emit(facts.source))
-            card.new_session.connect(self.ask_for_session)
-            card.rehearsal.connect(self.ask_for_rehearsal)
             cards.append(card)
         for made in cards:
             apply_theme_within(made, self.theme)
@@ -313,12 +323,31 @@ class HomePlace(Place):
         for card in (self.device, self.lab):
             card.setMinimumWidth(0 if stacked else COLUMN_PX)
             card.setMaximumWidth(QWIDGETSIZE_MAX if stacked else COLUMN_PX)
-        self.grid.arrange(self.width() - 56)
+        self.grid.arrange(self.width() - 2 * MARGIN)
+        whole = self.grid.whole_height
+        self.cards_area.setMinimumHeight(min(whole, self.grid.row_height + NEXT_ROW_PX))
+        self.cards_area.setMaximumHeight(whole)
+
+    def focusNextPrevChild(self, forward: bool) -> bool:  # noqa: N802 - Qt's name
+        """Scroll to a card that gets the keyboard from outside the cards, too."""
+        moved = super().focusNextPrevChild(forward)
+        now = self.focusWidget()
+        if moved and now is not None and self.grid.isAncestorOf(now):
+            self.cards_area.ensureWidgetVisible(now)
+        return moved
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Make room: cards go below each other."""
         super().resizeEvent(event)
         self._arrange()
+
+
+def _beside_bar(part: QWidget | QLayout) -> QHBoxLayout:
+    """Return a part in a row that leaves room for the scroll bar of the cards."""
+    row = QHBoxLayout()
+    row.setContentsMargins(0, 0, BAR_PX, 0)
+    row.addWidget(part) if isinstance(part, QWidget) else row.addLayout(part)
+    return row
 
 
 def _buttons(card: StudyCard | BrokenCard) -> tuple[QWidget, ...]:

@@ -100,6 +100,8 @@ class Clamped(QLabel):
         self.setAccessibleName(text)
         self.whole, self._most, self._steady = text, lines, steady
         self.setFixedHeight(lines * self.fontMetrics().lineSpacing() + 2)
+        if role in HEADINGS:
+            give_role(self, QAccessible.Role.Heading)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Cut the text anew."""

@@ -9,6 +9,7 @@ from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QApplication, QLabel
 
+from study_app.authoring.kept_settings import kept_original
 from study_app.viewmodels.designer.requests import SetValue
 
 pytestmark = pytest.mark.slow
@@ -70,6 +71,7 @@ def test_the_fields_of_a_copy_can_be_edited_at_once(designer: Any) -> None:
     designer.controller.begin("demo", "mine")
     designer.select(title[:2])
     assert designer.row(*title).field.isEnabled()
+    assert kept_original(designer.editing.opened.file) == "demo"
 
 
 def test_the_description_grows_to_three_lines(qtbot: Any, designer: Any) -> None:

@@ -9,6 +9,7 @@ from PySide6.QtCore import QEvent, QPoint, Qt
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 
 from study_app.authoring.drafts import Draft, keep
+from study_app.authoring.kept_settings import begin_settings
 from study_app.gui.home import view
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.home.study_cards import StudyCard
@@ -66,9 +67,9 @@ def test_a_study_that_is_added_edited_or_damaged_changes_its_card(qtbot, tmp_pat
     qtbot.waitUntil(lambda: titles(home) == before)
 
 
-def test_a_card_says_that_a_draft_was_not_saved_and_its_pen_opens_it(qtbot, tmp_path, monkeypatch):
+def test_cards_of_drafts_come_first_say_what_was_not_saved_and_continue_it(qtbot, tmp_path, monkeypatch):
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
-    file = own_study(tmp_path)
+    file, fresh = own_study(tmp_path), tmp_path / "protocols" / "fresh.toml"
     home = open_home(qtbot, tmp_path / "results")
 
     def card_of(title):
@@ -78,20 +79,28 @@ def test_a_card_says_that_a_draft_was_not_saved_and_its_pen_opens_it(qtbot, tmp_
         return not card_of("Own").draft.isVisible()
 
     assert hidden()
-    keep(file, Draft(file.read_text(encoding="utf-8") + "# edited\n", ""))  # as after a kill
-    keep(tmp_path / "protocols" / "fresh.toml", Draft('format = 2\n[study]\nname = "fresh"\ntitle = "Fresh"\n', ""))
+    text = file.read_text(encoding="utf-8")
+    keep(file, Draft(text.replace('title = "Own"', 'title = "Else"', 1), ""))  # as after a kill
+    keep(fresh, Draft('format = 2\n[study]\nname = "fresh"\ntitle = "Fresh"\n', ""))
+    begin_settings(fresh, "demo")
     home.enter()
     qtbot.waitUntil(lambda: any(getattr(card.facts, "title", "") == "Fresh" for card in home.grid.cards))
-    for title, end in (("Own", ", not saved. This card shows the saved file."), ("Fresh", ", not saved")):
+    assert {card.facts.title for card in home.grid.cards[:2]} == {"Own", "Fresh"}
+    for title, end in (("Own", ", not saved: Title. Sessions use the saved file."), ("Fresh", ", never saved.")):
         words = card_of(title).draft.text()
         assert words.startswith("Draft of today ")
         assert words.endswith(end)
+    assert card_of("Fresh").origin.whole == "Copy of demo  ·  fresh.toml"
     asked = []
     home.edit_asked.connect(asked.append)
-    qtbot.mouseClick(card_of("Fresh").pen, Qt.MouseButton.LeftButton)
-    qtbot.mouseClick(card_of("Own").pen, Qt.MouseButton.LeftButton)
-    assert asked == [str(tmp_path / "protocols" / "fresh.toml"), "own"]
-    keep(file, Draft(file.read_text(encoding="utf-8"), ""))
+    for title in ("Fresh", "Own"):
+        pen = card_of(title).pen
+        assert (pen.text(), pen.accessibleName()) == ("Continue", f"Continue {title}, {title.lower()}")
+        qtbot.mouseClick(pen, Qt.MouseButton.LeftButton)
+    assert asked == [str(fresh), "own"]
+    filled = [one for one in home.findChildren(QPushButton) if one.property("role") == "primary" and one.isVisible()]
+    assert filled == [home.grid.cards[0].pen]
+    keep(file, Draft(text, ""))
     home.enter()
     qtbot.waitUntil(hidden)
 
@@ -159,6 +168,5 @@ def test_cards_of_studies_with_one_title_show_their_files(qtbot, tmp_path, monke
     own_study(tmp_path, "A first look")
     home = open_home(qtbot, tmp_path / "results")
     cards = [card for card in study_cards(home) if card.facts.title == "A first look"]
-    shown = [{it.text() for it in card.findChildren(QLabel)} & {"demo", "own"} for card in cards]
-    assert sorted(map(sorted, shown)) == [["demo"], ["own"]]
+    assert [card.origin.whole for card in cards] == ["Own study  ·  own.toml", "Shipped study  ·  demo.toml"]
     assert len({card.new.accessibleName() for card in cards}) == 2

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import QPoint, QRect, QSize, Qt
 from PySide6.QtGui import QAccessible, QFontMetrics
 from PySide6.QtWidgets import QApplication, QPushButton
 
 from study_app.devices.descriptor import NONE, Backend
+from study_app.gui.home import view
 from study_app.gui.home.main_window import LEAST
 from study_app.gui.home.study_cards import BrokenCard, StudyCard
 from study_app.gui.theme.theme import DARK, font
@@ -176,6 +179,57 @@ def test_three_studies_and_the_sessions_fit_in_a_small_screen(qtbot, results, mo
     home.show_machine(MachineSettings(device="mouse"), mouse)
     QApplication.processEvents()
     assert home.area.verticalScrollBar().maximum() == 0
+
+
+@pytest.mark.parametrize("size", [QSize(1366, 768), QSize(1600, 1000)])
+def test_the_sessions_stay_in_sight_below_many_studies_whose_titles_are_whole(qtbot, results, size):
+    home = open_home(qtbot, results, size)
+    table = home.sessions.rows.table
+    QApplication.processEvents()
+    assert len(home.grid.cards) > 6
+    assert home.area.verticalScrollBar().maximum() == 0
+    assert home.rect().contains(QRect(table.mapTo(home, table.rect().topLeft()), table.size()))
+    assert table.viewport().height() > 3 * table.rowHeight(0)
+    first, second = (home.grid.cards[at].mapTo(home.cards_area, QPoint()) for at in (0, 3))
+    assert first.y() == 0
+    assert home.grid.row_height < second.y() < home.cards_area.height()
+    for card in study_cards(home):
+        assert (" ".join(card.title.text().split("\n")), card.title.toolTip()) == (card.facts.title, "")
+    home.window().activateWindow()
+    home.sessions.kind.setFocus()
+    qtbot.waitUntil(lambda: home.focusWidget() is home.sessions.kind)
+    home.focusPreviousChild()
+    assert home.focusWidget() is home.grid.cards[-1].rehearse
+    assert home.cards_area.rect().contains(home.focusWidget().mapTo(home.cards_area, QPoint(1, 1)))
+
+
+def test_a_long_title_is_cut_after_two_lines_and_whole_in_tip_and_name(qtbot, results, monkeypatch):
+    long = "How people tell " + ", ".join(f"liquid {number}" for number in range(20)) + " apart"
+    home = open_home(qtbot, results)
+    monkeypatch.setattr(view, "read_studies", lambda _opened: (replace(study_facts("demo"), title=long),))
+    home.show_studies()
+    qtbot.waitUntil(lambda: not home.reading)
+    QApplication.processEvents()
+    (card,) = home.grid.cards
+    assert card.title.text().count("\n") == 1
+    assert (card.title.toolTip(), card.title.accessibleName()) == (long, long)
+
+
+def test_keys_begin_a_study_and_open_a_protocol(home, qtbot, monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        "study_app.gui.home.view.QFileDialog.getOpenFileName", lambda *_: asked.append("open") or ("", "")
+    )
+    home.new_asked.connect(lambda source: asked.append(("new", source)))
+    home.main.activateWindow()
+    qtbot.waitUntil(home.main.isActiveWindow)
+    qtbot.keyClick(home.main, Qt.Key.Key_N, Qt.KeyboardModifier.ControlModifier)
+    qtbot.keyClick(home.main, Qt.Key.Key_O, Qt.KeyboardModifier.ControlModifier)
+    assert asked == [("new", ""), "open"]
+    assert [button.toolTip() for button in (home.open_protocol, home.new_study)] == [
+        "Open protocol … (Ctrl+O)",
+        "New study … (Ctrl+N)",
+    ]
 
 
 def test_a_small_window_cuts_nothing_off_sideways(home, qtbot):

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.app.designer.controller import DesignerController
 from study_app.authoring.drafts import draft_of
-from study_app.authoring.kept_settings import keep_setting, kept_participants
+from study_app.authoring.kept_settings import keep_setting, kept_original, kept_participants
 from study_app.authoring.versions.contents import kept_content, kept_versions
 from study_app.errors import StoreError
 from study_app.protocol.source.files import protocol_hash, shipped_file
@@ -108,6 +108,7 @@ def test_another_study_that_cannot_be_saved_keeps_its_edits_as_a_draft(
     ran.editing.ask(SetValue(REPETITIONS, 3))
     ran.saving.save_as_another("pantry")
     assert kept_participants(ran.file.with_name("pantry.toml")) is None
+    assert kept_original(ran.file.with_name("pantry.toml")) == "kitchen"
     draft = draft_of(ran.file.with_name("pantry.toml"))
     assert ("The study was not saved", "the disk is full.") in ran.messages
     assert draft is not None
