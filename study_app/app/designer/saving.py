@@ -21,7 +21,7 @@ from study_app.authoring.writer.refused import Refused
 from study_app.errors import StudyError
 from study_app.gui.designer.versions.save_card import SaveCard
 from study_app.gui.designer.view import DesignerPlace
-from study_app.viewmodels.designer.designer_view import Banner
+from study_app.viewmodels.designer.designer_view import Banner, BannerAction
 from study_app.viewmodels.designer.versions.changes_view import FILE
 from study_app.viewmodels.designer.versions.standing import save_prompt
 from study_app.viewmodels.home import time_words
@@ -50,7 +50,7 @@ class Saving(QObject):
         self.editing, self.place, self.runs = editing, place, runs
         self.banner: Banner | None = None
         self._notice: Banner | None = None
-        self._faulty: Banner | None = None
+        self._lasts: bool | None = None  # while the study is edited (True), until it is (False), until it is closed
         self.card: SaveCard | None = None
         self._others, self._trouble = 0, ""
         self._drafting = QTimer(self)
@@ -59,7 +59,7 @@ class Saving(QObject):
         self._watch = FileWatch(editing)
         self._watch.touched.connect(self._look_while_shown)
         editing.opened_other.connect(self._begin)
-        editing.edited.connect(self._forget_saving)
+        editing.edited.connect(self._end_notice)
         place.left.connect(self.leave)
         place.save_asked.connect(self.save)
         place.banner_asked.connect(self.answer_banner)
@@ -70,11 +70,28 @@ class Saving(QObject):
         opened = self.editing.opened
         assert opened is not None  # noqa: S101 - that is what was opened
         self._drafting.start(DRAFT_MS)
-        self._others, self._trouble, self._notice = opened.keeper.others, "", None
+        self._others, self._trouble = opened.keeper.others, ""
+        self._note(None)
         if opened.draft is not None and opened.edited and opened.base:
             when = time_words(opened.draft.kept_at)
-            self._notice = Banner(f"Draft of {when}, not saved", (("discard", "Discard the draft"),))
+            self._note(f"Draft of {when}, not saved", ("discard", "Discard the draft"), lasts=True)
         self.banner = _banner(opened) or self._notice
+
+    def _note(self, words: str | None, *actions: tuple[BannerAction, str], lasts: bool | None = None) -> None:
+        """Show a line that needs no answer where no other one is needed, None for none; ``lasts`` says for how long."""
+        self._notice, self._lasts = None if words is None else Banner(words, actions, closes=True), lasts
+
+    def _end_notice(self) -> None:
+        """Take back what is true no longer: that the draft differs from the file, or that the file has problems."""
+        opened = self.editing.opened
+        if opened is not None and self._notice is not None and self._lasts is (not opened.edited):
+            self._close_notice(opened)
+
+    def _close_notice(self, opened: OpenStudy) -> None:
+        self._note(None)
+        opened.draft = None  # it is not announced again
+        self.banner = _banner(opened)
+        self.place.banner.show_banner(self.banner)
 
     def look_again(self) -> None:
         """Look whether the study may be changed, and whether another program changed its file.
@@ -112,7 +129,10 @@ class Saving(QObject):
             drafts = [one.hash for one in kept_versions(opened.file) if one.origin == "draft"]
             self.compare_asked.emit(FILE if _changed_outside(opened) or not drafts else drafts[-1])
             return
-        self._notice = None
+        if action == "close":
+            self._close_notice(opened)
+            return
+        self._note(None)
         if action == "keep":
             self._try(opened, lambda: opened.keep_mine(time.monotonic()))
         elif action == "take":
@@ -193,17 +213,10 @@ class Saving(QObject):
             self.editing.announce()
             return
         count = len(opened.study.faults)
-        said = f"Saved. It cannot be run yet: {counted(count, 'problem')}"
-        self._notice = self._faulty = Banner(said, (("problems", "Show the list"),)) if count else None
+        said = f"Saved. It cannot be run yet: {counted(count, 'problem')}" if count else None
+        self._note(said, ("problems", "Show the list"), lasts=False)
         self._show_banner(opened)
         self.saved.emit(opened.file)
-
-    def _forget_saving(self) -> None:
-        """Take back that the study was saved with problems: it is edited."""
-        opened = self.editing.opened
-        if opened is not None and opened.edited and self._notice is not None and self._notice is self._faulty:
-            self._notice, self.banner = None, _banner(opened)
-            self.place.banner.show_banner(self.banner)
 
     # drafts
 
@@ -230,10 +243,8 @@ class Saving(QObject):
             self._drafting.setInterval(DRAFT_MS)
         if opened.keeper.others > self._others:
             self._others = opened.keeper.others
-            self._notice = Banner(
-                "Another window of the program edits this study, too: its unsaved edits are kept as a version",
-                (("compare", "Compare"),),
-            )
+            said = "Another window of the program edits this study, too: its unsaved edits are kept as a version"
+            self._note(said, ("compare", "Compare"))
             self._show_banner(opened)
         if written:
             self.kept.emit()

@@ -10,13 +10,13 @@ from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import RADIUS_CARD
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import SHADOW, Card, Icon
-from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.designer_view import Banner
 
 
 class BannerCard(Card):
-    """Draws a `Banner`; ``asked`` carries the action of a button.
+    """Draws a `Banner`; ``asked`` carries the action of a button, "close" of the one that closes it.
 
     Where the study is read-only, it is hidden while another line is shown; any other banner needs an answer.
     """
@@ -28,12 +28,15 @@ class BannerCard(Card):
         self.words = label("", "label", wraps=True)
         self.sign = Icon("info", "accent", 20)
         self.buttons: list[ActionButton] = []
+        self.close_button = IconButton("cross", "Close this line", "Close (Esc)", size=36, role="plain")
+        self.close_button.clicked.connect(lambda: self.asked.emit("close"))
         self._banner: Banner | None = None
         self._other = False
         self._row = QHBoxLayout()
         self._row.setSpacing(10)
         self._row.addWidget(self.sign)
         self._row.addWidget(self.words, 1)
+        self._row.addWidget(self.close_button)
         self.column.addLayout(self._row)
         self.hide()
 
@@ -41,6 +44,13 @@ class BannerCard(Card):
         """Hide what needs no answer while another line is shown (``other``)."""
         self._other = other
         self.setVisible(self._banner is not None and not (other and self._banner.only_offers_copy))
+
+    def close_by_key(self) -> bool:
+        """Close a line that can be closed; return whether there was one."""
+        closes = self.isVisible() and self._banner is not None and self._banner.closes
+        if closes:
+            self.asked.emit("close")
+        return closes
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint a tinted surface with an accent edge, unlike the cards of the study."""
@@ -54,6 +64,7 @@ class BannerCard(Card):
     def show_banner(self, banner: Banner | None) -> None:
         """Show another banner; None hides it."""
         self._banner = banner
+        self.close_button.setVisible(banner is not None and banner.closes)
         self.make_room(other=self._other)
         if banner is None:
             self.words.clear()
@@ -69,5 +80,5 @@ class BannerCard(Card):
             made = ActionButton("", words, role="primary" if action == "copy" else "", height=36)
             made.clicked.connect(lambda _checked=False, action=action: self.asked.emit(action))
             apply_theme_within(made, self.theme)
-            self._row.addWidget(made)
+            self._row.insertWidget(self._row.count() - 1, made)
             self.buttons.append(made)

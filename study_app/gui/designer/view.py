@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from PySide6.QtCore import Signal, SignalInstance
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtCore import Qt, Signal, SignalInstance
+from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 
 from study_app.gui.designer.arrangement import Arrangement
@@ -347,6 +347,11 @@ class DesignerPlace(Place):
         """Let Tab go through the parts as they are seen."""
         parts = [self.nothing, self.header, self.banner, *self.parts.in_order]
         return go_on(parts, super().focusNextPrevChild, forward=forward)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Close the line above the parts at an Esc that no part took."""
+        if event.key() != Qt.Key.Key_Escape or not self.banner.close_by_key():
+            super().keyPressEvent(event)
 
     def wants_narrow_rail(self) -> bool:
         """Return that form and file need the width."""

@@ -13,7 +13,7 @@ from study_app.viewmodels.tones import Tone
 
 NO_FILE: Final = FileText()
 NO_VERSION: Final = VersionChip()
-BannerAction: TypeAlias = Literal["copy", "keep", "take", "compare", "discard", "problems"]
+BannerAction: TypeAlias = Literal["copy", "keep", "take", "compare", "discard", "problems", "close"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +42,14 @@ class StudyChoice:
 
 @dataclass(frozen=True, slots=True)
 class Banner:
-    """One line above the form, with its buttons: what each asks for, and its words."""
+    """One line above the form, with its buttons: what each asks for, and its words.
+
+    ``closes`` says that it needs no answer and can be closed.
+    """
 
     words: str
     actions: tuple[tuple[BannerAction, str], ...] = ()
+    closes: bool = False
 
     @property
     def only_offers_copy(self) -> bool:

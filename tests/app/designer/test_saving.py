@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from PySide6.QtCore import Qt
 
-from study_app.authoring.drafts import draft_of
-from study_app.authoring.versions.contents import kept_content
+from study_app.authoring.drafts import Draft, draft_of, keep
+from study_app.authoring.versions.contents import content_hash, kept_content
 from study_app.errors import StoreError
 from study_app.protocol.source.files import protocol_hash
 from study_app.store.sessions.folder_lock import open_alone
@@ -166,6 +167,33 @@ def test_saving_says_that_the_study_cannot_be_run_until_it_is_edited(drafted: An
     drafted.saving.save()
     assert not drafted.place.banner.isVisible()
     assert drafted.file.read_text() == drafted.text
+
+
+def test_the_line_about_a_draft_ends_by_undo_by_saving_and_by_closing_it(designer: Any, qtbot: Any) -> None:
+    banner, text = designer.place.banner, designer.file.read_text()
+    for end in ("undo", "save", "button", "escape"):
+        designer.controller.open("demo")
+        assert not banner.close_button.isVisible(), "a read-only study stays one"
+        keep(designer.file, Draft(f"{text}# {end}\n", content_hash(designer.file.read_bytes())))
+        designer.controller.open("kitchen")
+        assert designer.place.banner_words.text().startswith("Draft of today")
+        designer.editing.ask(SetText(TITLE, "en", end))
+        assert banner.isVisible()
+        if end == "undo":
+            designer.editing.undo()
+            assert banner.isVisible(), "the draft still differs from the file"
+            designer.editing.undo()
+        elif end == "save":
+            designer.saving.save()
+        elif end == "button":
+            qtbot.mouseClick(banner.close_button, Qt.MouseButton.LeftButton)
+            designer.saving.look_again()
+        else:
+            designer.place.parts.focus_outline()
+            qtbot.keyClick(designer.window.focusWidget(), Qt.Key.Key_Escape)
+        assert not banner.isVisible()
+        assert designer.editing.opened.edited == (end in {"button", "escape"})
+        designer.saving.save()
 
 
 def test_a_read_only_study_shows_one_line_at_a_time_above_the_parts(designer: Any) -> None:
