@@ -172,7 +172,7 @@ class DesignerController(QObject):
         self._choices = studies(opened)
         self._warnings = ()
         self.editing.open(opened)
-        self.place.outline.words.clear()
+        self.place.begin_study()
         self.place.close_new()
         self.show()
         self.show_outline()

@@ -205,6 +205,13 @@ class DesignerPlace(Place):
         if self.outline.rows:
             self.outline.mark(view.form.path)
 
+    def begin_study(self) -> None:
+        """Show the next view at the top: it is of another study."""
+        self.view, self.form.form = DesignerView(), None
+        self.outline.begin()
+        for area in (self.measures.area, self.problems.area):
+            area.verticalScrollBar().setValue(0)
+
     def show_header(self, state: HeaderState) -> None:
         """Show the header's state."""
         self.header.show_state(state)

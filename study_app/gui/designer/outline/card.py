@@ -118,6 +118,14 @@ class OutlineCard(Card):
                 self.tree.selectionModel().select(index, flag)
         self._filling = False
 
+    def begin(self) -> None:
+        """Begin with the next rows as if there had been none: at the top, everything closed, nothing to find."""
+        self.rows, self._opened = (), set()
+        self._filling = True
+        self.items.clear()
+        self._filling = False
+        self.words.clear()
+
     def show_outline(self, rows: tuple[OutlineRow, ...], selected: object) -> None:
         """Show rows; what was open stays open."""
         if rows != self.rows:
