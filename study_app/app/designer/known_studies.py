@@ -10,6 +10,7 @@ from study_app.app.designer.open_study import OpenStudy
 from study_app.authoring.drafts import draft_of, drafted_files, unsaved_files
 from study_app.authoring.edited_study import read
 from study_app.authoring.fields import row_at
+from study_app.authoring.kept_settings import kept_original
 from study_app.authoring.names import Document
 from study_app.authoring.new_study import template
 from study_app.authoring.outline import study_title
@@ -51,7 +52,8 @@ def studies(opened: OpenStudy | None) -> tuple[StudyChoice, ...]:
             continue
         title = _title(file, drafted=file in drafted) if opened is None or source != own else opened.title
         stem = Path(source).stem
-        choices.append(StudyChoice(title or stem, f"{stem}.toml", source, is_shipped(source), file in drafted))
+        ships, original = is_shipped(source), "" if file is None else kept_original(file)
+        choices.append(StudyChoice(title or stem, f"{stem}.toml", source, ships, file in drafted, original))
     return tuple(sorted(choices, key=lambda choice: (choice.shipped, choice.title.casefold(), choice.source)))
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt
-from PySide6.QtGui import QKeyEvent, QPainter
-from PySide6.QtWidgets import QStyledItemDelegate, QStyleOptionViewItem
+from PySide6.QtGui import QColor, QKeyEvent, QPainter
+from PySide6.QtWidgets import QStyle, QStyledItemDelegate, QStyleOptionViewItem
 
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.widgets.controls import Choice
 from study_app.viewmodels.designer.designer_view import StudyChoice
 
 MARK_PX = 28
+TITLE_ROLE = Qt.ItemDataRole.UserRole + 1
+"""How many letters of a line are the title."""
 OPENS = {
     Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown, Qt.Key.Key_Home, Qt.Key.Key_End,
     Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space, Qt.Key.Key_F4,
@@ -19,7 +21,7 @@ Index = QModelIndex | QPersistentModelIndex
 
 
 class StudyLine(QStyledItemDelegate):
-    """A study in the list of all; the open one has a check mark."""
+    """A study in the list of all: its file is less prominent than its title, and the open one has a check mark."""
 
     def __init__(self, studies: StudyList) -> None:
         super().__init__(studies)
@@ -30,8 +32,20 @@ class StudyLine(QStyledItemDelegate):
         return super().sizeHint(option, index) + QSize(MARK_PX, 0)
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
-        """Paint the words, and the mark at the right."""
-        super().paint(painter, option, index)
+        """Paint the title, what follows it in another ink, and the mark at the right."""
+        shown = QStyleOptionViewItem(option)
+        self.initStyleOption(shown, index)
+        style, words, title = self._studies.style(), index.data(), index.data(TITLE_ROLE)
+        room = style.subElementRect(QStyle.SubElement.SE_ItemViewItemText, shown, self._studies.view())
+        room.setLeft(room.left() + style.pixelMetric(QStyle.PixelMetric.PM_FocusFrameHMargin) + 1)  # as Qt does
+        shown.text = "" if title else words  # type: ignore[attr-defined]  # missing in the stubs
+        style.drawControl(QStyle.ControlElement.CE_ItemViewItem, shown, painter, self._studies.view())
+        if title:
+            painter.setFont(shown.font)  # type: ignore[attr-defined]
+            for part, ink in ((words[:title], "text"), (words[title:], "text2")):
+                painter.setPen(QColor(getattr(self._studies.theme, ink)))
+                painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, part)
+                room.setLeft(room.left() + painter.fontMetrics().horizontalAdvance(part))
         if index.row() == self._studies.currentIndex():
             place = QRectF(option.rect)  # type: ignore[attr-defined]  # missing in the stubs
             mark = QRectF(place.right() - MARK_PX, place.center().y() - 8, 16, 16)
@@ -46,11 +60,11 @@ class StudyList(Choice):
         self.setItemDelegate(StudyLine(self))
 
     def add_study(self, study: StudyChoice, *, opened: bool) -> None:
-        """Add a study, by title and file."""
-        words = f"{study.words}  (shipped)" if study.shipped else study.words
-        self.addItem(words, study.source)
+        """Add a study, by title, file and where it is from."""
+        self.addItem(study.words, study.source)
+        self.setItemData(self.count() - 1, len(study.title), TITLE_ROLE)
         if opened:
-            self.setItemData(self.count() - 1, f"{words}, open", Qt.ItemDataRole.AccessibleTextRole)
+            self.setItemData(self.count() - 1, f"{study.words}, open", Qt.ItemDataRole.AccessibleTextRole)
 
     def showPopup(self) -> None:  # noqa: N802 - Qt's name
         """Open the list; where no study is open, at its first line."""

@@ -26,6 +26,8 @@ class StudyChoice:
         What it is called, the name of its file, and what it is opened by.
     shipped, drafted : bool
         Whether it ships with the program, and whether a draft of it was kept that is not saved.
+    original : str
+        The name of the study that it is a copy of; "" where it is not known to be one.
     """
 
     title: str
@@ -33,11 +35,13 @@ class StudyChoice:
     source: str
     shipped: bool = False
     drafted: bool = False
+    original: str = ""
 
     @property
     def words(self) -> str:
-        """Title and file: titles are not unique."""
-        return f"{self.title}  ·  {self.file}"
+        """Title, file and where it is from: titles are not unique."""
+        origin = "shipped" if self.shipped else self.original and f"copy of {self.original}"
+        return f"{self.title}  ·  {self.file}" + (f"  ({origin})" if origin else "")
 
 
 @dataclass(frozen=True, slots=True)

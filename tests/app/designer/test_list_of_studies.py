@@ -9,6 +9,7 @@ from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication
 
+from study_app.authoring.kept_settings import begin_settings
 from study_app.protocol.source.files import shipped
 from study_app.viewmodels.designer.requests import SetText
 
@@ -30,10 +31,14 @@ def add_study(designer: Any, name: str, title: str) -> None:
 def test_studies_are_listed_by_title_with_their_files_whatever_was_opened_last(designer: Any) -> None:
     for name, title in (("zeta", "apples"), ("beta", "Melons"), ("alpha", "Melons")):
         add_study(designer, name, title)
+    begin_settings(designer.file.with_name("beta.toml"), "alpha")
     designer.controller.open("kitchen")
     own = [words for words in listed(designer) if "(shipped)" not in words][:-2]
     assert own[:2] == ["A first look  ·  kitchen.toml", "apples  ·  zeta.toml"]
-    assert [words for words in own if words.startswith("Melons")] == ["Melons  ·  alpha.toml", "Melons  ·  beta.toml"]
+    assert [words for words in own if words.startswith("Melons")] == [
+        "Melons  ·  alpha.toml",
+        "Melons  ·  beta.toml  (copy of alpha)",
+    ]
     assert own == sorted(own, key=str.casefold)
     shipped_ones = [words for words in listed(designer) if "(shipped)" in words]
     assert len(shipped_ones) == len(shipped())
@@ -44,8 +49,11 @@ def test_studies_are_listed_by_title_with_their_files_whatever_was_opened_last(d
     designer.controller.enter()
     assert listed(designer) == before
     box = designer.place.header.study
-    assert box.currentText() == "Melons  ·  beta.toml"
-    assert box.itemData(box.currentIndex(), Qt.ItemDataRole.AccessibleTextRole) == "Melons  ·  beta.toml, open"
+    assert box.currentText() == "Melons  ·  beta.toml  (copy of alpha)"
+    assert (
+        box.itemData(box.currentIndex(), Qt.ItemDataRole.AccessibleTextRole)
+        == "Melons  ·  beta.toml  (copy of alpha), open"
+    )
 
 
 def test_the_list_shows_a_title_as_it_is_edited(designer: Any) -> None:
