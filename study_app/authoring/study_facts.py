@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import Final
 
 from study_app.authoring.edited_study import Study
-from study_app.authoring.measures.participant_texts import missing_texts
+from study_app.authoring.measures.participant_texts import missing_texts, to_translate
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.haptics.model.steady_state import HAND_MPS, steady
 from study_app.protocol.describe import warnings
@@ -36,7 +36,7 @@ class Facts:
     missing : dict of str to int
         How many texts each language lacks; none where it lacks none.
     warnings : tuple of str
-        The warnings of ``check``, but those that take simulated observers.
+        The warnings of ``check``, but those that take simulated observers, and what is to be translated.
     """
 
     expected_s: float | None = None
@@ -53,18 +53,19 @@ class Facts:
 @lru_cache(maxsize=2)
 def facts(study: Study) -> Facts:
     """Return the facts of a study."""
-    missing = missing_texts(study)
+    missing, translate = missing_texts(study), to_translate(study)
     valid = valid_part(study)
     if (protocol := valid.protocol) is None:
-        return Facts(missing=missing)
+        return Facts(missing=missing, warnings=translate)
     language = protocol.study.languages[0]
     known = Facts(
         steps_s={step: step_duration_s(protocol, step, language) for step in protocol.steps},
         missing=missing,
+        warnings=translate,
     )
     if valid.forces:
         forces_n = {name: steady(protocol.scene_of(name), HAND_MPS).force_n for name in protocol.liquids}
-        known = replace(known, forces_n=forces_n, warnings=warnings(protocol, simulates=False))
+        known = replace(known, forces_n=forces_n, warnings=(*warnings(protocol, simulates=False), *translate))
     if not valid.whole:
         return known
     orders = orders_of(protocol)

@@ -47,14 +47,19 @@ def check(protocol: str | None, *, schema: bool, delay_ticks: int) -> None:
     else:
         import time
 
+        from study_app.authoring.edited_study import read
+        from study_app.authoring.measures.participant_texts import to_translate
         from study_app.protocol.source.files import find
         from study_app.store import workstation
         from study_app.video.sources import missing_here
 
         study = load.load(protocol, delay_ticks=delay_ticks)
         camera = workstation.load_or_default()[0].camera
-        missing = missing_here(study, find(protocol).parent, camera, time.monotonic_ns)
+        file = find(protocol)
+        missing = missing_here(study, file.parent, camera, time.monotonic_ns)
         click.echo(describe.describe(study, delay_ticks))
+        for sentence in to_translate(read(file.read_bytes(), file.parent)):
+            click.echo(f"\nNote: {sentence}.")
         if missing:
             click.echo(f"\nNote: {missing}. Sessions of this study do not start on this computer.")
 

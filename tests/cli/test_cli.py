@@ -90,6 +90,15 @@ def test_check_far_from_the_checkout_tells_the_study_in_words(tmp_path: Path) ->
     assert "8 N" in finished.stdout
 
 
+def test_check_notes_how_many_texts_are_still_to_translate(tmp_path: Path, liquid_study: Run) -> None:
+    source = source_bytes("rek2024").decode()
+    assert liquid_study("check", "rek2024").stdout.count("Note:") == 0
+    (tmp_path / "own.toml").write_text(source.replace('nl = "Welkom"', 'nl = "Welcome"'), encoding="utf-8")
+    noted = liquid_study("check", "own.toml")
+    assert noted.returncode == 0
+    assert noted.stdout.endswith("\nNote: study.languages: 1 text to translate to Dutch, as in English so far.\n")
+
+
 def test_check_takes_a_file_of_liquids_without_a_study(tmp_path: Path, liquid_study: Run) -> None:
     """One that has a part of a study needs all of it."""
     liquids = "format = 1\n[liquids.tar]\ndensity_kg_m3 = 1153\n"

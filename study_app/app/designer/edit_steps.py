@@ -21,6 +21,7 @@ from study_app.app.designer.element_steps import (
 )
 from study_app.authoring.additions import added
 from study_app.authoring.changes.initial_values import initial, singular
+from study_app.authoring.changes.languages import following
 from study_app.authoring.changes.short_texts import followed
 from study_app.authoring.conversions import left_by, switched
 from study_app.authoring.edited_study import Study
@@ -81,8 +82,7 @@ class Steps:
             name = label_of(asked.path[-1])
             return Step(f"Change {name}", (Set(asked.path, asked.value),), None, asked.path if asked.typing else None)
         if isinstance(asked, SetText):
-            edits = (*_text(study, asked), *followed(study, asked.path, asked.language, asked.text))
-            return Step(f"Type {label_of(asked.path[-1])}", edits, None, (*asked.path, asked.language))
+            return _typed(study, asked)
         if isinstance(asked, RemoveKey):
             return Step(f"Remove {label_of(asked.path[-1])}", (Unset(asked.path),))
         if isinstance(asked, AddKey):
@@ -141,6 +141,14 @@ def _of_elements(study: Study, asked: Request, selected: Path) -> Step:
     if type(asked) in _OF_ELEMENTS:
         return _OF_ELEMENTS[type(asked)](study, asked)
     raise Refused("this cannot be done with a study")
+
+
+def _typed(study: Study, asked: SetText) -> Step:
+    """Return the step that types a text; copies of it in other languages and short texts follow."""
+    edits: tuple[Edit, ...] = ()
+    for code in (asked.language, *following(study, asked.path, asked.language)):
+        edits += (*_text(study, replace(asked, language=code)), *followed(study, asked.path, code, asked.text))
+    return Step(f"Type {label_of(asked.path[-1])}", edits, None, (*asked.path, asked.language))
 
 
 def _text(study: Study, asked: SetText) -> tuple[Edit, ...]:

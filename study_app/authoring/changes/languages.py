@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from study_app.authoring.changes.initial_values import new_text
 from study_app.authoring.edited_study import Study
+from study_app.authoring.names import ITEMS
 from study_app.authoring.writer.edits import Edit, Set, Unset
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.checks.cross_references import TEXTS
-from study_app.protocol.source.document import Path, entries
+from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.wording.languages import LANGUAGES, language_name
 
 
@@ -61,6 +63,26 @@ def filled_in(study: Study, code: str) -> tuple[Edit, ...]:
         elif isinstance(text, str):
             found.append(Set(path, {first: text, code: text}))
     return tuple(found)
+
+
+def is_copied(texts: Mapping[str, Any], code: str, first: str) -> bool:
+    """Return whether a text in a language is still that of the first language, or of a new question.
+
+    A text without a letter, such as "7", is the same in every language.
+    """
+    text = texts.get(code)
+    return text in (texts.get(first), new_text(ITEMS)) and any(map(str.isalpha, str(text or "")))
+
+
+def following(study: Study, path: Path, language: str) -> tuple[str, ...]:
+    """Return the languages whose copies follow a text that is typed in a language: it is the first one."""
+    texts, first = value_at(study.document, path), languages_of(study)[0]
+    if language != first or not isinstance(texts, Mapping):
+        return ()
+    old = texts.get(first)
+    if old == new_text(ITEMS):  # nothing is said yet that could be translated
+        return ()
+    return tuple(code for code in texts if code != first and texts[code] == old and is_copied(texts, code, first))
 
 
 def texts_of(study: Study) -> Iterator[tuple[Path, Any]]:

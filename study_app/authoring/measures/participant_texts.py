@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final
 
-from study_app.authoring.changes.initial_values import new_text
-from study_app.authoring.changes.languages import languages_of, texts_of
+from study_app.authoring.changes.languages import is_copied, languages_of, texts_of
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import is_localised, label_of
-from study_app.authoring.names import ITEMS
 from study_app.authoring.outline import title_of
 from study_app.authoring.schema_nodes import alternatives
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.json_schema import schema
+from study_app.protocol.wording.languages import language_name
 from study_app.store.verification.leaks import Telltales
 
 SHORTEST: Final = 3
@@ -66,9 +65,13 @@ def own_texts(study: Study) -> dict[str, tuple[int, int]]:
     return {code: (there - copied.get(code, 0), wanted) for code, (there, wanted) in texts_by_language(study).items()}
 
 
-def is_copied(texts: Mapping[str, Any], code: str, first: str) -> bool:
-    """Return whether a text in a language is still that of the first language, or of a new question."""
-    return bool(texts.get(code)) and texts[code] in (texts.get(first), new_text(ITEMS))
+def to_translate(study: Study) -> tuple[str, ...]:
+    """Return a warning for each language with copied texts; they prevent no session."""
+    first = language_name(languages_of(study)[0])
+    return tuple(
+        f"study.languages: {count} text{'s' * (count != 1)} to translate to {language_name(code)}, as in {first} so far"
+        for code, count in copied_texts(study).items()
+    )
 
 
 def revealing(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:

@@ -8,7 +8,13 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 
-from study_app.viewmodels.designer.requests import AddElement, ChangeLanguage
+from study_app.app.designer.edit_steps import Steps
+from study_app.authoring.changes.short_texts import short_of
+from study_app.authoring.edited_study import Study, read
+from study_app.authoring.writer.edits import Set
+from study_app.protocol.source.document import value_at
+from study_app.viewmodels.designer.requests import AddElement, ChangeLanguage, SetText
+from tests.authoring.grown import PROTOCOLS
 
 pytestmark = pytest.mark.slow
 
@@ -26,6 +32,27 @@ def write(qtbot: Any, designer: Any, field: str, words: str) -> None:
 
 def short(designer: Any) -> Any:
     return designer.row(*designer.editing.selected, "short").row.row.value
+
+
+def test_copies_in_another_language_follow_a_text_and_its_short_one_until_they_are_edited() -> None:
+    source = (PROTOCOLS / "demo.toml").read_text(encoding="utf-8")
+    study, question = read(source.encode(), PROTOCOLS), (*ITEMS, 0)
+
+    def typed(study: Study, code: str, words: str) -> tuple[Study, Any]:
+        now, _ = study.edited(*Steps().step(study, SetText((*question, "text"), code, words)).edits)
+        return now, [value_at(now.document, (*question, key)) for key in ("text", "short")]
+
+    for code in ("nl", "de"):
+        for how in ("add", "copy"):
+            study, _ = study.edited(*Steps().step(study, ChangeLanguage(how, code)).edits)
+    text = value_at(study.document, (*question, "text"))["en"]
+    study, _ = study.edited(*(Set((*question, "short", code), short_of(text)) for code in ("en", "nl", "de")))
+    study, _ = typed(study, "de", "War es kalt?")
+    _, found = typed(study, "en", "Was it cold?")
+    assert found == [
+        {"en": "Was it cold?", "nl": "Was it cold?", "de": "War es kalt?"},
+        {"en": "Was it cold", "nl": "Was it cold", "de": "War es kalt"},
+    ]
 
 
 def test_the_short_text_follows_the_text_until_it_is_edited(qtbot: Any, designer: Any) -> None:

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from study_app.authoring.changes.initial_values import singular
+from study_app.authoring.changes.languages import is_copied
 from study_app.authoring.changes.series import NUMBERS, series_starts
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Choice, Row, label_of, refused_at, row_at, rows, sections_of
-from study_app.authoring.measures.participant_texts import is_copied, missing_texts, own_texts
+from study_app.authoring.measures.participant_texts import copied_texts, missing_texts, own_texts
 from study_app.authoring.names import named_at
 from study_app.authoring.outline import title_of
 from study_app.protocol.groups.group import sequences_in
@@ -346,9 +347,10 @@ def _notes(document: Mapping[str, Any], row: Row) -> Iterator[tuple[str, str]]:
 
 def _entries(study: Study, row: Row) -> Iterator[Entry]:
     if row.path == STUDY_LANGUAGES:
-        lacking, own = missing_texts(study), own_texts(study)
+        lacking, own, copied = missing_texts(study), own_texts(study), copied_texts(study)
         for at, code in enumerate(row.value if isinstance(row.value, tuple) else ()):
             note = "{} of {} texts".format(*own.get(str(code), (0, 0)))
+            note += f", {copied[str(code)]} to translate" if str(code) in copied else ""
             yield Entry((*row.path, at), language_name(str(code)), note, lacking.get(str(code), 0))
     if row.kind in {"list", "tables", "references"} and isinstance(row.value, tuple | Mapping):
         keys = row.value if isinstance(row.value, Mapping) else range(len(row.value))

@@ -32,7 +32,6 @@ from study_app.viewmodels.designer.measures.number_cards import (
     Verdict,
 )
 from study_app.viewmodels.number_words import minutes
-from study_app.viewmodels.sessions import counted
 
 MOST_CODES: Final = 8
 """Of more codes only how even they are is said."""
@@ -126,10 +125,8 @@ def text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
     found: list[Verdict] = [("bad", "warning", f"Missing texts: {missing}")]
     if not missing:
         found = [("ok", "check", f"Every text in {languages}")]
-        first = language_name(codes[0])
-        copied = copied_texts(study).items()
-        same = [f"{counted(number, 'text')} in {language_name(code)} as in {first}" for code, number in copied]
-        found = [("neutral", "info", ", ".join(same))] if same else found
+    if copied := ", ".join(f"{count} in {language_name(code)}" for code, count in copied_texts(study).items()):
+        found = [*(found if missing else ()), ("neutral", "info", f"Texts to translate: {copied}")]
     if (protocol := valid_part(study).protocol) is not None:
         revealed = revealing(study, protocol)
         named = f"{revealed[0].element}: “{revealed[0].word}” reveals a condition" if revealed else ""
@@ -210,13 +207,11 @@ def texts_card(study: Study) -> TextsCard:
     counts, with_own = texts_by_language(study), own_texts(study)
     for code, (there, wanted) in counts.items():
         own = with_own[code][0]
-        verdict: Verdict = ("ok", "check", "complete") if own == wanted else ("bad", "warning", "texts are missing")
-        if own < there == wanted:
-            verdict = (
-                "neutral",
-                "info",
-                f"{there - own} as in {language_name(next(iter(counts)))}, not translated yet",
-            )
+        parts = (wanted - there, "missing"), (there - own, "to translate")
+        words = ", ".join(f"{count} {what}" for count, what in parts if count)
+        verdict: Verdict = ("bad", "warning", words) if there < wanted else ("neutral", "info", words)
+        if own == wanted:
+            verdict = ("ok", "check", "complete")
         lines.append(Line(language_name(code), f"{own} of {wanted}", own / max(1, wanted), verdict))
     protocol = valid_part(study).protocol
     found = () if protocol is None else revealing(study, protocol)
