@@ -6,7 +6,7 @@ are in the coordinate u; answers follow from uniform numbers that the caller dra
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -36,6 +36,8 @@ class Observers:
         From 5 to 95 %, in u.
     guess, lapse : float
         Guess rate and lapse rate.
+    presented : callable, optional
+        From levels as they are asked to levels as they are presented, both in u; by default they are the same.
     """
 
     family: Family
@@ -43,9 +45,12 @@ class Observers:
     width: float
     guess: float
     lapse: float
+    presented: Callable[[Floats], Floats] | None = None
 
     def probability(self, levels: ArrayLike) -> Floats:
         """Return the probability of a success at ``levels``, one for each track or one for all."""
+        if self.presented is not None:
+            levels = self.presented(np.asarray(levels, float))
         return success(self.family, levels, self.thresholds, self.width, self.guess, self.lapse)
 
 

@@ -16,7 +16,8 @@ from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, UNKNOWN, Dyn
 from study_app.haptics.model.slope_limits import refuses
 from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
 from study_app.outlets.session_outlets import OutletStatus
-from study_app.protocol.checks.clipped_levels import beyond_slope_limit, highest_damping
+from study_app.protocol.checks.clipped_levels import beyond_slope_limit, by_stimulus
+from study_app.protocol.levels.presented_levels import highest_damping
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import expected_duration_s
 from study_app.protocol.orders.latin_squares import enrolment
@@ -161,8 +162,8 @@ def _levels(facts: Facts, protocol: Protocol) -> list[Check]:
     if highest_nspm == 0:
         return []
     value, about = f"up to {highest_nspm:g} N·s/m", f"with a delay of {_ticks(facts.delay_ticks)}"
-    for block in blocks:
-        if (beyond := beyond_slope_limit(protocol, block, facts.delay_ticks)) is not None:
+    for alike in by_stimulus(protocol):
+        if (beyond := beyond_slope_limit(protocol, alike, facts.delay_ticks)) is not None:
             return [Check("Levels", "failure", value, about, f"{beyond.message}: {beyond.hint}")]
     return [Check("Levels", "ok", value, about)]
 

@@ -6,8 +6,8 @@ import pytest
 
 from study_app.authoring.edited_study import Study, read
 from study_app.authoring.study_facts import facts
-from study_app.protocol.checks.clipped_levels import levels
 from study_app.protocol.describe import describe
+from study_app.protocol.levels.presented_levels import levels
 from study_app.protocol.load import load, shipped
 from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule
 from tests.authoring.grown import PROTOCOLS

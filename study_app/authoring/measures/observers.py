@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -137,7 +137,7 @@ def observe(plan: ThresholdPlan, threshold: float, lapses: float, stop: Stop = l
         if first is None:
             first, course = answered, _course(plan, answered, stop)
     assert first is not None  # noqa: S101 - there is a first one
-    found = np.concatenate(medians)
+    found, planted = np.concatenate(medians), replace(first.observers, thresholds=np.array(u))
     errors = (found - u) * math.log(10) if stimulus.spacing == "log" else (found - u) / u
     at = np.linspace(*stimulus.domain, POINTS)
     quantiles = np.quantile(found, SHARES)
@@ -145,9 +145,9 @@ def observe(plan: ThresholdPlan, threshold: float, lapses: float, stop: Stop = l
         threshold,
         lapses,
         len(found),
-        float(first.observers.probability(np.array([u]))[0]),
+        float(planted.probability(u)),
         tuple(stimulus.level_of(float(one)) for one in at),
-        tuple(_function(first, u, at)),
+        tuple(planted.probability(at).tolist()),
         tuple(tuple(_function(first, float(one), at)) for one in quantiles),
         _asked(plan, np.concatenate(presented)),
         course or (),
@@ -157,7 +157,9 @@ def observe(plan: ThresholdPlan, threshold: float, lapses: float, stop: Stop = l
     )
 
 
-def measurable(plan: ThresholdPlan, lapses: float, least: float, stop: Stop = lambda: False) -> Measurable | None:
+def measurable(
+    plan: ThresholdPlan, lapses: float, least: float, stop: Stop = lambda: False, most: float = math.inf
+) -> Measurable | None:
     """Return which thresholds a block can measure; None where tracks of the method are not simulated.
 
     Parameters
@@ -170,6 +172,8 @@ def measurable(plan: ThresholdPlan, lapses: float, least: float, stop: Stop = la
         No threshold below this level counts: twice the largest error of a valid trial.
     stop : callable
         Whether to give up.
+    most : float
+        No threshold above this level counts: the highest one that is presented in full.
 
     Raises
     ------
@@ -180,7 +184,7 @@ def measurable(plan: ThresholdPlan, lapses: float, least: float, stop: Stop = la
     found: list[Planted] = []
     for u in np.linspace(*stimulus.domain, PLANTED).tolist():
         threshold = stimulus.level_of(u)
-        if threshold < least or threshold <= 0:
+        if not least <= threshold <= most or threshold <= 0:
             continue
         levels, held = [], []
         for _ in range(0, OBSERVERS, AT_ONCE):
@@ -208,7 +212,7 @@ def _longest(found: list[Planted]) -> tuple[float, float] | None:
 
 
 def _function(answered: Answered, u: float, at: Floats) -> list[float]:
-    """Return the share of successes of an observer with threshold ``u`` at some levels [u]."""
+    """Return the function of an observer with threshold ``u`` at some levels [u], were they presented in full."""
     who = answered.observers
     found: list[float] = success(who.family, at, u, who.width, who.guess, who.lapse).tolist()
     return found

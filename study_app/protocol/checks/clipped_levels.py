@@ -1,190 +1,139 @@
-"""The levels of a block: what each presents, its force at the task's fastest point, and which limit would clip it."""
+"""Which levels of a stimulus a limit clips, in the words of ``check``."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import product
-from typing import Final, Literal
+from typing import Final
 
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import slope_limit
 from study_app.haptics.model.steady_state import steady
 from study_app.protocol.blocks import Block
+from study_app.protocol.levels.presented_levels import (
+    FASTER,
+    UNPACED_MPS,
+    Level,
+    damping_of,
+    ends,
+    hand_mps_of,
+    level_limits,
+    levels,
+)
 from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.source.problems import Fault
-from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulus
-from study_app.protocol.trials.tracks import condition_of, method_of, standards_of, stimulus_of
+from study_app.protocol.trials.stimuli import OF_LINK, Stimulus
+from study_app.protocol.trials.tracks import condition_of, stimulus_of
 
-FASTER: Final = 1.2
-"""A hand exceeds the pace of its target by up to a fifth. [choice]"""
-UNPACED_MPS: Final = 0.3
-"""A hand that is free moves as fast. [choice]"""
 MOST_NAMED: Final = 4
 """Of more clipped levels the first and the last of each row are named."""
 PACED: Final = 'choose a task of kind "follow"'
-_HALVINGS: Final = 20
 _GIVES: Final = ("gives", "give")
 _IS: Final = ("is", "are")
 
 
-@dataclass(frozen=True, slots=True)
-class Level:
-    """One level of one standard.
-
-    Attributes
-    ----------
-    standard : float or None
-        The standard, in the unit of the varied number; None where the level is the value itself.
-    level, comparison : float
-        The level as it is asked, and the value that it stands for.
-    asked_n, sent_n : float or None
-        Force of its drag at the task's fastest point, and of what the limits leave of it [N]; None for a number of the
-        condition.
-    clipped_by : str or None
-        The "norm" (``device.force_limit_n``) or the "slope" limit of the loop (`haptics.model.slope_limits`).
-    damping_nspm : float
-        Of a linear law [N·s/m at the hand]; 0 of others.
-    """
-
-    standard: float | None
-    level: float
-    comparison: float
-    asked_n: float | None = None
-    sent_n: float | None = None
-    clipped_by: Literal["slope", "norm"] | None = None
-    damping_nspm: float = 0.0
+def by_stimulus(protocol: Protocol) -> list[list[Block]]:
+    """Return the blocks of levels, those that present one stimulus together."""
+    found: dict[str, list[Block]] = {}
+    for block in protocol.blocks.values():
+        if block.stimulus is not None:
+            found.setdefault(block.stimulus, []).append(block)
+    return list(found.values())
 
 
-def levels(protocol: Protocol, block_id: str) -> tuple[Level, ...]:
-    """Return every level that a block with a stimulus can present, standard by standard, the smallest first.
-
-    Raises
-    ------
-    KeyError
-        There is no such block.
-    """
-    block = protocol.blocks[block_id]
-    if block.stimulus is None:
-        return ()
-    stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
-    asked = sorted({*(stimulus.grid if method.adaptive else ()), *method.asked(stimulus)})
-    scene, hand_mps = protocol.scene_for(condition_of(protocol, stimulus)), hand_mps_of(protocol, block)
-    return tuple(
-        _level(stimulus, scene, hand_mps, standard, level)
-        for standard in standards_of(protocol, block)
-        for level in asked
-    )
-
-
-def standard_of(protocol: Protocol, block_id: str, standard: float) -> Level:
-    """Return a standard of a block as its level 0."""
-    block = protocol.blocks[block_id]
-    stimulus = stimulus_of(protocol, block)
-    scene = protocol.scene_for(condition_of(protocol, stimulus))
-    found = _level(stimulus, scene, hand_mps_of(protocol, block), None, standard)
-    return replace(found, standard=standard, level=0.0, comparison=standard)
+def beyond_slope_limit(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> Fault | None:
+    """Return that dampings of blocks with one stimulus exceed the slope limit for a delay [ticks]; None: none does."""
+    stimulus = stimulus_of(protocol, blocks[0])
+    found = [one for block in blocks for one in ends(protocol, block)]
+    if not found:
+        return None
+    standard, level, scene = max(found, key=lambda one: damping_of(one[2]))
+    highest_nspm, (limit_nspm, loop) = damping_of(scene), _loop(scene, delay_ticks)
+    if highest_nspm <= limit_nspm:
+        return None
+    if stimulus.vary in OF_LINK:
+        gives = f'"{condition_of(protocol, stimulus)}" gives'
+        hint = f"damping_nspm = {floored(limit_nspm, 1):g}"
+    else:
+        every = list(_every(protocol, blocks))
+        gives = _named(every, [one for one in every if one.damping_nspm > limit_nspm], _GIVES)
+        hint = _within_limit(stimulus, standard, level, limit_nspm)
+    message = f"{gives} {highest_nspm:g} N·s/m at the hand; {loop} is {limit_nspm:g}"
+    return Fault(("stimuli", str(blocks[0].stimulus), "levels"), message, hint)
 
 
-def _level(stimulus: Stimulus, scene: Scene, hand_mps: float, standard: float | None, level: float) -> Level:
-    comparison = stimulus.comparison(standard, level)
-    if stimulus.vary in OF_CONDITION or len(scene.liquids) != 1:
-        return Level(standard, level, comparison)
-    varied = override(scene, stimulus.vary, comparison)
-    force = steady(varied, hand_mps)
-    return Level(standard, level, comparison, force.drag_n, force.force_n, force.limit, _damping_nspm(varied))
-
-
-def hand_mps_of(protocol: Protocol, block: Block) -> float:
-    """Return the speed of the hand at the fastest point of a block's task [m/s]."""
-    task = protocol.tasks[block.task]
-    return FASTER * task.fastest_stroke((0.0, 0.0, 0.0)).speed_mps if isinstance(task, Follow) else UNPACED_MPS
-
-
-def ends(protocol: Protocol, block: Block) -> Iterator[tuple[float | None, float, Scene]]:
-    """Yield standard, level and scene at the strongest and the weakest level of each standard, but for delays."""
-    stimulus = stimulus_of(protocol, block)
-    if stimulus.vary == DELAY:
-        return
-    asked = method_of(protocol, block).asked(stimulus)
-    scene = protocol.scene_for(condition_of(protocol, stimulus))
-    for standard, level in product(standards_of(protocol, block), (max(asked), min(asked))):
-        varied = scene
-        if stimulus.vary not in OF_LINK:
-            varied = override(scene, stimulus.vary, stimulus.comparison(standard, level))
-        yield standard, level, varied
-
-
-def highest_damping(protocol: Protocol, block: Block) -> float:
-    """Return the highest damping that a block of levels presents [N·s/m at the hand]; 0 without a linear law."""
-    return max((_damping_nspm(scene) for _, _, scene in ends(protocol, block)), default=0.0)
-
-
-def beyond_slope_limit(protocol: Protocol, block: Block, delay_ticks: int) -> Fault | None:
-    """Return that dampings of a block exceed the slope limit for a delay [ticks]; None if none does."""
-    highest_nspm, stimulus = highest_damping(protocol, block), stimulus_of(protocol, block)
-    for standard, level, scene in ends(protocol, block):
-        limit_nspm, loop = _loop(scene, delay_ticks)
-        if _damping_nspm(scene) == highest_nspm > limit_nspm:
-            if stimulus.vary in OF_LINK:
-                gives = f'"{condition_of(protocol, stimulus)}" gives'
-                hint = f"damping_nspm = {floored(limit_nspm, 1):g}"
-            else:
-                every = levels(protocol, block.id)
-                gives = _named(every, [one for one in every if one.damping_nspm > limit_nspm], _GIVES)
-                hint = _within_limit(stimulus, standard, level, limit_nspm)
-            message = f"{gives} {highest_nspm:g} N·s/m at the hand; {loop} is {limit_nspm:g}"
-            return Fault(("stimuli", str(block.stimulus), "levels"), message, hint)
-    return None
-
-
-def clipped(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator[Fault]:
-    """Yield which levels of a block each limit clips; the force limit only where it clips more than the slope limit.
+def clipped(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> Iterator[Fault]:
+    """Yield which levels each limit clips; a level that both clip counts as one of the slope limit.
 
     Parameters
     ----------
     protocol : Protocol
         The study.
-    block : Block
-        A block with a stimulus; where its task sets no pace, only damping has a limit (`clipped_unpaced`).
+    blocks : sequence of Block
+        Blocks with one stimulus; in those whose task sets no pace, only damping has a limit (`clipped_unpaced`).
     delay_ticks : int
         How many ticks late a force acts.
     """
-    beyond = beyond_slope_limit(protocol, block, delay_ticks)
+    beyond = beyond_slope_limit(protocol, blocks, delay_ticks)
     if beyond is not None:
         yield beyond
-    task, place = protocol.tasks[block.task], ("stimuli", str(block.stimulus), "levels")
-    hand_mps, stimulus = hand_mps_of(protocol, block), stimulus_of(protocol, block)
-    found = [(steady(scene, hand_mps), scene) for *_, scene in ends(protocol, block) if len(scene.liquids) == 1]
-    if not isinstance(task, Follow) or all(force.limit is None for force, _ in found):
+    place, stimulus = ("stimuli", str(blocks[0].stimulus), "levels"), stimulus_of(protocol, blocks[0])
+    blocks = [block for block in blocks if isinstance(protocol.tasks[block.task], Follow)]
+    found = [(block, scene) for block in blocks for *_, scene in ends(protocol, block) if len(scene.liquids) == 1]
+    if all(steady(scene, hand_mps_of(protocol, block)).limit is None for block, scene in found):
         return
-    strongest, scene = max(found, key=lambda one: one[0].drag_n)
+    condition = condition_of(protocol, stimulus)
     if stimulus.vary in OF_LINK:
-        condition = f'"{condition_of(protocol, stimulus)}" is'
-        yield from (Fault(place, *words) for words in clipped_at_pace(scene, task, condition))
+        block, scene = max(found, key=lambda one: hand_mps_of(protocol, one[0]))
+        yield from _at_pace(protocol, block, scene, f'"{condition}" is')
         return
-    every, (limit_nspm, loop) = levels(protocol, block.id), _loop(scene, delay_ticks)
+    every, scene = _every(protocol, blocks), protocol.scene_for(condition)
+    limit_nspm, loop = _loop(scene, delay_ticks)
     by_loop = [one for one in every if one.damping_nspm > limit_nspm or one.clipped_by == "slope"]
     if by_loop and beyond is None:
         most = max(by_loop, key=lambda one: one.asked_n or 0.0)
         message = (
-            f"{_named(every, by_loop, _IS)} {most.asked_n:.1f} N at {FASTER:g} times the paced "
-            f"{hand_mps / FASTER:.3g} m/s; {loop} leaves {most.sent_n:.1f} N"
+            f"{_named(list(every), by_loop, _IS)} {most.asked_n:.1f} N at {FASTER:g} times the paced "
+            f"{hand_mps_of(protocol, every[most]) / FASTER:.3g} m/s; {loop} leaves {most.sent_n:.1f} N"
         )
-        yield Fault(place, message, _highest_unclipped(protocol, block, most))
-    by_force = [one for one in every if (one.asked_n or 0.0) > scene.force_limit_n]
-    if strongest.drag_n > scene.force_limit_n and not set(by_force) <= set(by_loop):
-        yield from (Fault(place, *words) for words in clipped_at_pace(scene, task, _named(every, by_force, _IS)))
+        yield Fault(place, message, _highest_in_full(protocol, every[most], most.standard))
+    by_force = [one for one in every if (one.asked_n or 0.0) > scene.force_limit_n and one not in by_loop]
+    if by_force:
+        most = max(by_force, key=lambda one: one.asked_n or 0.0)
+        strongest = override(scene, stimulus.vary, most.comparison)
+        named = _named(list(every), by_force, _IS)
+        yield from _at_pace(protocol, every[most], strongest, named)
+
+
+def _at_pace(protocol: Protocol, block: Block, scene: Scene, what: str) -> Iterator[Fault]:
+    task = protocol.tasks[block.task]
+    if isinstance(task, Follow):
+        for message, hint in clipped_at_pace(scene, task, what):
+            yield Fault(("stimuli", str(block.stimulus), "levels"), message, hint)
+
+
+def _every(protocol: Protocol, blocks: Sequence[Block]) -> dict[Level, Block]:
+    """Return each level of blocks with one stimulus once: where its force is the largest, with its block."""
+    found: dict[tuple[float, float], tuple[Level, Block]] = {}
+    for block in blocks:
+        for one in levels(protocol, block.id):
+            known = found.get(key := (one.standard or 0.0, one.level))
+            if known is None or (one.asked_n or 0.0) > (known[0].asked_n or 0.0):
+                found[key] = one, block
+    return dict(found[key] for key in sorted(found))
 
 
 def clipped_unpaced(protocol: Protocol, block: Block) -> str | None:
-    """Return which levels are clipped in fast motions of a task without a pace, as a warning; None where none is."""
-    found = [scene for *_, scene in ends(protocol, block) if len(scene.liquids) == 1]
+    """Return which levels are clipped in fast motions of a task without a pace, as a warning; None where none is.
+
+    The levels are those of all blocks with this stimulus and task.
+    """
+    alike = [one for one in protocol.blocks.values() if (one.stimulus, one.task) == (block.stimulus, block.task)]
+    found = [scene for one in alike for *_, scene in ends(protocol, one) if len(scene.liquids) == 1]
     if isinstance(protocol.tasks[block.task], Follow) or all(steady(one, UNPACED_MPS).limit is None for one in found):
         return None
-    every = levels(protocol, block.id)
+    every = list(_every(protocol, alike))
     some = [one for one in every if one.clipped_by is not None]
     of = f" of {_listed(every, some)}" if some else ""  # a number of the condition changes no force
     by_loop = any(steady(one, UNPACED_MPS).limit == "slope" for one in found)
@@ -222,10 +171,6 @@ def floored(value: float, digits: int) -> float:
     return math.floor(value * step + 1e-6) / step
 
 
-def _damping_nspm(scene: Scene) -> float:
-    return max(liquid.drag.damping_nspm or 0.0 for liquid in scene.liquids)
-
-
 def _loop(scene: Scene, delay_ticks: int) -> tuple[float, str]:
     """Return the slope limit [N·s/m] of a scene's loop, and what it is called."""
     limit_nspm = slope_limit(1 / scene.rate_hz, delay_ticks, scene.velocity)
@@ -246,18 +191,13 @@ def _within_limit(stimulus: Stimulus, standard: float | None, level: float, limi
     return f"levels to {floored(most_level, 3):g}, or the standard to {floored(most_standard, 1):g}"
 
 
-def _highest_unclipped(protocol: Protocol, block: Block, level: Level) -> str:
-    """Return up to which level of a standard the loop leaves the force as asked, "" where not even the lowest."""
-    stimulus, hand_mps = stimulus_of(protocol, block), hand_mps_of(protocol, block)
-    scene = protocol.scene_for(condition_of(protocol, stimulus))
-    least, most = stimulus.levels[0], level.level
-    if _level(stimulus, scene, hand_mps, level.standard, least).clipped_by is not None:
+def _highest_in_full(protocol: Protocol, block: Block, standard: float | None) -> str:
+    """Return up to which level of a standard no limit clips the force, "" where not even the lowest."""
+    stimulus, limits = stimulus_of(protocol, block), level_limits(protocol, block)
+    if limits is None or not limits.lowest:
         return ""
-    for _ in range(_HALVINGS):
-        middle = (least + most) / 2
-        fits = _level(stimulus, scene, hand_mps, level.standard, middle).clipped_by is None
-        least, most = (middle, most) if fits else (least, middle)
-    return f"levels to {floored(least, 3):g}"
+    highest = stimulus.level_between(standard, limits.lowest)
+    return f"levels to {floored(highest, 3):g}" if highest >= stimulus.levels[0] else ""
 
 
 def _named(every: Sequence[Level], some: Sequence[Level], verbs: tuple[str, str]) -> str:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, ClassVar, Final
 
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_means import MeanPlan, expected_mean, mean_plan
+from study_app.protocol.levels.presented_levels import Clipping, clipping
 from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity
 from study_app.protocol.trials.design import Design
@@ -72,6 +73,8 @@ class ThresholdPlan:
         Catch trials of each track.
     standards : int
         How many standards the block has.
+    clipping : Clipping or None
+        How limits clip the levels that observers answer to; None: they are presented in full.
     """
 
     stimulus: Stimulus
@@ -79,6 +82,7 @@ class ThresholdPlan:
     method: Method
     catch: int
     standards: int
+    clipping: Clipping | None = None
 
     per: ClassVar[str] = " per standard"
 
@@ -94,7 +98,18 @@ class ThresholdPlan:
         each = max(1, round(trials / least))
         changed = {"trials": each * method.tracks} if method.adaptive else {"repetitions": each}
         catch = round(self.catch * each / max(1, self.trials // least))
-        return ThresholdPlan(stimulus, self.design, method.model_copy(update=changed), catch, self.standards)
+        return replace(self, method=method.model_copy(update=changed), catch=catch)
+
+    def presented(self, levels: Floats) -> Floats:
+        """Return levels as they are presented, both in u."""
+        import numpy as np  # noqa: PLC0415
+
+        if self.clipping is None:
+            return levels
+        log = self.stimulus.spacing == "log"
+        found = self.clipping.presented(self.stimulus, 10.0**levels if log else levels)
+        with np.errstate(divide="ignore"):  # a level of 0 has the logarithm −∞
+            return np.log10(np.maximum(found, 0.0)) if log else found
 
     def middle_half(self, count: int) -> Floats:
         """Return thresholds [u], evenly spaced over the middle half of the levels."""
@@ -123,7 +138,8 @@ class ThresholdPlan:
         assumed, guess = self.method.assumed(stimulus, design), design.guess_rate
         if guess is None:
             guess = lapses if guesses_of(stimulus, design) is None else FALSE_ALARMS
-        observers = Observers(assumed.family, thresholds, assumed.width_prior[0], guess, lapses)
+        presented = None if self.clipping is None else self.presented
+        observers = Observers(assumed.family, thresholds, assumed.width_prior[0], guess, lapses, presented)
         noise_trials, high = design.noise(self.method.presentations(stimulus)), stimulus.domain[1]
         tracks, yes = [], np.zeros(len(thresholds))
         for number in range(1, self.method.tracks + 1):
@@ -185,7 +201,9 @@ def threshold_plan(protocol: Protocol, block: Block) -> ThresholdPlan | None:
     if not rises(stimulus, design):
         return None
     catch, standards = len(tracks_of(protocol, block)[0].catch), len(standards_of(protocol, block))
-    return ThresholdPlan(stimulus, design, method_of(protocol, block), catch, standards)
+    limits = clipping(protocol, block)
+    presented = limits if limits is not None and limits.paced else None
+    return ThresholdPlan(stimulus, design, method_of(protocol, block), catch, standards, presented)
 
 
 @lru_cache(maxsize=32)

@@ -6,9 +6,10 @@ import math
 from collections.abc import Iterator
 
 from study_app.protocol.blocks import Block
-from study_app.protocol.checks.clipped_levels import PACED, clipped_unpaced, highest_damping
+from study_app.protocol.checks.clipped_levels import PACED, clipped_unpaced
 from study_app.protocol.checks.estimator_response import fastest_hz
 from study_app.protocol.checks.expected_precision import imprecise
+from study_app.protocol.levels.presented_levels import highest_damping
 from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.trials.tracks import design_of, method_of, tracks_of
 

@@ -10,7 +10,7 @@ from typing import Final
 
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
 from study_app.haptics.model.scene import Scene
-from study_app.protocol.checks.clipped_levels import clipped, clipped_at_pace, floored
+from study_app.protocol.checks.clipped_levels import by_stimulus, clipped, clipped_at_pace, floored
 from study_app.protocol.checks.estimator_response import fastest_hz, passed_share
 from study_app.protocol.model import Follow, Protocol, Reach
 from study_app.protocol.source.problems import Fault
@@ -31,8 +31,8 @@ def paced(protocol: Protocol, delay_ticks: int = BELIEVED_TICKS) -> Iterator[Fau
     """
     yield from _hidden(protocol)
     yield from _lagging(protocol)
-    of_levels = [block for block in protocol.blocks.values() if block.stimulus is not None]
-    yield from dict.fromkeys(fault for block in of_levels for fault in clipped(protocol, block, delay_ticks))
+    for blocks in by_stimulus(protocol):
+        yield from clipped(protocol, blocks, delay_ticks)
     for block in protocol.blocks.values():
         task = protocol.tasks[block.task]
         if block.stimulus is None and isinstance(task, Follow):

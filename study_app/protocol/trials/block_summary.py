@@ -10,8 +10,8 @@ from study_app.haptics.model.overrides import override
 from study_app.haptics.model.slope_limits import slope_limit
 from study_app.haptics.model.steady_state import steady
 from study_app.protocol.blocks import Block
-from study_app.protocol.checks.clipped_levels import FASTER, highest_damping
 from study_app.protocol.checks.expected_precision import precision_rows
+from study_app.protocol.levels.presented_levels import FASTER, highest_damping
 from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity
 from study_app.protocol.trials.methods.adjustment import Adjustment

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Final, Literal, Self, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 from pydantic.json_schema import SkipJsonSchema
@@ -17,6 +17,11 @@ from study_app.haptics.model.ranges import within
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Id
 
+if TYPE_CHECKING:
+    from study_app.psychophysics.families import Floats
+
+Level = TypeVar("Level", float, "Floats")
+"""One level or value, or an array of them."""
 LevelKind: TypeAlias = Literal["weber", "difference", "value"]
 
 DELAY: Final = "delay_ms"
@@ -142,14 +147,14 @@ class Stimulus(Table):
         """What a level is."""
         return self.level or ("difference" if self.vary.endswith("_ms") else "weber")
 
-    def comparison(self, standard: float | None, level: float) -> float:
+    def comparison(self, standard: float | None, level: Level) -> Level:
         """Return the comparison at a level, in the unit of the varied number.
 
         Parameters
         ----------
         standard : float or None
             The standard; None where the level is the value itself.
-        level : float
+        level : float or array
             The level; 0 is the standard itself.
         """
         if standard is None or self.level_kind == "value":
@@ -157,7 +162,7 @@ class Stimulus(Table):
         distance = standard * level if self.level_kind == "weber" else level
         return standard + distance if self.direction == "up" else standard - distance
 
-    def level_between(self, standard: float | None, comparison: float) -> float:
+    def level_between(self, standard: float | None, comparison: Level) -> Level:
         """Return the level at which a comparison lies; `comparison` inverted."""
         if standard is None or self.level_kind == "value":
             return comparison

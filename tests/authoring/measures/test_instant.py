@@ -6,13 +6,12 @@ import pytest
 
 from study_app.authoring.edited_study import Study, read
 from study_app.authoring.measures.balance import balance_of
-from study_app.authoring.measures.forces import level_limits
 from study_app.authoring.measures.participant_texts import copied_texts, revealing, text_keys, texts_by_language
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.edits import Set, Unset
 from study_app.haptics.model.slope_limits import slope_limit
-from study_app.protocol.checks.clipped_levels import levels, standard_of
+from study_app.protocol.levels.presented_levels import level_limits, levels, standard_of
 from study_app.protocol.load import load, shipped
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s
 from study_app.protocol.source.files import shipped_file
@@ -26,7 +25,7 @@ def study_of(name: str) -> Study:
 @pytest.mark.parametrize(("name", "block"), [("viscosityjnd", "viscosity"), ("thickness", "thickness")])
 def test_a_limit_begins_where_levels_begin_to_be_clipped(name: str, block: str) -> None:
     protocol = load(name)
-    limits = level_limits(protocol, block, max(one.comparison for one in levels(protocol, block)))
+    limits = level_limits(protocol, protocol.blocks[block])
     assert limits is not None
     assert limits.force is not None
     assert limits.loop is not None
@@ -43,7 +42,7 @@ def test_a_limit_begins_where_levels_begin_to_be_clipped(name: str, block: str) 
 def test_numbers_of_a_condition_have_no_force_of_their_own() -> None:
     for name in ("delaydetect", "forcedelay"):
         protocol = load(name)
-        assert level_limits(protocol, "delay", 100.0) is None
+        assert level_limits(protocol, protocol.blocks["delay"]) is None
         assert {one.asked_n for one in levels(protocol, "delay")} == {None}
 
 

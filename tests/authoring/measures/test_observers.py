@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
+from study_app.app.designer.measures.measures_worker import Measuring
+from study_app.app.designer.measures.wanted import wanted_of
 from study_app.authoring.measures.observers import GivenUp, Planted, _longest, measurable, observe
 from study_app.authoring.new_study import template
+from study_app.authoring.writer.edits import Set
 from study_app.protocol.checks.expected_precision import ThresholdPlan, expected, threshold_plan
+from study_app.viewmodels.designer.measures.measures_view import Controls, focus_of
+
+CLIPPED = Set(("stimuli", "damping", "standards"), [32]), Set(("stimuli", "damping", "levels"), [0.02, 2.0])
+FULL = 53 / 32 - 1
+"""The highest level of these that is presented in full: the slope limit of the loop is 53 N·s/m."""
 
 
-def plan_of(trials: int = 40) -> ThresholdPlan:
-    protocol = template("viscosity-jnd").protocol
+def plan_of(trials: int = 40, *changes: Set) -> ThresholdPlan:
+    protocol = template("viscosity-jnd").edited(*changes)[0].formed
     assert protocol is not None
     plan = threshold_plan(protocol, protocol.blocks["viscosity"])
     assert plan is not None
@@ -38,6 +49,61 @@ def test_planted_observers_are_found_as_precisely_as_check_expects() -> None:
     assert {round(one.level, 9) for one in found.one} <= grid
     assert found.at_threshold == pytest.approx(0.5 + 0.48 / 2, abs=1e-6)  # half the way from guessing to lapsing
     assert found.found[0][30] > found.planted[30] > found.found[4][30]  # a lower threshold is a higher function
+
+
+@pytest.mark.parametrize(
+    ("changes", "asked", "presented"),
+    [
+        (CLIPPED, [0.02, 0.6, 0.7, 2.0], [0.02, 0.6, FULL, FULL]),
+        ((*CLIPPED[:1], Set(("stimuli", "damping", "levels"), [0.02, 0.6])), [0.6], [0.6]),
+        ((Set(("stimuli", "damping", "standards"), [60]),), [0.1, 0.6], [0.0, 0.0]),
+        (
+            (Set(("stimuli", "damping", "standards"), [60]), Set(("stimuli", "damping", "direction"), "down")),
+            [0.05, 0.5],
+            [0.0, (53 - 30) / 53],
+        ),
+    ],
+)
+def test_levels_are_presented_as_the_limits_leave_them(
+    changes: tuple[Set, ...], asked: list[float], presented: list[float]
+) -> None:
+    plan = plan_of(40, *changes)
+    found = 10.0 ** plan.presented(np.log10(asked))
+    assert found.tolist() == pytest.approx(presented, rel=1e-6)
+
+
+def test_observers_answer_to_clipped_levels_as_to_the_highest_that_is_presented_in_full() -> None:
+    plan, full = plan_of(12, *CLIPPED), np.log10(FULL)
+    answered = plan.answered(np.full(4, full), np.random.default_rng(1), 0.02)
+    assert answered is not None
+    at_limit, beyond = (answered.observers.probability(np.full(4, at))[0] for at in (full, full + 0.4))
+    assert at_limit == pytest.approx(0.5 + 0.48 / 2, abs=1e-3)
+    assert beyond == pytest.approx(at_limit, abs=1e-6)
+
+
+def test_no_clipped_level_is_a_threshold_that_can_be_measured() -> None:
+    free = {"kind": "explore", "min_s": 2, "max_s": 4, "instruction": "Feel."}
+    unpaced = CLIPPED[1], Set(("tasks", "stir"), free), Set(("stimuli", "damping", "standards"), [12])
+    for changes, most in ((CLIPPED, FULL), (unpaced, 8 / 0.3 / 12 - 1)):
+        protocol = template("viscosity-jnd").edited(*changes)[0].formed
+        assert protocol is not None
+        focus = focus_of(protocol, ("blocks", "viscosity"))
+        (wanted,) = [one for one in wanted_of(protocol, focus, Controls()) if isinstance(one, Measuring)]
+        assert wanted.most == pytest.approx(most, rel=1e-4)
+        assert (wanted.plan.clipping is None) == (changes is unpaced)  # fast motions are repeated, not answered
+    found = measurable(plan_of(4, *CLIPPED), 0.02, 0.02, most=0.03)
+    assert found is not None
+    assert [one.threshold for one in found.planted] == pytest.approx([0.02], rel=0.01)
+
+
+@pytest.mark.slow
+def test_clipped_levels_make_the_error_larger() -> None:
+    clipped, full = plan_of(24, *CLIPPED), plan_of(24, *CLIPPED)
+    found = [observe(one, 0.6, 0.02) for one in (clipped, replace(full, clipping=None))]
+    assert found[0] is not None
+    assert found[1] is not None
+    assert found[0].error > 1.2 * found[1].error
+    assert max(found[0].planted) < found[0].at_threshold + 0.05 < max(found[1].planted)
 
 
 @pytest.mark.slow

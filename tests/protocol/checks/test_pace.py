@@ -9,7 +9,7 @@ import pytest
 from study_app.errors import ProtocolError
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.steady_state import steady
-from study_app.protocol.checks.clipped_levels import FASTER
+from study_app.protocol.levels.presented_levels import FASTER
 from study_app.protocol.load import parse
 from study_app.protocol.model import Follow, Protocol
 
@@ -143,14 +143,13 @@ def test_each_row_is_reported_at_its_line(edits: list[tuple[str, str]], place: s
     assert problem.line is not None
 
 
-def test_levels_that_only_the_force_limit_clips_are_named_too() -> None:
+def test_each_level_is_named_once_with_the_limit_that_clips_it() -> None:
     with pytest.raises(ProtocolError) as refused:
         study([("[8]", "[40]"), ("repetitions = 2", "repetitions = 2\nlevels = [0.1, 0.2, 0.6]")])
     said = [problem.message for problem in refused.value.problems]
     assert said == [
         "standard 40 at level 0.6 gives 64 N·s/m at the hand; the slope limit (1000 Hz, kalman, 1 tick) is 53",
-        "standard 40 at levels 0.1, 0.2 and 0.6 is up to 12.1 N at 1.2 times the paced 0.157 m/s; "
-        "device.force_limit_n is 8",
+        "standard 40 at levels 0.1 and 0.2 is up to 9.0 N at 1.2 times the paced 0.157 m/s; device.force_limit_n is 8",
     ]
 
 

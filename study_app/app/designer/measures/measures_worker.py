@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, TypeAlias
@@ -38,11 +39,12 @@ class Observing:
 
 @dataclass(frozen=True, slots=True)
 class Measuring:
-    """Ask for `Measurable`, not below a level."""
+    """Ask for `Measurable`, not below a level, and not above another one."""
 
     plan: ThresholdPlan
     lapses: float
     least: float
+    most: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,8 +124,8 @@ def _found(wanted: Wanted, stop: Stop) -> Found:
     match wanted:
         case Observing(plan, threshold, lapses):
             return observe(plan, threshold, lapses, stop)
-        case Measuring(plan, lapses, least):
-            return measurable(plan, lapses, least, stop)
+        case Measuring(plan, lapses, least, most):
+            return measurable(plan, lapses, least, stop, most)
         case Grouping():
             return _group(wanted, stop)
         case Detecting():

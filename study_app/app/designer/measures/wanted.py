@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Any, Final
 
 from study_app.app.designer.measures.measures_worker import Advising, Detecting, Grouping, Measuring, Observing, Wanted
 from study_app.authoring.measures.participant_texts import text_keys
 from study_app.protocol.checks.expected_precision import ThresholdPlan, threshold_plan
+from study_app.protocol.levels.presented_levels import clipping
 from study_app.protocol.model import Protocol
 from study_app.viewmodels.designer.measures.measures_view import Controls, Focus
 
@@ -30,7 +32,7 @@ def wanted_of(protocol: Protocol, focus: Focus, controls: Controls) -> tuple[Wan
         wanted = [
             Observing(plan, controls.threshold, controls.lapses),
             Grouping(plan, controls.participants, controls.precision),
-            Measuring(plan, controls.lapses, least_of(protocol, plan)),
+            Measuring(plan, controls.lapses, least_of(protocol, plan), most_of(protocol, focus)),
         ]
     if focus.compares and focus.block is not None:
         depends = _dependencies(protocol)
@@ -77,6 +79,12 @@ def least_of(protocol: Protocol, plan: ThresholdPlan) -> float:
     if plan.stimulus.level_kind == "weber":
         return ERRORS * (limits.level_error_percent or USUAL_ERROR_PERCENT) / 100
     return 0.0
+
+
+def most_of(protocol: Protocol, focus: Focus) -> float:
+    """Return the largest level that an estimate can be of: the highest one that is presented in full."""
+    found = None if focus.block is None else clipping(protocol, focus.block)
+    return math.inf if found is None or focus.plan is None else found.highest(focus.plan.stimulus)
 
 
 def _dependencies(protocol: Protocol) -> str:

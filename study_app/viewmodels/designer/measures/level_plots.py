@@ -7,12 +7,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from study_app.authoring.measures.forces import LevelLimits, level_limits
 from study_app.authoring.measures.observers import Measurable, Observed
 from study_app.authoring.measures.planned import ENOUGH, GroupPrecision
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
 from study_app.protocol.blocks import Block
-from study_app.protocol.checks.clipped_levels import Level, clipped, clipped_unpaced, levels, standard_of
+from study_app.protocol.checks.clipped_levels import clipped, clipped_unpaced
+from study_app.protocol.levels.presented_levels import (
+    Clipping,
+    Level,
+    LevelLimits,
+    clipping,
+    level_limits,
+    levels,
+    standard_of,
+)
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import BlockOrder
 from study_app.protocol.trials.tracks import design_of, stimulus_of
@@ -31,6 +39,7 @@ from study_app.viewmodels.designer.measures.number_cards import (
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 
 MOST_LABELS: Final = 9
+AS_ASKED: Final = "Clipped levels are simulated as they are requested"
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,13 +75,14 @@ class Simulated:
 
 @dataclass(frozen=True, slots=True)
 class LevelBlock:
-    """A block with a stimulus, with what its levels are, and whether their forces are known."""
+    """A block with a stimulus: what its levels are, how limits clip them, and whether their forces are known."""
 
     protocol: Protocol
     block: Block
     words: LevelWords
     levels: tuple[Level, ...]
     limits: LevelLimits | None
+    clipping: Clipping | None
     forces: bool = True
 
     @property
@@ -88,12 +98,19 @@ class LevelBlock:
     @property
     def clipped_from(self) -> float | None:
         """The place from which on a limit takes part of the force away, where some level is beyond it."""
-        first = next((one for one in self.shown if one.clipped_by is not None), None)
-        if first is None or self.limits is None:
-            return None
-        limit = min(one for one in (self.limits.force, self.limits.loop, math.inf) if one is not None)
-        level = self.words.stimulus.level_between(self.standard, limit)
-        return self.words.at(level) if math.isfinite(level) and level > 0 else self.words.at(first.level)
+        level = math.inf if self.clipping is None else self.clipping.highest(self.words.stimulus)
+        return self.words.at(level) if math.isfinite(level) else None
+
+    @property
+    def clipped_words(self) -> str:
+        """What is simulated of levels that a limit clips, in a sentence; "" where none is clipped."""
+        if self.clipping is None:
+            return AS_ASKED if any(one.clipped_by is not None for one in self.shown) else ""
+        highest = self.clipping.highest(self.words.stimulus)
+        which = "The standard is" if not 0 < highest < math.inf else f"Levels above {self.words.words(highest)} are"
+        if self.clipping.paced:
+            return f"{which} clipped: observers are simulated with what the limits leave"
+        return f"{which} clipped in fast motions, whose trials are repeated. {AS_ASKED}"
 
 
 def level_block(protocol: Protocol, block: Block, *, forces: bool = True) -> LevelBlock | None:
@@ -101,10 +118,9 @@ def level_block(protocol: Protocol, block: Block, *, forces: bool = True) -> Lev
     if block.stimulus is None or block.design is None:
         return None
     found = levels(protocol, block.id)
-    most = max((one.comparison for one in found), default=0.0)
     words = LevelWords(stimulus_of(protocol, block), design_of(protocol, block))
-    limits = level_limits(protocol, block.id, most) if forces else None
-    return LevelBlock(protocol, block, words, found, limits, forces)
+    limits, clips = (level_limits(protocol, block), clipping(protocol, block)) if forces else (None, None)
+    return LevelBlock(protocol, block, words, found, limits, clips, forces)
 
 
 def number_cards(
@@ -140,8 +156,10 @@ def _range(of: LevelBlock, simulated: Simulated) -> NumberCard:
     if found is None:
         return _unknown(title, words.unit, simulated)
     anew = "measurable" in simulated.anew
+    clipped = of.clipped_words
     if found.ends is None:
-        return NumberCard(title, "none", "", ("bad", "warning", "estimates are biased"), anew)
+        why = "estimates are biased" if found.planted else "the standard is clipped"
+        return NumberCard(title, "none", "", ("bad", "warning", why), anew, clipped)
     low, high = found.ends
     note: Verdict = ("neutral", "info", f"of {words.number(of.words.stimulus.levels[1])} {words.unit} at most")
     if words.stimulus.level_kind == "weber" and of.standard is not None:
@@ -149,7 +167,7 @@ def _range(of: LevelBlock, simulated: Simulated) -> NumberCard:
         note = ("neutral", "info", f"{' to '.join(values)} {words.value_unit}")
     if not low * 0.999 <= simulated.threshold <= high * 1.001:
         note = ("warn", "warning", f"not {words.words(simulated.threshold)}")
-    return NumberCard(title, f"{words.number(low, 2)} – {words.number(high, 2)}", words.unit, note, anew)
+    return NumberCard(title, f"{words.number(low, 2)} – {words.number(high, 2)}", words.unit, note, anew, clipped)
 
 
 def _one_person(of: LevelBlock, simulated: Simulated) -> NumberCard:
@@ -272,17 +290,20 @@ def forces_plot(of: LevelBlock, problems: Mapping[ProblemRow, tuple[str, ...]]) 
         bars.insert(0, ForceBar(own.asked_n or 0.0, own.sent_n or 0.0, own.clipped_by is not None, standard=True))
         values.insert(0, of.standard)
     unit, limit_n = of.words.value_unit, of.protocol.device.force_limit_n
-    clipped = sum(one.clipped_by is not None for one in of.levels)
-    asked = len(of.levels) - clipped
-    row, repair = _repair(of, problems)
-    warning = "" if not clipped else row.message if row is not None else clipped_unpaced(of.protocol, of.block) or ""
+    count = sum(one.clipped_by is not None for one in of.levels)
+    asked = len(of.levels) - count
+    rows = [row for row in problems if row.fault.path == ("stimuli", str(of.block.stimulus), "levels")]
+    repair = next((RepairOffer(words[0], row) for row in rows if (words := problems[row])), None)
+    messages = [fault.message for fault in clipped(of.protocol, [of.block], BELIEVED_TICKS)]
+    said = ". ".join(f"{one[:1].upper()}{one[1:]}" for one in messages)
+    warning = said or clipped_unpaced(of.protocol, of.block) or ""
     top = max(limit_n, *(bar.asked_n for bar in bars))
     step = max(1, math.ceil(len(bars) / MOST_LABELS))
     standard = "" if of.standard is None else f"standard {rounded(of.standard)} {unit}, "
     told = f"{asked} of {len(of.levels)} as asked"
     verdicts: tuple[Verdict, ...] = (("ok", "check", told),)
-    if clipped:
-        verdicts = ("neutral", "info", told), ("bad" if row is not None else "warn", "warning", f"{clipped} clipped")
+    if count:
+        verdicts = ("neutral", "info", told), ("bad" if rows else "warn", "warning", f"{count} clipped")
     strongest = max(one.asked_n or 0.0 for one in shown)
     slope_n = min((one.sent_n or 0.0 for one in shown if one.clipped_by == "slope"), default=None)
     slope = "" if slope_n is None else f", the slope limit of the loop {slope_n:.2f} N"
@@ -299,17 +320,6 @@ def forces_plot(of: LevelBlock, problems: Mapping[ProblemRow, tuple[str, ...]]) 
         sentence=(
             f"Force at {len(shown)} levels from {rounded(values[0])} to {rounded(values[-1])} {unit}: at most "
             f"{strongest:.2f} N are requested; the limit is {limit_n:g} N{slope}. {asked} of {len(of.levels)} levels "
-            f"are as requested, {clipped} are clipped."
+            f"are as requested, {count} are clipped."
         ),
     )
-
-
-def _repair(
-    of: LevelBlock, problems: Mapping[ProblemRow, tuple[str, ...]]
-) -> tuple[ProblemRow | None, RepairOffer | None]:
-    """Return the problem of a block's levels, and the repair that was found for it."""
-    place = ("stimuli", str(of.block.stimulus), "levels")
-    said = {fault.message for fault in clipped(of.protocol, of.block, BELIEVED_TICKS)}
-    row = next((one for one in problems if one.fault.path == place and one.fault.message in said), None)
-    words = () if row is None else problems[row]
-    return row, RepairOffer(words[0], row) if words else None

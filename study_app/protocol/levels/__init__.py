@@ -1,0 +1,1 @@
+"""Levels of stimuli as they are presented."""

@@ -1,0 +1,245 @@
+"""The levels of a block as they are presented: force at the task's fastest point, and what the limits leave of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import TYPE_CHECKING, Final, Literal
+
+from study_app.errors import StudyError
+from study_app.haptics.model.overrides import override
+from study_app.haptics.model.scene import Scene
+from study_app.haptics.model.steady_state import steady
+from study_app.protocol.blocks import Block
+from study_app.protocol.model import Follow, Protocol
+from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulus
+from study_app.protocol.trials.tracks import condition_of, method_of, standards_of, stimulus_of
+
+if TYPE_CHECKING:
+    from study_app.psychophysics.families import Floats
+
+FASTER: Final = 1.2
+"""A hand exceeds the pace of its target by up to a fifth. [choice]"""
+UNPACED_MPS: Final = 0.3
+"""A hand that is free moves as fast. [choice]"""
+BEYOND: Final = (4.0, 2.0, 1.0)
+"""So far beyond the largest value a limit is looked for, less where a liquid cannot have such a number."""
+_HALVINGS: Final = 32
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """One level of one standard.
+
+    Attributes
+    ----------
+    standard : float or None
+        The standard, in the unit of the varied number; None where the level is the value itself.
+    level, comparison : float
+        The level as it is asked, and the value that it stands for.
+    asked_n, sent_n : float or None
+        Force of its drag at the task's fastest point, and of what the limits leave of it [N]; None for a number of the
+        condition.
+    clipped_by : str or None
+        The "norm" (``device.force_limit_n``) or the "slope" limit of the loop (`haptics.model.slope_limits`).
+    damping_nspm : float
+        Of a linear law [N·s/m at the hand]; 0 of others.
+    """
+
+    standard: float | None
+    level: float
+    comparison: float
+    asked_n: float | None = None
+    sent_n: float | None = None
+    clipped_by: Literal["slope", "norm"] | None = None
+    damping_nspm: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class LevelLimits:
+    """Up to which values of the varied number the force is presented in full; None: beyond what is looked at.
+
+    Attributes
+    ----------
+    force, loop : float or None
+        The highest value that the force limit, and the slope limit of the loop, leave as it is asked.
+    hand_mps : float
+        The speed of the hand that both are for [m/s].
+    """
+
+    force: float | None
+    loop: float | None
+    hand_mps: float
+
+    @property
+    def lowest(self) -> float | None:
+        """The value above which a limit clips the force; None where none does."""
+        return min((one for one in (self.force, self.loop) if one is not None), default=None)
+
+
+@dataclass(frozen=True, slots=True)
+class Clipping:
+    """How limits clip what a block presents at its highest standard.
+
+    Attributes
+    ----------
+    standard : float or None
+        The standard; None where the level is the value itself.
+    limit : float
+        The value of the varied number that is presented instead of every higher one.
+    paced : bool
+        Whether the task sets the pace; otherwise levels are clipped in fast motions alone, whose trials are repeated.
+    """
+
+    standard: float | None
+    limit: float
+    paced: bool
+
+    def highest(self, stimulus: Stimulus) -> float:
+        """Return the highest level that is presented in full; infinite where higher levels have less force."""
+        if self.standard is not None and stimulus.level_kind != "value" and stimulus.direction == "down":
+            return math.inf
+        return stimulus.level_between(self.standard, self.limit)
+
+    def presented(self, stimulus: Stimulus, levels: Floats) -> Floats:
+        """Return levels as they are presented: between what the limits leave of the standard and of the comparison.
+
+        Parameters
+        ----------
+        stimulus : Stimulus
+            What is varied.
+        levels : (n,) array
+            Levels as they are asked.
+        """
+        import numpy as np  # noqa: PLC0415 - protocols do not load it
+
+        standard = None if self.standard is None else min(self.standard, self.limit)
+        comparisons = np.minimum(stimulus.comparison(self.standard, levels), self.limit)
+        return stimulus.level_between(standard, comparisons)
+
+
+def levels(protocol: Protocol, block_id: str) -> tuple[Level, ...]:
+    """Return every level that a block with a stimulus can present, standard by standard, the smallest first.
+
+    Raises
+    ------
+    KeyError
+        There is no such block.
+    """
+    block = protocol.blocks[block_id]
+    if block.stimulus is None:
+        return ()
+    stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
+    asked = sorted({*(stimulus.grid if method.adaptive else ()), *method.asked(stimulus)})
+    scene, hand_mps = protocol.scene_for(condition_of(protocol, stimulus)), hand_mps_of(protocol, block)
+    return tuple(
+        _level(stimulus, scene, hand_mps, standard, level)
+        for standard in standards_of(protocol, block)
+        for level in asked
+    )
+
+
+def standard_of(protocol: Protocol, block_id: str, standard: float) -> Level:
+    """Return a standard of a block as its level 0."""
+    block = protocol.blocks[block_id]
+    stimulus = stimulus_of(protocol, block)
+    scene = protocol.scene_for(condition_of(protocol, stimulus))
+    found = _level(stimulus, scene, hand_mps_of(protocol, block), None, standard)
+    return replace(found, standard=standard, level=0.0, comparison=standard)
+
+
+def _level(stimulus: Stimulus, scene: Scene, hand_mps: float, standard: float | None, level: float) -> Level:
+    comparison = stimulus.comparison(standard, level)
+    if stimulus.vary in OF_CONDITION or len(scene.liquids) != 1:
+        return Level(standard, level, comparison)
+    varied = override(scene, stimulus.vary, comparison)
+    force = steady(varied, hand_mps)
+    return Level(standard, level, comparison, force.drag_n, force.force_n, force.limit, damping_of(varied))
+
+
+def level_limits(protocol: Protocol, block: Block) -> LevelLimits | None:
+    """Return the limits of what a block varies; None where it varies no force of one liquid."""
+    if block.stimulus is None:
+        return None
+    stimulus, standards = stimulus_of(protocol, block), standards_of(protocol, block)
+    scene, asked = protocol.scene_for(condition_of(protocol, stimulus)), method_of(protocol, block).asked(stimulus)
+    most = max(stimulus.comparison(standard, level) for standard, level in product(standards, (0.0, *asked)))
+    if stimulus.vary in OF_CONDITION or len(scene.liquids) != 1 or most <= 0:
+        return None
+    hand_mps = hand_mps_of(protocol, block)
+
+    def beyond_force(value: float) -> bool:
+        return steady(override(scene, stimulus.vary, value), hand_mps).drag_n > scene.force_limit_n
+
+    def beyond_loop(value: float) -> bool:
+        unlimited = override(scene, stimulus.vary, value).model_copy(update={"force_limit_n": math.inf})
+        return steady(unlimited, hand_mps).limit is not None
+
+    return LevelLimits(_last(beyond_force, most), _last(beyond_loop, most), hand_mps)
+
+
+def _last(beyond: Callable[[float], bool], most: float) -> float | None:
+    """Return the highest value, up to some times ``most``, that is not beyond a limit; None where none is."""
+    high = next((factor * most for factor in BEYOND if _holds(beyond, factor * most)), None)
+    if high is None:
+        return None
+    low = 0.0
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        low, high = (low, middle) if _holds(beyond, middle) else (middle, high)
+    return low
+
+
+def _holds(beyond: Callable[[float], bool], value: float) -> bool:
+    """Return whether a value is beyond a limit; one that a liquid cannot have is not."""
+    try:
+        return beyond(value)
+    except StudyError:
+        return False
+
+
+def clipping(protocol: Protocol, block: Block) -> Clipping | None:
+    """Return how limits clip a block's levels; None where they clip none, or no level follows from the limits."""
+    if block.stimulus is None:
+        return None
+    scenes = [scene for *_, scene in ends(protocol, block) if len(scene.liquids) == 1]
+    hand_mps = hand_mps_of(protocol, block)
+    if all(steady(scene, hand_mps).limit is None for scene in scenes):
+        return None
+    limits = level_limits(protocol, block)
+    if limits is None or not limits.lowest:
+        return None
+    standard = max((one for one in standards_of(protocol, block) if one is not None), default=None)
+    return Clipping(standard, limits.lowest, isinstance(protocol.tasks[block.task], Follow))
+
+
+def hand_mps_of(protocol: Protocol, block: Block) -> float:
+    """Return the speed of the hand at the fastest point of a block's task [m/s]."""
+    task = protocol.tasks[block.task]
+    return FASTER * task.fastest_stroke((0.0, 0.0, 0.0)).speed_mps if isinstance(task, Follow) else UNPACED_MPS
+
+
+def ends(protocol: Protocol, block: Block) -> Iterator[tuple[float | None, float, Scene]]:
+    """Yield standard, level and scene at the strongest and the weakest level of each standard, but for delays."""
+    stimulus = stimulus_of(protocol, block)
+    if stimulus.vary == DELAY:
+        return
+    asked = method_of(protocol, block).asked(stimulus)
+    scene = protocol.scene_for(condition_of(protocol, stimulus))
+    for standard, level in product(standards_of(protocol, block), (max(asked), min(asked))):
+        varied = scene
+        if stimulus.vary not in OF_LINK:
+            varied = override(scene, stimulus.vary, stimulus.comparison(standard, level))
+        yield standard, level, varied
+
+
+def damping_of(scene: Scene) -> float:
+    """Return the highest damping of a scene's liquids with a linear law [N·s/m at the hand]; 0 without one."""
+    return max((liquid.drag.damping_nspm or 0.0 for liquid in scene.liquids), default=0.0)
+
+
+def highest_damping(protocol: Protocol, block: Block) -> float:
+    """Return the highest damping that a block of levels presents [N·s/m at the hand]; 0 without a linear law."""
+    return max((damping_of(scene) for _, _, scene in ends(protocol, block)), default=0.0)
