@@ -36,6 +36,11 @@ class Balanced:
     session: str = ""
 
     @property
+    def last_even(self) -> int:
+        """The number of participants of the last full round; 0 where there is none."""
+        return 0 if self.rows is None else self.evenness.orders - self.evenness.orders % self.rows
+
+    @property
     def next_even(self) -> int | None:
         """The next number of participants that fills a round; None without a square."""
         people = self.evenness.orders

@@ -18,7 +18,7 @@ from study_app.psychophysics.families import Floats, success
 OBSERVERS: Final = 400
 SEED: Final = 1
 AT_ONCE: Final = 100
-"""Observers that are simulated between two looks at whether to stop."""
+"""Observers that are simulated together."""
 SHARES: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
 """The quantiles of every band: the middle, the 50 % and the 90 % in between."""
 POINTS: Final = 61
@@ -30,8 +30,13 @@ BIAS: Final = 0.1
 COVERAGE: Final = 0.93
 """A threshold can be measured if the mean estimate is within the bias and so many 95 % intervals hold it. [choice]"""
 
-Stop: TypeAlias = Callable[[], bool]
+Watch: TypeAlias = Callable[[int, int], None]
+"""Is told how many simulations of how many are done; raises `GivenUp` to end them."""
 Values: TypeAlias = tuple[float, ...]
+
+
+def unwatched(_done: int, _total: int) -> None:
+    """Let simulations come to their end."""
 
 
 class GivenUp(Exception):
@@ -114,28 +119,27 @@ class Measurable:
     planted: tuple[Planted, ...]
 
 
-def observe(plan: ThresholdPlan, threshold: float, lapses: float, stop: Stop = lambda: False) -> Observed | None:
+def observe(plan: ThresholdPlan, threshold: float, lapses: float, watch: Watch = unwatched) -> Observed | None:
     """Return what observers with a threshold (a level) show; None where tracks of the method are not simulated.
 
     Raises
     ------
     GivenUp
-        ``stop`` asked for it.
+        By ``watch``.
     """
     stimulus, random = plan.stimulus, np.random.default_rng(SEED)
     u = stimulus.coordinate(threshold)
     medians, course, presented = [], None, []
     first: Answered | None = None
-    for _ in range(0, OBSERVERS, AT_ONCE):
-        if stop():
-            raise GivenUp
+    for done in range(0, OBSERVERS, AT_ONCE):
+        watch(done, OBSERVERS)
         answered = plan.answered(np.full(AT_ONCE, u), random, lapses)
         if answered is None:
             return None
         medians.append(plan.estimates(answered).medians)
         presented += [one.levels[~np.isnan(one.levels)] for one in answered.tracks]
         if first is None:
-            first, course = answered, _course(plan, answered, stop)
+            first, course = answered, _course(plan, answered, watch)
     assert first is not None  # noqa: S101 - there is a first one
     found, planted = np.concatenate(medians), replace(first.observers, thresholds=np.array(u))
     errors = (found - u) * math.log(10) if stimulus.spacing == "log" else (found - u) / u
@@ -158,7 +162,7 @@ def observe(plan: ThresholdPlan, threshold: float, lapses: float, stop: Stop = l
 
 
 def measurable(
-    plan: ThresholdPlan, lapses: float, least: float, stop: Stop = lambda: False, most: float = math.inf
+    plan: ThresholdPlan, lapses: float, least: float, watch: Watch = unwatched, most: float = math.inf
 ) -> Measurable | None:
     """Return which thresholds a block can measure; None where tracks of the method are not simulated.
 
@@ -170,26 +174,24 @@ def measurable(
         Lapse rate of the observers.
     least : float
         No threshold below this level counts: twice the largest error of a valid trial.
-    stop : callable
-        Whether to give up.
+    watch : callable
+        Is told how far the simulations are.
     most : float
         No threshold above this level counts: the highest one that is presented in full.
 
     Raises
     ------
     GivenUp
-        ``stop`` asked for it.
+        By ``watch``.
     """
     stimulus, random = plan.stimulus, np.random.default_rng(SEED)
     found: list[Planted] = []
-    for u in np.linspace(*stimulus.domain, PLANTED).tolist():
-        threshold = stimulus.level_of(u)
-        if not least <= threshold <= most or threshold <= 0:
-            continue
+    planted = [(u, stimulus.level_of(u)) for u in np.linspace(*stimulus.domain, PLANTED).tolist()]
+    planted = [(u, threshold) for u, threshold in planted if least <= threshold <= most and threshold > 0]
+    for number, (u, threshold) in enumerate(planted):
         levels, held = [], []
-        for _ in range(0, OBSERVERS, AT_ONCE):
-            if stop():
-                raise GivenUp
+        for done in range(0, OBSERVERS, AT_ONCE):
+            watch(number * OBSERVERS + done, len(planted) * OBSERVERS)
             answered = plan.answered(np.full(AT_ONCE, u), random, lapses)
             if answered is None:
                 return None
@@ -228,13 +230,12 @@ def _asked(plan: ThresholdPlan, presented: Floats) -> tuple[tuple[float, float],
     return tuple((plan.stimulus.level_of(u), share) for u, share in zip(places.tolist(), counts.tolist(), strict=True))
 
 
-def _course(plan: ThresholdPlan, answered: Answered, stop: Stop) -> tuple[tuple[int, Values], ...]:
+def _course(plan: ThresholdPlan, answered: Answered, watch: Watch) -> tuple[tuple[int, Values], ...]:
     """Return the quantiles of the estimates after some numbers of trials."""
     each, tracks = answered.tracks[0].levels.shape[1], len(answered.tracks)
     found: list[tuple[int, Values]] = []
     for number in sorted({round(one) for one in np.geomspace(1, each, min(COURSE, each))}):
-        if stop():
-            raise GivenUp
+        watch(0, OBSERVERS)
         medians = plan.estimates(answered, most=number).medians
         quantiles = (plan.stimulus.level_of(one) for one in np.quantile(medians, SHARES).tolist())
         found.append((number * tracks, tuple(quantiles)))

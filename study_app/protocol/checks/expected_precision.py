@@ -288,7 +288,8 @@ def imprecise(protocol: Protocol, block: Block) -> Iterator[str]:
     ]
     yield (
         f"{place}.{key}: {plan.trials} trials{plan.per} give ±{100 * reached:.0f} % with "
-        f"{people} participants, not ±{100 * precision:g} %: {', or '.join(ways) or 'a larger analysis.precision'}"
+        f"{people} planned participants, not ±{100 * precision:g} %: "
+        f"{' or '.join(ways) + ' would on average' if ways else 'a larger analysis.precision'}"
     )
 
 

@@ -202,7 +202,7 @@ def _figures(protocol: Protocol) -> Iterator[tuple[str, str]]:
     yield "clock", f"{max(1, round(expected_duration_s(protocol) / 60))} min"
     people = None if protocol.analysis is None else protocol.analysis.participants
     if people is not None:
-        yield "people", str(people)
+        yield "people", f"{people} planned"
     yield "layers", f"{trials} trial{'s' * (trials != 1)}"
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from study_app.app.designer.measures.measures_worker import Measuring
 from study_app.app.designer.measures.wanted import wanted_of
-from study_app.authoring.measures.observers import GivenUp, Planted, _longest, measurable, observe
+from study_app.authoring.measures.observers import OBSERVERS, PLANTED, GivenUp, Planted, _longest, measurable, observe
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
 from study_app.protocol.checks.expected_precision import ThresholdPlan, expected, threshold_plan
@@ -135,7 +135,16 @@ def test_the_range_is_the_longest_row_without_a_gap() -> None:
 
 
 def test_a_simulation_is_given_up_when_asked() -> None:
+    told = []
+
+    def watch(done: int, total: int) -> None:
+        told.append((done, total))
+        if done:
+            raise GivenUp
+
     with pytest.raises(GivenUp):
-        observe(plan_of(), 0.2, 0.02, lambda: True)
+        observe(plan_of(4), 0.2, 0.02, watch)
+    assert (told[0], told[-1]) == ((0, OBSERVERS), (100, OBSERVERS))
     with pytest.raises(GivenUp):
-        measurable(plan_of(), 0.02, 0.0, lambda: True)
+        measurable(plan_of(4), 0.02, 0.0, watch)
+    assert told[-1] == (100, PLANTED * OBSERVERS)

@@ -213,14 +213,14 @@ def test_too_few_repetitions_for_the_planned_precision_are_a_warning() -> None:
     (sentence,) = imprecise(short, short.blocks["pairs"])
     assert sentence == (
         f"blocks.pairs.repetitions: 40 trials per comparison give ±{100 * found.of_group(10):.0f} % with 10 "
-        f"participants, not ±10 %: {found.participants_for(0.1)} participants"
+        f"planned participants, not ±10 %: {found.participants_for(0.1)} participants would on average"
     )
     assert sentence in describe(short)
     thickness = load("thickness")
     assert thickness.analysis is not None
     wanted = thickness.analysis.model_copy(update={"precision": 0.05})
     (sentence,) = imprecise(thickness.model_copy(update={"analysis": wanted}), thickness.blocks["thickness"])
-    assert sentence.startswith("methods.nine.repetitions: 36 trials give ±9 % with 20 participants, not ±5 %: ")
+    assert sentence.startswith("methods.nine.repetitions: 36 trials give ±9 % with 20 planned participants, not ±5 %: ")
 
 
 def test_an_exponent_that_was_not_published_is_one_half_and_a_modulus_is_no_trial() -> None:

@@ -112,8 +112,8 @@ def test_too_few_trials_for_the_planned_precision_are_a_warning():
     found = expected(plan_of(short))
     people, trials = found.participants_for(0.15), found.trials_for(0.15, 20)
     assert sentence == (
-        f"methods.m.trials: 20 trials per standard give ±{100 * found.of_group(20):.0f} % with 20 participants, "
-        f"not ±15 %: about {trials} trials, or {people} participants"
+        f"methods.m.trials: 20 trials per standard give ±{100 * found.of_group(20):.0f} % with 20 planned "
+        f"participants, not ±15 %: about {trials} trials or {people} participants would on average"
     )
     assert 22 < 100 * found.of_group(20) < 28
     assert 40 < people < 60
@@ -127,7 +127,7 @@ def test_a_precision_that_no_trials_reach_asks_for_participants_alone():
     short = study('kind = "questplus", trials = 20', "analysis = { participants = 4, precision = 0.05 }\n")
     (sentence,) = imprecise(short, short.blocks["thicker"])
     assert "trials, or" not in sentence
-    assert sentence.endswith(" participants")
+    assert sentence.endswith(" participants would on average")
 
 
 @pytest.mark.parametrize("name", ["rek2024", "demo"])

@@ -38,6 +38,7 @@ from study_app.viewmodels.designer.measures.measures_view import (
     focus_of,
     measures_view,
 )
+from study_app.viewmodels.designer.measures.number_cards import ANEW
 from study_app.viewmodels.designer.problem_rows import ProblemRow, problem_rows
 
 IDLE_MS: Final = 20
@@ -164,14 +165,17 @@ class MeasuresController(QObject):
         """Return what is known of what is wanted; where nothing is, what was known of the block before."""
         block = "" if focus.block is None else focus.block.id
         found: dict[str, Any] = {}
-        anew = set()
+        progress, failed = {}, {}
         for one in wanted:
             name = NAMES[type(one)]
             if self.slow.known(one):
                 found[name] = self._last[name, block] = self.slow.found(one)
-            elif (before := self._last.get((name, block))) is not None:
-                found[name] = before
-                anew.add(name)
+            elif why := self.slow.failure(one):
+                failed[name] = f"{why[:1].upper()}{why[1:]}."
+            else:
+                found[name] = self._last.get((name, block))
+                counted = self.slow.progress(one)
+                progress[name] = ANEW if counted is None else f"{counted[0]} of {counted[1]} simulated"
         observed, measured, group = (found.get(name) for name in ("observed", "measurable", "group"))
         detectable = found.get("detectable")
         return SlowResults(
@@ -179,15 +183,14 @@ class MeasuresController(QObject):
                 observed if isinstance(observed, Observed) else None,
                 measured if isinstance(measured, Measurable) else None,
                 group if isinstance(group, GroupPrecision) else None,
-                frozenset(anew),
+                progress,
+                failed,
                 controls.threshold,
                 controls.precision,
-                self.slow.waits,
+                controls.planned,
             ),
             detectable if isinstance(detectable, Detectable) else None,
-            "detectable" in anew,
             found.get("warnings") or (),
-            self.slow.waits,
         )
 
     def _take_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, TypeAlias
 
-from study_app.authoring.measures.observers import GivenUp, Measurable, Observed, measurable, observe
+from study_app.authoring.measures.observers import GivenUp, Measurable, Observed, Watch, measurable, observe
 from study_app.authoring.measures.planned import ENOUGH, Detectable, Finding, GroupPrecision
 from study_app.protocol.checks.expected_precision import ThresholdPlan, imprecise
 from study_app.protocol.model import Protocol
@@ -91,13 +91,25 @@ Found: TypeAlias = Observed | Measurable | GroupPrecision | Detectable | tuple[s
 
 
 @dataclass(frozen=True, slots=True)
+class Counted:
+    """Says how many simulations of how many are done of what is wanted."""
+
+    wanted: Wanted
+    done: int
+    total: int
+
+
+@dataclass(frozen=True, slots=True)
 class MeasureOrder:
-    """What is wanted of a study, in this order; each is answered by (what was wanted, what was found)."""
+    """What is wanted of a study, in this order; each is answered by (what was wanted, what was found).
+
+    Before it, `Counted` says how far its simulations are.
+    """
 
     wanted: tuple[Wanted, ...]
 
 
-MeasureClient: TypeAlias = WorkerClient[MeasureOrder, tuple[Wanted, Found] | None]
+MeasureClient: TypeAlias = WorkerClient[MeasureOrder, tuple[Wanted, Found] | Counted | None]
 
 
 def start_measure_worker() -> MeasureClient:
@@ -115,62 +127,77 @@ def carry_out(order: MeasureOrder, send: Send, stop: Stop) -> None:
     """
     try:
         for wanted in order.wanted:
-            send((wanted, _found(wanted, stop)))
+            send((wanted, _found(wanted, _watch(wanted, send, stop))))
     except GivenUp as given_up:
         raise Stopped("the study was edited") from given_up
 
 
-def _found(wanted: Wanted, stop: Stop) -> Found:
+def _watch(wanted: Wanted, send: Send, stop: Stop) -> Watch:
+    def watch(done: int, total: int) -> None:
+        if stop():
+            raise GivenUp
+        send(Counted(wanted, done, total))
+
+    return watch
+
+
+def _found(wanted: Wanted, watch: Watch) -> Found:
     match wanted:
         case Observing(plan, threshold, lapses):
-            return observe(plan, threshold, lapses, stop)
+            return observe(plan, threshold, lapses, watch)
         case Measuring(plan, lapses, least, most):
-            return measurable(plan, lapses, least, stop, most)
+            return measurable(plan, lapses, least, watch, most)
         case Grouping():
-            return _group(wanted, stop)
+            return _group(wanted, watch)
         case Detecting():
-            return _detectable(wanted, stop)
+            return _detectable(wanted, watch)
         case Advising(protocol=protocol):
             return tuple(sentence for block in protocol.main_blocks for sentence in imprecise(protocol, block))
 
 
-def _group(wanted: Grouping, stop: Stop) -> GroupPrecision:
+def _group(wanted: Grouping, watch: Watch) -> GroupPrecision:
     people, precision = wanted.participants, wanted.precision
-    more = wanted.plan.with_trials(round(MORE * wanted.plan.trials))
-    shares = [_studies(plan, (people,), stop).within(0, precision) for plan in (wanted.plan, more)]
-    enough = people if shares[0] >= ENOUGH else _enough(wanted, stop)
+    more, looked = wanted.plan.with_trials(round(MORE * wanted.plan.trials)), _looked_for(people)
+    total = THRESHOLD_STUDIES * (2 + len(looked))
+    plans = enumerate((wanted.plan, more))
+    shares = [_studies(plan, (people,), watch, (at, total)).within(0, precision) for at, plan in plans]
+    enough = people if shares[0] >= ENOUGH else None
+    for at, sizes in enumerate(looked, start=2):
+        if enough is not None:
+            break
+        found = _studies(wanted.plan, sizes, watch, (at, total))
+        enough = next((size for place, size in enumerate(sizes) if found.within(place, precision) >= ENOUGH), None)
     most = max(MOST_PEOPLE, people)
     return GroupPrecision(
         people, THRESHOLD_STUDIES, precision, wanted.plan.trials, shares[0], more.trials, shares[1], most, enough
     )
 
 
-def _enough(wanted: Grouping, stop: Stop) -> int | None:
-    """Return how many participants are enough, looked for up to twice as many, then up to twice as many again."""
-    last = wanted.participants
+def _looked_for(people: int) -> list[range]:
+    """Return where it is looked for how many participants are enough: twice as many each time, up to `MOST_PEOPLE`."""
+    found, last = [], people
     while last < MOST_PEOPLE:
-        sizes = range(last + 1, min(2 * last, MOST_PEOPLE) + 1)
-        found, last = _studies(wanted.plan, sizes, stop), sizes[-1]
-        for at, size in enumerate(sizes):
-            if found.within(at, wanted.precision) >= ENOUGH:
-                return size
-    return None
+        found.append(range(last + 1, min(2 * last, MOST_PEOPLE) + 1))
+        last = found[-1][-1]
+    return found
 
 
-def _studies(plan: ThresholdPlan, sizes: Sequence[int], stop: Stop) -> threshold_studies.Found:
-    """Return what simulated studies of so many participants find, as ``power`` does."""
+def _studies(plan: ThresholdPlan, sizes: Sequence[int], watch: Watch, turn: tuple[int, int]) -> threshold_studies.Found:
+    """Return what simulated studies of so many participants find, as ``power`` does.
+
+    ``turn`` is how often as many studies were simulated before, and how many there will be in all.
+    """
     from study_app.analysis.power import threshold_studies  # noqa: PLC0415 - loads scipy: only in this process
 
     total = threshold_studies.Found()
     for number in range(THRESHOLD_STUDIES // threshold_studies.BATCH):
-        if stop():
-            raise GivenUp
+        watch(turn[0] * THRESHOLD_STUDIES + number * threshold_studies.BATCH, turn[1])
         case = threshold_studies.Case("", plan, (SEED, 0, plan.trials, number))
         total.halves += threshold_studies.study_batch(case, sizes).halves
     return total
 
 
-def _detectable(wanted: Detecting, stop: Stop) -> Detectable | None:
+def _detectable(wanted: Detecting, watch: Watch) -> Detectable | None:
     from study_app.analysis.power.batch_counts import BATCH, Counts, count  # noqa: PLC0415 - loads scipy
     from study_app.analysis.power.plan import HIGHEST, compares_statements, plan  # noqa: PLC0415
     from study_app.analysis.power.power_curves import powers  # noqa: PLC0415
@@ -178,11 +205,10 @@ def _detectable(wanted: Detecting, stop: Stop) -> Detectable | None:
     protocol = wanted.protocol
     if not compares_statements(protocol):
         return None
-    planned = plan(protocol, _features(wanted, stop))
+    planned = plan(protocol, _features(wanted, watch))
     sizes, counts = (wanted.participants,), Counts()
     for number in range(STUDIES // BATCH):
-        if stop():
-            raise GivenUp
+        watch(number * BATCH, STUDIES)
         found = count(planned, sizes, SEED, number, BATCH)
         counts = {what: counts.get(what, 0) + one for what, one in found.items()}
     curves = powers(planned, sizes, STUDIES, STUDIES, SEED, counts).curves
@@ -199,17 +225,12 @@ def _detectable(wanted: Detecting, stop: Stop) -> Detectable | None:
 _features_of: dict[str, ConditionFeatures] = {}
 
 
-def _features(wanted: Detecting, stop: Stop) -> ConditionFeatures:
+def _features(wanted: Detecting, watch: Watch) -> ConditionFeatures:
     """Return the features of each condition, kept for the last study: rehearsing them takes most of the time."""
     from study_app.session.simulated.trial_features import condition_features  # noqa: PLC0415 - the compiler: only here
 
     if wanted.depends not in _features_of:
-
-        def look(_words: str) -> None:
-            if stop():
-                raise GivenUp
-
-        found = condition_features(wanted.protocol, seed=SEED, progress=look)
+        found = condition_features(wanted.protocol, seed=SEED, progress=lambda _words: watch(0, STUDIES))
         _features_of.clear()
         _features_of[wanted.depends] = found
     return _features_of[wanted.depends]

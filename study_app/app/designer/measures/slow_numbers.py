@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections import OrderedDict
 from collections.abc import Callable
 from typing import Final
@@ -10,6 +11,7 @@ from typing import Final
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from study_app.app.designer.measures.measures_worker import (
+    Counted,
     Found,
     MeasureClient,
     MeasureOrder,
@@ -22,11 +24,17 @@ log = logging.getLogger(__name__)
 
 REST_MS: Final = 800
 LOOK_MS: Final = 100
+COUNT_S: Final = 0.5
+"""So often the numbers say how far their simulations are."""
+FAILED: Final = "the process of the simulations does not start"
 KEPT: Final = 200
 
 
 class SlowNumbers(QObject):
-    """Gives what is known of the numbers that are wanted, and orders the others; ``came`` follows each answer."""
+    """Gives what is known of the numbers that are wanted, and orders the others.
+
+    ``came`` follows each answer, and what is said of simulations that run or have failed.
+    """
 
     came = Signal()
 
@@ -36,7 +44,9 @@ class SlowNumbers(QObject):
         self._client: MeasureClient | None = None
         self._known: OrderedDict[Wanted, Found] = OrderedDict()
         self._wanted: tuple[Wanted, ...] = ()
-        self._failed: set[Wanted] = set()
+        self._failed: dict[Wanted, str] = {}
+        self._counted: Counted | None = None
+        self._said_s = 0.0
         self._ordered = 0
         self.rest = QTimer(self)
         self.rest.setSingleShot(True)
@@ -50,7 +60,7 @@ class SlowNumbers(QObject):
         """Want these numbers from now on, and no others; what is under way for others is given up."""
         if wanted == self._wanted:
             return
-        self._wanted = wanted
+        self._wanted, self._counted = wanted, None
         self._failed.clear()
         if self._look.isActive():
             self._look.stop()
@@ -69,10 +79,14 @@ class SlowNumbers(QObject):
         """Return what was answered, None where nothing was."""
         return self._known.get(wanted)
 
-    @property
-    def waits(self) -> bool:
-        """Whether a number is still to come."""
-        return bool(self._open())
+    def failure(self, wanted: Wanted) -> str:
+        """Return why a number is not computed; "" where nothing failed."""
+        return self._failed.get(wanted, "")
+
+    def progress(self, wanted: Wanted) -> tuple[int, int] | None:
+        """Return how many simulations of a number are done, and of how many; None where it does not run."""
+        counted = self._counted
+        return (counted.done, counted.total) if counted is not None and counted.wanted == wanted else None
 
     def _open(self) -> tuple[Wanted, ...]:
         return tuple(one for one in self._wanted if one not in self._known and one not in self._failed)
@@ -88,7 +102,7 @@ class SlowNumbers(QObject):
                 self._client = self.make()
             except OSError as error:  # no process to be had: the designer goes on without these numbers
                 log.info("the worker of slow numbers does not start: %s", error)
-                self._failed |= set(wanted)
+                self._failed |= dict.fromkeys(wanted, FAILED)
                 self.came.emit()
                 return
         self._ordered = self._client.order(MeasureOrder(wanted))
@@ -102,15 +116,27 @@ class SlowNumbers(QObject):
             if isinstance(answer, tuple):
                 self._keep(*answer)
                 changed = True
+            elif isinstance(answer, Counted):
+                self._counted = answer
+                changed = changed or time.monotonic() > self._said_s + COUNT_S
             elif number == self._ordered:
                 self._look.stop()
                 if isinstance(answer, Refused | Crashed):
                     if not (isinstance(answer, Refused) and answer.stopped):
-                        log.info("slow numbers failed: %s", answer.sentence)
-                        self._failed |= set(self._open())
+                        self._fail(answer.sentence)
                     changed = True
         if changed:
+            self._said_s = time.monotonic()
             self.came.emit()
+
+    def _fail(self, sentence: str) -> None:
+        """Give up the number that was computed, and order those after it."""
+        log.info("slow numbers failed: %s", sentence)
+        self._counted = None
+        failed, *others = self._open()
+        self._failed[failed] = sentence
+        if others:
+            self.rest.start()
 
     def _keep(self, wanted: Wanted, found: Found) -> None:
         self._known[wanted] = found

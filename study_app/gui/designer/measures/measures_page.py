@@ -16,7 +16,7 @@ from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.cards import Card, Chip, Icon, paint_ground
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
-from study_app.viewmodels.designer.measures.number_cards import ANEW, EARLIER, ForcesPlot, MeasuresView, NumberCard
+from study_app.viewmodels.designer.measures.number_cards import EARLIER, ForcesPlot, MeasuresView, NumberCard
 
 if TYPE_CHECKING:
     from study_app.gui.designer.measures.block_plots import ForcesView, FunctionView, TrackView
@@ -75,10 +75,10 @@ class PlotCard(Card):
         self.column.addWidget(plot, 1)
         self._legend = legend
 
-    def show_heading(self, words: str, *, anew: bool) -> None:
-        """Say what is drawn, and whether it is of an earlier study."""
+    def show_heading(self, words: str, waiting: str) -> None:
+        """Say what is drawn, and how far the simulations of what is to be drawn are."""
         self.heading_unit.show_text(words)
-        self.legend.setText(f"{ANEW[:1].upper()}{ANEW[1:]}" if anew else self._legend)
+        self.legend.setText(f"{waiting[:1].upper()}{waiting[1:]}" if waiting else self._legend)
 
 
 class WarningBar(Themed, QWidget):
@@ -215,18 +215,17 @@ class MeasuresPage(Themed, QWidget):
         for name, view, plot in (("function", self.function, shown.function), ("track", self.track, shown.track)):
             if view is not None:
                 view.show_plot(replace(plot, anew=True) if plot is not None and shown.earlier else plot)
-                anew = bool(shown.waiting) if plot is None else plot.anew
-                self._head(name, "" if plot is None else plot.heading, anew=anew)
+                self._head(name, "" if plot is None else plot.heading, shown.waiting)
         forces = self.cards.get("forces")
         if shown.forces is not None and isinstance(forces, ForcesCard):
             forces.show_forces(shown.forces)
         self.grid.setVisible(bool(shown.cards))
         self.grid.show_cards(shown.cards)
 
-    def _head(self, name: str, words: str, *, anew: bool) -> None:
+    def _head(self, name: str, words: str, waiting: str) -> None:
         card = self.cards[name]
         if isinstance(card, PlotCard):
-            card.show_heading(words, anew=anew)
+            card.show_heading(words, waiting)
 
     def _make_plots(self) -> None:
         from study_app.gui.designer.measures.block_plots import (  # noqa: PLC0415 - pyqtgraph, once there is a plot

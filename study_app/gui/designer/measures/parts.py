@@ -14,7 +14,6 @@ from study_app.gui.widgets.cards import Bar, Card, Icon, Rule
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, Ink, figures, label, set_ink
 from study_app.viewmodels.designer.measures.number_cards import (
-    ANEW,
     BalanceCard,
     Line,
     LinesCard,
@@ -78,7 +77,7 @@ class NumberPart(Card):
         self.number.setText(shown.number)
         set_ink(self.number, "text3" if shown.anew else "text")
         self.unit.setText(shown.unit)
-        waiting: Verdict = ("neutral", "clock", ANEW)
+        waiting: Verdict = ("neutral", "clock", shown.anew)
         tone, icon, words = waiting if shown.anew else shown.note
         self.icon.show_icon(icon or "info", INKS[tone])
         self.note.show_text(words)
@@ -209,7 +208,7 @@ class BalancePart(Made):
     """How even the orders of a block are: two tables of counts."""
 
     def __init__(self, shown: BalanceCard) -> None:
-        super().__init__("Balance", f"{shown.block}, {shown.participants} people")
+        super().__init__("Balance", f"{shown.block}, {shown.people}")
         tables = QWidget()
         row = QHBoxLayout(tables)
         row.setContentsMargins(0, 0, 0, 0)
@@ -268,9 +267,9 @@ class LinesPart(Made):
     """Lines with bars, and sentences below them."""
 
     def __init__(self, shown: LinesCard) -> None:
-        super().__init__(shown.title, ANEW if shown.anew else shown.aside)
+        super().__init__(shown.title, shown.anew or shown.aside)
         if shown.lines:
-            self.add(_lines(shown.lines, grey=shown.anew))
+            self.add(_lines(shown.lines, grey=bool(shown.anew)))
         if shown.lines and shown.sentences:
             self.add(Rule())
         for verdict in shown.sentences:

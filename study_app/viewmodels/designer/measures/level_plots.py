@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from study_app.authoring.measures.observers import Measurable, Observed
@@ -26,7 +26,9 @@ from study_app.protocol.orders.block_orders import BlockOrder
 from study_app.protocol.trials.tracks import design_of, stimulus_of
 from study_app.viewmodels.designer.measures.level_words import LevelWords, even_ticks, rounded
 from study_app.viewmodels.designer.measures.number_cards import (
+    FAILED,
     NO_FORCES,
+    ON_AVERAGE,
     UNKNOWN,
     ForceBar,
     ForcesPlot,
@@ -35,6 +37,7 @@ from study_app.viewmodels.designer.measures.number_cards import (
     RepairOffer,
     TrackPlot,
     Verdict,
+    people,
 )
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 
@@ -54,23 +57,26 @@ class Simulated:
         The thresholds that can be measured.
     group : GroupPrecision or None
         Studies of so many participants.
-    anew : frozenset of str
-        Which of the three are of an earlier study.
+    progress : mapping
+        How far the simulations are of those that are still to come, in words; their values are of an earlier study.
+    failed : mapping
+        Why those are not known whose simulations failed.
     threshold : float
         The planted threshold, a level.
     precision : float
         Half the group's 95 % interval that is wanted, as a share of the mean.
-    waits : bool
-        Whether a number is still to come.
+    planned : int or None
+        How many participants the file plans.
     """
 
     observed: Observed | None = None
     measurable: Measurable | None = None
     group: GroupPrecision | None = None
-    anew: frozenset[str] = frozenset()
+    progress: Mapping[str, str] = field(default_factory=dict)
+    failed: Mapping[str, str] = field(default_factory=dict)
     threshold: float = 0.0
     precision: float = 0.15
-    waits: bool = False
+    planned: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,17 +130,17 @@ def level_block(protocol: Protocol, block: Block, *, forces: bool = True) -> Lev
 
 
 def number_cards(
-    of: LevelBlock, simulated: Simulated, participants: int, duration_s: float, order: BlockOrder, warned: int | None
+    of: LevelBlock, simulated: Simulated, participants: int, duration_s: float, order: BlockOrder, *, warned: bool
 ) -> tuple[NumberCard, ...]:
     """Return the four numbers of a block whose tracks are simulated.
 
-    ``warned`` is of how many participants ``check`` warns that they are too few; None: it does not.
+    ``warned``: whether ``check`` warns that the planned participants are too few.
     """
     breaks = f", {order.breaks} break{'s' * (order.breaks > 1)}" if order.breaks else ""
     return (
         _range(of, simulated),
         _one_person(of, simulated),
-        _people(simulated, participants, simulated.precision, warned),
+        _people(simulated, participants, simulated.precision, warned=warned),
         NumberCard(
             "Lasts", f"{duration_s / 60:.0f}", "min",
             ("neutral", "clock", f"{order.trials} trials{breaks}"),
@@ -142,9 +148,11 @@ def number_cards(
     )  # fmt: skip
 
 
-def _unknown(title: str, unit: str, simulated: Simulated) -> NumberCard:
-    """Return a number that is not known: not yet, or because nothing simulates it."""
-    return NumberCard(title, UNKNOWN, unit, ("neutral", "info", "not simulated"), anew=simulated.waits)
+def _unknown(title: str, unit: str, simulated: Simulated, name: str) -> NumberCard:
+    """Return a number that is not known: not yet, because its simulation failed, or because nothing simulates it."""
+    if name in simulated.failed:
+        return NumberCard(title, UNKNOWN, unit, FAILED, more=simulated.failed[name])
+    return NumberCard(title, UNKNOWN, unit, ("neutral", "info", "not simulated"), simulated.progress.get(name, ""))
 
 
 def _range(of: LevelBlock, simulated: Simulated) -> NumberCard:
@@ -154,8 +162,8 @@ def _range(of: LevelBlock, simulated: Simulated) -> NumberCard:
         of.words,
     )
     if found is None:
-        return _unknown(title, words.unit, simulated)
-    anew = "measurable" in simulated.anew
+        return _unknown(title, words.unit, simulated, "measurable")
+    anew = simulated.progress.get("measurable", "")
     clipped = of.clipped_words
     if found.ends is None:
         why = "estimates are biased" if found.planted else "the standard is clipped"
@@ -173,24 +181,26 @@ def _range(of: LevelBlock, simulated: Simulated) -> NumberCard:
 def _one_person(of: LevelBlock, simulated: Simulated) -> NumberCard:
     found = simulated.observed
     if found is None:
-        return _unknown("One person", "%", simulated)
+        return _unknown("One person", "%", simulated, "observed")
     note: Verdict = ("neutral", "people", f"at a {of.words.name} of {of.words.words(found.threshold)}")
-    return NumberCard("One person", f"± {100 * found.error:.0f}", "%", note, "observed" in simulated.anew)
+    return NumberCard("One person", f"± {100 * found.error:.0f}", "%", note, simulated.progress.get("observed", ""))
 
 
-def _people(simulated: Simulated, participants: int, precision: float, warned: int | None) -> NumberCard:
+def _people(simulated: Simulated, participants: int, precision: float, *, warned: bool) -> NumberCard:
     found = simulated.group
     if found is None:
-        return _unknown(f"{participants} people in ± {100 * precision:g} %", "% of studies", simulated)
-    title = f"{found.participants} people in ± {100 * found.precision:g} %"
+        title = f"{people(participants, simulated.planned)} in ± {100 * precision:g} %"
+        return _unknown(title, "% of studies", simulated, "group")
+    title = f"{people(found.participants, simulated.planned)} in ± {100 * found.precision:g} %"
     enough = found.share >= ENOUGH
     note: Verdict = ("ok", "check", "Enough") if enough else ("warn", "warning", "Not enough")
-    many = f"More than {found.most}" if found.enough is None else f"About {found.enough}"
-    needed = f"{100 * ENOUGH:g} % needed" if enough else f"{many} participants are needed for {100 * ENOUGH:g} %"
+    many = f"more than {found.most}" if found.enough is None else f"about {found.enough}"
+    needed = f"{100 * ENOUGH:g} % are enough" if enough else f"Needed: {many} participants for {100 * ENOUGH:g} %"
     more = f"{needed}; with {found.more_trials} trials: {100 * found.more_share:.0f} %"
-    if warned is not None:
-        more += f". The warning of check refers to the {warned} planned participants and uses the expected precision"
-    return NumberCard(title, f"{100 * found.share:.0f}", "% of studies", note, "group" in simulated.anew, more)
+    if warned:
+        more += f". {ON_AVERAGE}"
+    anew = simulated.progress.get("group", "")
+    return NumberCard(title, f"{100 * found.share:.0f}", "% of studies", note, anew, more)
 
 
 def function_plot(of: LevelBlock, simulated: Simulated) -> FunctionPlot | None:
@@ -223,7 +233,7 @@ def function_plot(of: LevelBlock, simulated: Simulated) -> FunctionPlot | None:
         ticks_x=words.ticks(),
         ticks_y=tuple((one, f"{one:g}") for one in even_ticks(low_percent, 100.0, 7)),
         sentence=sentence,
-        anew="observed" in simulated.anew,
+        anew="observed" in simulated.progress,
     )
 
 
@@ -263,7 +273,7 @@ def track_plot(of: LevelBlock, simulated: Simulated) -> TrackPlot | None:
             f"{words.number(low)} and {words.words(high)}, the simulated value is {words.words(found.threshold)}. "
             f"One of them answered {right} of {len(found.one)} trials with success."
         ),
-        anew="observed" in simulated.anew,
+        anew="observed" in simulated.progress,
     )
 
 

@@ -25,7 +25,14 @@ from study_app.viewmodels.designer.measures.level_plots import (
     track_plot,
 )
 from study_app.viewmodels.designer.measures.level_words import LevelWords, rounded
-from study_app.viewmodels.designer.measures.number_cards import ANEW, Card, ControlValues, LinesCard, MeasuresView
+from study_app.viewmodels.designer.measures.number_cards import (
+    FAILED,
+    Card,
+    ControlValues,
+    LinesCard,
+    MeasuresView,
+    people,
+)
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 
 BELOW: Final = 4
@@ -74,24 +81,18 @@ class SlowResults:
     Attributes
     ----------
     simulated : Simulated
-        Of a block with a method.
+        Of a block with a method, and how far all simulations are.
     detectable : Detectable or None
         Of a block whose statements compare conditions.
-    detectable_anew : bool
-        Whether it is of an earlier study.
     warnings : tuple of str
         Sentences.
-    waits : bool
-        Whether a number is still to come.
     parts : int or None
         On how many parts the questions stand on a small screen; None: not known.
     """
 
     simulated: Simulated = field(default_factory=Simulated)
     detectable: Detectable | None = None
-    detectable_anew: bool = False
     warnings: tuple[str, ...] = ()
-    waits: bool = False
     parts: int | None = None
 
 
@@ -113,8 +114,8 @@ def focus_of(protocol: Protocol | None, path: Path) -> Focus:
 
 def control_values(protocol: Protocol | None, focus: Focus, controls: Controls) -> ControlValues:
     """Return what the controls show: threshold and lapses only where observers are simulated."""
-    planned = controls.planned if controls.planned != controls.participants else None
-    values = ControlValues(controls.participants, "" if planned is None else f"({planned} planned)")
+    unit = "planned" if controls.planned == controls.participants else f"({controls.planned or 'none'} planned)"
+    values = ControlValues(controls.participants, unit)
     if protocol is None or focus.plan is None:
         return values
     words = LevelWords(focus.plan.stimulus, focus.plan.design)
@@ -152,12 +153,12 @@ def measures_view(
     valid = valid_part(study)
     protocol, focus = valid.protocol, focus_of(valid.protocol, path)
     block, values = focus.block, control_values(protocol, focus, controls)
-    waiting = ANEW if slow.waits else ""
+    waiting = slow.simulated.progress.get("observed", FAILED[2] if "observed" in slow.simulated.failed else "")
     of = None if protocol is None or block is None else level_block(protocol, block, forces=valid.forces)
     if protocol is not None and block is not None and of is not None and focus.plan is not None:
         numbers = number_cards(
             of, slow.simulated, controls.participants, facts.steps_s.get(block.id, 0.0),
-            order_of(protocol, block), controls.planned if slow.warnings else None,
+            order_of(protocol, block), warned=bool(slow.warnings),
         )  # fmt: skip
         return MeasuresView(
             values, numbers, function_plot(of, slow.simulated), track_plot(of, slow.simulated),
@@ -170,7 +171,7 @@ def measures_view(
 
 def _others(study: Study, facts: Facts, path: Path, controls: Controls, slow: SlowResults) -> list[Card]:
     session: list[Card] = [cards.session_card(study, facts, path)]
-    warned = cards.warnings_card(facts, slow.warnings, controls.planned, controls.participants)
+    warned = cards.warnings_card(facts, slow.warnings, slow.simulated.failed.get("warnings", ""))
     return session if warned is None else [*session, warned]
 
 
@@ -184,13 +185,15 @@ def _cards(study: Study, facts: Facts, path: Path, focus: Focus, controls: Contr
         return [*found, cards.texts_card(study)]
     if asked:
         found = [cards.questions_card(protocol, str(path[1]), slow.parts), cards.texts_card(study), *found]
-    if block is not None and (balance := cards.balance_card(study, protocol, block, controls.participants)):
+    if block is not None and (
+        balance := cards.balance_card(study, protocol, block, controls.participants, controls.planned)
+    ):
         found.append(balance)
     if block is not None and focus.compares:
-        detectable = cards.detectable_card(
-            study, block, controls.participants, slow.detectable, anew=slow.detectable_anew
-        )
-        found.append(detectable)
+        simulated, known = slow.simulated, slow.detectable
+        who = people(controls.participants if known is None else known.participants, controls.planned)
+        underway = simulated.progress.get("detectable", ""), simulated.failed.get("detectable", "")
+        found.append(cards.detectable_card(study, block, who, known, underway))
     found.append(cards.force_card(study, facts, protocol, _liquids(protocol, path, block)))
     if path[0] == "liquids" and len(path) > 1 and path[1] in protocol.liquids and valid.forces:
         found.insert(0, cards.effects_card(study, protocol, str(path[1])))
@@ -198,7 +201,7 @@ def _cards(study: Study, facts: Facts, path: Path, focus: Focus, controls: Contr
         found.append(cards.block_card(study, facts, protocol, block))
     if not asked:
         found.append(cards.texts_card(study))
-    warned: LinesCard | None = cards.warnings_card(facts, slow.warnings, controls.planned)
+    warned: LinesCard | None = cards.warnings_card(facts, slow.warnings, slow.simulated.failed.get("warnings", ""))
     return found if warned is None else [*found, warned]
 
 

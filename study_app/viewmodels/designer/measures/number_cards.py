@@ -12,26 +12,33 @@ UNKNOWN: Final = "–"
 ANEW: Final = "simulating …"
 EARLIER: Final = "These numbers are of the last valid state: solve the problems to update them."
 NO_FORCES: Final = "Not known until the problems of device and scene are solved."
+ON_AVERAGE: Final = "The warning of check is about the precision that the planned participants reach on average"
 Verdict: TypeAlias = tuple[Tone, str, str]
 """Tone, icon and words."""
+FAILED: Final[Verdict] = ("bad", "warning", "simulation failed")
 Segment: TypeAlias = tuple[str, float, bool, Path]
 """Words, share of the time, whether it is looked at, and the element."""
 Ticks: TypeAlias = tuple[tuple[float, str], ...]
 Values: TypeAlias = tuple[float, ...]
 
 
+def people(participants: int, planned: int | None) -> str:
+    """Return a number of participants that are simulated, and whether the file plans as many."""
+    return f"{participants} {'planned' if participants == planned else 'simulated'}"
+
+
 @dataclass(frozen=True, slots=True)
 class NumberCard:
     """One number: its title, the number, its unit, its verdict or a note, and a sentence below it.
 
-    ``anew`` while another one is computed.
+    ``anew`` says how far the simulations of another one are, "" where none runs.
     """
 
     title: str
     number: str
     unit: str = ""
     note: Verdict = ("neutral", "", "")
-    anew: bool = False
+    anew: str = ""
     more: str = ""
 
 
@@ -71,8 +78,8 @@ class BalanceCard:
     ----------
     block : str
         Title of the block.
-    participants : int
-        Over so many.
+    people : str
+        Over how many participants, and whether they are planned.
     codes : tuple of str
         The columns of both tables.
     positions, follows : tuple of tuple of int
@@ -84,7 +91,7 @@ class BalanceCard:
     """
 
     block: str
-    participants: int
+    people: str
     codes: tuple[str, ...]
     positions: tuple[tuple[int, ...], ...]
     follows: tuple[tuple[int, ...], ...]
@@ -104,13 +111,13 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class LinesCard:
-    """Lines with bars, with a sentence below them; ``anew`` while other numbers are computed."""
+    """Lines with bars, with a sentence below them; ``anew`` says how far the simulations of other numbers are."""
 
     title: str
     aside: str
     lines: tuple[Line, ...]
     sentences: tuple[Verdict, ...] = ()
-    anew: bool = False
+    anew: str = ""
 
 
 @dataclass(frozen=True, slots=True)

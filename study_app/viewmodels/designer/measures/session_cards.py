@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, TypeAlias
 
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of
@@ -22,7 +22,9 @@ from study_app.protocol.orders.durations import answering_s
 from study_app.protocol.source.document import Path
 from study_app.protocol.wording.languages import language_name
 from study_app.viewmodels.designer.measures.number_cards import (
+    FAILED,
     NO_FORCES,
+    ON_AVERAGE,
     UNKNOWN,
     BalanceCard,
     Line,
@@ -30,9 +32,13 @@ from study_app.viewmodels.designer.measures.number_cards import (
     SessionCard,
     TextsCard,
     Verdict,
+    people,
 )
 from study_app.viewmodels.number_words import minutes
 
+SQUARE_NAMES: Final = {"williams": "Williams design", "latin": "Latin square"}
+Underway: TypeAlias = tuple[str, str]
+"""How far a simulation is, and why it failed; each "" where it is not so."""
 MOST_CODES: Final = 8
 """Of more codes only how even they are is said."""
 MOST_ROWS: Final = 6
@@ -135,17 +141,20 @@ def text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
     return found
 
 
-def balance_card(study: Study, protocol: Protocol, block: Block, participants: int) -> BalanceCard | None:
+def balance_card(
+    study: Study, protocol: Protocol, block: Block, participants: int, planned: int | None = None
+) -> BalanceCard | None:
     """Return how even the orders of a block are over so many participants; None where it has one code."""
     judged = balance_of(protocol, block, participants)
     if judged is None:
         return None
-    evenness, rows = judged.evenness, judged.rows
+    evenness, rows, who = judged.evenness, judged.rows, people(participants, planned)
     if evenness.balanced:
-        rounds = "" if rows is None else f", {participants // rows} round{'s' * (participants > rows)} of {rows}"
+        rounds = "" if rows is None else f": {participants} are {counted(participants // rows, 'round')} of {rows}"
         verdict: Verdict = ("ok", "check", f"balanced{rounds}")
     elif rows is not None and participants % rows:
-        verdict = ("warn", "warning", f"balanced at {judged.next_even}")
+        even = " or ".join(str(one) for one in (judged.last_even, judged.next_even) if one)
+        verdict = ("warn", "warning", f"balanced with {even} participants, for a {SQUARE_NAMES[judged.order]}")
     elif rows is not None:
         verdict = ("warn", "warning", "positions balanced, carry-over not")
     elif judged.order == "fixed":
@@ -157,10 +166,10 @@ def balance_card(study: Study, protocol: Protocol, block: Block, participants: i
         cells = [count for line in evenness.positions for count in line]
         after = evenness.after_another
         words = f"positions {min(cells)} to {max(cells)} times, carry-over {min(after)} to {max(after)} times"
-        return BalanceCard(title, evenness.orders, (), (), (), 0, (*verdict[:2], f"{verdict[2]}; {words}"))
+        return BalanceCard(title, who, (), (), (), 0, (*verdict[:2], f"{verdict[2]}; {words}"))
     shown = evenness.positions[:MOST_ROWS]
     return BalanceCard(
-        title, evenness.orders, evenness.codes, shown, evenness.follows, len(evenness.positions) - len(shown), verdict
+        title, who, evenness.codes, shown, evenness.follows, len(evenness.positions) - len(shown), verdict
     )
 
 
@@ -219,15 +228,15 @@ def texts_card(study: Study) -> TextsCard:
     return TextsCard(tuple(lines), revealed)
 
 
-def detectable_card(
-    study: Study, block: Block, participants: int, found: Detectable | None, *, anew: bool
-) -> LinesCard:
-    """Return the smallest difference of each statement that studies of so many participants show."""
-    title = f"What {participants if found is None else found.participants} people can show"
+def detectable_card(study: Study, block: Block, who: str, found: Detectable | None, underway: Underway) -> LinesCard:
+    """Return the smallest difference of each statement that studies of so many participants (``who``) show."""
+    title, (progress, failed) = "What participants can show", underway
     if not valid_part(study).forces:  # what is answered depends on them
-        return LinesCard(title, "", (), (("neutral", "minus", NO_FORCES),))
+        return LinesCard(title, who, (), (("neutral", "minus", NO_FORCES),))
+    if failed:
+        return LinesCard(title, who, (), (FAILED, ("neutral", "info", failed)))
     if found is None:
-        return LinesCard(title, "", (), (("neutral", "clock", "Studies are simulated."),), anew=True)
+        return LinesCard(title, who, (), (("neutral", "clock", "Studies are simulated."),), progress)
     items = study.document.get("questionnaires", {}).get(block.questionnaire, {}).get("items", ())
     places = {item.get("id"): at for at, item in enumerate(items)}
     lines = []
@@ -240,12 +249,10 @@ def detectable_card(
     note: Verdict = ("neutral", "info", model)
     if not lines:
         note = ("neutral", "info", "The answer model knows none of the statements.")
-    return LinesCard(title, f"points of {found.points}", tuple(lines), (note,), anew)
+    return LinesCard(title, f"{who}, points of {found.points}", tuple(lines), (note,), progress)
 
 
-def warnings_card(
-    facts: Facts, more: Sequence[str], planned: int | None = None, simulated: int | None = None
-) -> LinesCard | None:
+def warnings_card(facts: Facts, more: Sequence[str], failed: str = "") -> LinesCard | None:
     """Return the warnings of ``check``; None where there are none.
 
     Parameters
@@ -254,19 +261,14 @@ def warnings_card(
         The facts of the study, with its warnings.
     more : sequence of str
         Those about a precision that is not reached, which take simulated observers.
-    planned : int or None
-        How many participants they are of: those that the file plans.
-    simulated : int or None
-        Of how many participants the card of numbers is, where there is one.
+    failed : str
+        Why those are not known, "" where their simulation did not fail.
     """
     sentences: list[Verdict] = [("warn", "warning", _sentence(one)) for one in (*facts.warnings, *more)]
-    if more and planned is not None:
-        of_check = f"The warning uses the expected precision for the {planned} participants that the file plans."
-        of_card = (
-            f" The number above is the share of simulated studies with {simulated} participants that reach the "
-            "planned precision."
-        )
-        sentences.append(("neutral", "info", of_check if simulated is None else of_check + of_card))
+    if more:
+        sentences.append(("neutral", "info", f"{ON_AVERAGE}."))
+    if failed:
+        sentences += [("bad", "warning", "The expected precision is not known."), ("neutral", "info", failed)]
     return LinesCard("Warnings", "of check", (), tuple(sentences)) if sentences else None
 
 

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QLineEdit
 
 from study_app.app.designer.measures.measures_worker import (
     Advising,
+    Counted,
     Grouping,
     MeasureOrder,
     Measuring,
@@ -29,7 +30,17 @@ from study_app.gui.designer.measures.parts import NumberPart
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.protocol.checks.expected_precision import threshold_plan
 from study_app.protocol.source.files import shipped_file
-from study_app.viewmodels.designer.measures.number_cards import ANEW, UNKNOWN, Line, LinesCard, NumberCard, TextsCard
+from study_app.viewmodels.designer.measures.number_cards import (
+    ANEW,
+    FAILED,
+    ON_AVERAGE,
+    UNKNOWN,
+    Line,
+    LinesCard,
+    NumberCard,
+    TextsCard,
+)
+from study_app.workers.messages import Crashed
 from tests.app.designer.measures.conftest import Worker, jnd, shown
 
 pytestmark = pytest.mark.slow
@@ -92,6 +103,33 @@ def test_slow_numbers_come_are_given_up_and_are_kept(qtbot: Any, designer: Any, 
     assert not page.earlier.isVisible()
 
 
+def test_a_card_says_how_far_its_simulations_are_and_that_one_crashed(
+    qtbot: Any, designer: Any, worker: Worker
+) -> None:
+    jnd(designer)
+    qtbot.waitUntil(lambda: bool(worker.orders))
+    observing, _, *others = worker.orders[0].wanted
+    one, people, *_ = designer.place.measures.numbers.parts[1:]
+    worker.given.append((1, Counted(observing, 240, 400)))
+    qtbot.waitUntil(lambda: one.note.whole == "240 of 400 simulated")
+    assert people.note.whole == ANEW  # it waits for its turn
+    assert designer.place.measures.cards["function"].legend.text() == "240 of 400 simulated"
+    worker.answer(Observing)
+    worker.given.append((1, Crashed(1)))
+    qtbot.waitUntil(lambda: people.note.whole == FAILED[2])
+    assert (people.number.text(), one.number.text()) == (UNKNOWN, "± 26")
+    assert people.more.text() == "The process ended with exit code 1; the terminal may show why."
+    qtbot.waitUntil(lambda: len(worker.orders) == 2)
+    assert worker.orders[1].wanted == tuple(others)  # those after it are simulated all the same
+    worker.given.append((2, Crashed(-9)))
+    qtbot.waitUntil(lambda: len(worker.orders) == 3)
+    worker.given.append((3, Crashed(-9)))
+    qtbot.waitUntil(lambda: ANEW not in [part.note.whole for part in designer.place.measures.numbers.parts])
+    designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 60))
+    qtbot.waitUntil(lambda: len(worker.orders) == 4)
+    assert people.note.whole == ANEW  # another study, another try
+
+
 def test_what_is_simulated_is_typed_at_the_right(qtbot: Any, designer: Any, worker: Worker) -> None:
     jnd(designer)
     qtbot.waitUntil(lambda: bool(worker.orders))
@@ -124,18 +162,18 @@ def test_the_number_of_participants_is_kept_for_each_study(qtbot: Any, designer:
     def shows(number: str, planned: str) -> None:
         qtbot.waitUntil(lambda: (control.field.text(), control.unit.text()) == (number, planned))
 
-    shows("20", "")
+    shows("20", "planned")
     simulate("8")
     shows("8", "(20 planned)")
     file = designer.editing.opened.file
     designer.controller.open("kitchen")
-    shows("12", "")
+    shows("12", "(none planned)")
     designer.controller.open(str(file))
     shows("8", "(20 planned)")
     assert kept_participants(file) == 8
     assert b"participants = 20" in designer.editing.opened.source()
     simulate("20")
-    shows("20", "")
+    shows("20", "planned")
     assert kept_participants(file) is None  # from now on it follows the file
 
 
@@ -153,30 +191,19 @@ def test_a_new_study_has_no_number_of_participants_of_one_that_was_discarded(
 def test_a_verdict_says_whether_the_participants_are_enough(qtbot: Any, designer: Any, worker: Worker) -> None:
     jnd(designer)
     people = designer.place.measures.numbers.parts[2]
-    of_check = ". The warning of check refers to the 20 planned participants and uses the expected precision"
-    for participants, number, verdict, more in (
-        (20, "93", ("ok", "check", "Enough"), f"80 % needed; with 107 trials: 98 %{of_check}"),
-        (
-            12,
-            "13",
-            ("warn", "warning", "Not enough"),
-            f"About 22 participants are needed for 80 %; with 107 trials: 22 %{of_check}",
-        ),
-        (
-            8,
-            "13",
-            ("warn", "warning", "Not enough"),
-            f"More than 60 participants are needed for 80 %; with 107 trials: 22 %{of_check}",
-        ),
+    enough, few = ("ok", "check", "Enough"), ("warn", "warning", "Not enough")
+    for participants, who, number, verdict, words in (
+        (20, "20 planned", "93", enough, "80 % are enough; with 107 trials: 98 %"),
+        (12, "12 simulated", "13", few, "Needed: about 22 participants for 80 %; with 107 trials: 22 %"),
+        (8, "8 simulated", "13", few, "Needed: more than 60 participants for 80 %; with 107 trials: 22 %"),
     ):
+        more = f"{words}. {ON_AVERAGE}"
         designer.place.measures.controls.participants.entered.emit(participants)
         qtbot.waitUntil(lambda n=participants: worker.sizes[-1:] == [n])
         worker.answer()
         qtbot.waitUntil(lambda more=more: people.more.isVisible() and people.more.text() == more)
         assert people.shown.note == verdict
-        assert (
-            people.accessibleName() == f"{participants} people in ± 15 %: {number} % of studies, {verdict[2]}. {more}"
-        )
+        assert people.accessibleName() == f"{who} in ± 15 %: {number} % of studies, {verdict[2]}. {more}"
 
 
 @pytest.mark.usefixtures("worker")
@@ -227,19 +254,20 @@ def test_a_block_of_statements_shows_what_people_can_show(qtbot: Any, designer: 
     assert (wanted.block, wanted.participants) == ("liquids", 12)
     grid = designer.place.measures.grid
     titles = [part.accessibleName() for part in grid.parts]
-    assert titles[:4] == ["Session", "Balance", "What 12 people can show", "Force of each liquid"]
+    assert titles[:4] == ["Session", "Balance", "What participants can show", "Force of each liquid"]
     worker.answer()
     qtbot.waitUntil(lambda: grid.cards[2].lines != ())
     lines = [(line.title, line.number) for line in grid.cards[2].lines]
     assert lines == [("Feels like a liquid", "0.9"), ("Like honey", UNKNOWN)]
     kept = grid.parts[0]
     designer.place.measures.controls.participants.entered.emit(14)
-    qtbot.waitUntil(lambda: grid.cards[1].participants == 14)
+    qtbot.waitUntil(lambda: grid.cards[1].people == "14 simulated")
     assert grid.parts[0] is kept  # only what changed is made anew
     designer.place.pane.show_tab("file")
     facts = designer.place.pane.facts
     qtbot.waitUntil(lambda: facts.isVisible() and len(facts.grid.parts) == 4)
-    assert facts.grid.cards[2].anew  # what 12 can show, until the answer for 14 is there
+    assert facts.grid.cards[2].anew  # until the answer for 14 is there, it is what 12 can show
+    assert facts.grid.cards[2].aside.startswith("12 simulated")
     assert [part.accessibleName() for part in facts.grid.parts] == titles[:4]
 
 
@@ -247,7 +275,8 @@ def test_without_a_process_the_other_numbers_stay(qtbot: Any, designer: Any) -> 
     designer.controller.measures.slow.rest.setInterval(10)
     jnd(designer)
     part = designer.place.measures.numbers.parts[1]
-    qtbot.waitUntil(lambda: part.note.whole == "not simulated")
+    qtbot.waitUntil(lambda: part.note.whole == FAILED[2])
+    assert part.more.text() == "The process of the simulations does not start."
     assert designer.place.measures.numbers.parts[3].number.text() == "17"
 
 
@@ -304,7 +333,7 @@ def test_the_worker_process_simulates_observers_and_studies() -> None:
         if found and found[-1][1] is None:
             break
     client.close()
-    observed, group = (answer[1] for _, answer in found[:2])
+    observed, group = (answer[1] for _, answer in found if isinstance(answer, tuple))
     assert observed.threshold == 0.2
     assert 0.0 <= group.share <= 1.0
     assert group.more_trials > group.trials == 20

@@ -45,14 +45,17 @@ def test_the_share_of_studies_is_that_of_the_command_power() -> None:
     ((done, found),) = list(sweep(planned, (6,), THRESHOLD_STUDIES, 1, Serial()))[-1:]
     answers: list[Any] = []
     carry_out(MeasureOrder((Grouping(planned["viscosity"][20], 6, 0.5),)), answers.append, lambda: False)
-    ((_, group),) = answers
+    *counted, (_, group) = answers
+    shares = [one.done / one.total for one in counted]
+    assert shares == sorted(shares)
+    assert 0.0 == shares[0] < shares[-1] < 1.0
     assert done == group.studies
     assert group.share == found["viscosity", 20].within(0, 0.5)
     assert 0.0 < group.share < ENOUGH
     sizes = range(7, 13)
     ((_, found),) = list(sweep(planned, sizes, THRESHOLD_STUDIES, 1, Serial()))[-1:]
-    shares = [found["viscosity", 20].within(at, 0.5) for at in range(len(sizes))]
-    assert group.enough == next(size for size, share in zip(sizes, shares, strict=True) if share >= ENOUGH)
+    within = [found["viscosity", 20].within(at, 0.5) for at in range(len(sizes))]
+    assert group.enough == next(size for size, share in zip(sizes, within, strict=True) if share >= ENOUGH)
 
 
 @pytest.mark.slow

@@ -30,8 +30,11 @@ def study_of(name: str) -> Study:
     return read(shipped_file(name).read_bytes(), shipped_file(name).parent)
 
 
-def view(study: Study, path: Path, slow: SlowResults | None = None, people: int = 12) -> MeasuresView:
-    return measures_view(study, facts(study), path, Controls(people), slow or SlowResults(), {})
+def view(
+    study: Study, path: Path, slow: SlowResults | None = None, people: int = 12, planned: int | None = None
+) -> MeasuresView:
+    controls = Controls(people, planned=planned)
+    return measures_view(study, facts(study), path, controls, slow or SlowResults(), {})
 
 
 @pytest.mark.slow
@@ -68,11 +71,11 @@ def test_a_block_of_statements_shows_session_balance_power_and_force() -> None:
     assert ("ok", "check", "One page, no scrolling at 1366 × 768") in session.verdicts
     assert sum(share for _, share, *_ in session.segments) == pytest.approx(1.0)
     assert isinstance(balance, BalanceCard)
-    assert balance.verdict == ("ok", "check", "balanced, 2 rounds of 6")
+    assert balance.verdict == ("ok", "check", "balanced: 12 are 2 rounds of 6")
     assert {count for line in balance.positions for count in line} == {4}
     assert isinstance(power, LinesCard)
     assert [line.number for line in power.lines] == ["1.0", UNKNOWN]
-    assert power.aside == "points of 7"
+    assert power.aside == "12 simulated, points of 7"
     assert isinstance(force, LinesCard)
     assert study.protocol is not None
     names = list(study.protocol.conditions_in("liquids"))
@@ -81,7 +84,13 @@ def test_a_block_of_statements_shows_session_balance_power_and_force() -> None:
     assert [line.number for line in force.lines] == [f"{force_n:.2f} N" for force_n in forces]
     uneven = view(study, ("blocks", "liquids"), people=13).cards[1]
     assert isinstance(uneven, BalanceCard)
-    assert uneven.verdict == ("warn", "warning", "balanced at 18")
+    assert (uneven.people, uneven.verdict[2]) == (
+        "13 simulated",
+        "balanced with 12 or 18 participants, for a Williams design",
+    )
+    few = view(study, ("blocks", "liquids"), people=5, planned=5).cards[1]
+    assert isinstance(few, BalanceCard)
+    assert (few.people, few.verdict[2]) == ("5 planned", "balanced with 6 participants, for a Williams design")
 
 
 def test_a_questionnaire_shows_each_time_it_is_asked_and_its_languages() -> None:

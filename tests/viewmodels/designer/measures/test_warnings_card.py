@@ -5,8 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
-import pytest
-
+from study_app.viewmodels.designer.measures.number_cards import ON_AVERAGE
 from study_app.viewmodels.designer.measures.session_cards import warnings_card
 
 
@@ -19,19 +18,11 @@ def test_warnings_are_sentences_and_places_of_the_file_stay_as_they_are() -> Non
     assert warnings_card(SimpleNamespace(warnings=()), ()) is None  # type: ignore[arg-type]  # facts without any
 
 
-@pytest.mark.parametrize(
-    ("simulated", "said"),
-    [
-        (None, "The warning uses the expected precision for the 20 participants that the file plans."),
-        (
-            12,
-            "The warning uses the expected precision for the 20 participants that the file plans. The number above is "
-            "the share of simulated studies with 12 participants that reach the planned precision.",
-        ),
-    ],
-)
-def test_a_warning_about_precision_says_of_which_participants_it_is(simulated: int | None, said: str) -> None:
+def test_a_warning_about_precision_says_what_it_is_about_and_a_failure_why_there_is_none() -> None:
     facts: Any = SimpleNamespace(warnings=())
-    card = warnings_card(facts, ("methods.adaptive.trials: 80 trials give ±18 %",), 20, simulated)
+    card = warnings_card(facts, ("methods.adaptive.trials: 80 trials give ±18 %",))
     assert card is not None
-    assert card.sentences[-1] == ("neutral", "info", said)
+    assert card.sentences[-1] == ("neutral", "info", f"{ON_AVERAGE}.")
+    card = warnings_card(facts, (), "The process ended.")
+    assert card is not None
+    assert [words for *_, words in card.sentences] == ["The expected precision is not known.", "The process ended."]
