@@ -47,6 +47,14 @@ _OF_LENGTHS: Final = {
 _SENTENCES: Final = re.compile(r"((?:[a-z_0-9-]+, )*[a-z_0-9-]+): ([^;]+?)(?:; |\.?\Z)")
 
 
+LABELS: Final = {
+    "between_s": "Between trials",
+    "feedback_s": "Feedback duration",
+    "level_error_ms": "Level error of delays",
+}
+"""Labels of keys that do not read well, or like another one, without their unit."""
+
+
 @dataclass(frozen=True, slots=True)
 class Choice:
     """One value that can be chosen, with its sentence ("" where the model has none); None leaves the key out."""
@@ -250,6 +258,8 @@ def label_of(step: str | int) -> str:
     """Return a key in words, without its unit: "Force limit" of ``force_limit_n``; of an entry its number."""
     if isinstance(step, int):
         return str(step + 1)
+    if step in LABELS:
+        return LABELS[step]
     unit = _suffix(step)
     plain = step.removesuffix(f"_{unit}") if unit else step
     return plain.replace("_", " ").strip().capitalize()

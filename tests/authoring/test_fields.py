@@ -137,6 +137,9 @@ def test_rows_say_label_unit_bounds_and_reason() -> None:
     assert row.bounds == ("at least 0.1", "at most 8")
     assert "8 N is the most" in row.reason
     assert label_of("density_kg_m3") == "Density"
+    for name, model in DEFS.items():
+        labels = [label_of(key) for key in model.get("properties", ())]
+        assert len(labels) == len(set(labels)), name
 
 
 def test_choices_have_their_sentences() -> None:

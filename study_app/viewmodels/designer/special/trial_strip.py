@@ -6,10 +6,13 @@ from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
 from study_app.authoring.edited_study import Study
-from study_app.authoring.fields import Row
+from study_app.authoring.fields import Row, label_of
+from study_app.protocol.model import Follow, Reach
 from study_app.protocol.orders.durations import ANSWER_S, CHOICE_S
+from study_app.protocol.source.document import Path
 from study_app.protocol.trials.design import ORDINALS
 from study_app.protocol.trials.methods.adjustment import Adjustment
+from study_app.protocol.trials.task import AnyTask
 from study_app.protocol.trials.tracks import design_of, method_of
 from study_app.viewmodels.designer.form.row_facts import RowFacts
 
@@ -18,13 +21,33 @@ PhaseKind: TypeAlias = Literal["interval", "pause", "question", "feedback"]
 
 @dataclass(frozen=True, slots=True)
 class Phase:
-    """A phase of a trial: what it is, its name, what is written in its picture, and how long it takes [s]."""
+    """A phase of a trial.
+
+    Attributes
+    ----------
+    kind : {"interval", "pause", "question", "feedback"}
+        What it is.
+    name, words : str
+        Its name, and what is written in its picture.
+    duration_s : float
+        How long it takes [s].
+    field : tuple of str or int
+        Where the file says so; () where the program does.
+    about : bool
+        Whether it takes about as long.
+    """
 
     kind: PhaseKind
     name: str
     words: str
     duration_s: float
+    field: Path = ()
     about: bool = False
+
+    @property
+    def opens(self) -> str:
+        """The label of its field; "" where it has none."""
+        return label_of(self.field[-1]) if self.field else ""
 
     @property
     def duration(self) -> str:
@@ -55,21 +78,33 @@ def trial_strip(study: Study, row: Row) -> TrialStrip | None:
     design, task = design_of(protocol, block), protocol.tasks[block.task]
     phases: list[Phase] = []
     free = task.expected_s != task.limit_s
+
+    def of_design(key: str) -> Path:
+        return ("designs", str(block.design), key) if block.design in protocol.designs else ()
+
     for number in range(design.intervals):
         if number:
-            phases.append(Phase("pause", "Pause", "", design.pause_s))
+            phases.append(Phase("pause", label_of("pause_s"), "", design.pause_s, of_design("pause_s")))
         words = ORDINALS[number] if design.intervals > 1 else ""
-        phases.append(Phase("interval", "Interval", words, task.expected_s, free))
+        phases.append(Phase("interval", "Interval", words, task.expected_s, ("tasks", block.task, _length(task)), free))
     method = method_of(protocol, block) if block.stimulus is not None else None
     if isinstance(method, Adjustment):
-        phases.append(Phase("question", "Setting", "", method.most_s / 2, about=True))
+        field = ("methods", str(block.method), "most_s") if block.method in protocol.methods else ()
+        phases.append(Phase("question", "Setting", "", method.most_s / 2, field, about=True))
     else:
         reply_s = CHOICE_S if design.reply == "choice" else ANSWER_S
-        phases.append(Phase("question", "Question", design.reply, reply_s, about=True))
+        phases.append(Phase("question", "Question", design.reply, reply_s, of_design("question"), about=True))
     if design.shows_feedback(block.phase == "practice"):
-        phases.append(Phase("feedback", "Feedback", "", design.feedback_s))
-    whole_s = sum(phase.duration_s for phase in phases) + design.between_s
-    return TrialStrip((*phases, Phase("pause", "Inter-trial", "", design.between_s)), whole_s)
+        phases.append(Phase("feedback", "Feedback", "", design.feedback_s, of_design("feedback_s")))
+    phases.append(Phase("pause", label_of("between_s"), "", design.between_s, of_design("between_s")))
+    return TrialStrip(tuple(phases), sum(phase.duration_s for phase in phases))
+
+
+def _length(task: AnyTask) -> str:
+    """Return the key that says how long a task takes."""
+    if isinstance(task, Reach):
+        return "duration_s" if task.count is None else "count"
+    return "cycles" if isinstance(task, Follow) else "max_s"
 
 
 FACTS: Final = RowFacts((("Block", "design"),), trial_strip)

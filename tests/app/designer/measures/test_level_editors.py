@@ -9,7 +9,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
 from study_app.authoring.edited_study import read
-from study_app.authoring.fields import row_at
+from study_app.authoring.fields import label_of, row_at
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
 from study_app.protocol.load import load
@@ -124,3 +124,32 @@ def test_a_trial_takes_as_long_as_check_says(name: str, block: str) -> None:
     kinds = [phase.kind for phase in strip.phases]
     assert kinds.count("interval") == (1 if name == "thickness" else 2)
     assert ("feedback" in kinds) == (name == "viscosityjnd")
+    assert [phase.name for phase in strip.phases][-1] == label_of("between_s") == "Between trials"
+    rows_of = {phase.field: row_at(study.document, phase.field) for phase in strip.phases if phase.field}
+    assert len(rows_of) >= len(set(kinds))
+    assert None not in rows_of.values()
+
+
+@pytest.mark.slow
+def test_each_phase_of_a_trial_leads_to_its_field(qtbot: Any, designer: Any) -> None:
+    designer.controller.begin("template:viscosity-jnd", "thicker")
+    for number, (phase, field) in enumerate((
+        (0, ("tasks", "stir", "cycles")),
+        (1, ("designs", "pair", "pause_s")),
+        (3, ("designs", "pair", "question")),
+        (4, ("designs", "pair", "feedback_s")),
+        (5, ("designs", "pair", "between_s")),
+    )):  # fmt: skip
+        designer.select(("blocks", "training"))
+        button = designer.row("blocks", "training", "design").field.view.phases[phase]
+        if number % 2:
+            button.setFocus()
+            qtbot.keyClick(button, Qt.Key.Key_Space)
+        else:
+            qtbot.mouseClick(button, LEFT)
+        assert designer.editing.selected == field[:2]
+        form = designer.place.form
+        reached = [row.row.row.path for row in form.rows if row.isAncestorOf(form.focusWidget())]
+        added = [path for path, made in form.adds.items() if made is form.focusWidget()]
+        assert reached + added == [field]
+        assert button.accessibleName()

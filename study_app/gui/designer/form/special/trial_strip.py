@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QWidget
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtWidgets import QAbstractButton, QBoxLayout, QHBoxLayout, QWidget
 
 from study_app.gui.designer.form.row_fields import ChoiceField
 from study_app.gui.designer.form.special_editor import SpecialEditor
@@ -14,6 +14,7 @@ from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
 from study_app.viewmodels.designer.form.form_rows import FormRow
+from study_app.viewmodels.designer.requests import GoTo
 from study_app.viewmodels.designer.special.trial_strip import Phase, TrialStrip
 
 HEIGHT, PICTURE_PX, GAP = 104, 52, 6
@@ -21,47 +22,33 @@ LEAST_SHARE = 0.12
 """Of the width, for the shortest phase."""
 
 
-class StripView(Themed, QWidget):
-    """One trial, as wide as its phases are long, but each wide enough for its words."""
+class PhaseButton(Themed, QAbstractButton):
+    """A phase of a trial; a press asks for its field."""
 
-    def __init__(self) -> None:
-        super().__init__()
-        self.strip: TrialStrip | None = None
-        self.setFixedHeight(HEIGHT)
+    def __init__(self, strip: QWidget) -> None:
+        super().__init__(strip)
+        self.phase: Phase | None = None
 
-    def show_strip(self, strip: TrialStrip) -> None:
-        """Show another trial."""
-        self.strip = strip
-        self.setAccessibleName("One trial")
-        self.setAccessibleDescription(strip.sentence)
-        self.setToolTip(strip.sentence)
+    def show_phase(self, phase: Phase) -> None:
+        """Show another phase."""
+        self.phase = phase
+        opens = f"Opens “{phase.opens}”" if phase.opens else ""
+        self.setAccessibleName(f"{phase.name}, {phase.duration}")
+        self.setAccessibleDescription(opens)
+        self.setToolTip("\n".join(filter(None, (f"{phase.name}, {phase.duration}", opens))))
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus if phase.field else Qt.FocusPolicy.NoFocus)
+        self.setCursor(Qt.CursorShape.PointingHandCursor if phase.field else Qt.CursorShape.ArrowCursor)
         self.update()
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for a trial."""
-        return QSize(260, HEIGHT)
-
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the phases from left to right."""
-        if self.strip is None:
+        """Paint picture, name and duration, with a ring where it has the keyboard."""
+        if self.phase is None:
             return
-        painter, phases = QPainter(self), self.strip.phases
+        painter, t, phase = QPainter(self), self.theme, self.phase
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setFont(font("small", weight=600))
-        painter.setPen(QColor(self.theme.text2))
-        head = QRectF(0, 0, self.width(), 16)
-        painter.drawText(head, Qt.AlignmentFlag.AlignLeft, "One trial")
-        painter.drawText(head, Qt.AlignmentFlag.AlignRight, f"{self.strip.duration_s:.3g} s")
-        whole = self.width() - GAP * (len(phases) - 1)
-        x = 0.0
-        for phase, width in zip(phases, _widths(phases, whole), strict=True):
-            self._phase(painter, phase, QRectF(x, 18, width, HEIGHT - 18))
-            x += width + GAP
-
-    def _phase(self, painter: QPainter, phase: Phase, room: QRectF) -> None:
-        t = self.theme
-        picture = QRectF(room.left(), room.top(), room.width(), PICTURE_PX).adjusted(0.5, 0.5, -0.5, -0.5)
-        painter.setPen(QPen(QColor(t.border), 1))
+        picture = QRectF(0, 0, self.width(), PICTURE_PX).adjusted(1, 1, -1, -1)
+        lit = self.hasFocus() or (self.underMouse() and bool(phase.field))
+        painter.setPen(QPen(QColor(t.accent if lit else t.border), 2 if self.hasFocus() else 1))
         painter.setBrush(QColor(t.selected if phase.kind == "interval" else t.sunk))
         painter.drawRoundedRect(picture, 6, 6)
         middle = picture.center()
@@ -71,14 +58,12 @@ class StripView(Themed, QWidget):
             draw_icon(painter, "list", QRectF(middle.x() - 9, middle.y() - 9, 18, 18), t.accent, 2.0)
         elif phase.kind == "feedback":
             draw_icon(painter, "check", QRectF(middle.x() - 9, middle.y() - 9, 18, 18), t.ok, 2.2)
-        painter.setPen(QColor(t.text))
         painter.setFont(font("small"))
-        metrics, width = painter.fontMetrics(), int(room.width() + GAP - 2)
-        name = metrics.elidedText(phase.name, Qt.TextElideMode.ElideRight, width)
-        painter.drawText(QPointF(room.left(), picture.bottom() + 15), name)
-        painter.setPen(QColor(t.text2))
-        words = metrics.elidedText(phase.duration, Qt.TextElideMode.ElideRight, width)
-        painter.drawText(QPointF(room.left(), picture.bottom() + 30), words)
+        metrics = painter.fontMetrics()
+        for ink, words, below in ((t.text, phase.name, 15), (t.text2, phase.duration, 30)):
+            painter.setPen(QColor(ink))
+            shown = metrics.elidedText(words, Qt.TextElideMode.ElideRight, self.width())
+            painter.drawText(QPointF(0, picture.bottom() + below), shown)
 
     def _interval(self, painter: QPainter, phase: Phase, picture: QRectF) -> None:
         """Paint the ball on its way, and which interval it is."""
@@ -100,6 +85,70 @@ class StripView(Themed, QWidget):
         painter.setFont(font("key"))
         painter.drawText(picture.adjusted(0, 0, 0, -3), Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom,
                          phase.words)  # fmt: skip
+
+
+class StripView(Themed, QWidget):
+    """One trial, as wide as its phases are long, but each wide enough for its words.
+
+    ``opened`` carries the path of the field of the phase that is pressed.
+    """
+
+    opened = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.strip: TrialStrip | None = None
+        self.phases: list[PhaseButton] = []
+        self.setFixedHeight(HEIGHT)
+
+    def show_strip(self, strip: TrialStrip) -> None:
+        """Show another trial."""
+        self.strip = strip
+        self.setAccessibleName("One trial")
+        self.setAccessibleDescription(strip.sentence)
+        while len(self.phases) < len(strip.phases):
+            made = PhaseButton(self)
+            made.clicked.connect(lambda _checked=False, made=made: self._open(made))
+            made.apply_theme(self.theme)
+            self.phases.append(made)
+        for at, button in enumerate(self.phases):
+            button.setVisible(at < len(strip.phases))
+            if at < len(strip.phases):
+                button.show_phase(strip.phases[at])
+        self._place()
+        self.update()
+
+    def _open(self, pressed: PhaseButton) -> None:
+        if pressed.phase is not None and pressed.phase.field:
+            self.opened.emit(pressed.phase.field)
+
+    def _place(self) -> None:
+        if self.strip is None:
+            return
+        phases, x = self.strip.phases, 0.0
+        for button, width in zip(self.phases, _widths(phases, self.width() - GAP * (len(phases) - 1)), strict=False):
+            button.setGeometry(round(x), 18, round(width), HEIGHT - 18)
+            x += width + GAP
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Give each phase its width."""
+        super().resizeEvent(event)
+        self._place()
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for a trial."""
+        return QSize(260, HEIGHT)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the heading."""
+        if self.strip is None:
+            return
+        painter = QPainter(self)
+        painter.setFont(font("small", weight=600))
+        painter.setPen(QColor(self.theme.text2))
+        head = QRectF(0, 0, self.width(), 16)
+        painter.drawText(head, Qt.AlignmentFlag.AlignLeft, "One trial")
+        painter.drawText(head, Qt.AlignmentFlag.AlignRight, f"{self.strip.duration_s:.3g} s")
 
 
 def _widths(phases: tuple[Phase, ...], whole: float) -> list[float]:
@@ -126,6 +175,7 @@ class DesignField(ChoiceField):
         self.box.setDirection(QBoxLayout.Direction.TopToBottom)
         for widget in (choice, self.view):
             self.box.addWidget(widget)
+        self.view.opened.connect(lambda path: self.asked.emit(GoTo(path[:2], path)))
         self.show_value()
 
     def show_value(self) -> None:
