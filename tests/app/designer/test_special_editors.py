@@ -42,7 +42,7 @@ def test_conditions_say_liquid_delay_and_force(qtbot: Any, designer: Any) -> Non
     designer.editing.select(("blocks", "delays"))
     protocol = load(designer.file)
     late = designer.row("blocks", "delays", "conditions").field.rows[1]
-    assert late.note.whole == "Thin, 200 ms late"
+    assert late.note.text() == "Thin, 200 ms late"
     assert late.force.text() == f"{steady(protocol.scene_for('late')).force_n:.2f} N"
     field = designer.row("blocks", "delays", "conditions").field
     designer.file.write_text(designer.file.read_text().replace("density_kg_m3 = 1000", "density_kg_m3 = 1300"))
@@ -215,7 +215,7 @@ def test_a_repair_is_offered_at_its_field_and_made_there(qtbot: Any, designer: A
     designer.editing.select(("blocks", "liquids"))
     row = designer.row("blocks", "liquids", "conditions")
     assert row.field.rows[1].faulty
-    assert row.field.rows[1].note.whole == "not in the study"
+    assert row.field.rows[1].note.text() == "not in the study"
     qtbot.waitUntil(lambda: bool(row.repairs))
     press(qtbot, row.repairs[0])
     assert designer.text == text

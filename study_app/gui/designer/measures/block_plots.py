@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -9,15 +10,16 @@ import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QSize, Qt
 from PySide6.QtGui import QBrush, QColor, QPen
 
+from study_app.gui.designer.measures.limit_colours import limit_colour
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.live_plots import Plot, pen
-from study_app.viewmodels.designer.measures.number_cards import ForcesPlot, FunctionPlot, TrackPlot
+from study_app.viewmodels.designer.measures.number_cards import LIMIT_NAMES, ForcesPlot, FunctionPlot, Limit, TrackPlot
 
 BARS = 0.14  # of the height, for how often each level is asked
 SYMBOLS = ("o", "t1", "s", "d")
 DASHED = (4.0, 3.0)
-LIMIT_PX, LIMITS_PX = 66.0, 128.0  # of the name of the force limit, and of those of both limits
+LIMITS_PX = 128.0  # of the names of the limits
 
 
 class MeasurePlot(Plot):
@@ -86,13 +88,14 @@ class MeasurePlot(Plot):
         made.setPen(self.stroke(colour, width, DASHED if dashed else None))
         self.add(made, 2)
 
-    def zone(self, first: float, last: float, *, upright: bool) -> None:
-        """Mark where limits take part of the force away."""
-        colour = QColor(self.theme.warn)
+    def zone(self, limit: Limit, first: float, last: float, *, upright: bool) -> None:
+        """Mark where a limit takes part of the force away."""
+        colour = QColor(limit_colour(self.theme, limit))
+        edge = colour.name()
         colour.setAlphaF(0.16)
         made = pg.LinearRegionItem(
             (first, last), orientation="vertical" if upright else "horizontal", movable=False, brush=QBrush(colour),
-            pen=pen(self.theme.warn, 1, DASHED),
+            pen=pen(edge, 1, DASHED),
         )  # fmt: skip
         self.add(made, -8)
 
@@ -129,8 +132,9 @@ class FunctionView(MeasurePlot):
         before = at > (left + right) / 2
         self.words(shown.mark_words, at, percent, theme.text, (1.08, 1.0) if before else (-0.08, 0.0))
         self._bars(shown, bottom, top)
-        if shown.clipped_from is not None and shown.clipped_from < right:
-            self.zone(max(left, shown.clipped_from), right, upright=True)
+        if shown.clipped_from is not None and shown.clipped_from[0] < right:
+            first, limit = shown.clipped_from
+            self.zone(limit, max(left, first), right, upright=True)
         self.show_ticks("left", list(shown.ticks_y))
         self.show_ticks("bottom", list(shown.ticks_x))
         beyond = 0.03 * (right - left)
@@ -144,8 +148,9 @@ class FunctionView(MeasurePlot):
             return
         apart = float(np.min(np.diff(places))) if len(places) > 1 else 0.04 * (shown.span[1] - shown.span[0])
         heights = BARS * (top - bottom) * shares / shares.max()
-        clipped = np.array([shown.clipped_from is not None and at >= shown.clipped_from for at in places])
-        for some, ink in ((~clipped, self.theme.accent), (clipped, self.theme.warn)):
+        first, limit = shown.clipped_from or (math.inf, "norm")
+        clipped = places >= first
+        for some, ink in ((~clipped, self.theme.accent), (clipped, limit_colour(self.theme, limit))):
             if some.any():
                 colour = QColor(self.theme.ctl if shown.anew else ink)
                 colour.setAlphaF(0.6)
@@ -181,8 +186,9 @@ class TrackView(MeasurePlot):
                     brush=QBrush(ink) if success else QBrush(QColor(theme.surface)),
                 )  # fmt: skip
                 self.add(points, 3)
-        if shown.clipped_from is not None and shown.clipped_from < top:
-            self.zone(max(bottom, shown.clipped_from), top, upright=False)
+        if shown.clipped_from is not None and shown.clipped_from[0] < top:
+            first, limit = shown.clipped_from
+            self.zone(limit, max(bottom, first), top, upright=False)
         self.show_ticks("left", list(shown.ticks_y))
         self.show_ticks("bottom", list(shown.ticks_x))
         beyond = 0.04 * (top - bottom)
@@ -206,13 +212,16 @@ class ForcesView(MeasurePlot):
         if not shown.bars:
             return
         for at, bar in enumerate(shown.bars):
-            if bar.clipped and bar.asked_n > bar.sent_n:
+            if bar.clipped_by and bar.asked_n > bar.sent_n:
                 lost = pg.BarGraphItem(
                     x=[at], y0=bar.sent_n, height=[bar.asked_n - bar.sent_n], width=0.62,
-                    brush=QBrush(Qt.BrushStyle.NoBrush), pen=pen(theme.warn, 1.2, (2.0, 2.0)),
+                    brush=QBrush(Qt.BrushStyle.NoBrush), pen=pen(limit_colour(theme, bar.clipped_by), 1.2, (2.0, 2.0)),
                 )  # fmt: skip
                 self.add(lost, 1)
-        inks = [theme.ctl if bar.standard else theme.warn if bar.clipped else theme.accent for bar in shown.bars]
+        inks = [
+            theme.ctl if bar.standard else limit_colour(theme, bar.clipped_by) if bar.clipped_by else theme.accent
+            for bar in shown.bars
+        ]
         for ink in dict.fromkeys(inks):
             places = [at for at, one in enumerate(inks) if one == ink]
             bars = pg.BarGraphItem(
@@ -222,12 +231,13 @@ class ForcesView(MeasurePlot):
             self.add(bars, 0)
         top = max(shown.limit_n, *(bar.asked_n for bar in shown.bars))
         highest = 1.16 * top
-        limits = [(f"limit {shown.limit_n:g} N", shown.limit_n, theme.bad, 0.5)]
-        if shown.slope_n is not None:  # one name above its line, the other below: the limits may be nearly equal
-            limits = [(*limits[0][:3], 1.0), (f"slope limit {shown.slope_n:.3g} N", shown.slope_n, theme.warn, 0.0)]
-        room_px = LIMIT_PX if shown.slope_n is None else LIMITS_PX
-        room = count * room_px / max(room_px + 1.0, self.box.width() - room_px)
-        for words, force_n, ink, above in limits:
+        limits: dict[Limit, float] = {"norm": shown.limit_n}
+        if shown.slope_n is not None:
+            limits["slope"] = shown.slope_n
+        room = count * LIMITS_PX / max(LIMITS_PX + 1.0, self.box.width() - LIMITS_PX)
+        for name, force_n in limits.items():
+            ink, words = limit_colour(theme, name), f"{LIMIT_NAMES[name]} {force_n:.3g} N"
+            above = 0.5 if len(limits) == 1 else 1.0 if name == "norm" else 0.0  # the limits may be nearly equal
             self.curve([-0.7, count - 0.3], [force_n, force_n], ink, 1.5, dashed=True)
             self.words(words, count - 0.2, force_n, ink, (0.0, above), over=True)
         self.box.setXRange(-0.8, count - 0.2 + room, padding=0)

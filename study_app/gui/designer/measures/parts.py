@@ -52,7 +52,7 @@ class NumberPart(Card):
         self.shown: NumberCard | None = None
         self.title = Elided("small", "text2")
         self.number, self.unit = figures("", "number"), label("", "small", "text2")
-        self.icon, self.note = Icon("info", "text2", 14), Elided("small", "text2")
+        self.icon, self.note = Icon("info", "text2", 14), label("", "small", "text2", wraps=True)
         self.more = label("", "small", "text2", wraps=True)
         across, below = QHBoxLayout(), QHBoxLayout()
         across.setSpacing(6)
@@ -60,7 +60,7 @@ class NumberPart(Card):
         across.addWidget(self.unit, 0, Qt.AlignmentFlag.AlignBottom)
         across.addStretch()
         below.setSpacing(6)
-        below.addWidget(self.icon)
+        below.addWidget(self.icon, 0, Qt.AlignmentFlag.AlignTop)
         below.addWidget(self.note, 1)
         self.column.addWidget(self.title)
         self.column.addLayout(across)
@@ -80,7 +80,7 @@ class NumberPart(Card):
         waiting: Verdict = ("neutral", "clock", shown.anew)
         tone, icon, words = waiting if shown.anew else shown.note
         self.icon.show_icon(icon or "info", INKS[tone])
-        self.note.show_text(words)
+        self.note.setText(words)
         self.more.setText(shown.more)
         self.more.setVisible(bool(shown.more) and not shown.anew)
         also = f". {shown.more}" if self.more.isVisibleTo(self) else ""

@@ -27,12 +27,14 @@ from study_app.protocol.trials.tracks import design_of, stimulus_of
 from study_app.viewmodels.designer.measures.level_words import LevelWords, even_ticks, rounded
 from study_app.viewmodels.designer.measures.number_cards import (
     FAILED,
+    LIMIT_NAMES,
     NO_FORCES,
     ON_AVERAGE,
     UNKNOWN,
     ForceBar,
     ForcesPlot,
     FunctionPlot,
+    Limit,
     NumberCard,
     RepairOffer,
     TrackPlot,
@@ -102,10 +104,12 @@ class LevelBlock:
         return tuple(one for one in self.levels if one.standard == self.standard)
 
     @property
-    def clipped_from(self) -> float | None:
-        """The place from which on a limit takes part of the force away, where some level is beyond it."""
+    def clipped_from(self) -> tuple[float, Limit] | None:
+        """The place from which on a limit takes part of the force away, and which; None where no level is beyond it."""
         level = math.inf if self.clipping is None else self.clipping.highest(self.words.stimulus)
-        return self.words.at(level) if math.isfinite(level) else None
+        if self.limits is None or not math.isfinite(level):
+            return None
+        return self.words.at(level), "norm" if self.limits.force == self.limits.lowest else "slope"
 
     @property
     def clipped_words(self) -> str:
@@ -293,11 +297,11 @@ def forces_plot(of: LevelBlock, problems: Mapping[ProblemRow, tuple[str, ...]]) 
         return ForcesPlot("", (), (), (), 0.0, None, (verdict,), NO_FORCES, None, NO_FORCES)
     if not shown or of.limits is None:
         return None
-    bars = [ForceBar(one.asked_n or 0.0, one.sent_n or 0.0, one.clipped_by is not None) for one in shown]
+    bars = [ForceBar(one.asked_n or 0.0, one.sent_n or 0.0, one.clipped_by) for one in shown]
     values = [one.comparison for one in shown]
     if of.standard is not None:
         own = standard_of(of.protocol, of.block.id, of.standard)
-        bars.insert(0, ForceBar(own.asked_n or 0.0, own.sent_n or 0.0, own.clipped_by is not None, standard=True))
+        bars.insert(0, ForceBar(own.asked_n or 0.0, own.sent_n or 0.0, own.clipped_by, standard=True))
         values.insert(0, of.standard)
     unit, limit_n = of.words.value_unit, of.protocol.device.force_limit_n
     count = sum(one.clipped_by is not None for one in of.levels)
@@ -316,7 +320,7 @@ def forces_plot(of: LevelBlock, problems: Mapping[ProblemRow, tuple[str, ...]]) 
         verdicts = ("neutral", "info", told), ("bad" if rows else "warn", "warning", f"{count} clipped")
     strongest = max(one.asked_n or 0.0 for one in shown)
     slope_n = min((one.sent_n or 0.0 for one in shown if one.clipped_by == "slope"), default=None)
-    slope = "" if slope_n is None else f", the slope limit of the loop {slope_n:.2f} N"
+    slope = "" if slope_n is None else f", the {LIMIT_NAMES['slope']} {slope_n:.2f} N"
     return ForcesPlot(
         heading=f"N, {standard}at {of.limits.hand_mps:.3f} m/s of the hand",
         bars=tuple(bars),
@@ -329,7 +333,7 @@ def forces_plot(of: LevelBlock, problems: Mapping[ProblemRow, tuple[str, ...]]) 
         repair=repair,
         sentence=(
             f"Force at {len(shown)} levels from {rounded(values[0])} to {rounded(values[-1])} {unit}: at most "
-            f"{strongest:.2f} N are requested; the limit is {limit_n:g} N{slope}. {asked} of {len(of.levels)} levels "
-            f"are as requested, {count} are clipped."
+            f"{strongest:.2f} N are requested; the {LIMIT_NAMES['norm']} is {limit_n:g} N{slope}. {asked} of "
+            f"{len(of.levels)} levels are as requested, {count} are clipped."
         ),
     )

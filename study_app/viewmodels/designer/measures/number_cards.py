@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, TypeAlias
+from typing import Final, Literal, TypeAlias
 
 from study_app.protocol.source.document import Path
 from study_app.viewmodels.tones import Tone
 
 UNKNOWN: Final = "–"
+Limit: TypeAlias = Literal["norm", "slope"]
+LIMIT_NAMES: Final[dict[Limit, str]] = {"norm": "force limit", "slope": "slope limit"}
 ANEW: Final = "simulating …"
 EARLIER: Final = "These numbers are of the last valid state: solve the problems to update them."
 NO_FORCES: Final = "Not known until the problems of device and scene are solved."
@@ -144,8 +146,8 @@ class FunctionPlot:
         The threshold in words.
     low : float
         The least percentage that is drawn.
-    clipped_from : float or None
-        From which level on a limit takes part of the force away.
+    clipped_from : (float, str) or None
+        From which level on a limit takes part of the force away, and which.
     ticks_x, ticks_y : tuple of (float, str)
         Where the axes are written at.
     sentence : str
@@ -163,7 +165,7 @@ class FunctionPlot:
     mark: tuple[float, float]
     mark_words: str
     low: float
-    clipped_from: float | None
+    clipped_from: tuple[float, Limit] | None
     ticks_x: Ticks
     ticks_y: Ticks
     sentence: str
@@ -190,8 +192,8 @@ class TrackPlot:
         The last trial.
     planted : float
         The planted threshold.
-    clipped_from : float or None
-        From which level on a limit takes part of the force away.
+    clipped_from : (float, str) or None
+        From which level on a limit takes part of the force away, and which.
     ticks_x, ticks_y : tuple of (float, str)
         Where the axes are written at.
     observers : int
@@ -209,7 +211,7 @@ class TrackPlot:
     one: tuple[tuple[int, float, int, bool], ...]
     last: int
     planted: float
-    clipped_from: float | None
+    clipped_from: tuple[float, Limit] | None
     ticks_x: Ticks
     ticks_y: Ticks
     observers: int
@@ -219,11 +221,11 @@ class TrackPlot:
 
 @dataclass(frozen=True, slots=True)
 class ForceBar:
-    """The force of a level: as asked, as sent, whether it is clipped, and whether it is the standard's [N]."""
+    """The force of a level: as asked, as sent, which limit clips it, and whether it is the standard's [N]."""
 
     asked_n: float
     sent_n: float
-    clipped: bool = False
+    clipped_by: Limit | None = None
     standard: bool = False
 
 

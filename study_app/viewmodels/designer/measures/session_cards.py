@@ -23,6 +23,7 @@ from study_app.protocol.source.document import Path
 from study_app.protocol.wording.languages import language_name
 from study_app.viewmodels.designer.measures.number_cards import (
     FAILED,
+    LIMIT_NAMES,
     NO_FORCES,
     ON_AVERAGE,
     UNKNOWN,
@@ -182,10 +183,9 @@ def force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[s
     lines = []
     for name in names:
         it = found[name]
-        limit = "the force limit" if it.limit == "norm" else "the limit of the loop"
-        verdict: Verdict = (
-            ("ok", "check", "not clipped") if it.limit is None else ("bad", "warning", f"clipped by {limit}")
-        )
+        verdict: Verdict = ("ok", "check", "not clipped")
+        if it.limit is not None:  # in the colour of the limit
+            verdict = ("warn" if it.limit == "norm" else "bad", "warning", f"clipped by the {LIMIT_NAMES[it.limit]}")
         lines.append(
             Line(_title(study, name, "liquids"), f"{it.force_n:.2f} N", min(1.0, it.force_n / limit_n), verdict)
         )
@@ -193,7 +193,9 @@ def force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[s
     sentences: tuple[Verdict, ...] = tuple(("warn", "warning", _sentence(one)) for one in alike)
     if not sentences and len(names) > 1:
         sentences = (("ok", "check", "No pair is hard to tell apart"),)
-    return LinesCard("Force of each liquid", f"at 0.1 m/s, limit {limit_n:g} N", tuple(lines), sentences)
+    return LinesCard(
+        "Force of each liquid", f"at 0.1 m/s, {LIMIT_NAMES['norm']} {limit_n:g} N", tuple(lines), sentences
+    )
 
 
 def effects_card(study: Study, protocol: Protocol, name: str) -> LinesCard:

@@ -17,7 +17,7 @@ from study_app.viewmodels.designer.form.row_facts import RowFacts
 from study_app.viewmodels.designer.measures.level_plots import level_block
 from study_app.viewmodels.designer.measures.level_words import LevelWords, even_ticks, log_ticks, rounded
 from study_app.viewmodels.designer.measures.measures_view import focus_of
-from study_app.viewmodels.designer.measures.number_cards import Ticks
+from study_app.viewmodels.designer.measures.number_cards import LIMIT_NAMES, Limit, Ticks
 
 FARTHEST: Final = 3.0
 """A limit is drawn up to so many times the highest level, or spans above it."""
@@ -55,8 +55,8 @@ class LevelAxis:
         What a level is, and how the levels are spaced.
     standard : str
         The highest standard in words, "" without one.
-    force, loop : AxisLimit or None
-        Where the force limit and the limit of the loop begin, if that is near the levels.
+    limits : mapping
+        Where the force limit ("norm") and the slope limit begin, if that is near the levels.
     ticks : tuple of (float, str)
         Levels at which the axis is written at.
     sentence : str
@@ -73,8 +73,7 @@ class LevelAxis:
     unit: str
     caption: str
     standard: str
-    force: AxisLimit | None
-    loop: AxisLimit | None
+    limits: Mapping[Limit, AxisLimit]
     ticks: Ticks
     sentence: str
 
@@ -117,14 +116,13 @@ def level_axis(study: Study, row: Row) -> LevelAxis | None:
         words.unit,
         f"{words.kind}{f', {words.unit}' if words.unit else ''}, {'logarithmic' if log else 'linear'}",
         standard,
-        shown.get("force"),
-        shown.get("loop"),
+        shown,
         tuple((value / factor, rounded(value)) for value in ticks),
         f"{stimulus.steps} levels from {words.words(low)} to {words.words(high)}, {spacing}.{beyond}",
     )
 
 
-def _limits(study: Study, row: Row, words: LevelWords) -> tuple[str, dict[str, AxisLimit]]:
+def _limits(study: Study, row: Row, words: LevelWords) -> tuple[str, dict[Limit, AxisLimit]]:
     """Return the highest standard in words, and the limits of the block that presents the levels."""
     protocol = study.formed
     focus = focus_of(protocol, row.path[:-1])
@@ -132,13 +130,14 @@ def _limits(study: Study, row: Row, words: LevelWords) -> tuple[str, dict[str, A
     if of is None:
         return "", {}
     standard = "" if of.standard is None else f"standard {rounded(of.standard)} {words.value_unit}".rstrip()
-    found = {}
+    found: dict[Limit, AxisLimit] = {}
     if of.limits is not None:
-        for name, title, value in (("force", "force limit", of.limits.force), ("loop", "loop limit", of.limits.loop)):
+        values: dict[Limit, float | None] = {"norm": of.limits.force, "slope": of.limits.loop}
+        for name, value in values.items():
             if value is not None:
                 level = words.stimulus.level_between(of.standard, value)
                 if math.isfinite(level) and level > 0:
-                    found[name] = AxisLimit(f"{title} {rounded(value)} {words.value_unit}".rstrip(), level)
+                    found[name] = AxisLimit(f"{LIMIT_NAMES[name]} {rounded(value)} {words.value_unit}".rstrip(), level)
     return standard, found
 
 

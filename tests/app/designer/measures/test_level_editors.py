@@ -91,15 +91,15 @@ def test_the_axis_says_where_limits_begin() -> None:
     assert (shown.low, shown.high, shown.logarithmic, shown.unit) == (0.02, 0.6, True, "%")
     assert shown.standard == "standard 8 N·s/m"
     assert shown.least < shown.low < shown.high < shown.most
-    assert (shown.force, shown.loop) == (None, None)  # they are far away at 8 N·s/m
+    assert shown.limits == {}  # they are far away at 8 N·s/m
     strong, _ = study.edited(Set(("stimuli", "damping", "standards"), [32]))
     row = row_at(strong.document, LEVELS)
     assert row is not None
     near = level_axis(strong, row)
     assert near is not None
-    assert near.loop is not None
-    assert near.loop.words == "loop limit 53 N·s/m"
-    assert near.loop.level == pytest.approx(53 / 32 - 1, rel=1e-3)
+    slope = near.limits["slope"]
+    assert slope.words == "slope limit 53 N·s/m"
+    assert slope.level == pytest.approx(53 / 32 - 1, rel=1e-3)
     broken, _ = study.edited(Set(LEVELS, [0.6, 0.02]))
     row = row_at(broken.document, LEVELS)
     assert row is not None

@@ -26,6 +26,7 @@ from study_app.authoring.kept_settings import keep_setting, kept_participants
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
 from study_app.gui.designer.measures.card_grid import CardGrid
+from study_app.gui.designer.measures.limit_colours import limit_colour
 from study_app.gui.designer.measures.parts import NumberPart
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.protocol.checks.expected_precision import threshold_plan
@@ -56,7 +57,7 @@ def test_slow_numbers_come_are_given_up_and_are_kept(qtbot: Any, designer: Any, 
     qtbot.waitUntil(lambda: bool(worker.orders))
     assert [type(one) for one in worker.orders[0].wanted] == [Observing, Grouping, Measuring, Advising]
     assert page.numbers.parts[0].number.text() == UNKNOWN
-    assert page.numbers.parts[0].note.whole == ANEW
+    assert page.numbers.parts[0].note.text() == ANEW
     assert page.numbers.parts[3].number.text() != UNKNOWN  # how long it lasts is known at once
     worker.answer()
     shown(qtbot, designer, 0, "5 – 50")
@@ -69,7 +70,7 @@ def test_slow_numbers_come_are_given_up_and_are_kept(qtbot: Any, designer: Any, 
 
     designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 60))
     qtbot.waitUntil(lambda: len(worker.orders) == 2)
-    assert page.numbers.parts[1].note.whole == ANEW  # grey, with the number of before
+    assert page.numbers.parts[1].note.text() == ANEW  # grey, with the number of before
     assert page.numbers.parts[1].number.text() == "± 26"
     assert page.function.shown.anew
     designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 100))
@@ -111,12 +112,12 @@ def test_a_card_says_how_far_its_simulations_are_and_that_one_crashed(
     observing, _, *others = worker.orders[0].wanted
     one, people, *_ = designer.place.measures.numbers.parts[1:]
     worker.given.append((1, Counted(observing, 240, 400)))
-    qtbot.waitUntil(lambda: one.note.whole == "240 of 400 simulated")
-    assert people.note.whole == ANEW  # it waits for its turn
+    qtbot.waitUntil(lambda: one.note.text() == "240 of 400 simulated")
+    assert people.note.text() == ANEW  # it waits for its turn
     assert designer.place.measures.cards["function"].legend.text() == "240 of 400 simulated"
     worker.answer(Observing)
     worker.given.append((1, Crashed(1)))
-    qtbot.waitUntil(lambda: people.note.whole == FAILED[2])
+    qtbot.waitUntil(lambda: people.note.text() == FAILED[2])
     assert (people.number.text(), one.number.text()) == (UNKNOWN, "± 26")
     assert people.more.text() == "The process ended with exit code 1; the terminal may show why."
     qtbot.waitUntil(lambda: len(worker.orders) == 2)
@@ -124,10 +125,10 @@ def test_a_card_says_how_far_its_simulations_are_and_that_one_crashed(
     worker.given.append((2, Crashed(-9)))
     qtbot.waitUntil(lambda: len(worker.orders) == 3)
     worker.given.append((3, Crashed(-9)))
-    qtbot.waitUntil(lambda: ANEW not in [part.note.whole for part in designer.place.measures.numbers.parts])
+    qtbot.waitUntil(lambda: ANEW not in [part.note.text() for part in designer.place.measures.numbers.parts])
     designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 60))
     qtbot.waitUntil(lambda: len(worker.orders) == 4)
-    assert people.note.whole == ANEW  # another study, another try
+    assert people.note.text() == ANEW  # another study, another try
 
 
 def test_what_is_simulated_is_typed_at_the_right(qtbot: Any, designer: Any, worker: Worker) -> None:
@@ -218,7 +219,11 @@ def test_a_clipped_level_is_repaired_by_its_button(qtbot: Any, designer: Any) ->
     assert list(forces.shown.verdicts) == chips
     assert [chip.word for chip in forces.chips] == [words for *_, words in chips]
     assert f"{forces.shown.slope_n:.2f}" == "7.99"  # 53 N·s/m at 0.151 m/s, and not the force limit of 8 N
-    assert "slope limit 7.99 N" in [one.toPlainText() for one in page.forces.drawn if isinstance(one, TextItem)]
+    drawn = [one for one in page.forces.drawn if isinstance(one, TextItem)]
+    assert [one.toPlainText() for one in drawn] == ["force limit 8 N", "slope limit 7.99 N"]
+    inks = [limit_colour(page.theme, limit) for limit in ("norm", "slope")]  # those of the axis in the form
+    assert [one.color.name().upper() for one in drawn] == [ink.upper() for ink in inks]
+    assert {bar.clipped_by for bar in forces.shown.bars} == {None, "slope"}
     assert forces.words.text() == designer.place.view.problems[0].message
     click(forces.repair)
     assert designer.editing.opened.study.protocol is not None
@@ -275,7 +280,7 @@ def test_without_a_process_the_other_numbers_stay(qtbot: Any, designer: Any) -> 
     designer.controller.measures.slow.rest.setInterval(10)
     jnd(designer)
     part = designer.place.measures.numbers.parts[1]
-    qtbot.waitUntil(lambda: part.note.whole == FAILED[2])
+    qtbot.waitUntil(lambda: part.note.text() == FAILED[2])
     assert part.more.text() == "The process of the simulations does not start."
     assert designer.place.measures.numbers.parts[3].number.text() == "17"
 

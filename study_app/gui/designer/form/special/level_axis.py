@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QBoxLayout, QSlider, QWidget
 
 from study_app.gui.designer.form.row_fields import LineField
 from study_app.gui.designer.form.special_editor import SpecialEditor
+from study_app.gui.designer.measures.limit_colours import limit_colour
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.sliders import Range
@@ -168,11 +169,10 @@ class AxisView(Themed, QWidget):
         low, high = (self._x(end.level) for end in self.ends)
         painter.setBrush(QColor(t.selected))
         painter.drawRect(QRectF(low, track.top(), high - low, TRACK_PX))
-        for limit, ink in ((axis.force, t.warn), (axis.loop, t.bad)):
-            if limit is not None:
-                x = self._x(limit.level)
-                painter.setBrush(QBrush(QColor(ink), Qt.BrushStyle.BDiagPattern))
-                painter.drawRect(QRectF(x, track.top(), track.right() - x, TRACK_PX))
+        for name, limit in axis.limits.items():
+            x = self._x(limit.level)
+            painter.setBrush(QBrush(QColor(limit_colour(t, name)), Qt.BrushStyle.BDiagPattern))
+            painter.drawRect(QRectF(x, track.top(), track.right() - x, TRACK_PX))
         painter.setPen(QPen(QColor(t.accent), 1.4))
         if (self.ends[0].level, self.ends[1].level) == (axis.low, axis.high):
             for level in axis.levels:
@@ -193,7 +193,7 @@ class AxisView(Themed, QWidget):
 
     def _limits(self, painter: QPainter, axis: LevelAxis, track: QRectF) -> None:
         """Paint where the limits begin, the name of the higher one above that of the lower one."""
-        found = [(limit, ink) for limit, ink in ((axis.force, self.theme.warn), (axis.loop, self.theme.bad)) if limit]
+        found = [(limit, limit_colour(self.theme, name)) for name, limit in axis.limits.items()]
         for row, (limit, ink) in enumerate(sorted(found, key=lambda pair: pair[0].level)):
             x, top = self._x(limit.level), 14.0 * (1 - row)
             painter.setPen(QPen(QColor(ink), 1.6, Qt.PenStyle.SolidLine if row == 0 else Qt.PenStyle.DashLine))
