@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path as File
-from typing import Any
+from typing import Any, Final
 
-from study_app.authoring.writer.edits import Edit, Unset, WriterError, apply, check_encodable
+from study_app.authoring.writer.edits import Edit, Unset, WriterError, apply, check_encodable, meaning
 from study_app.authoring.writer.refused import Refused
 from study_app.authoring.writer.splices import Splice, Splices, applied
 from study_app.errors import Problem, ProtocolError
 from study_app.protocol.load import examined, located, read_document
 from study_app.protocol.model import Protocol
-from study_app.protocol.source.document import Path
+from study_app.protocol.source.document import Path, frozen
+from study_app.protocol.source.line_numbers import Places
 from study_app.protocol.source.liquid_files import TABLE, with_liquid_files
 from study_app.protocol.source.problems import Fault
 
-__all__ = ["Refused", "Study", "WriterError", "read"]
+_NOT_TOML: Final = "the file cannot be read: correct its text first"
+
+__all__ = ["Refused", "Study", "Trial", "WriterError", "read"]
 
 
 @dataclass(frozen=True)
@@ -40,55 +43,82 @@ class Study:
     before: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     @cached_property
-    def _read(self) -> tuple[Mapping[str, Any], Protocol | None, tuple[Fault, ...], tuple[Problem, ...]]:
-        own = self.text.encode()
-        source = with_liquid_files(own, self.folder)
-        try:
-            document, places = read_document(source, "")
-        except ProtocolError as error:
-            faults = tuple(Fault((), problem.message, problem.hint) for problem in error.problems)
-            return self.before, None, faults, error.problems
-        protocol, found = examined(document)
-        if source != own:
-            document = {key: value for key, value in document.items() if key != TABLE}
-        return document, protocol, tuple(found), located(found, places)
+    def _source(self) -> bytes:
+        return with_liquid_files(self.text.encode(), self.folder)
 
-    @property
+    @cached_property
+    def _read(self) -> tuple[dict[str, Any] | None, Places, tuple[Problem, ...]]:
+        """The document with the files that it names and the lines it stands on; None where it is not TOML, and why."""
+        try:
+            return *read_document(self._source, ""), ()
+        except ProtocolError as error:
+            return None, Places(""), error.problems
+
+    @cached_property
+    def _examined(self) -> tuple[Protocol | None, tuple[Fault, ...]]:
+        document, _, broken = self._read
+        if document is None:
+            return None, tuple(Fault((), problem.message, problem.hint) for problem in broken)
+        protocol, found = examined(document)
+        return protocol, tuple(found)
+
+    @cached_property
     def document(self) -> Mapping[str, Any]:
         """The tables of the text, arrays as tuples; those of the last text that was TOML where this one is not."""
-        return self._read[0]
+        document = self._read[0]
+        if document is None:
+            return self.before
+        bundled = self._source != self.text.encode()
+        return {key: value for key, value in document.items() if key != TABLE} if bundled else document
 
     @property
     def protocol(self) -> Protocol | None:
         """The protocol, None where there are faults."""
-        return None if self.faults else self._read[1]
+        return None if self.faults else self.formed
 
     @property
     def formed(self) -> Protocol | None:
         """The protocol, also where forces beyond a limit are its only faults; None where there are others."""
-        return self._read[1]
+        return self._examined[0]
 
     @property
     def faults(self) -> tuple[Fault, ...]:
         """What is wrong, by path."""
-        return self._read[2]
+        return self._examined[1]
 
-    @property
+    @cached_property
     def problems(self) -> tuple[Problem, ...]:
         """What is wrong, as ``check`` prints it."""
-        return self._read[3]
+        _, places, broken = self._read
+        return broken or located(self.faults, places)
 
     @property
     def is_toml(self) -> bool:
         """Whether the text can be read; otherwise only its text can be edited."""
-        return all(problem.place != "file" for problem in self.problems)
+        return self._read[0] is not None
 
     def needs(self, place: Path) -> bool:
         """Return whether a table of a section would be incomplete without one of its keys."""
-        text, _ = apply(self.text, Unset(place))
+        after, _ = self.edited(Unset(place))
         table = place[:2]
-        without = {fault for fault in self._with(text).faults if fault.path[: len(table)] == table}
+        without = {fault for fault in after.faults if fault.path[: len(table)] == table}
         return not without <= set(self.faults)
+
+    @property
+    def trial(self) -> Trial:
+        """The same study to try edits on.
+
+        Raises
+        ------
+        Refused
+            The text is not TOML.
+        """
+        if (document := self._read[0]) is None:
+            raise Refused(_NOT_TOML)
+        found = Trial("", self.folder, source=document)
+        if "_examined" in self.__dict__:
+            found.__dict__["_examined"] = self._examined
+        return found
 
     def edited(self, *edits: Edit) -> tuple[Study, tuple[Splices, ...]]:
         """Return the study after some edits, one after the other, and their splices.
@@ -99,7 +129,7 @@ class Study:
             The text is not TOML, or an edit makes no sense.
         """
         if not self.is_toml:
-            raise Refused("the file cannot be read: correct its text first")
+            raise Refused(_NOT_TOML)
         text, steps = self.text, list[Splices]()
         for edit in edits:
             text, found = apply(text, edit)
@@ -132,6 +162,38 @@ class Study:
 
     def _with(self, text: str) -> Study:
         return Study(text, self.folder, self.document)
+
+
+@dataclass(frozen=True)
+class Trial(Study):
+    """A study to try edits on: what they mean, without the text that they make, which takes far longer to write.
+
+    Files that only edits name are not read.
+    """
+
+    source: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def _read(self) -> tuple[dict[str, Any] | None, Places, tuple[Problem, ...]]:
+        return dict(self.source), Places(""), ()
+
+    @cached_property
+    def document(self) -> Mapping[str, Any]:
+        """The tables, arrays as tuples."""
+        return {key: value for key, value in self.source.items() if key != TABLE}
+
+    def edited(self, *edits: Edit) -> tuple[Study, tuple[Splices, ...]]:
+        """Return the study after some edits, one after the other, with no splices.
+
+        Raises
+        ------
+        Refused
+            An edit makes no sense.
+        """
+        document = dict(self.source)
+        for edit in edits:
+            document = meaning(document, edit)
+        return (replace(self, source=frozen(document)) if edits else self), ()
 
 
 def read(source: bytes, folder: File = File()) -> Study:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, TypeAlias
@@ -119,28 +119,25 @@ def _read(text: str) -> Document:
 
 
 def meaning(document: Mapping[str, Any], edit: Edit) -> Document:
-    """Return the document that an edit means.
+    """Return the document that an edit means; what it does not change is shared with the document before.
 
     Raises
     ------
     Refused
         The edit makes no sense in this document.
     """
-    found: Document = copy.deepcopy(dict(document))
-    node: Any = found
+    found: Document = dict(document)
     *parent, last = edit.path
     if isinstance(edit, Set):
         _check_value(edit.value)
-        for step in parent:
-            node = node.setdefault(step, {}) if isinstance(node, dict) else _at(node, step)
+        node = _own(found, parent, makes=True)
         if isinstance(node, list):
             _at(node, last)
         elif not isinstance(node, dict):
             raise Refused(f"{_words(tuple(parent))} is not a table: it has no key {last}")
         node[last] = copy.deepcopy(edit.value)
         return found
-    for step in parent:
-        node = _at(node, step)
+    node = _own(found, parent)
     if isinstance(edit, Insert):
         _check_value(edit.value)
         if not isinstance(node, list) or not isinstance(last, int) or not 0 <= last <= len(node):
@@ -159,6 +156,16 @@ def meaning(document: Mapping[str, Any], edit: Edit) -> Document:
     else:
         _rename(found, node, edit)
     return found
+
+
+def _own(document: Document, path: Iterable[str | int], *, makes: bool = False) -> Any:
+    """Return what is at a path as the document's own: tables and arrays on the way are copied, the rest is shared."""
+    node: Any = document
+    for step in path:
+        inner = {} if makes and isinstance(node, dict) and step not in node else _at(node, step)
+        node[step] = dict(inner) if isinstance(inner, dict) else list(inner) if _is_array(inner) else inner
+        node = node[step]
+    return node
 
 
 def same(one: Any, other: Any) -> bool:
@@ -182,12 +189,9 @@ def _rename(found: Document, node: Any, edit: Rename) -> None:
     if not isinstance(node, dict):
         raise Refused("entries of an array have no name")
     _check_free(node, edit.name)
-    for path in edit.references:
-        *parent, last = path
-        inner: Any = found
-        for step in parent:
-            inner = _at(inner, step)
-        inner[last] = edit.name
+    for *parent, last in edit.references:
+        _own(found, parent)[last] = edit.name
+    node = _own(found, edit.path[:-1])
     node[edit.name] = node.pop(edit.path[-1])
 
 
@@ -229,9 +233,13 @@ def _at(node: Any, step: str | int) -> Any:
 
 
 def _has(node: Any, step: str | int) -> bool:
-    if isinstance(node, list):
+    if _is_array(node):
         return isinstance(step, int) and 0 <= step < len(node)
     return isinstance(node, dict) and step in node
+
+
+def _is_array(node: Any) -> bool:
+    return isinstance(node, list | tuple)
 
 
 def _words(path: Path) -> str:
