@@ -11,6 +11,8 @@ from study_app.authoring.writer.edits import Duplicate, Edit, Insert, Move, Rena
 from study_app.authoring.writer.refused import Refused
 from tests.authoring.grown import PROTOCOLS
 
+pytestmark = pytest.mark.slow
+
 BLOCK = ("blocks", "delays", "conditions")
 EDITS: tuple[Edit, ...] = (
     Set(("conditions", "water", "delay_ms"), 5000),

@@ -17,8 +17,8 @@ from study_app.app.designer.element_steps import (
     move,
     move_to,
     paste,
-    series,
 )
+from study_app.app.designer.series_steps import series
 from study_app.authoring.additions import added
 from study_app.authoring.changes.initial_values import initial, singular
 from study_app.authoring.changes.languages import following

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from study_app.authoring.additions import added, duplicated, fitted
@@ -11,7 +11,6 @@ from study_app.authoring.changes.fragments import pasted
 from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.changes.languages import filled_in, languages_of, with_language, without_language
 from study_app.authoring.changes.moves import moved
-from study_app.authoring.changes.series import check_made, first_edits, members, next_edits, number_row
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, row_at
 from study_app.authoring.names import deletions, free_name, named_at, references_to, replaced, with_references
@@ -31,12 +30,10 @@ from study_app.viewmodels.designer.requests import (
     ChangeLanguage,
     DeleteElement,
     DuplicateElement,
-    MakeSeries,
     MoveElement,
     MoveTo,
     Paste,
 )
-from study_app.viewmodels.sessions import counted
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +75,7 @@ def add(study: Study, asked: AddElement, selected: Path) -> Step:
     section = asked.section
     behind = selected[len(section)] if selected[: len(section)] == section and len(selected) > len(section) else None
     edits, path = added(study, section, dict([asked.kind]) if asked.kind else None, behind=behind)
-    return Step(f"Add {singular(section[-1])}", _beside(study, edits, selected, path), path, fresh=True)
+    return Step(f"Add {singular(section[-1])}", beside(study, edits, selected, path), path, fresh=True)
 
 
 def add_named(study: Study, asked: AddNamed) -> Step:
@@ -121,30 +118,12 @@ def duplicate(study: Study, asked: DuplicateElement) -> Step:
     now = study
     for path in _last_first((asked.path, *asked.also)):
         made, copy = _copied(now, path)
-        made = _beside(now, made, path, copy)
+        made = beside(now, made, path, copy)
         copies = [*(_after_insert(one, copy) for one in copies), copy]
         edits = (*edits, *made)
         now, _ = now.edited(*made)
     words = f"Duplicate {_titles(study, (asked.path, *asked.also))}"
     return Step(words, edits, copies[0], several=tuple(copies), fresh=len(copies) == 1)
-
-
-def series(study: Study, asked: MakeSeries) -> Step:
-    """Return the step that makes an element the first of a series, and its copies right after it."""
-    row = number_row(study.document, asked.path, asked.field)
-    first, *others = members(study, asked.path, row, asked.values)
-    edits, path = first_edits(study, asked.path, row, first)
-    now, _ = study.edited(*edits)
-    made = [path]
-    for one in others:
-        more, copy = next_edits(now, made[-1], replace(row, path=(*made[-1], *asked.field[2:])), one)
-        more = _beside(now, more, made[-1], copy)
-        now, _ = now.edited(*more)
-        edits, made = (*edits, *more), [*made, copy]
-    check_made(study, now, asked.path, made)
-    words = f"Make {counted(len(made), singular(path[0]))} of {title_of(study.document, asked.path)}"
-    said = ", ".join(title_of(now.document, one) for one in made)
-    return Step(words, edits, path, several=tuple(made), said=said)
 
 
 def _copied(study: Study, path: Path) -> tuple[tuple[Edit, ...], Path]:
@@ -156,7 +135,7 @@ def _copied(study: Study, path: Path) -> tuple[tuple[Edit, ...], Path]:
     return (Insert(copy, list(value) if isinstance(value, tuple) else value),), copy
 
 
-def _beside(study: Study, edits: tuple[Edit, ...], original: Path, copy: Path) -> tuple[Edit, ...]:
+def beside(study: Study, edits: tuple[Edit, ...], original: Path, copy: Path) -> tuple[Edit, ...]:
     """Return edits that add an element, with its step in the session right after that of another one."""
     after, _ = study.edited(*edits)
     first, step = step_of(after.document, original), step_of(after.document, copy)
@@ -213,7 +192,7 @@ def paste(study: Study, asked: Paste) -> Step:
     now = after
     for path in found.paths:
         if len(path) == 2:
-            more = _beside(now, fitted(study, now, path), asked.path, path)
+            more = beside(now, fitted(study, now, path), asked.path, path)
             edits = (*edits, *more)
             now, _ = now.edited(*more)
     words = f"Paste {_titles(after, found.paths)}"

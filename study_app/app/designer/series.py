@@ -2,35 +2,46 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final
 
 from PySide6.QtCore import QObject, Qt, QTimer
 
 from study_app.app.designer.editing import Editing
-from study_app.app.designer.element_steps import series
+from study_app.app.designer.series_steps import judged_series
 from study_app.authoring.changes.series import series_starts
-from study_app.authoring.writer.refused import Refused
 from study_app.gui.designer.prompts import SeriesCard
 from study_app.gui.designer.view import DesignerPlace
-from study_app.viewmodels.designer.prompts import refused_plan, series_plan, series_prompt
+from study_app.protocol.source.document import Path
+from study_app.viewmodels.designer.prompts import SeriesPlan, series_plan, series_prompt
 from study_app.viewmodels.designer.requests import AskSeries, MakeSeries
 
 REST_MS: Final = 300
+PART_S: Final = 0.03
+"""So long the window may wait for parts of the check; one part alone may take longer in a large study."""
 
 
 class SeriesPrompts(QObject):
-    """Shows the card that asks for the values of a series."""
+    """Shows the card that asks for the values of a series.
+
+    Whether the study can take what is typed, and what helps where it cannot, is found in parts once typing pauses;
+    the window goes on between them.
+    """
 
     def __init__(self, editing: Editing, place: DesignerPlace) -> None:
         super().__init__(editing)
         self.editing, self.place = editing, place
-        self._asked: tuple[SeriesCard, MakeSeries]
-        self._resting = QTimer(self)
-        self._resting.setInterval(REST_MS)
-        self._resting.setSingleShot(True)
-        self._resting.timeout.connect(self._check)
+        self._typed: dict[Path, tuple[str, str]] = {}
+        self._parts: Iterator[SeriesPlan | None] = iter(())
+        self._asked: MakeSeries | None = None
+        self._making = False
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.timeout.connect(self._go_on)
         place.series_asked.connect(self.ask)
+        editing.opened_other.connect(self._typed.clear)
 
     def ask(self, asked: AskSeries) -> None:
         """Ask for the values of a series, of a section also for its element, or say why there can be none."""
@@ -44,12 +55,15 @@ class SeriesPrompts(QObject):
             return
         if prompt.fields:
             self.editing.select(prompt.path)
+        self._asked = None
         card = SeriesCard(prompt)
         card.typed.connect(lambda asked: self._plan(card, asked))
-        card.make_asked.connect(lambda asked: self._make(card, asked))
+        card.make_asked.connect(self._make)
         card.chosen.connect(lambda path: self._choose(card, AskSeries(path, among)))
-        card.answered.connect(self.editing.ask)
+        card.answered.connect(self._answer)
         self.place.show_prompt(card, card.first)
+        if prompt.path in self._typed:
+            card.take_values(*self._typed[prompt.path])
 
     def _choose(self, card: SeriesCard, asked: AskSeries) -> None:
         """Ask for a series of the element that was chosen in the card; values stay if it has the same number."""
@@ -57,34 +71,43 @@ class SeriesPrompts(QObject):
         self.ask(asked)
         if isinstance(shown := self.place.prompt, SeriesCard):
             shown.elements.setFocus(Qt.FocusReason.OtherFocusReason)
-            if not number or shown.number.findText(number) >= 0:
+            if values:
                 shown.take_values(number, values)
 
     def _plan(self, card: SeriesCard, asked: MakeSeries) -> None:
         """Show what the values make; whether the study can take it is checked once typing pauses."""
+        self._timer.stop()
+        self._asked, self._making = None, False
         if (opened := self.editing.writable) is None:
             return
+        self._typed[asked.path] = card.number.currentText(), asked.values
         card.show_plan(series_plan(opened.study, asked.path, asked.field, asked.values))
-        self._resting.stop()
-        if card.plan.lines:
-            self._asked = card, asked
-            self._resting.start()
+        if asked.values.strip():
+            self._asked = asked
+            self._parts = judged_series(opened.study, asked)
+            self._timer.start(REST_MS)
 
-    def _check(self) -> bool:
-        """Show why the study cannot take what the values make; return whether it can."""
-        self._resting.stop()
-        card, asked = self._asked
-        if (opened := self.editing.writable) is None or self.place.prompt is not card:
-            return False
-        try:
-            series(opened.study, asked)
-        except Refused as refusal:
-            card.show_plan(refused_plan(refusal))
-            return False
-        return True
+    def _go_on(self) -> None:
+        """Check the next parts, at least one."""
+        card = self.place.prompt
+        if self._asked is None or not isinstance(card, SeriesCard):
+            return
+        pauses = time.monotonic() + PART_S
+        for plan in self._parts:
+            if plan is not None:
+                card.show_plan(plan)
+            if time.monotonic() > pauses:
+                self._timer.start(0)
+                return
+        if self._making and card.plan.lines:
+            card.answered.emit(self._asked)
 
-    def _make(self, card: SeriesCard, asked: MakeSeries) -> None:
-        """Make a series that the study can take."""
-        self._asked = card, asked
-        if self._check():
-            card.answered.emit(asked)
+    def _make(self, asked: MakeSeries) -> None:
+        """Make a series as soon as it is known that the study can take it."""
+        self._making = True
+        if asked == self._asked:
+            self._go_on()
+
+    def _answer(self, asked: MakeSeries) -> None:
+        self._typed.pop(asked.path, None)
+        self.editing.ask(asked)

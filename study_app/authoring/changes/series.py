@@ -24,6 +24,8 @@ MOST: Final = 24
 NUMBERS: Final = frozenset({"number", "whole number"})
 """Kinds of rows that hold one number."""
 _DEEPEST: Final = 2
+_ALIKE: Final = frozenset({"pages"})
+"""Sections whose tables differ in their texts alone: copies of one that differ in a number are of no use."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +52,17 @@ class Member:
         return next((text for _, text in self.titles), label_of(self.name))
 
 
+def is_element(document: Mapping[str, Any], path: Path) -> bool:
+    """Return whether there is a table of a section there whose copies may differ in a number."""
+    if len(path) != 2 or path[0] in _ALIKE or not isinstance(value_at(document, path), Mapping):
+        return False
+    section = row_at(document, path[:1])
+    return section is not None and section.kind == "tables"
+
+
 def number_rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
     """Return the numbers of an element of which there can be a series, in the order of its form."""
-    table = len(path) == 2 and isinstance(path[1], str) and isinstance(value_at(document, path), Mapping)
-    return tuple(_numbers(document, path, _DEEPEST)) if table else ()
+    return tuple(_numbers(document, path, _DEEPEST)) if is_element(document, path) else ()
 
 
 def series_starts(document: Mapping[str, Any], path: Path) -> tuple[Path, ...]:
@@ -99,8 +108,25 @@ def members(study: Study, path: Path, row: Row, text: str) -> tuple[Member, ...]
         A value is not a number that is permitted there, or is given twice, there are fewer than two or too many, or
         a title is that of another element.
     """
+    typed = typed_values(study.document, row, text)
+    if why := next((why for _, why in typed if why), ""):
+        raise Refused(why)
+    if len(typed) < 2:
+        raise Refused("a series has two values or more")
+    if len(typed) > MOST:
+        raise Refused(f"a series has at most {MOST} values")
+    return members_of(study, path, row, [value for value, _ in typed])
+
+
+def members_of(study: Study, path: Path, row: Row, values: Sequence[int | float]) -> tuple[Member, ...]:
+    """Return the elements of a series with these values, as `members` does.
+
+    Raises
+    ------
+    Refused
+        A title is that of another element.
+    """
     document, name = study.document, str(path[1])
-    values = _values(document, row, text)
     taken = {*names(document, str(path[0]))} - {name}
     ending = "" if row.value is None else f"_{_word(row.value)}"
     own = bool(ending) and name.endswith(ending)
@@ -132,8 +158,8 @@ def next_edits(study: Study, previous: Path, row: Row, member: Member) -> tuple[
     return (*edits, *_given(member, copy, previous, row), *listed), copy
 
 
-def check_made(before: Study, after: Study, original: Path, made: Sequence[Path]) -> None:
-    """Refuse a series that adds problems to a study.
+def problem_made(before: Study, after: Study, original: Path, made: Sequence[Path]) -> tuple[str, Path]:
+    """Return the first problem that a series adds to a study, in words, and its place; "" where it adds none.
 
     A problem that the element had before, such as a text that is missing, may be that of its copies, too.
 
@@ -145,18 +171,14 @@ def check_made(before: Study, after: Study, original: Path, made: Sequence[Path]
         The element before it became the first one of the series.
     made : sequence of path
         The elements of the series.
-
-    Raises
-    ------
-    Refused
-        A problem is new.
     """
     known = {_as_before(fault, original, ()) for fault in before.faults}
     for fault in after.faults:
         if _as_before(fault, original, made) not in known:
             inside = (label_of(step) for step in fault.path[2:] if isinstance(step, str))
             where = ", ".join((title_of(after.document, fault.path[:2]), *inside))
-            raise Refused(f"this series would cause a problem: {where}: {fault.message}")
+            return f"{where}: {fault.message}", fault.path
+    return "", ()
 
 
 def _as_before(fault: Fault, original: Path, made: Sequence[Path]) -> tuple[Path, str]:
@@ -188,22 +210,24 @@ def _numbers(document: Mapping[str, Any], path: Path, deepest: int) -> Iterator[
         yield from _numbers(document, inner, deepest - 1)
 
 
-def _values(document: Mapping[str, Any], row: Row, text: str) -> tuple[int | float, ...]:
+def typed_values(document: Mapping[str, Any], row: Row, text: str) -> tuple[tuple[int | float, str], ...]:
+    """Return the values that are typed, each with the reason why it cannot be one of the series, "" for none.
+
+    Raises
+    ------
+    Refused
+        There is no value, or one is not a number.
+    """
     try:
         typed = typed_numbers(text, row.unit)
     except ValueError as unclear:
         raise Refused(str(unclear)) from unclear
-    found: list[int | float] = []
+    found: list[tuple[int | float, str]] = []
     for word, value in typed:
-        if why := why_not(document, row, value):
-            raise Refused(f"{word} is not permitted: {row.label} is {why}")
-        if value in found:
-            raise Refused(f"{word} is there twice")
-        found.append(value)
-    if len(found) < 2:
-        raise Refused("a series has two values or more")
-    if len(found) > MOST:
-        raise Refused(f"a series has at most {MOST} values")
+        why = why_not(document, row, value)
+        twice = any(value == earlier for earlier, _ in found)
+        reason = f"{word} is not permitted: {row.label} is {why}" if why else f"{word} is there twice" if twice else ""
+        found.append((value, reason))
     return tuple(found)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import zip_longest
+
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QScrollArea, QVBoxLayout, QWidget
@@ -17,6 +19,8 @@ HIGHEST = 560
 PLACES_PX = 200
 PLAN_PX = 98
 """The room for what a series makes, or for why it cannot be made: the buttons below it stay where they are."""
+WAY_PX, MOST_WAYS = 36, 3
+"""The room for buttons with what helps where a series cannot be made, and how many there are at most."""
 
 
 class Prompt(Card):
@@ -145,6 +149,19 @@ class SeriesCard(Prompt):
         self.area.setFixedHeight(PLAN_PX)
         self.area.setWidget(said)
         self.column.addWidget(self.area)
+        self.ways = [ActionButton("", "", height=WAY_PX) for _ in range(MOST_WAYS)]
+        room = QWidget()
+        room.setFixedHeight(WAY_PX)
+        offered = QHBoxLayout(room)
+        offered.setContentsMargins(0, 0, 0, 0)
+        offered.setSpacing(10)
+        for at, way in enumerate(self.ways):
+            way.setProperty("dense", "true")
+            way.setFont(font("label"))
+            way.clicked.connect(lambda _checked=False, at=at: self.answered.emit(self.plan.ways[at].asks))
+            offered.addWidget(way)
+        offered.addStretch()
+        self.column.addWidget(room)
         self.make = ActionButton("bars", "", role="primary", height=40)
         self.make.clicked.connect(self._make)
         self.buttons.addWidget(self.make)
@@ -162,16 +179,25 @@ class SeriesCard(Prompt):
         self.plan = plan
         self.refusal.setText(plan.refusal)
         self.refusal.setVisible(bool(plan.refusal))
-        self.values.setAccessibleDescription(plan.refusal)
+        self.values.setAccessibleDescription(" ".join((plan.refusal, *(way.words for way in plan.ways))).strip())
         self.lines.setText("\n".join(plan.lines))
         self.lines.setVisible(bool(plan.lines))
         self.make.show_action("bars", plan.make)
         self.make.setEnabled(bool(plan.lines))
+        for button, way in zip_longest(self.ways, plan.ways):
+            button.setVisible(way is not None)
+            if way is not None:
+                button.show_action("", way.words)
+                button.setToolTip(way.meaning)
+                button.setAccessibleDescription(way.meaning)
 
     def take_values(self, number: str, values: str) -> None:
-        """Take the number and the values that were chosen for another element."""
+        """Take a number and values that were chosen before, unless the element has no such number."""
+        if self.number.findText(number) < 0:
+            return
         self.number.setCurrentText(number)
         self.values.setText(values)
+        self.values.selectAll()
         self._type()
 
     def _type(self) -> None:

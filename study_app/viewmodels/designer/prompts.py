@@ -12,7 +12,7 @@ from study_app.authoring.outline import title_of
 from study_app.authoring.writer.refused import Refused
 from study_app.number_text import exact_text
 from study_app.protocol.source.document import Path
-from study_app.viewmodels.designer.requests import AskSeries
+from study_app.viewmodels.designer.requests import AskSeries, MakeSeries
 from study_app.viewmodels.sessions import counted
 
 
@@ -67,6 +67,15 @@ class SeriesPrompt:
 
 
 @dataclass(frozen=True, slots=True)
+class SeriesWay:
+    """What helps where a series is refused: the words of its button, what they mean, and the series that is made."""
+
+    words: str
+    meaning: str
+    asks: MakeSeries
+
+
+@dataclass(frozen=True, slots=True)
 class SeriesPlan:
     """What a series will be.
 
@@ -78,11 +87,14 @@ class SeriesPlan:
         Why it cannot be made with these values, "" where it can.
     make : str
         What the button says that makes it.
+    ways : tuple of SeriesWay
+        What helps where it cannot be made.
     """
 
     lines: tuple[str, ...] = ()
     refusal: str = ""
     make: str = "Make the series"
+    ways: tuple[SeriesWay, ...] = ()
 
 
 def series_prompt(study: Study, asked: AskSeries) -> SeriesPrompt | None:

@@ -108,11 +108,17 @@ class DuplicateElement:
 
 @dataclass(frozen=True, slots=True)
 class MakeSeries:
-    """Make an element the first of a series: ``field`` is the number that differs, ``values`` as they were typed."""
+    """Make an element the first of a series: ``field`` is the number that differs, ``values`` as they were typed.
+
+    Of the lists that name the element, those in ``only`` then name nothing but the series, those in ``kept`` none of
+    its copies.
+    """
 
     path: Path
     field: Path
     values: str
+    only: tuple[Path, ...] = ()
+    kept: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

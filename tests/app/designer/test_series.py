@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.gui.designer.prompts import SeriesCard
 from study_app.viewmodels.designer.prompts import series_plan
-from study_app.viewmodels.designer.requests import AskSeries, MakeSeries
+from study_app.viewmodels.designer.requests import AddKey, AskSeries, MakeSeries
 
 pytestmark = pytest.mark.slow
 
@@ -49,7 +49,7 @@ def test_a_series_of_delays_is_made_by_keys_alone_in_one_step(qtbot: Any, water:
     assert card(water).lines.text().splitlines()[1] == "Thin 60: 60 ms  ·  thin_60"
     assert card(water).make.text() == "Make 4 conditions"
     qtbot.keyClick(values, Qt.Key.Key_Return)
-    assert water.place.prompt is None
+    qtbot.waitUntil(lambda: water.place.prompt is None)
     conditions = document(water)["conditions"]
     named = ["thin", "thin_60", "thin_120", "thin_240"]
     assert [conditions[name]["delay_ms"] for name in named] == [0, 60, 120, 240]
@@ -92,6 +92,7 @@ def test_another_number_is_chosen_and_the_series_made_by_the_mouse(qtbot: Any, w
     shown.number.activated.emit(shown.number.currentIndex())
     qtbot.keyClicks(shown.values, "1, 2.5")
     qtbot.mouseClick(shown.make, LEFT)
+    qtbot.waitUntil(lambda: water.place.prompt is None)
     liquids = document(water)["liquids"]
     assert liquids["thin_2_5"]["viscosity_pa_s"] == 2.5
     assert liquids["thin_2_5"]["density_kg_m3"] == liquids["thin"]["density_kg_m3"]
@@ -121,7 +122,9 @@ def test_a_series_is_offered_in_the_list_of_conditions_and_at_headings(qtbot: An
         ("conditions", name) for name in document(designer)["conditions"]
     ]
     assert card(designer).asked.path == ()
-    for path in (("study",), ("scene",)):
+    page = next(("pages", name) for name, one in document(designer)["pages"].items())
+    designer.editing.ask(AddKey((*page, "min_s")))
+    for path in (("study",), ("scene",), ("pages",), page):
         designer.select(path)
         assert not head.series.isVisible()
 
@@ -153,7 +156,7 @@ def test_a_series_that_would_make_a_problem_is_refused_while_it_is_typed(qtbot: 
     values = card(water).values
     qtbot.keyClicks(values, "0 60")
     qtbot.keyClick(values, Qt.Key.Key_Return)  # before the keys rest
-    assert '"thin_60" presents the same as "thin_60_2"' in card(water).refusal.text()
+    qtbot.waitUntil(lambda: '"thin_60" presents the same as "thin_60_2"' in card(water).refusal.text())
     assert not card(water).make.isEnabled()
     qtbot.keyClick(values, Qt.Key.Key_Return)
     assert water.text == before
@@ -161,6 +164,50 @@ def test_a_series_that_would_make_a_problem_is_refused_while_it_is_typed(qtbot: 
     qtbot.keyClicks(values, "1")
     assert card(water).refusal.text() == ""
     assert card(water).make.text() == "Make 2 conditions"
+
+
+def shown_ways(designer: Any) -> list[str]:
+    return [way.text() for way in card(designer).ways if way.isVisible()]
+
+
+def test_a_way_on_is_offered_until_the_values_change_and_made_in_one_step(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    before = designer.text
+    designer.place.series_asked.emit(AskSeries(CONDITION))
+    values = card(designer).values
+    qtbot.keyClicks(values, "0 60")
+    qtbot.waitUntil(lambda: len(shown_ways(designer)) == 2)
+    assert not card(designer).make.isEnabled()
+    qtbot.keyClicks(values, "0")
+    assert shown_ways(designer) == []
+    qtbot.waitUntil(lambda: shown_ways(designer) == ["List only these in Liquids", "Leave Liquids as it is"])
+    qtbot.mouseClick(card(designer).ways[0], LEFT)
+    assert designer.place.prompt is None
+    assert list(document(designer)["blocks"]["liquids"]["conditions"]) == ["thin", "thin_600"]
+    assert len(designer.editing.opened.history.done) == 1
+    designer.editing.undo()
+    assert designer.text == before
+
+
+def test_values_typed_before_cancel_come_back_for_the_same_element(qtbot: Any, water: Any) -> None:
+    liquid = ("liquids", "thin")
+    water.place.series_asked.emit(AskSeries(liquid))
+    shown = card(water)
+    shown.number.setCurrentText("Viscosity [Pa·s]")
+    qtbot.keyClicks(shown.values, "1 x")
+    qtbot.mouseClick(shown.cancel, LEFT)
+    water.place.series_asked.emit(AskSeries(CONDITION))
+    assert card(water).values.text() == ""
+    water.place.series_asked.emit(AskSeries(liquid))
+    shown = card(water)
+    assert (shown.number.currentText(), shown.values.text()) == ("Viscosity [Pa·s]", "1 x")
+    assert shown.refusal.text() == "“x” is not a number."
+    qtbot.keyClicks(shown.values, "1 2")  # in place of them
+    qtbot.mouseClick(shown.make, LEFT)
+    qtbot.waitUntil(lambda: water.place.prompt is None)
+    assert "thin_2" in document(water)["liquids"]
+    water.place.series_asked.emit(AskSeries(liquid))
+    assert card(water).values.text() == ""
 
 
 def test_a_problem_that_a_study_had_before_refuses_no_series(designer: Any) -> None:

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.changes.languages import is_copied
-from study_app.authoring.changes.series import NUMBERS, series_starts
+from study_app.authoring.changes.series import NUMBERS, is_element, series_starts
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Choice, Row, label_of, refused_at, row_at, rows, sections_of
 from study_app.authoring.measures.participant_texts import copied_texts, missing_texts, own_texts
@@ -202,7 +202,7 @@ def form(study: Study, path: Path) -> Form:
         question_lines(study, path[:-1]) if path[2:3] == ("items",) else NO_QUESTIONS,
         tuple((path[:length], title_of(document, path[:length])) for length in (1, 2, 4) if length <= len(path)),
         f"Feel {title}" if len(path) == 2 and path[0] in WITH_LIQUIDS else "",
-        any(map(_has_numbers, sections)) if len(path) == 2 else bool(series_starts(document, path)),
+        any(map(_has_numbers, sections)) if is_element(document, path) else bool(series_starts(document, path)),
     )  # fmt: skip
 
 
