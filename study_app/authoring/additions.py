@@ -10,10 +10,11 @@ from typing import Any, Final
 from study_app.authoring.changes.initial_values import LETTER, initial, singular
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, row_at, rows
-from study_app.authoring.names import check_id, free_name, sections_at
+from study_app.authoring.names import check_id, sections_at
 from study_app.authoring.repairs import Repair, is_unknown_name, removes, repairs
 from study_app.authoring.writer.edits import Duplicate, Edit, Insert, Set
 from study_app.authoring.writer.refused import Refused
+from study_app.ids import free_id
 from study_app.protocol.source.document import Path, entries, names, value_at
 from study_app.protocol.source.problems import Fault, rule_of
 
@@ -61,7 +62,7 @@ def added(
         path = (*section, behind + 1 if isinstance(behind, int) and behind < count else count)
         first = Insert(path, value) if row.value else Set(section, [value])
     else:
-        path = (*section, free_name(names(study.document, str(section[0])), name or singular(section[-1])))
+        path = (*section, free_id(names(study.document, str(section[0])), name or singular(section[-1])))
         first = Set(path, value, behind if isinstance(behind, str) else None)
     others: list[Edit] = []
     tried = {(fault.path, fault.message) for fault in study.faults}
@@ -125,9 +126,9 @@ def duplicated(study: Study, path: Path, wanted: str = "") -> tuple[tuple[Edit, 
         copy: Path = (*path[:-1], last + 1)
         edits: list[Edit] = [Duplicate(path)]
         if isinstance(name, str):
-            edits.append(Set((*copy, "id"), free_name(filter(None, taken), name)))
+            edits.append(Set((*copy, "id"), free_id(filter(None, taken), name)))
     else:
-        copy = (*path[:-1], wanted or free_name(names(study.document, str(path[0])), str(name)))
+        copy = (*path[:-1], wanted or free_id(names(study.document, str(path[0])), str(name)))
         edits = [Duplicate(path, str(copy[-1]))]
     return (*edits, *fitted(study, study.edited(*edits)[0], copy)), copy
 

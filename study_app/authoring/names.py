@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from itertools import count
 from typing import Any
 
 from study_app.authoring.writer.edits import Edit, Rename, Set, Unset
 from study_app.authoring.writer.refused import Refused
-from study_app.haptics.model.liquid import MAX_ID
+from study_app.ids import MAX_FROM_TEXT, MAX_ID, free_id, id_of
 from study_app.protocol.checks.cross_references import CHOICES, ITEM_REFERENCES
 from study_app.protocol.source.document import Path, entries, has, names, value_at
 
@@ -61,14 +59,21 @@ def renamed(document: Document, thing: Path, name: str) -> tuple[Edit, ...]:
     Refused
         The name is taken, or is not an id.
     """
-    check_id(name)
     item = _item_id(document, thing)
     if item is None:
-        if name in _siblings(document, thing):
-            raise Refused(f'the name "{name}" is taken: choose another one')
+        taken = {*_siblings(document, thing)} - {str(thing[-1])}
+    else:
+        taken = {str(other["id"]) for path, other in _items(document) if _in_same(thing, path) and path != thing}
+    title = value_at(document, (*thing, "text" if item is not None else "title"))
+    text = next(iter(title.values()), "") if isinstance(title, Mapping) else title
+    wanted = id_of(name) or id_of(str(text or ""), MAX_FROM_TEXT) or id_of(str(item or thing[-1])) or "question"
+    free = free_id(taken, wanted)
+    check_id(name, free)
+    if name in taken:
+        where = "" if item is None else " by another item of this questionnaire"
+        raise Refused(f'the name "{name}" is taken{where}: "{free}" is free', free)
+    if item is None:
         return (Rename(thing, name, references_to(document, thing)),)
-    if any(_in_same(thing, path) and other["id"] == name for path, other in _items(document) if path != thing):
-        raise Refused(f'the name "{name}" is taken by another item of this questionnaire: choose another one')
     return (Set((*thing, "id"), name), *(Set(place, name) for place in references_to(document, thing)))
 
 
@@ -118,18 +123,8 @@ def deletions(paths: Iterable[Path]) -> tuple[Edit, ...]:
     return tuple(Unset(path) for path in sorted(outer, key=_sortable, reverse=True))
 
 
-def free_name(taken: Iterable[str], name: str) -> str:
-    """Return ``name``, or with the first number from 2 on that is free, in place of one that it ends with."""
-    used = set(taken)
-    if name not in used:
-        return name
-    stem = re.sub(r"_[0-9]+$", "", name)
-    numbers = (f"_{number}" for number in count(2))
-    return next(new for end in numbers if (new := f"{stem[: MAX_ID - len(end)]}{end}") not in used)
-
-
-def check_id(name: str) -> None:
-    """Refuse what is not an id.
+def check_id(name: str, free: str = "") -> None:
+    """Refuse what is not an id, and propose one that is.
 
     Raises
     ------
@@ -139,7 +134,8 @@ def check_id(name: str) -> None:
     plain = name.isascii() and name.replace("_", "a").isalnum() and name == name.lower()
     if not plain or not name[:1].isalpha() or len(name) > MAX_ID:
         rule = f"at most {MAX_ID} small letters, digits and underscores, a letter first"
-        raise Refused(f'"{name}" is not an id: write {rule}')
+        proposed = f'; "{free}" is free' if free else ""
+        raise Refused(f'"{name}" is not an id: write {rule}{proposed}', free)
 
 
 def _within(path: Path, outer: Path) -> bool:

@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from study_app.authoring.changes.languages import languages_of, with_language, without_language
+from study_app.authoring.drafts import unsaved_files
 from study_app.authoring.edited_study import Study, read
 from study_app.authoring.templates import FOLDER, templates
 from study_app.authoring.versions.contents import save
 from study_app.authoring.writer.edits import Set
 from study_app.authoring.writer.refused import Refused
+from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.files import shipped
 from study_app.protocol.source.problems import did_you_mean
@@ -41,8 +43,7 @@ class Answers:
 
 NO_ANSWERS: Final = Answers()
 FIRST_VERSION: Final = "0.1"
-NAME_LENGTH: Final = 40
-_NAME: Final = re.compile(rf"[a-z][a-z0-9]{{0,{NAME_LENGTH - 1}}}")
+_NAME: Final = re.compile(rf"[a-z][a-z0-9]{{0,{MAX_SHORT_NAME - 1}}}")
 _SELF: Final = "liquid-study check NAME"
 
 
@@ -116,7 +117,7 @@ def check_free(name: str) -> Path:
     _check_name(name)
     file = workspace().protocols / f"{name}.toml"
     if file.exists():
-        raise Refused(f"{file} is already there: choose another name")
+        raise _refused(f"{file} is already there", name)
     return file
 
 
@@ -137,8 +138,18 @@ def write_new(study: Study, name: str) -> Path:
 
 def _check_name(name: str) -> None:
     if not _NAME.fullmatch(name):
-        raise Refused(
-            f'"{name}" is not a short name: write at most {NAME_LENGTH} small letters and digits, a letter first'
-        )
+        rule = f"write at most {MAX_SHORT_NAME} small letters and digits, a letter first"
+        raise _refused(f'"{name}" is not a short name: {rule}', name)
     if name in shipped():
-        raise Refused(f'"{name}" is a study that ships with the program: choose another name')
+        raise _refused(f'"{name}" is a study that ships with the program', name)
+
+
+def taken_names() -> set[str]:
+    """Return the short names of studies: those that ship, and those of the workspace, saved or not."""
+    folder = workspace().protocols
+    return {*shipped(), *(file.stem for file in (*folder.glob("*.toml"), *unsaved_files(folder)))}
+
+
+def _refused(why: str, name: str) -> Refused:
+    free = free_short_name(taken_names(), short_name_of(name) or "study")
+    return Refused(f'{why}; "{free}" is free', free)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import tomllib
 from pathlib import Path
 from typing import Any, Final
 
 from study_app.errors import ProtocolError, StoreError
-from study_app.haptics.model.liquid import MAX_ID
 from study_app.haptics.model.scene import Scene
+from study_app.ids import free_id, id_of
 from study_app.lab.ab_comparison import Setting
 from study_app.lab.presets import preset_text, save
 from study_app.protocol.load import load
@@ -36,7 +35,8 @@ def use_in_study(study: Path, setting: Setting, file: Path | None) -> str:
     """
     before = _read(study)
     document = _document(study, before)
-    name = _free_name(file.stem if file is not None else setting.scene.liquids[0].id, document.get("liquids", {}))
+    wanted = id_of(file.stem if file is not None else setting.scene.liquids[0].id)
+    name = free_id(document.get("liquids", {}), wanted or "liquid")
     made = file if file is not None else _free_file(study.parent / f"{name}.toml")
     named = _relative(made, study.parent)
     newline = "\r\n" if b"\r\n" in before else "\n"
@@ -72,13 +72,6 @@ def _tables(source: bytes) -> dict[str, Any] | None:
         return tomllib.loads(source.decode())
     except (ValueError, RecursionError):
         return None
-
-
-def _free_name(wanted: str, taken: Any) -> str:
-    """Return a name for a liquid that the study has not yet."""
-    words = re.sub(r"[^a-z0-9]+", "_", wanted.lower()).strip("_")[: MAX_ID - 4]
-    words = words if words[:1].isalpha() else f"liquid_{words}".rstrip("_")
-    return next(name for name in (words, *(f"{words}_{number}" for number in range(2, 999))) if name not in taken)
 
 
 def _free_file(wanted: Path) -> Path:

@@ -7,8 +7,8 @@ from typing import Annotated, Any, ClassVar, Final, Literal, Self, TypeAlias
 from pydantic import Field, SerializerFunctionWrapHandler, StringConstraints, model_serializer, model_validator
 from pydantic_core import PydanticCustomError
 
-from study_app.haptics.model.liquid import MAX_ID
 from study_app.haptics.model.ranges import within
+from study_app.ids import MAX_ID
 from study_app.protocol.orders.order_constraint import Constraint
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Id, Localised

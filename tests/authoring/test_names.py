@@ -11,7 +11,6 @@ from study_app.authoring.names import (
     check_id,
     choices_at,
     deletions,
-    free_name,
     named_at,
     references_to,
     renamed,
@@ -19,8 +18,9 @@ from study_app.authoring.names import (
     with_references,
 )
 from study_app.authoring.templates import FOLDER
+from study_app.authoring.writer.edits import Set
 from study_app.authoring.writer.refused import Refused
-from study_app.haptics.model.liquid import MAX_ID
+from study_app.ids import MAX_ID
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.source.document import Path, entries
 from tests.authoring.grown import PROTOCOLS
@@ -129,9 +129,21 @@ def test_renamed_refuses_a_taken_name() -> None:
         renamed(document, ("questionnaires", "liquid", "items", 1), "feels_liquid")
 
 
-def test_free_name_counts_from_2() -> None:
-    assert free_name(["a", "a_2"], "a") == "a_3"
-    assert free_name(["b"], "a") == "a"
-    assert free_name(["a", "a_2"], "a_2") == "a_3"
-    long = "x" * MAX_ID
-    assert len(free_name([long], long)) <= len(long)
+@pytest.mark.parametrize(
+    ("thing", "name", "free"),
+    [
+        (("liquids", "thick"), "thin", "thin_2"),
+        (("liquids", "thick"), "Thin", "thin_2"),
+        (("liquids", "thick"), "Crème brûlée", "creme_brulee"),
+        (("liquids", "thick"), "", "thick"),
+        (("questionnaires", "liquid", "items", 1), "feels_liquid", "feels_liquid_2"),
+        (("questionnaires", "liquid", "items", 1), "", "this_liquid_behaves_like"),
+        (("blocks", "liquids"), "2", "comparing_liquids"),
+    ],
+)
+def test_a_refused_id_proposes_one_that_is_free(thing: Path, name: str, free: str) -> None:
+    document, _ = study_of("demo").edited(Set(("blocks", "liquids", "title"), "Comparing liquids"))
+    with pytest.raises(Refused, match=f'"{free}" is free$') as refused:
+        renamed(document.document, thing, name)
+    assert refused.value.free == free
+    assert renamed(document.document, thing, free)

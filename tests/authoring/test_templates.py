@@ -123,7 +123,7 @@ def test_new_refuses_to_overwrite(protocols: Path) -> None:
     before = (protocols / "mine.toml").read_bytes()
     again = new("mine", "--template", "rate-realism")
     assert isinstance(again.exception, Refused)
-    assert "is already there: choose another name" in str(again.exception)
+    assert str(again.exception).endswith('mine.toml is already there; "mine2" is free')
     assert (protocols / "mine.toml").read_bytes() == before
 
 

@@ -31,7 +31,7 @@ from study_app.authoring.kept_settings import begin_settings
 from study_app.authoring.names import renamed
 from study_app.authoring.new_study import NO_ANSWERS, Answers, answered, template
 from study_app.authoring.study_facts import facts
-from study_app.authoring.writer.refused import Refused
+from study_app.authoring.writer.refused import Refused, free_in
 from study_app.errors import StudyError
 from study_app.gui.designer.view import DesignerPlace
 from study_app.protocol.source.document import Path as Place
@@ -149,7 +149,7 @@ class DesignerController(QObject):
                 study, copy_of = read(file.read_bytes(), file.parent), file.stem
             opened = open_new(answered(study, answers), name)
         except StudyError as error:
-            self.place.refuse_new(f"{error}.")
+            self.place.refuse_new(f"{error}.", free_in(error))
             return
         self.saving.leave()
         begin_settings(opened.file, copy_of)
@@ -201,7 +201,10 @@ class DesignerController(QObject):
             self.place.message.emit("This repair cannot be made", f"{refusal}.")
 
     def _refuse(self, path: Place, sentence: str, asked: Request) -> None:
-        self.place.refuse(path, sentence, renaming=isinstance(asked, RenameElement))
+        if isinstance(asked, RenameElement):
+            self._judge_id(path, asked.name)
+        else:
+            self.place.refuse(path, sentence)
 
     def _show_addable(self) -> None:
         if (opened := self.editing.writable) is not None:
@@ -213,16 +216,16 @@ class DesignerController(QObject):
             self.place.adding.offer_fields(fields_to_go_to(opened.study, words, opened.history.selected))
 
     def _judge_id(self, path: Place, name: str) -> None:
-        """Say at once why an id cannot be taken."""
-        opened, why = self.editing.writable, ""
+        """Say at once why an id cannot be taken, and which one could be."""
+        opened, why, free = self.editing.writable, "", ""
         if opened is None:
             return
         try:
             if name != str(path[-1]):
                 renamed(opened.study.document, path, name)
         except Refused as refusal:
-            why = f"{str(refusal)[:1].upper()}{str(refusal)[1:]}."
-        self.place.form.head.refuse(why)
+            why, free = f"{refusal}.", refusal.free
+        self.place.form.head.refuse(why, free)
 
     def _show_step(self, step: Step) -> None:
         if step.several or step.fresh or step.said:

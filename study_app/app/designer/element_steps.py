@@ -13,10 +13,11 @@ from study_app.authoring.changes.languages import filled_in, languages_of, with_
 from study_app.authoring.changes.moves import moved
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, row_at
-from study_app.authoring.names import deletions, free_name, named_at, references_to, replaced, with_references
+from study_app.authoring.names import deletions, named_at, references_to, replaced, with_references
 from study_app.authoring.outline import title_of
 from study_app.authoring.writer.edits import Edit, Insert, Move, Set
 from study_app.authoring.writer.refused import Refused
+from study_app.ids import free_id
 from study_app.protocol.instruments.instrument import instrument
 from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.wording.languages import language_name
@@ -99,7 +100,7 @@ def add_instrument(study: Study, asked: AddInstrument) -> Step:
     table: dict[str, Any] = {"instrument": asked.name}
     if not set(languages) <= set(source["languages"]):
         table["items"] = [{"id": item["id"]} for item in source["items"]]
-    path = ("questionnaires", free_name(names(study.document, "questionnaires"), asked.name.replace("-", "_")))
+    path = ("questionnaires", free_id(names(study.document, "questionnaires"), asked.name.replace("-", "_")))
     return Step(f"Add {asked.name}", (Set(path, table),), path)
 
 

@@ -12,7 +12,7 @@ from study_app.authoring.edited_study import read
 from study_app.authoring.fields import row_at
 from study_app.authoring.kept_settings import kept_original
 from study_app.authoring.names import Document
-from study_app.authoring.new_study import template
+from study_app.authoring.new_study import taken_names, template
 from study_app.authoring.outline import study_title
 from study_app.authoring.templates import templates
 from study_app.errors import StudyError
@@ -116,8 +116,7 @@ def new_choices(source: str = "") -> tuple[TemplateChoice, ...]:
     """
     in_order = [name for name in TEMPLATES if name in templates()]
     choices = [_template_choice(name) for name in dict.fromkeys((*in_order, *templates()))]
-    files = (*workspace().protocols.glob("*.toml"), *unsaved_files(workspace().protocols))
-    taken = {*shipped(), *(file.stem for file in files)}
+    taken = taken_names()
     copied = dict.fromkeys([source, *shipped()] if source and not source.startswith("template:") else shipped())
     for name in copied:
         file = shipped_file(name) if name in shipped() else find(name)

@@ -17,7 +17,7 @@ from study_app.app.designer.versions.known_runs import KnownRuns
 from study_app.authoring.kept_settings import begin_settings
 from study_app.authoring.versions.contents import ChangedOutsideError, kept_versions
 from study_app.authoring.versions.runs import Standing, check_version
-from study_app.authoring.writer.refused import Refused
+from study_app.authoring.writer.refused import Refused, free_in
 from study_app.errors import StudyError
 from study_app.gui.designer.versions.save_card import SaveCard
 from study_app.gui.designer.view import DesignerPlace
@@ -194,7 +194,7 @@ class Saving(QObject):
             made = opened.saved_as(name)
         except StudyError as refusal:
             if self.card is not None:
-                self.card.refuse(f"{refusal}.")
+                self.card.refuse(f"{refusal}.", free_in(refusal))
             return
         self.write_draft(at_once=True)
         self.place.close_prompt()

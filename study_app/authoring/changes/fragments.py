@@ -12,17 +12,17 @@ from study_app.authoring.additions import added
 from study_app.authoring.changes.short_texts import short_of
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, row_at
-from study_app.authoring.names import free_name, references_to, renamed
+from study_app.authoring.names import references_to, renamed
 from study_app.authoring.writer.edits import Edit, Rename, Set, WriterError, apply, same
 from study_app.authoring.writer.keys import insert_block
 from study_app.authoring.writer.refused import Refused
 from study_app.authoring.writer.spans import spans_of
 from study_app.authoring.writer.splices import Editor, applied
 from study_app.authoring.writer.values import tables
+from study_app.ids import MAX_FROM_TEXT, free_id, id_of
 from study_app.protocol.source.document import Path, entries, frozen, names, value_at
 
 MOST_LINES: Final = 200
-_ID: Final = re.compile(r"[^a-z0-9]+")
 _BULLET: Final = re.compile(r"^\s*(?:[-*•]|\d{1,3}[.)])\s+")
 
 
@@ -100,7 +100,7 @@ def _tables(study: Study, selected: Path, text: str, document: Mapping[str, Any]
     for section in document:
         taken = set(names(study.document, section))
         for name in document[section]:
-            new = free_name({*taken, *(set(document[section]) - {name})}, name) if name in taken else name
+            new = free_id({*taken, *(set(document[section]) - {name})}, name) if name in taken else name
             if new != name:
                 inner = frozen(tomllib.loads(text))
                 text, _ = apply(text, Rename((section, name), new, references_to(inner, (section, name))))
@@ -129,7 +129,7 @@ def _items(study: Study, selected: Path, text: str, document: Mapping[str, Any])
         own = inner["questionnaires"][form]["items"][index]
         if isinstance(own, Mapping) and own.get("id") in there:
             others = {one.get("id") for one in inner["questionnaires"][form]["items"] if isinstance(one, Mapping)}
-            for edit in renamed(inner, place, free_name(there | {str(one) for one in others}, str(own["id"]))):
+            for edit in renamed(inner, place, free_id(there | {str(one) for one in others}, str(own["id"]))):
                 text, _ = apply(text, edit)
     new = tomllib.loads(text)["questionnaires"][form]["items"]
     there_now = [item for _, item in entries(study.document, f"questionnaires.{form}.items.*")]
@@ -180,7 +180,7 @@ def _questions_of(study: Study, selected: Path, pasted_text: str) -> Pasted:
     now, taken = study, _ids(study, form)
     paths: list[Path] = []
     for line in lines:
-        name = free_name(taken, _id_of(line))
+        name = free_id(taken, id_of(line, MAX_FROM_TEXT) or "question")
         taken.add(name)
         text, short = ({languages[0]: one} if len(languages) > 1 else one for one in (line, short_of(line)))
         value = {"id": name, **kind, "text": text, "short": short}
@@ -189,11 +189,6 @@ def _questions_of(study: Study, selected: Path, pasted_text: str) -> Pasted:
         paths.append(path)
         at = int(path[-1])
     return Pasted(now.text, (), tuple(paths))
-
-
-def _id_of(line: str) -> str:
-    words = _ID.sub("_", line.casefold()).strip("_")[:24].strip("_")
-    return words if words[:1].isalpha() else "question"
 
 
 def _ids(study: Study, form: str) -> set[str]:

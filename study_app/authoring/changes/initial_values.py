@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from study_app.authoring.fields import Row, label_of, row_at
-from study_app.authoring.names import free_name
 from study_app.authoring.schema_nodes import Node, node_at, table_of
 from study_app.authoring.writer.refused import Refused
+from study_app.ids import free_id
 from study_app.protocol.forms.scale import POINTS
 from study_app.protocol.source.document import Path, entries, value_at
 
@@ -92,7 +92,7 @@ def _text(document: Mapping[str, Any], path: Path, node: Node, *, localised: boo
     around = value_at(document, path[:-1])
     if path[-1] == "id":
         taken = (str(name) for _, name in entries(document, ".".join((*map(str, path[:2]), "*", "*", "id"))))
-        return free_name(taken, singular(path[-3]))
+        return free_id(taken, singular(path[-3]))
     if node.get("pattern") == LETTER:
         used = {letter for _, letter in entries(document, f"{path[0]}.*.{path[-1]}")}
         return next((letter for letter in string.ascii_uppercase if letter not in used), "Z")

@@ -14,7 +14,7 @@ from study_app.authoring.names import references_to, renamed
 from study_app.authoring.outline import title_of
 from study_app.authoring.writer.edits import Edit, Insert, Set
 from study_app.authoring.writer.refused import Refused
-from study_app.haptics.model.liquid import MAX_ID
+from study_app.ids import MAX_ID
 from study_app.number_text import MINUS, exact_text, number_of, typed_numbers
 from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.source.problems import Fault

@@ -1,12 +1,14 @@
-"""The button that makes a repair, at a field and in the list of problems."""
+"""Buttons that put something right: a repair, at a field and in the list of problems, and a name that is free."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFocusEvent, QMouseEvent
+from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 
 
@@ -30,3 +32,36 @@ class RepairButton(ActionButton):
         """Note that a click leads here, also where a key did before."""
         self.by_keys = False
         super().mousePressEvent(event)
+
+
+class NameRefusal(QWidget):
+    """Why a name is not taken, and a button with one that is free, which ``chosen`` carries."""
+
+    chosen = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._free = ""
+        self.words = label("", "label", "bad", wraps=True)
+        self.use = ActionButton("", "", height=32)
+        self.use.setProperty("dense", "true")
+        self.use.setFont(font("label"))
+        self.use.clicked.connect(lambda: self.chosen.emit(self._free))
+        line = QHBoxLayout(self)
+        line.setContentsMargins(0, 0, 0, 0)
+        line.setSpacing(8)
+        line.addWidget(self.words, 1)
+        line.addWidget(self.use)
+        self.show_refusal("")
+
+    def text(self) -> str:
+        """Return why the name is not taken, "" where it is."""
+        return self.words.text()
+
+    def show_refusal(self, sentence: str, free: str = "") -> None:
+        """Say why a name is not taken, "" for nothing, and offer one that is free."""
+        self._free = free
+        self.words.setText(f"{sentence[:1].upper()}{sentence[1:]}")
+        self.use.show_action("", f"Use {free}")
+        self.use.setVisible(bool(free))
+        self.setVisible(bool(sentence))

@@ -237,16 +237,13 @@ class DesignerPlace(Place):
             self.stack.setCurrentIndex(0)
             self.areas.focus_element()
 
-    def refuse_new(self, sentence: str) -> None:
-        """Say why a study cannot begin so."""
-        self.new_page.refuse(sentence)
+    def refuse_new(self, sentence: str, free: str = "") -> None:
+        """Say why a study cannot begin so, and offer a short name that is free."""
+        self.new_page.refuse(sentence, free)
 
-    def refuse(self, path: tuple[str | int, ...], sentence: str, *, renaming: bool) -> None:
+    def refuse(self, path: tuple[str | int, ...], sentence: str) -> None:
         """Say at its field why something was not done."""
-        if renaming:
-            self.form.head.refuse(sentence)
-        else:
-            self.form.refuse(path, sentence)
+        self.form.refuse(path, sentence)
 
     def ask_to_delete(self, asked: DeletePrompt) -> None:
         """Show what names an element, and ask what becomes of it."""

@@ -23,6 +23,7 @@ from pydantic import (
 from study_app.haptics.model.effect import Effect as EffectDescriptor
 from study_app.haptics.model.effects import EFFECTS, NAMED
 from study_app.haptics.model.ranges import DensityKgM3, Extent, Frozen, Metres, ViscosityPaS
+from study_app.ids import MAX_ID
 
 if TYPE_CHECKING:
     Effect: TypeAlias = str
@@ -35,8 +36,6 @@ else:
     ]
 
 MAX_LIQUIDS = 8
-MAX_ID = 60
-"""Letters of a name that tables and windows can show whole."""
 
 
 class Everywhere(Frozen):

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import re
-import unicodedata
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import chain, count
 from typing import Final
 
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import row_at, unit_of
 from study_app.authoring.known_answers import KnownAnswer, known_answers
 from study_app.authoring.names import Document
-from study_app.authoring.new_study import NAME_LENGTH, Answers
+from study_app.authoring.new_study import Answers
 from study_app.authoring.outline import study_title, title_of
 from study_app.authoring.templates import QUESTIONS
+from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s, step_duration_s
@@ -28,6 +27,7 @@ __all__ = [
     "Answers", "OwnQuestion", "Recovery", "TemplateChoice", "copy_choice", "languages_offered", "template_choice",
 ]  # fmt: skip
 
+COPY: Final = "copy"
 TEMPLATES: Final[Mapping[str, tuple[str, str]]] = {
     "compare-liquids": (
         "Compare liquids",
@@ -139,17 +139,10 @@ def languages_offered() -> tuple[tuple[str, str], ...]:
     return tuple((code, language.english_name) for code, language in LANGUAGES.items())
 
 
-def proposed_name(title: str) -> str:
-    """Return a short name made of a title: its letters a to z, small and without accents, and its digits."""
-    plain = unicodedata.normalize("NFKD", title).lower()
-    return re.sub(r"^[0-9]+", "", re.sub(r"[^a-z0-9]+", "", plain))[:NAME_LENGTH]
-
-
 def copy_name(name: str, taken: Collection[str]) -> str:
     """Return a short name for a copy of a study that is free: "kitchencopy", "kitchencopy2"."""
-    stem = re.sub("copy[0-9]*$", "", proposed_name(name)) or "study"
-    ends = chain(("copy",), (f"copy{number}" for number in count(2)))
-    return next(free for end in ends if (free := f"{stem[: NAME_LENGTH - len(end)]}{end}") not in taken)
+    stem = re.sub(f"{COPY}[0-9]*$", "", short_name_of(name)) or "study"
+    return free_short_name(taken, f"{stem[: MAX_SHORT_NAME - len(COPY)]}{COPY}")
 
 
 def template_choice(name: str, study: Study) -> TemplateChoice:

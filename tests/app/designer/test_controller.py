@@ -316,12 +316,17 @@ def test_a_question_can_be_added_wherever_there_is_a_questionnaire(designer: Any
     assert designer.place.view.form.path == ("questionnaires", "liquid", "items", before)
 
 
-def test_what_is_refused_is_said_at_its_field(designer: Any) -> None:
+def test_an_id_that_is_refused_can_be_replaced_by_one_that_is_free(qtbot: Any, designer: Any) -> None:
     designer.controller.open("kitchen")
     designer.editing.select(("liquids", "thin"))
     designer.editing.ask(RenameElement(("liquids", "thin"), "thick"))
-    assert designer.place.form.head.refusal.text() == 'The name "thick" is taken: choose another one.'
-    assert designer.place.form.head.refusal.isVisible()
+    head = designer.place.form.head
+    assert head.refusal.text() == 'The name "thick" is taken: "thick_2" is free.'
+    head.refusal.use.setFocus()
+    qtbot.keyClick(head.refusal.use, Qt.Key.Key_Return)
+    assert (head.id.text(), designer.editing.selected) == ("thick_2", ("liquids", "thick_2"))
+    assert head.id.hasFocus()
+    assert not head.refusal.isVisible()
 
 
 def test_a_kind_is_switched_and_back_without_losing_values(designer: Any) -> None:

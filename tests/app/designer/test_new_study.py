@@ -83,6 +83,19 @@ def test_an_answer_that_is_not_permitted_is_refused_in_place(designer: Any, fiel
     assert designer.editing.opened is None
 
 
+@pytest.mark.parametrize(("name", "free"), [("rek2024", "rek2024v2"), ("kitchen", "kitchen2"), ("My study", "mystudy")])
+def test_a_short_name_that_is_refused_can_be_replaced_by_one_that_is_free(
+    qtbot: Any, designer: Any, name: str, free: str
+) -> None:
+    designer.controller.ask_for_new()
+    page = designer.place.new_page
+    page.name.setText(name)
+    page.make.click()
+    assert page.refusal.text().endswith(f'; "{free}" is free.')
+    qtbot.keyClick(page.refusal.use, Qt.Key.Key_Return)
+    assert designer.editing.opened.file.stem == free
+
+
 @pytest.mark.parametrize("size", [(1600, 1000), (1366, 768), (1024, 640)])
 @pytest.mark.parametrize("theme", [LIGHT, DARK])
 def test_the_page_fits_its_window(qtbot: Any, designer: Any, size: tuple[int, int], theme: Any) -> None:

@@ -7,6 +7,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from study_app.gui.designer.form.typed_fields import TypedLine
+from study_app.gui.designer.repair_button import NameRefusal
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
@@ -76,8 +77,8 @@ class FormHead(QWidget):
         self.comments.hide()
         self._lock: tuple[object, str] = ((), "")
         self._read_only = False
-        self.refusal = label("", "label", "bad", wraps=True)
-        self.refusal.hide()
+        self.refusal = NameRefusal()
+        self.refusal.chosen.connect(self._take_free)
         self.feel = IconButton("drop", "Feel", size=34)
         self.series = ActionButton("bars", "Series …", height=34)
         self.series.setProperty("dense", "true")
@@ -195,15 +196,20 @@ class FormHead(QWidget):
         self.id.setFocus(Qt.FocusReason.ShortcutFocusReason)
         self.id.selectAll()
 
-    def refuse(self, sentence: str) -> None:
-        """Say why the id cannot be changed."""
-        self.refusal.setText(sentence)
-        self.refusal.setVisible(bool(sentence))
+    def refuse(self, sentence: str, free: str = "") -> None:
+        """Say why the id cannot be changed, and offer one that is free."""
+        self.refusal.show_refusal(sentence, free)
         self.id.show_refused(bool(sentence))
 
     def _type_id(self, name: str) -> None:
         if self.form is not None:
             self.id_typed.emit(self.form.path, name)
+
+    def _take_free(self, name: str) -> None:
+        """Take the id that is proposed; the keyboard goes from its button, which is gone then, to the id."""
+        self.id.setFocus(Qt.FocusReason.OtherFocusReason)
+        self.id.setText(name)
+        self._rename(name)
 
     def _ask_to_feel(self) -> None:
         if self.form is not None:

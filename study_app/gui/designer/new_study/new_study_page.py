@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QGridLayout,
     QHBoxLayout,
-    QLabel,
     QLineEdit,
     QScrollArea,
     QVBoxLayout,
@@ -22,6 +21,7 @@ from PySide6.QtWidgets import (
 from study_app.gui.designer.new_study.cards import RING, TemplateButton
 from study_app.gui.designer.new_study.new_study_questions import Questions
 from study_app.gui.designer.new_study.recovery_bar import RecoveryBar
+from study_app.gui.designer.repair_button import NameRefusal
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget, replace_inside
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule
 from study_app.gui.widgets.controls import ActionButton, Check, IconButton
@@ -78,7 +78,7 @@ class ChosenCard(Card):
         super().__init__(padding=20, gap=10)
         self.questions = Questions()
         self.title = label("", "card")
-        self.refusal = label("", "label", "bad", wraps=True)
+        self.refusal = NameRefusal()
         self.make = ActionButton("plus", "Make study", cap="Enter", role="primary", height=44)
         self.area = QScrollArea()
         self.area.setWidgetResizable(True)
@@ -150,11 +150,6 @@ class ChosenCard(Card):
         self.inside.removeWidget(self.begin)
         self.inside.insertWidget(1 if self.height() < LOW_BELOW else 2, self.begin)
 
-    def refuse(self, sentence: str) -> None:
-        """Say why a study cannot begin so."""
-        self.refusal.setText(f"{sentence[:1].upper()}{sentence[1:]}")
-        self.refusal.setVisible(bool(sentence))
-
 
 def _column(of: QWidget) -> QVBoxLayout:
     made = QVBoxLayout(of)
@@ -215,6 +210,7 @@ class NewStudyPage(Themed, QWidget):
         page.addLayout(below, 1)
         self.card.make.clicked.connect(self._begin)
         self.card.questions.entered.connect(self._begin)
+        self.card.refusal.chosen.connect(self._take_name)
         self._group.buttonToggled.connect(lambda _button, on: self._show_choice() if on else None)
 
     @property
@@ -228,7 +224,7 @@ class NewStudyPage(Themed, QWidget):
         return self.card.make
 
     @property
-    def refusal(self) -> QLabel:
+    def refusal(self) -> NameRefusal:
         """What is wrong."""
         return self.card.refusal
 
@@ -282,9 +278,13 @@ class NewStudyPage(Themed, QWidget):
         else:
             self.area.ensureWidgetVisible(button)
 
-    def refuse(self, sentence: str) -> None:
-        """Say why a study cannot begin so."""
-        self.card.refuse(sentence)
+    def refuse(self, sentence: str, free: str = "") -> None:
+        """Say why a study cannot begin so, and offer a short name that is free."""
+        self.card.refusal.show_refusal(sentence, free)
+
+    def _take_name(self, name: str) -> None:
+        self.card.questions.name.setText(name)
+        self._begin()
 
     def _open_file(self) -> None:
         chosen, _ = QFileDialog.getOpenFileName(self, "Copy a study", "", "Protocols (*.toml)")

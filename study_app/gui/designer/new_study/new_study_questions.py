@@ -11,13 +11,13 @@ from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.controls import Check
 from study_app.gui.widgets.labels import label
+from study_app.ids import short_name_of
 from study_app.number_text import number_of, typed_numbers
 from study_app.viewmodels.designer.new_study import (
     Answers,
     OwnQuestion,
     TemplateChoice,
     languages_offered,
-    proposed_name,
 )
 
 FIELD_PX, WORDS_PX = 36, 112
@@ -113,7 +113,7 @@ class Questions(Themed, QWidget):
 
     @property
     def _proposed(self) -> str:
-        return proposed_name(self.title.text()) or ("" if self._choice is None else self._choice.name)
+        return short_name_of(self.title.text()) or ("" if self._choice is None else self._choice.name)
 
     def short_name(self) -> str:
         """Return the short name that was typed, else the one that the title gives, else that of a copy."""

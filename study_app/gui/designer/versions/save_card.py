@@ -7,6 +7,7 @@ from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QWidget
 
 from study_app.gui.designer.prompts import Prompt
+from study_app.gui.designer.repair_button import NameRefusal
 from study_app.gui.designer.versions.change_list import LEAST, ChangeList
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.cards import Icon
@@ -39,8 +40,8 @@ class SaveCard(Prompt):
         self.version = _field("Version to save as", asked.version, 110)
         self.name = _field("Short name of the other study", "", 220)
         self.name.setPlaceholderText("small letters and digits")
-        self.refusal = label("", "label", "bad", wraps=True)
-        self.refusal.hide()
+        self.refusal = NameRefusal()
+        self.refusal.chosen.connect(self._take_name)
         self.changes = ActionButton("", "Show in Changes", role="plain", height=40)
         self.another = ActionButton("copy", "Save as another study …", height=40)
         self.save = ActionButton("save", "", role="primary", height=40)
@@ -73,10 +74,13 @@ class SaveCard(Prompt):
         room = min(MOST, max(LEAST, self.window().height() - REST_PX))
         self.list.setMinimumHeight(min(self.list.sizeHint().height(), room))
 
-    def refuse(self, sentence: str) -> None:
-        """Say why it cannot be saved so."""
-        self.refusal.setText(f"{sentence[:1].upper()}{sentence[1:]}")
-        self.refusal.setVisible(bool(sentence))
+    def refuse(self, sentence: str, free: str = "") -> None:
+        """Say why it cannot be saved so, and offer a short name that is free."""
+        self.refusal.show_refusal(sentence, free)
+
+    def _take_name(self, name: str) -> None:
+        self.name.setText(name)
+        self._save()
 
     def _show_name(self, *, naming: bool) -> None:
         self._naming = naming

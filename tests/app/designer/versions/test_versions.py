@@ -84,11 +84,10 @@ def test_what_changes_the_measure_can_be_saved_as_another_study(ran: Any, qtbot:
     qtbot.waitUntil(name.hasFocus)
     qtbot.keyClicks(name, "kitchen")
     qtbot.keyClick(name, Qt.Key.Key_Return)
-    assert "already there" in ran.place.prompt.refusal.text()
-    name.selectAll()
-    qtbot.keyClicks(name, "longer")
-    qtbot.keyClick(name, Qt.Key.Key_Return)
-    file = ran.file.parent / "longer.toml"
+    refusal = ran.place.prompt.refusal
+    assert refusal.text().endswith('already there; "kitchen2" is free.')
+    click(qtbot, refusal.use)
+    file = ran.file.parent / "kitchen2.toml"
     assert ran.editing.opened.file == file
     assert file.read_text() == ran.text
     assert ran.editing.opened.study.document["blocks"]["liquids"]["repetitions"] == 3

@@ -1,0 +1,56 @@
+"""Ids, and short names of studies: made from a text, and free among those that are taken."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable
+from itertools import count
+from typing import Final
+
+MAX_ID: Final = 60
+"""Letters of a name that tables and windows can show whole."""
+MAX_SHORT_NAME: Final = 40
+MAX_FROM_TEXT: Final = 24
+"""So many letters of a sentence make an id: it heads a column of tables."""
+_ANY_LENGTH: Final = 10_000
+
+
+def id_of(text: str, longest: int = MAX_ID) -> str:
+    """Return the id that a text gives: its words in small letters without accents, as many as there is room for.
+
+    Its first word begins with a letter; "" where there is none.
+
+    Examples
+    --------
+    >>> id_of("2. How thick was it?")
+    'how_thick_was_it'
+    """
+    plain = unicodedata.normalize("NFKD", re.sub("['’]", "", text.casefold()))
+    plain = "".join(letter for letter in plain if not unicodedata.combining(letter))
+    name = re.sub("[^a-z0-9]+", "_", plain).lstrip("0123456789_").rstrip("_")
+    whole, _, _ = name[: longest + 1].rpartition("_")
+    return name if len(name) <= longest else whole or name[:longest]
+
+
+def free_id(taken: Iterable[str], name: str) -> str:
+    """Return ``name``, or with the first number from 2 on that is free, in place of one that it ends with."""
+    return _free(taken, name, re.sub(r"_[0-9]+$", "", name), "_", MAX_ID)
+
+
+def short_name_of(text: str) -> str:
+    """Return the short name of a study that a text gives: the letters a to z and digits of its id."""
+    return id_of(text, _ANY_LENGTH).replace("_", "")[:MAX_SHORT_NAME]
+
+
+def free_short_name(taken: Iterable[str], name: str) -> str:
+    """Return a short name of a study that is free, as `free_id` does: "kitchen2"; a year stays: "rek2024v2"."""
+    stem = re.sub("(?<=[0-9])v[0-9]+$|(?<=[a-z])[0-9]{1,2}$", "", name)
+    return _free(taken, name, stem, "v" if stem[-1:].isdigit() else "", MAX_SHORT_NAME)
+
+
+def _free(taken: Iterable[str], name: str, stem: str, mark: str, longest: int) -> str:
+    used = set(taken)
+    ends = (f"{mark}{number}" for number in count(2))
+    names = (f"{stem[: longest - len(end)]}{end}" for end in ends)
+    return name if name not in used else next(new for new in names if new not in used)
