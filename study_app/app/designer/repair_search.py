@@ -43,18 +43,22 @@ class RepairSearch(QObject):
 
     def repair(self, row: ProblemRow, words: str) -> Repair | None:
         """Return a repair by its words; one that was offered before the last edit is looked for at once."""
-        if row in self._problems and row not in self._known and self._study is not None and self._study.is_toml:
-            self._look(self._study, row)
+        self._look(row)
         return next((one for one in self._known.get(row, ()) if one.words == words), None)
 
-    def _look(self, study: Study, row: ProblemRow) -> None:
-        self._known[row] = (*repairs(study, row.fault), *additions_for(study, row.fault))
+    def show(self, row: ProblemRow) -> None:
+        """Look for the repairs of a problem at once."""
+        self._look(row)
+        if row in self._known:
+            self.found.emit(row, tuple(one.words for one in self._known[row]))
+
+    def _look(self, row: ProblemRow) -> None:
+        study = self._study
+        if row in self._problems and row not in self._known and study is not None and study.is_toml:
+            self._known[row] = (*repairs(study, row.fault), *additions_for(study, row.fault))
 
     def _find(self) -> None:
-        if self._study is None or not self._waiting:
-            return
-        row = self._waiting.pop(0)
-        self._look(self._study, row)
-        self.found.emit(row, tuple(one.words for one in self._known[row]))
+        if self._waiting:
+            self.show(self._waiting.pop(0))
         if self._waiting:
             self._timer.start(0)

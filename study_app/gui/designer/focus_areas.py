@@ -35,9 +35,13 @@ class FocusAreas:
 
     def focus_field(self, path: ElementPath) -> None:
         """Go to a field of the form; where it has no row, to the first row."""
-        self._parts.show_side("form")
-        if not self._parts.form.focus(path):
+        if not self.focus_row(path):
             self._parts.form.focus_first()
+
+    def focus_row(self, path: ElementPath) -> bool:
+        """Go to a field of the form; return whether it has a row."""
+        self._parts.show_side("form")
+        return self._parts.form.focus(path)
 
     def leave_drawer(self) -> None:
         """Go to the form where the outline is a drawer."""

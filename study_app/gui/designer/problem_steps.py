@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.designer.focus_areas import FocusAreas
@@ -17,11 +17,13 @@ from study_app.viewmodels.designer.problem_rows import ProblemRow
 class ProblemSteps(QObject):
     """Opens problems at their fields and offers their repairs, at the field and in the list.
 
-    Signals: ``selected`` (path of an element), ``repair_asked`` (row, words).
+    Signals: ``selected`` (path of an element), ``repair_asked`` (row, words), ``repairs_wanted`` (a row whose repairs
+    are to be shown at once).
     """
 
     selected = Signal(object)
     repair_asked = Signal(object, str)
+    repairs_wanted = Signal(object)
 
     def __init__(self, card: ProblemsCard, form: FormCard, file: FileCard, areas: FocusAreas) -> None:
         super().__init__(card)
@@ -30,6 +32,7 @@ class ProblemSteps(QObject):
         self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
         self._opened_at: QWidget | None = None
         card.opened.connect(self._open)
+        card.next.clicked.connect(self.open_next)
         for part in (card, form):
             part.repair_asked.connect(self._repair)
 
@@ -56,12 +59,31 @@ class ProblemSteps(QObject):
         self._card.show_repairs(row, words)
         self._lead_to_repairs()
 
+    def open_next(self) -> None:
+        """Go to the next problem."""
+        if coming := self._card.coming:
+            self._open_repair(coming[0])
+
+    def _open_repair(self, row: ProblemRow) -> None:
+        """Go to the repair of a problem; where there is none, to its field."""
+        self._card.open(row)
+        self.repairs_wanted.emit(row)
+        for button in (self._form.repairs_of(row) or self._card.repairs_of(row))[:1]:
+            button.setFocus(Qt.FocusReason.ShortcutFocusReason)
+            for area in (self._form.area, self._card.area):
+                if area.isAncestorOf(button):
+                    area.ensureWidgetVisible(button, 0, 40)
+
+    def _can_be_repaired(self, row: ProblemRow) -> bool:
+        self.repairs_wanted.emit(row)
+        return bool(self._repairs.get(row))
+
     def _open(self, row: ProblemRow) -> None:
         """Go to the field of a problem; where there is none, to its line in the file."""
         self._card.show()
         if row.element:
             self.selected.emit(row.element)
-        in_form = bool(row.element) and self._form.focus(row.fault.path)
+        in_form = bool(row.element) and self._areas.focus_row(row.fault.path)
         if row.line is not None and not in_form and not row.warning:
             self._areas.show_tab("file")
         if row.line is not None:
@@ -76,14 +98,15 @@ class ProblemSteps(QObject):
             lead_by_tab(here, self._form.repairs_of(row) or self._card.repairs_of(row))
 
     def _repair(self, row: ProblemRow, words: str) -> None:
-        """Make a repair; a key leads to the next problem, or from the last one to its field, where a click leads."""
+        """Make a repair; a key leads to the next one, or from the last one to its field, where a click leads."""
         here = self._card.window().focusWidget()
         by_keys = isinstance(here, RepairButton) and here.by_keys and here.problem == row
         self._card.set_current(row)
         self.repair_asked.emit(row, words)
         if row in self._problems:
             return
-        if by_keys and self._problems:
-            self._card.open_next()
+        coming = [one for one in self._card.coming if not one.warning]
+        if by_keys and coming:
+            self._open_repair(next(filter(self._can_be_repaired, coming), coming[0]))
         else:
             self._areas.focus_field(row.fault.path)

@@ -147,7 +147,6 @@ class ProblemsCard(Card):
         self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.column.addWidget(self.area, 1)
-        self.next.clicked.connect(self.open_next)
         self.close_button.clicked.connect(self.close_asked)
 
     def show_problems(
@@ -199,7 +198,7 @@ class ProblemsCard(Card):
     def _add_line(self, row: ProblemRow) -> None:
         narrow = (self.parentWidget() or self).width() < NARROW_BELOW
         made = ProblemLine(row, self._repairs.get(row, ()), narrow=narrow)
-        made.opened.connect(lambda: self._open(made.row))
+        made.opened.connect(lambda: self.open(made.row))
         made.repair_asked.connect(lambda words: self.repair_asked.emit(made.row, words))
         made.here = row == self.at
         for part in (made, Rule()):
@@ -249,22 +248,24 @@ class ProblemsCard(Card):
             if line.row == row:
                 line.show_repairs(repairs)
 
-    def open_next(self) -> None:
-        """Go to the next problem: where the last one is solved, to the one that took its place in the list."""
-        if self.rows:
-            at = self.rows.index(self.at) + 1 if self.at in self.rows else self._number
-            self._open(self.rows[at % len(self.rows)])
+    @property
+    def coming(self) -> tuple[ProblemRow, ...]:
+        """Every row from the next one on: where the last one is solved, from the one that took its place."""
+        at = self.rows.index(self.at) + 1 if self.at in self.rows else self._number
+        at %= max(1, len(self.rows))
+        return (*self.rows[at:], *self.rows[:at])
 
     def repairs_of(self, problem: ProblemRow) -> list[RepairButton]:
         """Return the buttons that repair a problem."""
         return [button for line in self.lines for button in line.repairs if line.row == problem]
 
     def set_current(self, row: ProblemRow) -> None:
-        """Take a problem as the one that one is at; `open_next` goes on from there."""
+        """Take a problem as the one that one is at; ``coming`` begins after it."""
         if row in self.rows:
             self.at, self._number = row, self.rows.index(row)
 
-    def _open(self, row: ProblemRow) -> None:
+    def open(self, row: ProblemRow) -> None:
+        """Mark a problem as the one that one is at, and have it opened."""
         self.set_current(row)
         for line in self.lines:
             line.here = line.row == row

@@ -328,7 +328,7 @@ class DesignerPlace(Place):
     def _next_problem(self) -> None:
         if self.view.form is not None:
             self.flush()
-            self.problems.open_next()
+            self.problem_steps.open_next()
 
     def _rename(self) -> None:
         if self.form.head.id.isVisible() and not self.view.header.read_only:

@@ -1,4 +1,4 @@
-"""Problems by keys alone: F8 goes to a problem, Tab to its repair, Enter makes it and goes to the next problem."""
+"""Problems by keys alone: F8 goes to the repair of a problem, Enter makes it and goes to the next repair."""
 
 from __future__ import annotations
 
@@ -39,25 +39,36 @@ def broken(qtbot: Any, designer: Any) -> Any:
     return designer
 
 
-def test_tab_goes_from_a_problem_to_its_repair_and_enter_to_the_next_problem(qtbot: Any, broken: Any) -> None:
+@pytest.mark.parametrize(("width", "side"), [(1600, "form"), (1024, "pane")])
+def test_enter_alone_makes_every_repair(
+    qtbot: Any, broken: Any, monkeypatch: pytest.MonkeyPatch, width: int, side: str
+) -> None:
+    monkeypatch.setattr("study_app.app.designer.repair_search.REST_MS", 1_000_000)  # a user does not wait for repairs
+    broken.window.resize(width, 768)
+    broken.place.parts.show_side(side)
     first, second = broken.place.view.problems
-    field = press(qtbot, KEY.Key_F8)
-    assert broken.place.form.isAncestorOf(field)
-    assert broken.editing.selected == first.element
-    repair = press(qtbot, KEY.Key_Tab)
-    assert isinstance(repair, RepairButton)
-    assert repair.problem == first
-    field = press(qtbot, KEY.Key_Return)
-    assert [problem.fault.path for problem in broken.place.view.problems] == [second.fault.path]
-    assert broken.editing.selected == second.element
-    assert broken.row(*second.fault.path).isAncestorOf(field)
-    (problem,) = broken.place.view.problems
-    qtbot.waitUntil(lambda: bool(broken.place.form.repairs_of(problem)))
-    repair = press(qtbot, KEY.Key_Tab)
-    assert isinstance(repair, RepairButton)
+    for problem, key in ((first, KEY.Key_F8), (second, KEY.Key_Return)):
+        repair = press(qtbot, key)
+        assert isinstance(repair, RepairButton)
+        assert repair.problem.fault.path == problem.fault.path
+        assert broken.editing.selected == problem.element
+        assert broken.row(*problem.fault.path).isAncestorOf(repair)
+        assert repair.visibleRegion().boundingRect() == repair.rect()
     field = press(qtbot, KEY.Key_Return)
     assert broken.place.view.problems == ()
     assert broken.row(*second.fault.path).isAncestorOf(field), "nothing is left: the field that was repaired"
+
+
+def test_enter_passes_problems_without_a_repair_and_ends_at_a_field_of_one(qtbot: Any, broken: Any) -> None:
+    text = broken.text.replace("delay_ms = 0", 'delay_ms = "a"', 1).replace("min_s = 5 ", 'min_s = "a" ')
+    broken.editing.type_text("Break", text)
+    first, unclear, second, last = broken.place.view.problems
+    assert press(qtbot, KEY.Key_F8).problem == first
+    assert press(qtbot, KEY.Key_Return).problem.fault == second.fault
+    field = press(qtbot, KEY.Key_Return)
+    assert broken.row(*last.fault.path).isAncestorOf(field)
+    field = press(qtbot, KEY.Key_F8)
+    assert broken.row(*unclear.fault.path).isAncestorOf(field), "F8 passes none"
 
 
 def test_tab_goes_on_from_a_repair_to_the_rest_of_the_form(qtbot: Any, broken: Any) -> None:
@@ -67,6 +78,8 @@ def test_tab_goes_on_from_a_repair_to_the_rest_of_the_form(qtbot: Any, broken: A
     qtbot.waitUntil(lambda: bool(row.repairs))
     row.field.list.setFocus()
     assert press(qtbot, KEY.Key_Tab) is row.repairs[0]
+    assert row.isAncestorOf(press(qtbot, KEY.Key_Backtab))
+    row.repairs[0].setFocus()
     assert broken.place.form.isAncestorOf(press(qtbot, KEY.Key_Tab))
 
 
@@ -113,8 +126,7 @@ def test_a_repair_that_is_pressed_right_after_an_edit_is_made(qtbot: Any, broken
 
 def test_a_repair_that_is_clicked_after_tab_led_to_it_shows_what_was_repaired(qtbot: Any, broken: Any) -> None:
     first, _second = broken.place.view.problems
-    press(qtbot, KEY.Key_F8)
-    repair = press(qtbot, KEY.Key_Tab)
+    repair = press(qtbot, KEY.Key_F8)
     qtbot.mouseClick(repair, Qt.MouseButton.LeftButton)
     assert len(broken.place.view.problems) == 1
     assert broken.editing.selected == first.element
