@@ -2,45 +2,20 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRect, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QApplication, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtCore import QRect, Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QApplication, QHBoxLayout, QVBoxLayout, QWidget
 from shiboken6 import isValid
 
-from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.cards import Card, Rule, scrolled
-from study_app.gui.widgets.controls import IconButton
+from study_app.gui.widgets.controls import Cap, IconButton
 from study_app.gui.widgets.labels import label
-from study_app.viewmodels.designer.keys import GROUPS, KEYS, Keys, key_words
+from study_app.viewmodels.designer.keys import GROUPS, KEYS, Keys
 
 HIGHEST, WIDEST, MARGIN = 560, 980, 12
 COLUMNS = ((0,), (1,), (2, 3))
 """The groups of each column."""
 SCROLLS = {Qt.Key.Key_Up: -1, Qt.Key.Key_Down: 1, Qt.Key.Key_PageUp: -10, Qt.Key.Key_PageDown: 10}
-
-
-class Cap(Themed, QWidget):
-    """Keys as on a keyboard."""
-
-    def __init__(self, words: str) -> None:
-        super().__init__()
-        self.words = words
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for the words."""
-        return QSize(max(22, round(QFontMetricsF(font("key")).horizontalAdvance(self.words)) + 12), 20)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the edge and the words."""
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(QPen(QColor(self.theme.ctl), 1))
-        painter.drawRoundedRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5), 5, 5)
-        painter.setPen(QColor(self.theme.text))
-        painter.setFont(font("key"))
-        painter.drawText(QRectF(self.rect()), Qt.AlignmentFlag.AlignCenter, self.words)
 
 
 class KeysCard(Card):
@@ -84,12 +59,11 @@ class KeysCard(Card):
     def _row(one: Keys) -> QHBoxLayout:
         row = QHBoxLayout()
         row.setSpacing(5)
-        keys = [key_words(keys) for keys in one.keys]
         where = f" ({one.within})" if "outline" in one.within else ""
         words = label(f"{one.words}{where}", "label", "text2", wraps=True)
-        words.setAccessibleName(f"{one.words}{where}: {' or '.join(keys)}")
+        words.setAccessibleName(f"{one.words}{where}: {' or '.join(one.shown)}")
         row.addWidget(words, 1)
-        for key in keys:
+        for key in one.shown:
             row.addWidget(Cap(key))
         return row
 

@@ -13,6 +13,7 @@ from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.cards import Chip
 from study_app.gui.widgets.controls import ActionButton, CompactStop
 from study_app.gui.widgets.labels import Elided
+from study_app.viewmodels.designer.keys import key_cap
 from study_app.viewmodels.operator import OperatorView
 
 HEIGHT = 52
@@ -33,7 +34,7 @@ class Strip(Themed, QWidget):
         self.state = Chip("neutral", "clock", "Preparing")
         self.where = Elided("label", "text2")
         self.operator = ActionButton("", "Operator's window", key=OTHER_WINDOW, height=40)
-        self.stop = CompactStop("Stop playing") if played else CompactStop()
+        self.stop = CompactStop("Stop playing", key_cap("stop")) if played else CompactStop()
         self.operator.clicked.connect(self.operator_asked)
         self.stop.pressed.connect(self.stop_asked)
         row = hbox(self.state, (self.where, 1), spacing=12, margins=(16, 4, 8, 4), parent=self)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QPoint, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QPen, QWheelEvent
+from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QPen, QWheelEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QCheckBox,
@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
     QStyleOptionButton,
     QStyleOptionComboBox,
     QStylePainter,
+    QWidget,
 )
 
 from study_app.gui.theme.icons import draw_icon
@@ -38,6 +39,41 @@ class PressedByEnter(QPushButton):
             self.click()
 
 
+class Cap(Themed, QWidget):
+    """Keys as on a keyboard."""
+
+    def __init__(self, words: str) -> None:
+        super().__init__()
+        self.words = words
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for the words."""
+        return cap_size(self.words)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the edge and the words."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        paint_cap(painter, QPointF(), self.words, self.theme.text, self.theme.ctl)
+
+
+def cap_size(words: str) -> QSize:
+    """Return the room for keys as on a keyboard; none where there are no keys."""
+    return QSize(max(20, round(QFontMetricsF(font("key")).horizontalAdvance(words)) + 10) if words else 0, 20)
+
+
+def paint_cap(painter: QPainter, at: QPointF, words: str, ink: str, edge: str) -> None:
+    """Paint keys as on a keyboard, with their upper left corner at ``at``."""
+    body = QRectF(at, cap_size(words).toSizeF())
+    painter.setPen(QPen(QColor(edge), 1))
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    painter.drawRoundedRect(body.adjusted(0.5, 0.5, -0.5, -0.5), 5, 5)
+    painter.setPen(QColor(ink))
+    painter.setFont(font("key"))
+    painter.drawText(body, Qt.AlignmentFlag.AlignCenter, words)
+
+
 class ActionButton(Themed, PressedByEnter):
     """A button with an icon before its words and, where a key does the same, the key's cap behind them.
 
@@ -46,10 +82,9 @@ class ActionButton(Themed, PressedByEnter):
 
     def __init__(self, icon: str, text: str, *, key: str = "", cap: str = "", role: str = "", height: int = 44) -> None:
         super().__init__(text)
-        self._icon, self._key, self._cap, self._role = icon, key, cap or key, role
+        self._icon, self._key, self.cap, self._role = icon, key, cap or key, role
         self.setProperty("role", role)
         self.setFont(font("strong", scale=0.96))
-        self._key_font: QFont = font("key")
         self.setMinimumHeight(height)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         if key:
@@ -76,11 +111,8 @@ class ActionButton(Themed, PressedByEnter):
 
     def _content_width(self) -> float:
         width = QFontMetricsF(self.font()).horizontalAdvance(self.text())
-        icon = (28 if self.text() or self._cap else 20) if self._icon else 0
-        return width + icon + (12 + self._cap_width() if self._cap else 0)
-
-    def _cap_width(self) -> float:
-        return max(20.0, QFontMetricsF(self._key_font).horizontalAdvance(self._cap) + 10)
+        icon = (28 if self.text() or self.cap else 20) if self._icon else 0
+        return width + icon + (12 + cap_size(self.cap).width() if self.cap else 0)
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the style sheet's button, then its content in the middle."""
@@ -100,8 +132,9 @@ class ActionButton(Themed, PressedByEnter):
         painter.setFont(self.font())
         text_width = QFontMetricsF(self.font()).horizontalAdvance(self.text())
         painter.drawText(QRectF(x, 0, text_width + 2, self.height()), Qt.AlignmentFlag.AlignVCenter, self.text())
-        if self._cap:
-            self._paint_key(painter, QRectF(x + text_width + 11, middle - 10, self._cap_width(), 20), ink)
+        if self.cap:
+            edge = self._ink() if self._role == "primary" else self.theme.ctl
+            paint_cap(painter, QPointF(x + text_width + 11, middle - 10), self.cap, self._ink(), edge)
 
     def _ink(self) -> str:
         if not self.isEnabled():
@@ -110,24 +143,16 @@ class ActionButton(Themed, PressedByEnter):
             self._role, self.theme.text
         )
 
-    def _paint_key(self, painter: QPainter, cap: QRectF, ink: QColor) -> None:
-        painter.setPen(QPen(QColor(self.theme.ctl) if self._role != "primary" else ink, 1))
-        painter.setBrush(Qt.BrushStyle.NoBrush)
-        painter.drawRoundedRect(cap.adjusted(0.5, 0.5, -0.5, -0.5), 5, 5)
-        painter.setPen(ink)
-        painter.setFont(self._key_font)
-        painter.drawText(cap, Qt.AlignmentFlag.AlignCenter, self._cap)
-
 
 class CompactStop(Themed, QPushButton):
     """Stop force, in the force stop's own colour; it acts when pressed, not when released, and is never disabled.
 
-    Where the stop ends more than the force, ``words`` say so.
+    Where the stop ends more than the force, ``words`` say so; ``cap`` are the keys that are shown behind them.
     """
 
-    def __init__(self, words: str = "Stop force") -> None:
+    def __init__(self, words: str = "Stop force", cap: str = "") -> None:
         super().__init__()
-        self.words = words
+        self.words, self.cap = words, cap
         self.setProperty("role", "stop")
         self.setAccessibleName(f"{words}. Holding Esc does the same.")
         self.setToolTip(f"{words} (or hold Esc)")
@@ -137,15 +162,16 @@ class CompactStop(Themed, QPushButton):
         self._font = font("strong", scale=0.96)
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for octagon and words."""
-        return QSize(round(QFontMetricsF(self._font).horizontalAdvance(self.words)) + 62, STOP_HEIGHT)
+        """Return the room for octagon, words and keys."""
+        keys = cap_size(self.cap).width() + 10 if self.cap else 0
+        return QSize(round(QFontMetricsF(self._font).horizontalAdvance(self.words)) + 62 + keys, STOP_HEIGHT)
 
     def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return the same: it is never cut."""
         return self.sizeHint()
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the button, its octagon and its words."""
+        """Paint the button, its octagon, its words and its keys."""
         painter = QStylePainter(self)
         option = QStyleOptionButton()
         self.initStyleOption(option)
@@ -156,6 +182,9 @@ class CompactStop(Themed, QPushButton):
         painter.setPen(ink)
         painter.setFont(self._font)
         painter.drawText(QRectF(46, 0, self.width() - 46, self.height()), Qt.AlignmentFlag.AlignVCenter, self.words)
+        if self.cap:
+            at = QPointF(self.width() - 16 - cap_size(self.cap).width(), self.height() / 2 - 10)
+            paint_cap(painter, at, self.cap, self.theme.on_stop, self.theme.on_stop)
 
 
 class IconButton(Themed, PressedByEnter):

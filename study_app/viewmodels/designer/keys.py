@@ -24,6 +24,8 @@ class Keys:
         Its group, of `GROUPS`.
     within : str
         Which part of the place listens to it; "" for a shortcut of the whole place.
+    held : bool
+        Whether the key is held, not pressed.
     """
 
     action: str
@@ -31,6 +33,12 @@ class Keys:
     keys: tuple[str, ...]
     group: int
     within: str = ""
+    held: bool = False
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Its keys as they are written on a keyboard: "Ctrl+Enter", "hold Esc"."""
+        return tuple(f"{'hold ' * self.held}{key_words(keys)}" for keys in self.keys)
 
 
 LISTS: Final = "outline, lists"
@@ -65,6 +73,7 @@ KEYS: Final = (
     Keys("undo", "Undo", ("Ctrl+Z",), 2),
     Keys("redo", "Redo", ("Ctrl+Shift+Z", "Ctrl+Y"), 2),
     Keys("play", "Play from here", ("F5",), 2),
+    Keys("stop", "Stop playing", ("Escape",), 2, "windows while playing", held=True),
     Keys("keys", "Keys", ("Shift+F1",), 2),
     Keys("next field", "Next field", ("Tab",), 3, "field"),
     Keys("accept", "Accept", ("Return",), 3, "field"),
@@ -87,12 +96,12 @@ def key_words(keys: str) -> str:
 
 def key_cap(action: str) -> str:
     """Return what the cap on the button of an action says: "Ctrl D"."""
-    return key_words(keys_of(action)[0]).replace("+", " ")
+    return _OF[action].shown[0].replace("+", " ")
 
 
 def with_key(words: str, action: str) -> str:
     """Return words followed by the key of an action, for a tip: "Duplicate (Ctrl+D)"."""
-    return f"{words} ({key_words(keys_of(action)[0])})"
+    return f"{words} ({_OF[action].shown[0]})"
 
 
 def tip(action: str) -> str:

@@ -10,8 +10,14 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QShortcut
 from PySide6.QtWidgets import QApplication, QLabel
 
-from study_app.gui.designer.keys_card import HIGHEST, Cap
-from study_app.viewmodels.designer.keys import GROUPS, KEYS, key_words
+from study_app.gui.designer.keys_card import HIGHEST
+from study_app.gui.designer.participant.participant_tab import ParticipantTab
+from study_app.gui.designer.play.play_strip import PlayStrip
+from study_app.gui.operator.strip import Strip
+from study_app.gui.widgets.controls import Cap
+from study_app.viewmodels.designer.keys import GROUPS, KEYS
+from study_app.viewmodels.designer.participant_page import ParticipantView
+from study_app.viewmodels.designer.play import under_way
 
 pytestmark = pytest.mark.slow
 
@@ -35,7 +41,7 @@ def test_the_card_lists_every_key_and_esc_gives_the_keyboard_back(qtbot: Any, de
     assert card.isVisible()
     words = {label.text() for label in card.findChildren(QLabel)}
     assert {*GROUPS, "Duplicate", "Find in the study", "Delete (outline, lists)"} <= words
-    assert sorted(cap.words for cap in card.findChildren(Cap)) == sorted(key_words(k) for one in KEYS for k in one.keys)
+    assert sorted(cap.words for cap in card.findChildren(Cap)) == sorted(keys for one in KEYS for keys in one.shown)
     qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Escape)
     assert not card.isVisible()
     tree.setFocus()
@@ -83,9 +89,36 @@ def test_buttons_say_their_keys(designer: Any) -> None:
         assert button.width() >= button.minimumSizeHint().width(), "there is room for the cap of its key"
 
 
+def test_the_key_of_the_languages_is_shown_beside_them_where_there_is_room(qtbot: Any) -> None:
+    tab = ParticipantTab()
+    qtbot.addWidget(tab.aside)
+    tab.show_view(ParticipantView(languages=("en", "nl"), language="en"))
+    tab.aside.show()
+    tab.fit_aside(1000)
+    room = tab.aside.sizeHint().width()
+    assert tab.language_key.isVisible()
+    assert tab.language_key.words == "Ctrl L"
+    tab.fit_aside(room)
+    assert tab.language_key.isVisible()
+    tab.fit_aside(room - 1)
+    assert not tab.language_key.isVisible()
+    assert tab.aside.sizeHint().width() < room
+    tab.show_view(ParticipantView(languages=("en",), language="en"))
+    tab.fit_aside(1000)
+    assert not tab.language_key.isVisible()
+
+
+def test_what_stops_playing_shows_its_key(qtbot: Any) -> None:
+    below_header = PlayStrip()
+    qtbot.addWidget(below_header)
+    below_header.show_state(under_way("Liquids", "Scripted hand"))
+    assert below_header.buttons["stop"].cap == Strip(played=True).stop.cap == "hold Esc"
+    assert Strip().stop.cap == ""
+
+
 def test_the_documentation_lists_every_key() -> None:
     section = PAGE.read_text().split("## Keys")[1].split("\n## ")[0]
     rows = [line.split("|")[1] for line in section.splitlines() if line.startswith("| ")][2:]
     listed = {one.strip() for row in rows for either in row.split(",") for one in either.split(" or ")}
     long = {"Ins": "Insert", "Del": "Delete"}
-    assert listed == {long.get(key_words(keys), key_words(keys)) for one in KEYS for keys in one.keys}
+    assert listed == {long.get(keys, keys) for one in KEYS for keys in one.shown}

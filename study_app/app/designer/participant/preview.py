@@ -62,12 +62,11 @@ class ParticipantPreview(QObject):
     def __init__(self, editing: Editing, place: DesignerPlace) -> None:
         super().__init__(editing)
         self.editing, self.place = editing, place
-        self.tab = ParticipantTab()
-        page = PanePage(
-            "participant", "Participant", self.tab, self.tab.aside, most_px=lambda: self.tab.most_px, tip=tip("page")
-        )
+        self.tab = tab = ParticipantTab()
+        fit, most = tab.fit_aside, lambda: tab.most_px
+        page = PanePage("participant", "Participant", tab, tab.aside, fit_aside=fit, most_px=most, tip=tip("page"))
         place.pane.add_page(page, first=True)
-        self.tab.resized.connect(place.pane.make_room)
+        tab.resized.connect(place.pane.make_room)
         self._language = ""
         self._found: Found | None = None
         self._moment: Moment | None = None
@@ -88,7 +87,6 @@ class ParticipantPreview(QObject):
         editing.changed.connect(self._after_form.start)
         editing.edited.connect(self._follow)
         place.entered.connect(self._look_at_screen)
-        tab = self.tab
         tab.shown.connect(self._follow)
         tab.language_asked.connect(self.show_language)
         tab.step_asked.connect(self.go)

@@ -32,6 +32,8 @@ class PanePage:
         Controls at the right of the tabs, while the page is shown.
     with_facts : bool
         Whether the facts stay below the page.
+    fit_aside : callable
+        Fits the controls into so much room beside the tabs [px].
     most_px : callable
         Returns how high the body is at most; the facts take the rest [px].
     tip : str
@@ -43,6 +45,7 @@ class PanePage:
     body: QWidget
     aside: QWidget | None = None
     with_facts: bool = True
+    fit_aside: Callable[[int], None] = lambda _room_px: None
     most_px: Callable[[], int] = lambda: QWIDGETSIZE_MAX
     tip: str = ""
 
@@ -96,7 +99,6 @@ class RightPane(QWidget):
         for one in self.pages:
             if one.aside is not None:
                 one.aside.setVisible(one is page)
-        self._place_aside()
         self.make_room()
         if changed:
             self.tab_shown.emit(name)
@@ -109,21 +111,22 @@ class RightPane(QWidget):
 
     def _place_aside(self) -> None:
         """Put the controls of the page at the right of the tabs, or below them where there is no room."""
-        aside = next((one.aside for one in self.pages if one.name == self.tab), None)
-        if aside is not None:
-            needed = self.tabs.sizeHint().width() + aside.sizeHint().width() + GAP
-            row = self._asides if needed <= self.width() else self._below
-            if row.indexOf(aside) < 0:
-                row.addWidget(aside)
+        page = next((one for one in self.pages if one.name == self.tab), None)
+        if page is not None and page.aside is not None:
+            room = self.width() - 2 * SHADOW - self.tabs.sizeHint().width() - GAP
+            page.fit_aside(room)
+            row = self._asides if page.aside.sizeHint().width() <= room else self._below
+            if row.indexOf(page.aside) < 0:
+                row.addWidget(page.aside)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Put the controls where there is room."""
         super().resizeEvent(event)
-        self._place_aside()
         self.make_room()
 
     def make_room(self) -> None:
-        """Hide the facts where the window is too low for them, or the page takes their place."""
+        """Place the controls; hide the facts where the window is too low for them, or the page takes their place."""
+        self._place_aside()
         page = next((one for one in self.pages if one.name == self.tab), None)
         height = self.window().height()
         room = not self.isVisible() or self.height() >= FACTS_FROM_OWN

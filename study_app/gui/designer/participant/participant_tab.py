@@ -13,11 +13,11 @@ from study_app.gui.designer.segments import Segments
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card
-from study_app.gui.widgets.controls import Choice, IconButton
+from study_app.gui.widgets.controls import Cap, Choice, IconButton
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.number_field import NumberField
 from study_app.session.trial import TankView
-from study_app.viewmodels.designer.keys import tip
+from study_app.viewmodels.designer.keys import key_cap, tip
 from study_app.viewmodels.designer.participant_page import ParticipantView, ScreenSize
 
 MOST_IN_ROW: Final = 2
@@ -29,9 +29,11 @@ BAR_PX: Final = 34
 class ParticipantTab(Card):
     """Draws a `ParticipantView`.
 
-    ``aside`` holds language and screen, for the right of the tabs. Signals: ``language_asked`` (code), ``step_asked``
-    (−1 or 1), ``trial_asked`` (its number in its block), ``moment_asked`` (moment), ``resized`` when it needs another
-    height; ``happened``, ``frame_due`` and ``shown`` as of `LivePage`.
+    ``aside`` holds language and screen, for the right of the tabs; `fit_aside` gives it room.
+
+    Signals: ``language_asked`` (code), ``step_asked`` (−1 or 1), ``trial_asked`` (its number in its block),
+    ``moment_asked`` (moment), ``resized`` when it needs another height or ``aside`` another width; ``happened``,
+    ``frame_due`` and ``shown`` as of `LivePage`.
     """
 
     language_asked = Signal(str)
@@ -53,6 +55,8 @@ class ParticipantTab(Card):
         self.note = label("", "small", "warn", wraps=True)
         self.note.hide()
         self.languages = Segments("Language of the page")
+        self.language_key = Cap(key_cap("language"))
+        self.language_key.setToolTip(tip("language"))
         self.screens = Choice()
         self.screens.setAccessibleName("Screen")
         self.screens.setFont(font("label"))
@@ -65,6 +69,7 @@ class ParticipantTab(Card):
         across.setContentsMargins(0, 0, 0, 0)
         across.setSpacing(10)
         across.addWidget(self.languages)
+        across.addWidget(self.language_key)
         across.addWidget(self.screens)
         self.before = IconButton("chevron_left", "Previous step", "Previous step", size=36)
         self.after = IconButton("chevron", "Next step", "Next step", size=36)
@@ -131,6 +136,8 @@ class ParticipantTab(Card):
         else:
             self._row.insertWidget(self._row.indexOf(self.after) + 1, self.moments)
         self.page.show_view(view)
+        if view.languages != before.languages:
+            self.resized.emit()  # the controls beside the tabs have another width
         if (high := self.column.minimumSize().height()) != self._high:  # another note, or another row of pages
             self._high = high
             self.resized.emit()
@@ -146,6 +153,11 @@ class ParticipantTab(Card):
             part.setVisible(bool(after))
         self.trial.setAccessibleName(f"{before}, 1 to {view.trials}; Play from here begins with it")
         self.trial.show_text(str(view.trial))
+
+    def fit_aside(self, room_px: int) -> None:
+        """Show the key of the languages where there is room for it."""
+        self.language_key.setVisible(len(self.view.languages) > 1)
+        self.language_key.setVisible(len(self.view.languages) > 1 and self.aside.sizeHint().width() <= room_px)
 
     def show_tank(self, view: TankView) -> None:
         """Draw the ball in the tank."""

@@ -11,6 +11,7 @@ from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import SHADOW, Card, Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Ink, label
+from study_app.viewmodels.designer.keys import key_cap
 from study_app.viewmodels.designer.play import PlayState
 
 INKS: dict[str, Ink] = {"ok": "ok", "warn": "warn", "bad": "bad", "accent": "accent", "neutral": "text2"}
@@ -68,7 +69,8 @@ class PlayStrip(Card):
         for line in self._lines:
             self._listed.addWidget(line)
         for action, words in state.actions:
-            made = ActionButton(ICONS.get(action, ""), words, role=ROLES.get(action, ""), height=36)
+            cap = key_cap("stop") if action == "stop" else ""
+            made = ActionButton(ICONS.get(action, ""), words, cap=cap, role=ROLES.get(action, ""), height=36)
             made.clicked.connect(lambda _checked=False, action=action: self.asked.emit(action))
             self._row.addWidget(made)
             made.show()  # at once: a part that is not shown cannot take the keyboard
