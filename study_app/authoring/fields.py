@@ -44,6 +44,8 @@ _OF_LENGTHS: Final = {
     "maxItems": "at most {} entries",
     "maxLength": "at most {} characters",
 }
+_WORDS: Final = {"design": "Trial design", "designs": "Trial designs"}
+"""What keys are called that do not read well: a study has a design, too."""
 _SENTENCES: Final = re.compile(r"((?:[a-z_0-9-]+, )*[a-z_0-9-]+): ([^;]+?)(?:; |\.?\Z)")
 
 
@@ -262,7 +264,7 @@ def label_of(step: str | int) -> str:
         return LABELS[step]
     unit = _suffix(step)
     plain = step.removesuffix(f"_{unit}") if unit else step
-    return plain.replace("_", " ").strip().capitalize()
+    return _WORDS.get(plain) or plain.replace("_", " ").strip().capitalize()
 
 
 def unit_of(key: str) -> str:

@@ -238,7 +238,7 @@ def delete_prompt(study: Study, paths: Sequence[Path]) -> DeletePrompt:
 def _kind_and_title(study: Study, element: Path) -> str:
     """Return "Condition Water"; of what is no element of a section its title alone."""
     title = title_of(study.document, element)
-    return f"{singular(element[0]).capitalize()} {title}" if len(element) > 1 else title
+    return f"{label_of(singular(element[0]))} {title}" if len(element) > 1 else title
 
 
 def _field(study: Study, place: Path) -> str:

@@ -25,8 +25,8 @@ from study_app.viewmodels.designer.requests import AddElement, AddInstrument, As
 
 MOST_FIELDS: Final = 12
 QUESTIONNAIRES: Final = "questionnaires"
-NAMES: Final = {"designs": "Trial design"}
-"""What is called otherwise here than its section: a design is also that of a study."""
+HELP: Final = {"designs": "2IFC and other trial designs"}
+"""What a section is for, where its name does not say it."""
 SERIES: Final = "Copies at several levels of one number: {}"
 
 
@@ -53,10 +53,10 @@ def addable(study: Study, selected: Path) -> tuple[Addable, ...]:
     found = [one for path in lists for one in _of_list(study, path)]
     found += [
         Addable(
-            NAMES.get(str(path[0]), label_of(singular(path[0]))),
+            label_of(singular(path[0])),
             icon_of(path, study.document),
             AddElement(path),
-            f"To {label_of(path[0]).lower()}",
+            HELP.get(str(path[0]), f"To {label_of(path[0]).lower()}"),
         )
         for path in sections
     ]
@@ -103,7 +103,7 @@ def fields_to_go_to(study: Study, words: str, selected: Path) -> tuple[Addable, 
     for one in found[:MOST_FIELDS]:
         path, title = one.element, title_of(study.document, one.element)
         kind = singular(path[-2]) if isinstance(path[-1], int) else singular(path[0]) if len(path) > 1 else ""
-        named = f"{one.label} of {' '.join(filter(None, (kind, title)))}"
+        named = f"{one.label} of {' '.join(filter(None, (label_of(kind).lower(), title)))}"
         asks = GoTo(path, one.field)
         choice = f", {one.choice}" if one.choice else ""
         offered.append(Addable(f"{named}{choice}", icon_of(path, study.document), asks, one.help))

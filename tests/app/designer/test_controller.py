@@ -304,7 +304,8 @@ def test_a_question_can_be_added_wherever_there_is_a_questionnaire(designer: Any
         return [one.words for one in every if isinstance(one.asks, AddElement)]
 
     assert offered(("pages", "welcome")) == ["Question", "Questionnaire"]
-    assert offered(("pages", "welcome"), "design") == ["Trial design"]
+    for words in ("design", "2ifc"):
+        assert offered(("pages", "welcome"), words) == ["Trial design"]
     designer.editing.ask(AddElement(("questionnaires",)))
     questions = [words for words in offered(("pages", "welcome")) if words.startswith("Question of")]
     assert questions == ["Question of Liquid", "Question of Questionnaire"]

@@ -75,7 +75,7 @@ def test_what_is_chosen_comes_before_what_could_be_chosen(study: Study) -> None:
     assert fields(study) == blocks
     chosen, _ = study.edited(Set(("blocks", "liquids", "order"), "williams"))
     assert fields(chosen) == {("blocks", "liquids", "order")}
-    assert {one.label for one in found_fields(chosen, "design")} == {"Design"}
+    assert {one.label for one in found_fields(chosen, "design")} == {"Trial design"}
     assert {one.rank for one in found_fields(study, "anew in each")} == {SENTENCE}
 
 

@@ -390,7 +390,7 @@ def is_right_to_left(code: str) -> bool:
 
 def new_words(section: str) -> str:
     """Return what the choice is called that adds an element to a section and names it."""
-    return f"New {singular(section)} …"
+    return f"New {label_of(singular(section)).lower()} …"
 
 
 def choice_words(choice: Choice, default: object) -> str:

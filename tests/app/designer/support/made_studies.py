@@ -76,7 +76,7 @@ def make_two_interval(user: User) -> None:
     shorten(user)
     user.select("Liquids", "Session, in order")
     user.choose("Which of the two is given", "Stimulus")
-    user.press("Add Design")
+    user.press("Add Trial design")
     user.press("Add Method")
 
 
