@@ -172,8 +172,8 @@ class DesignerPlace(Place):
                 "problems": areas.focus_problems, "header": areas.focus_header,
                 "next part": lambda: areas.cycle(1), "part before": lambda: areas.cycle(-1),
                 "find": self.parts.focus_find, "next problem": self._next_problem, "file": areas.switch_to_file,
-                "back": self.back_asked.emit, "duplicate": self.elements.duplicate, "series": self.elements.make_series,
-                "rename": self._rename,
+                "back": self.back_asked.emit, "add": self.ask_to_add, "duplicate": self.elements.duplicate,
+                "series": self.elements.make_series, "rename": self._rename,
                 "up": lambda: self.elements.move_by(-1), "down": lambda: self.elements.move_by(1),
                 "new": lambda: None if self.stack.currentIndex() else self._ask(self.new_asked),
                 "open": self.header.open_file, "save": save, "undo": undo, "redo": redo, "keys": self.keys.switch,
@@ -287,7 +287,7 @@ class DesignerPlace(Place):
 
     def ask_to_add(self) -> None:
         """Ask what can be added."""
-        if self.view.form is not None and not self.view.header.read_only:
+        if self.view.form is not None and not self.view.header.read_only and not self.stack.currentIndex():
             self.flush()
             self.add_asked.emit()
 

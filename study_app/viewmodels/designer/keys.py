@@ -57,7 +57,7 @@ KEYS: Final = (
     Keys("page", "Participant's page", ("Ctrl+Return",), 0),
     Keys("leave page", "Leave that page", ("Escape",), 0, "page"),
     Keys("language", "That page in the next language", ("Ctrl+L",), 0),
-    Keys("add", "Add", ("Insert",), 1, "outline"),
+    Keys("add", "Add", ("Insert",), 1),
     Keys("duplicate", "Duplicate", ("Ctrl+D",), 1),
     Keys("series", "Copies that differ in one number", ("Ctrl+Shift+D",), 1),
     Keys("rename", "Rename", ("F2",), 1),

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QApplication
 
 pytestmark = pytest.mark.slow
 
@@ -126,3 +127,40 @@ def test_a_standard_questionnaire_is_found_by_typing_and_lists_questions_that_ne
     assert all(item.keys() == {"id"} for item in items)
     designer.editing.undo()
     assert designer.text == before
+
+
+def test_insert_and_enter_add_a_question_below_the_one_whose_text_is_typed(qtbot: Any, designer: Any) -> None:
+    designer.controller.begin("template:questionnaire-only", "asked")
+    items = ("questionnaires", "about_it", "items")
+    designer.select((*items, 0))
+    steps = len(designer.editing.opened.history.done)
+    designer.place.form.focus((*items, 0, "text"))
+    field = QApplication.focusWidget()
+    field.selectAll()
+    qtbot.keyClicks(field, "How was it?")
+    qtbot.keyClick(field, Qt.Key.Key_Insert)
+    assert designer.place.adding.isVisible()
+    qtbot.keyClick(designer.place.adding.words, Qt.Key.Key_Return)
+    typed, new = designer.editing.opened.study.document["questionnaires"]["about_it"]["items"][:2]
+    assert typed["text"] == "How was it?"
+    assert new["text"].startswith("New question")
+    assert designer.editing.selected == (*items, 1)
+    assert designer.row(*items, 1, "text").isAncestorOf(QApplication.focusWidget())
+    assert len(designer.editing.opened.history.done) == steps + 2
+
+
+def test_insert_while_an_id_is_typed_renames_and_adds_once(qtbot: Any, designer: Any) -> None:
+    designer.controller.begin("template:questionnaire-only", "asked")
+    designer.select(("scales", "agreement"))
+    steps, field = len(designer.editing.opened.history.done), designer.place.form.head.id
+    designer.place.form.head.edit_id()
+    qtbot.keyClicks(field, "accord")
+    qtbot.keyClick(field, Qt.Key.Key_Insert)
+    qtbot.keyClick(designer.place.adding.words, Qt.Key.Key_Return)
+    scales = list(designer.editing.opened.study.document["scales"])
+    assert scales == ["accord", "scale", "frequency"]
+    assert [step.words for step in designer.editing.opened.history.done[steps:]] == ["Rename to accord", "Add scale"]
+    qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Insert)
+    qtbot.keyClick(designer.place.adding.words, Qt.Key.Key_Escape)
+    assert list(designer.editing.opened.study.document["scales"]) == scales
+    assert len(designer.editing.opened.history.done) == steps + 2

@@ -83,7 +83,7 @@ class OutlineCard(Card):
         self.tree.clicked.connect(self._click)
         self.tree.expanded.connect(lambda index: None if self._finding else self._opened.add(self._key(index)))
         self.tree.collapsed.connect(lambda index: self._opened.discard(self._key(index)))
-        self.tree.key_pressed.connect(self._key_pressed)
+        self.tree.delete_asked.connect(self.delete_asked)
         self.tree.entered_row.connect(self._enter_row)
         self.tree.copy_asked.connect(self.copy_asked)
         self.tree.paste_asked.connect(self.paste_asked)
@@ -268,6 +268,3 @@ class OutlineCard(Card):
             self.tree.setFocus(Qt.FocusReason.OtherFocusReason)
             return True
         return super().eventFilter(watched, event)
-
-    def _key_pressed(self, key: int) -> None:
-        (self.add_asked if key == Qt.Key.Key_Insert else self.delete_asked).emit()

@@ -18,11 +18,11 @@ EDGE_PX = 24
 class Tree(Themed, QTreeView):
     """The rows.
 
-    Signals: ``key_pressed`` (Insert, Delete), ``entered_row`` (by Enter), ``copy_asked``, ``paste_asked``, ``dropped``
+    Signals: ``delete_asked``, ``entered_row`` (by Enter), ``copy_asked``, ``paste_asked``, ``dropped``
     (entries of a list, and the index of the one that they come before).
     """
 
-    key_pressed = Signal(int)
+    delete_asked = Signal()
     entered_row = Signal()
     copy_asked = Signal()
     paste_asked = Signal()
@@ -74,8 +74,8 @@ class Tree(Themed, QTreeView):
         """Hand on what means a step; Esc cancels a drag."""
         if self.dragged and event.key() == Qt.Key.Key_Escape:
             self._let_go()
-        elif event.key() in {Qt.Key.Key_Insert, Qt.Key.Key_Delete} and not event.modifiers():
-            self.key_pressed.emit(event.key())
+        elif event.key() == Qt.Key.Key_Delete and not event.modifiers():
+            self.delete_asked.emit()
         elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self.entered_row.emit()
         elif event.matches(QKeySequence.StandardKey.Copy):

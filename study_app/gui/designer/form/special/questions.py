@@ -11,6 +11,7 @@ from study_app.gui.designer.form.question_rows import QuestionRows
 from study_app.gui.designer.form.row_fields import Field, add_button
 from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.viewmodels.designer.form.form_rows import FormRow
+from study_app.viewmodels.designer.keys import with_key
 from study_app.viewmodels.designer.requests import AddElement
 
 
@@ -24,6 +25,7 @@ class QuestionsField(Field):
         self.rows.write_asked.connect(self.write_asked)
         self.rows.join_asked.connect(self.join_asked)
         self.add = add_button(f"Add to {row.row.label}", "Question")
+        self.add.setToolTip(with_key("Add a question", "add"))
         self.add.clicked.connect(lambda: self.asked.emit(AddElement(self.row.row.path)))
         self.box.addWidget(self.rows)
         self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)
