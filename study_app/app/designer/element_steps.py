@@ -21,6 +21,7 @@ from study_app.ids import free_id
 from study_app.protocol.instruments.instrument import instrument
 from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.wording.languages import language_name
+from study_app.viewmodels.designer.element_facts import kind_and_title
 from study_app.viewmodels.designer.form.form_rows import step_of
 from study_app.viewmodels.designer.problem_rows import element_of
 from study_app.viewmodels.designer.prompts import DeletePrompt
@@ -225,20 +226,14 @@ def delete_prompt(study: Study, paths: Sequence[Path]) -> DeletePrompt:
     document, path = study.document, paths[0]
     places = [place for one in paths for place in references_to(document, one)]
     outside = [place for place in places if not any(place[: len(one)] == one for one in paths)]
-    references = (f"{_kind_and_title(study, element_of(study, place))}: {_field(study, place)}" for place in outside)
+    references = (f"{kind_and_title(document, element_of(study, place))}: {_field(study, place)}" for place in outside)
     gone = {one: None for each in paths for one in with_references(document, each, study.needs)}
     elements = (one for one in gone if one not in paths and len(one) == 2 and isinstance(one[1], str))
-    together = tuple(_kind_and_title(study, one) for one in elements)
+    together = tuple(kind_and_title(document, one) for one in elements)
     others = (name for name in names(document, str(path[0])) if name != path[-1] and len(path) == 2)
     titles = tuple((name, title_of(document, (path[0], name))) for name in others) if len(paths) == 1 else ()
     words = tuple(dict.fromkeys(references))
     return DeletePrompt(path, _titles(study, paths), words, titles, tuple(paths[1:]), together)
-
-
-def _kind_and_title(study: Study, element: Path) -> str:
-    """Return "Condition Water"; of what is no element of a section its title alone."""
-    title = title_of(study.document, element)
-    return f"{label_of(singular(element[0]))} {title}" if len(element) > 1 else title
 
 
 def _field(study: Study, place: Path) -> str:

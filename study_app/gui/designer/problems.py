@@ -15,12 +15,12 @@ from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed, apply_theme_within, replace_inside
 from study_app.gui.widgets.cards import Card, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
-from study_app.gui.widgets.labels import Clamped, Elided, Ink, figures, label
+from study_app.gui.widgets.labels import Clamped, Elided, Ink, label
 from study_app.viewmodels.designer.keys import key_cap, tip
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 
 HIGHEST, NARROW_BELOW = 290, 1000
-HEAD_PX, ROW_PX, LINE_PX, REPAIR_PX, NARROW_REPAIR_PX = 92, 39, 56, 190, 110
+HEAD_PX, ROW_PX, NAME_PX, NARROW_NAME_PX, REPAIR_PX, NARROW_REPAIR_PX = 92, 46, 300, 210, 190, 110
 
 
 class ProblemLine(Themed, QWidget):
@@ -33,15 +33,17 @@ class ProblemLine(Themed, QWidget):
         super().__init__()
         self.row = row
         self.here = False
-        self.go = PressedByEnter(row.title)
+        self.go = PressedByEnter()
         self.go.setProperty("role", "plain")
         self.go.setProperty("dense", "true")
         self.go.setFont(font("label"))
-        where = f"{row.title}, {row.field}" if row.field else row.title
-        self.go.setAccessibleName(f"{where}: {row.message}")
+        self.go.setAccessibleName(f"{row.name}: {row.message}")
         self.go.clicked.connect(self.opened)
-        self.go.setFixedWidth(130 if narrow else 150)
-        self.go.setStyleSheet("text-align: left; padding-left: 0;")
+        self.go.setFixedSize(NARROW_NAME_PX if narrow else NAME_PX, 24)
+        self.go.setStyleSheet("text-align: left; padding: 0; color: palette(window-text);")
+        self.go.setText(self.go.fontMetrics().elidedText(row.name, Qt.TextElideMode.ElideRight, self.go.width() - 4))
+        self._place = Elided("small", "text2")
+        self._place.setFixedWidth(self.go.width())
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         across = QHBoxLayout(self)
         across.setContentsMargins(10, 2, 6, 2)
@@ -49,19 +51,11 @@ class ProblemLine(Themed, QWidget):
         self.mark = Icon("warning", "warn" if row.warning else "bad", 18)
         across.addWidget(self.mark)
         across.addWidget(Icon(row.icon, "text2", 18))
-        across.addWidget(self.go)
-        field = Elided("label", "text2")
-        field.show_text(row.field)
-        field.setFixedWidth(90 if narrow else 130)
-        across.addWidget(field)
-        words = row.message if narrow or not row.hint else f"{row.message}  ({row.hint})"
-        said = Clamped(words, 2, "label")
-        self.setToolTip(f"{row.message}  ({row.hint})" if row.hint else row.message)
-        said.setAlignment(Qt.AlignmentFlag.AlignVCenter)
-        self._line = figures("", "small", "text2")
-        self._line.setFixedWidth(LINE_PX)
-        across.addWidget(self._line)  # before the sentence: repairs of different widths would shift it
-        across.addWidget(said, 1)
+        across.addLayout(_column(self.go, self._place))
+        said, hint = Clamped(row.message, 2, "label", steady=False), Elided("small", "text2")
+        hint.show_text(row.hint)
+        self.setToolTip("\n".join(filter(None, (row.name, row.message, row.hint))))
+        across.addLayout(_column(said, *([hint] if row.hint else [])), 1)
         buttons = QWidget()
         buttons.setMinimumWidth(NARROW_REPAIR_PX if narrow else REPAIR_PX)
         self._repairs = QHBoxLayout(buttons)
@@ -78,7 +72,7 @@ class ProblemLine(Themed, QWidget):
         """Stand for the same problem of the study as it is now; None: it is solved."""
         if row is not None:
             self.row = row
-            self._line.setText("" if row.line is None else f"line {row.line}")
+            self._place.show_text(row.place)
             for button in self.repairs:
                 button.problem = row
         self.setEnabled(row is not None)
@@ -88,7 +82,7 @@ class ProblemLine(Themed, QWidget):
     def show_repairs(self, repairs: tuple[str, ...]) -> None:
         """Offer repairs, two at most."""
         for words in repairs[len(self.repairs) : 2]:
-            made = RepairButton(self.row, words, f"{self.row.title}, {self.row.field}")
+            made = RepairButton(self.row, words, self.row.name)
             made.clicked.connect(lambda _checked=False, words=words: self.repair_asked.emit(words))
             apply_theme_within(made, self.theme)
             self._repairs.addWidget(made)
@@ -105,6 +99,17 @@ class ProblemLine(Themed, QWidget):
         """Tint the one that one is at."""
         if self.here:
             paint_ground(self, self.theme.selected)
+
+
+def _column(*parts: QWidget) -> QVBoxLayout:
+    """Return lines of text, in the middle of their row."""
+    made = QVBoxLayout()
+    made.setSpacing(0)
+    made.addStretch()
+    for part in parts:
+        made.addWidget(part)
+    made.addStretch()
+    return made
 
 
 class ProblemsCard(Card):

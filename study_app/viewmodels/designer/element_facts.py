@@ -1,11 +1,33 @@
-"""The number by which one tells elements apart, next to their names in the outline and in lists to choose from."""
+"""What elements and their places in the file are called, and the number by which one tells elements apart."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
+from study_app.authoring.changes.initial_values import singular
+from study_app.authoring.fields import label_of
+from study_app.authoring.outline import title_of
 from study_app.protocol.source.document import Path, value_at
+
+
+def kind_of(path: Path) -> str:
+    """Return what an element is: "Block"; "" of a table that is the only one of its kind."""
+    if isinstance(path[-1], int):
+        return label_of(singular(path[-2]))
+    return label_of(singular(path[0])) if len(path) > 1 else ""
+
+
+def kind_and_title(document: Mapping[str, Any], path: Path) -> str:
+    """Return "Condition Water"; the title alone where it says what the element is."""
+    kind, title = kind_of(path), title_of(document, path)
+    return title if title.casefold().startswith(kind.casefold()) else f"{kind} {title}"
+
+
+def place_words(path: Path, line: int | None) -> str:
+    """Return a place in the file with its line, if that is known: "blocks.liquids.order · line 385"."""
+    place = ".".join(str(step + 1) if isinstance(step, int) else step for step in path)
+    return " · ".join(filter(None, (place, "" if line is None else f"line {line}")))
 
 
 def brief(document: Mapping[str, Any], path: Path) -> str:

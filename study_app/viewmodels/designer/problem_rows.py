@@ -10,10 +10,10 @@ from typing import Final
 
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, row_at
-from study_app.authoring.outline import title_of
 from study_app.protocol.source.document import Path, has, names
 from study_app.protocol.source.line_numbers import places_of
 from study_app.protocol.source.problems import Fault
+from study_app.viewmodels.designer.element_facts import kind_and_title, place_words
 from study_app.viewmodels.designer.outline_rows import FIRST, icon_of
 
 _PLACE: Final = re.compile(r"([a-z]\w*(?:\.\w+)+): (.+)", re.DOTALL)
@@ -30,8 +30,8 @@ class ProblemRow:
         What is wrong, by path.
     element : tuple of str or int
         The element whose form shows it; () where the file cannot be read.
-    title, icon, field : str
-        What the element is called, the name of its icon, and the label of the field.
+    name, icon : str
+        What element and field are called ("Block Liquids, Order"), and the name of the element's icon.
     message, hint : str
         The sentence of ``check``, and its hint.
     line : int or None
@@ -42,13 +42,17 @@ class ProblemRow:
 
     fault: Fault
     element: Path
-    title: str
+    name: str
     icon: str
-    field: str
     message: str
     hint: str
     line: int | None
     warning: bool = False
+
+    @property
+    def place(self) -> str:
+        """Its place in the file, such as ``blocks.liquids.order · line 385``."""
+        return place_words(self.fault.path, self.line)
 
 
 @lru_cache(maxsize=2)
@@ -56,7 +60,7 @@ def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
     """Return the problems of a study, in the order of their lines."""
     if not study.is_toml:
         return tuple(
-            ProblemRow(fault, (), "The file", "file", "", problem.message, problem.hint, problem.line)
+            ProblemRow(fault, (), "The file", "file", problem.message, problem.hint, problem.line)
             for fault, problem in zip(study.faults, study.problems, strict=True)
         )
     places = places_of(study.text)
@@ -101,14 +105,5 @@ def _row(study: Study, fault: Fault, line: int | None) -> ProblemRow:
     element = element_of(study, fault.path)
     inside = fault.path[len(element) :]
     message = f"{fault.message[:1].upper()}{fault.message[1:]}"
-    field = ", ".join(label_of(step) for step in inside)
-    return ProblemRow(
-        fault,
-        element,
-        title_of(study.document, element),
-        icon_of(element, study.document),
-        field,
-        message,
-        fault.hint,
-        line,
-    )
+    name = ", ".join((kind_and_title(study.document, element), *map(label_of, inside)))
+    return ProblemRow(fault, element, name, icon_of(element, study.document), message, fault.hint, line)

@@ -101,7 +101,12 @@ def test_problems_are_those_of_check_in_the_order_of_lines(study: Study) -> None
         ("questionnaires", "liquid", "items", 1),
         ("blocks", "liquids"),
     ]
-    assert [row.field for row in rows] == ["Liquid", "Kind", "Order"]
+    assert [row.name for row in rows] == [
+        "Condition Honey, Liquid",
+        "Question Immersive, Kind",
+        "Block Baseline settings, Order",
+    ]
+    assert [row.place for row in rows] == [f"{problem.place} · line {problem.line}" for problem in broken.problems]
 
 
 def test_a_place_belongs_to_the_nearest_element(study: Study) -> None:

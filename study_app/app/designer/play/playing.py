@@ -35,6 +35,7 @@ from study_app.store.folders import kept_pilot_folder
 from study_app.store.sessions.begin import SessionStart
 from study_app.viewmodels.designer import play as shown
 from study_app.viewmodels.designer.play import PlayDevices, PlayState
+from study_app.viewmodels.designer.problem_rows import problem_rows
 
 SIMULATED: Final = "scripted"
 LOOK_S: Final = 0.01
@@ -97,10 +98,13 @@ class Playing(QObject):
         opened = self.editing.opened
         if opened is None or self.under_way:
             return
+        study = opened.study
         try:
-            found = playable(opened.study, opened.history.selected, self.where())
+            found = playable(study, opened.history.selected, self.where())
         except NotPlayableError as refused:
-            self._show(shown.refuses(tuple(map(str, refused.problems))))
+            names = {str(one): row.name for one, row in zip(study.problems, problem_rows(study), strict=True)}
+            named = (replace(one, place=names.get(str(one), one.place)) for one in refused.problems)
+            self._show(shown.refuses(tuple(map(str, named))))
             return
         self._asked = found
         if self.device == SIMULATED:

@@ -18,7 +18,7 @@ from study_app.protocol.groups.group import sequences_in
 from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.source.line_numbers import Places, places_of
 from study_app.protocol.wording.languages import LANGUAGES, language_name
-from study_app.viewmodels.designer.element_facts import brief
+from study_app.viewmodels.designer.element_facts import brief, kind_of, place_words
 from study_app.viewmodels.designer.outline_rows import FIRST, icon_of
 from study_app.viewmodels.designer.special import FACTS
 from study_app.viewmodels.designer.special.questions import QuestionLines, question_lines
@@ -197,8 +197,8 @@ def form(study: Study, path: Path) -> Form:
         name = ""
     title = title_of(document, path)
     return Form(
-        path, title, icon_of(path, document), _kind(path), None if name is None else str(name), sections, own,
-        of_id, position_of(document, path),
+        path, title, icon_of(path, document), kind_of(path) or "Section of the file",
+        None if name is None else str(name), sections, own, of_id, position_of(document, path),
         question_lines(study, path[:-1]) if path[2:3] == ("items",) else NO_QUESTIONS,
         tuple((path[:length], title_of(document, path[:length])) for length in (1, 2, 4) if length <= len(path)),
         f"Feel {title}" if len(path) == 2 and path[0] in WITH_LIQUIDS else "",
@@ -233,12 +233,6 @@ def first_element(document: Mapping[str, Any]) -> Path:
     """Return what is selected first: the first step of the session, else the study's own table."""
     steps = ((*place, 0) for place, listed in sequences_in(document) if listed)
     return next((named for step in steps if (named := named_at(document, step)) is not None), FIRST)
-
-
-def _kind(path: Path) -> str:
-    if isinstance(path[-1], int):
-        return label_of(singular(path[-2]))
-    return label_of(singular(path[0])) if len(path) > 1 else "Section of the file"
 
 
 def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[Section]:
@@ -313,9 +307,6 @@ def _optional(row: Row) -> bool:
 
 def _form_row(study: Study, row: Row, places: Places) -> FormRow:
     document, path = study.document, row.path
-    line = places.line(path)
-    written = ".".join(str(step + 1) if isinstance(step, int) else step for step in path)
-    place = written if line is None else f"{written} · line {line}"
     faults = tuple(
         _sentence(study, fault.message, fault.hint) for fault in study.faults if fault.path[: len(path)] == path
     )
@@ -327,7 +318,7 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
         number = next((index for index, one in enumerate(row.either) if _fits(one, row.value)), 0)
     return FormRow(
         row,
-        place,
+        place_words(path, places.line(path)),
         faults,
         tuple((code, language_name(code)) for code in codes) if row.kind in {"localised", "paragraphs"} else (),
         tuple(_entries(study, row)),

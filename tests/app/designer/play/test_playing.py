@@ -248,7 +248,7 @@ def test_another_device_is_asked_for_and_a_fault_ahead_is_named(
     field.setPlainText(field.toPlainText().replace("[pages.thanks]\n", "[pages.thanks]\nnonsense = 3\n", 1))
     press_f5(qtbot, likert)
     assert "cannot be played" in header.strip.words.text()
-    assert any("pages.thanks" in line for line in header.strip.state.listed)
+    assert any("Page " in line and "pages.thanks" not in line for line in header.strip.state.listed), header.strip.state
     qtbot.mouseClick(header.strip.buttons["problems"], Qt.MouseButton.LeftButton)
     assert likert.place.problems.isVisible()
     assert len(opened) == 1
