@@ -78,6 +78,7 @@ KEYS: Final = (
     Keys("next field", "Next field", ("Tab",), 3, "field"),
     Keys("accept", "Accept", ("Return",), 3, "field"),
     Keys("restore", "Restore", ("Escape",), 3, "field"),
+    Keys("remove", "Remove its key from the file", ("Ctrl+Delete",), 3, "field"),
     Keys("count", "Count up, down", ("Up", "Down"), 3, "field"),
 )
 _OF: Final = {one.action: one for one in KEYS}

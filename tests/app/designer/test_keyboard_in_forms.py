@@ -6,11 +6,12 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 
 from study_app.gui.designer.form.languages_field import LanguagesField
 from study_app.gui.designer.form.typed_fields import TypedText
 from study_app.gui.designer.outline.rows import ROW_ROLE
+from study_app.gui.designer.tab_order import stops
 from study_app.viewmodels.designer.requests import SetValue
 
 pytestmark = pytest.mark.slow
@@ -118,3 +119,41 @@ def test_ctrl_3_goes_to_the_page_and_then_to_the_tabs_where_enter_chooses(qtbot:
     pane.tabs.buttons[1].setFocus()
     press(qtbot, KEY.Key_Return)
     assert pane.tab == "measures"
+
+
+def test_ctrl_delete_removes_the_key_of_a_field_whose_cross_tab_passes(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    block = ("blocks", "liquids")
+    designer.select(block)
+    text, removable = designer.text, [row for row in designer.place.form.rows if row.remove is not None]
+    assert {"title", "order", "repetitions", "questionnaire"} <= {str(row.row.row.path[-1]) for row in removable}
+    for row in removable:
+        assert row.remove not in stops(designer.place.form)
+        assert "(Ctrl+Del)" in row.remove.toolTip()
+        path = row.row.row.path
+        designer.place.form.focus(path)
+        if isinstance(QApplication.focusWidget(), QLineEdit):
+            QApplication.focusWidget().selectAll()  # as where Tab leads to it
+        press(qtbot, KEY.Key_Delete, CONTROL)
+        assert path[-1] not in designer.editing.opened.study.document["blocks"]["liquids"], path
+        assert designer.place.form.isAncestorOf(QApplication.focusWidget())
+        designer.editing.undo()
+        assert designer.text == text
+
+
+def test_ctrl_delete_deletes_a_word_where_one_follows_and_no_key_comes_back_with_what_was_typed(
+    qtbot: Any, designer: Any
+) -> None:
+    designer.controller.open("kitchen")
+    title = ("blocks", "liquids", "title")
+    designer.select(title[:2])
+    designer.place.form.focus(title)
+    field = QApplication.focusWidget()
+    field.setText("Two liquids")
+    field.setCursorPosition(0)
+    press(qtbot, KEY.Key_Delete, CONTROL)
+    assert field.text() == "liquids"
+    field.setCursorPosition(len(field.text()))
+    qtbot.keyClicks(field, " now")
+    press(qtbot, KEY.Key_Delete, CONTROL)
+    assert "title" not in designer.editing.opened.study.document["blocks"]["liquids"]

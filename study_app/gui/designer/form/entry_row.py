@@ -15,6 +15,7 @@ from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import Elided
 from study_app.viewmodels.designer.form.form_rows import Entry
+from study_app.viewmodels.designer.keys import with_key
 
 KEYS: Final = "Alt+Up and Alt+Down move it, Delete removes it, Shift and the arrows select several"
 
@@ -69,6 +70,13 @@ class EntryRow(Themed, QWidget):
         self.row.addWidget(made)
         return made
 
+    def remove_button(self, name: str) -> IconButton:
+        """Add a button that removes the entry, as Delete does; Tab passes it."""
+        made = self.button("cross", name)
+        made.setToolTip(with_key(name, "delete"))
+        made.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        return made
+
     def show_chosen(self, chosen: bool, count: int) -> None:
         """Show whether it is selected, with how many."""
         self.chosen = chosen
@@ -99,7 +107,7 @@ class EntryRow(Themed, QWidget):
             self.stepped.emit(by, extends)
         elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and not _held(event):
             self.opened.emit()
-        elif event.key() == Qt.Key.Key_Delete and self.grip:
+        elif event.key() == Qt.Key.Key_Delete and self.grip and not _held(event):
             self.remove_asked.emit()
         elif _duplicates(event) and self.grip:
             self.duplicate_asked.emit()

@@ -62,8 +62,7 @@ class EntriesField(EntryList):
             opens.clicked.connect(lambda _checked=False, at=at: self._open(at))
             shown.opened.connect(lambda at=at: self._open(at))
             if kind != "tables":
-                away = shown.button("cross", f"Remove {entry.title} from {row.row.label}")
-                away.setToolTip(with_key(away.accessibleName(), "delete"))
+                away = shown.remove_button(f"Remove {entry.title} from {row.row.label}")
                 away.clicked.connect(lambda _checked=False, at=at: self.remove((at,)))
             self.add_row(shown)
         self.add = add_button(f"Add to {row.row.label}", "Add")
@@ -121,7 +120,7 @@ class LinesField(EntryList):
             line.typed.connect(lambda text, at=at: self._take(at, text))
             line.came.connect(self.came)
             shown.row.addWidget(line, 1)
-            away = shown.button("cross", f"Remove {name}")
+            away = shown.remove_button(f"Remove {name}")
             away.clicked.connect(lambda _checked=False, at=at: self.remove((at,)))
             self.add_row(shown)
             self.lines.append(line)

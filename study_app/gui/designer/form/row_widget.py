@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from functools import cached_property
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from study_app.gui.designer.form.form_head import LABEL_PX
@@ -14,7 +15,7 @@ from study_app.gui.designer.form.languages_field import LanguagesField, stacked
 from study_app.gui.designer.form.list_fields import field, structure
 from study_app.gui.designer.form.special import EDITORS
 from study_app.gui.designer.form.special_editor import SpecialEditor
-from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
+from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText, removes_key
 from study_app.gui.designer.repair_button import RepairButton
 from study_app.gui.designer.segments import Segments
 from study_app.gui.designer.tab_order import lead_by_tab, stops
@@ -23,6 +24,7 @@ from study_app.gui.widgets.cards import Icon
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.form.form_rows import FormRow
+from study_app.viewmodels.designer.keys import with_key
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 from study_app.viewmodels.designer.requests import RemoveKey, SwitchKey
 
@@ -66,8 +68,10 @@ class RowWidget(Themed, QWidget):
         self.words.setBuddy(self.field)
         self.remove: IconButton | None = None
         if row.removable:
-            self.remove = IconButton("cross", f"Remove {row.row.label} from the file", size=FIELD_PX, role="plain")
-            self.remove.clicked.connect(lambda: self.field.asked.emit(RemoveKey(self.row.row.path)))
+            removes = f"Remove {row.row.label} from the file"
+            self.remove = IconButton("cross", removes, with_key(removes, "remove"), size=FIELD_PX, role="plain")
+            self.remove.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # no stop of Tab at each field
+            self.remove.clicked.connect(self._remove)
         across = QHBoxLayout()
         across.setSpacing(8)
         top = Qt.AlignmentFlag.AlignTop
@@ -117,6 +121,20 @@ class RowWidget(Themed, QWidget):
         column.insertWidget(column.count() - 1, made)
         apply_theme_within(made, self.theme)
         return made
+
+    def _remove(self) -> None:
+        """Ask to remove the key; what is being typed is handed on before, else it would come back with that."""
+        for part in self.field.findChildren(QWidget):
+            if isinstance(part, TypedLine | TypedText):
+                part.flush()
+        self.field.asked.emit(RemoveKey(self.row.row.path))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Remove the key from the file by its shortcut, unless the editor took it to delete a word."""
+        if removes_key(event) and self.remove is not None and self.remove.isEnabled():
+            self._remove()
+        else:
+            super().keyPressEvent(event)
 
     def _switch(self, key: object) -> None:
         if key != self.row.row.path[-1]:

@@ -11,6 +11,7 @@ from PySide6.QtGui import QFocusEvent, QKeyEvent, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit, QWidget
 
 from study_app.gui.theme.theme import font
+from study_app.viewmodels.designer.keys import keys_of
 
 HAND_ON_MS = 150
 """What is typed is handed on so long after the first key [ms]: typing without a rest is kept as well."""
@@ -21,6 +22,12 @@ MOST_LINES, SENTENCE_EDGE_PX = 6, 16
 """How many lines a sentence has at most, and what its field needs above and below them [px]."""
 LINE_BREAK = re.compile(r"\s*[\r\n\u2028\u2029]+\s*")
 KEYS_OF_PLACE = (QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo, QKeySequence.StandardKey.Save)
+
+
+def removes_key(event: QKeyEvent) -> bool:
+    """Return whether a key removes the field's key from the file."""
+    return QKeySequence(event.keyCombination()) == QKeySequence(keys_of("remove")[0])
+
 
 if TYPE_CHECKING:
     _Base = QWidget
@@ -73,6 +80,10 @@ class _Typed(_Base):
         """Return the text."""
         raise NotImplementedError
 
+    def nothing_to_delete(self) -> bool:
+        """Return whether all of the text is marked, or nothing is and the caret is at its end."""
+        raise NotImplementedError
+
     def restore(self) -> None:
         """Hand on what was there when the keyboard came."""
         self._rest.stop()
@@ -108,9 +119,11 @@ class _Typed(_Base):
         return True if self.leaves_to_place(event) else super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Restore at Esc."""
+        """Restore at Esc; leave the key that deletes a word to the row where no word follows or all is marked."""
         if event.key() == Qt.Key.Key_Escape:
             self.restore()
+        elif removes_key(event) and self.nothing_to_delete():
+            event.ignore()  # its row removes the key
         else:
             super().keyPressEvent(event)
 
@@ -159,6 +172,11 @@ class TypedLine(_Typed, QLineEdit):
         """Return the text."""
         return self.text()
 
+    def nothing_to_delete(self) -> bool:
+        """Return whether all of the text is marked, or nothing is and the caret is at its end."""
+        marked = self.selectedText()
+        return marked == self.text() if marked else self.cursorPosition() == len(self.text())
+
     def show_text(self, text: str) -> None:
         """Show a text, unless something else is being typed."""
         if not self.pending and text != self.text():
@@ -194,6 +212,11 @@ class TypedText(_Typed, QPlainTextEdit):
     def words(self) -> str:
         """Return the text."""
         return self.document().toRawText().replace("\u2029", "\n")
+
+    def nothing_to_delete(self) -> bool:
+        """Return whether all of the text is marked, or nothing is and the caret is at its end."""
+        at = self.textCursor()
+        return at.selectionEnd() - at.selectionStart() == len(self.words()) if at.hasSelection() else at.atEnd()
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return the room for some lines."""
