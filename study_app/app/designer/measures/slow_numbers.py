@@ -88,6 +88,11 @@ class SlowNumbers(QObject):
         counted = self._counted
         return (counted.done, counted.total) if counted is not None and counted.wanted == wanted else None
 
+    @property
+    def waits(self) -> bool:
+        """Whether a number is still to come."""
+        return bool(self._open())
+
     def _open(self) -> tuple[Wanted, ...]:
         return tuple(one for one in self._wanted if one not in self._known and one not in self._failed)
 

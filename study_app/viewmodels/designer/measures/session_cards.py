@@ -36,6 +36,7 @@ from study_app.viewmodels.designer.measures.number_cards import (
     people,
 )
 from study_app.viewmodels.number_words import minutes
+from study_app.viewmodels.sessions import counted
 
 SQUARE_NAMES: Final = {"williams": "Williams design", "latin": "Latin square"}
 Underway: TypeAlias = tuple[str, str]
