@@ -21,7 +21,9 @@ from study_app.viewmodels.tones import Tone
 
 NEW, OPEN = "\0new", "\0open"
 WIDE_FROM = 1180
-NAME_MOST_PX, NAME_EDGES_PX = 320, 60
+NAME_MOST_PX, NAME_EDGES_PX = 300, 60
+WIDEST_PROBLEMS, WIDEST_DRAFT, WIDEST_VERSION = "88 problems", "Draft kept 88:88", "1.8, was 1.8"
+"""What there is room for in each chip, so that nothing moves where it says other words."""
 
 
 class ChipButton(Themed, PressedByEnter):
@@ -60,7 +62,7 @@ class ChipButton(Themed, PressedByEnter):
         """Paint the chip, and a ring where it is focused."""
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        body = QRectF(0, self.height() / 2 - 14, self.width(), 28)
+        body = QRectF(0, self.height() / 2 - 14, self.sizeHint().width(), 28)
         paint_chip(painter, body, self.theme, *self._state, small=False)
         if self.hasFocus():
             painter.setPen(QPen(QColor(self.theme.accent), 2))
@@ -171,6 +173,9 @@ class DesignerHeader(QWidget):
         state = self.state
         named = min(NAME_MOST_PX, self.study.fontMetrics().horizontalAdvance(self.study.currentText()) + NAME_EDGES_PX)
         more = max(0, named - self.study.minimumWidth())
+        widest = ((self.problems, WIDEST_PROBLEMS), (self.draft, WIDEST_DRAFT), (self.version, WIDEST_VERSION))
+        for chip, words in widest:
+            chip.setMinimumWidth(chip_size(words, small=False).width())
         self.title.show()
         self.draft.setVisible(bool(state.chosen and state.draft))
         self.version.setVisible(bool(state.chosen and state.version.words))

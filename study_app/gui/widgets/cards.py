@@ -142,7 +142,8 @@ class Chip(Themed, QWidget):
         """Paint the pill, the icon and the word."""
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        paint_chip(painter, QRectF(self.rect()), self.theme, self.tone, self.icon, self.word, small=self._small)
+        body = QRectF(QPointF(), self.sizeHint().toSizeF())
+        paint_chip(painter, body, self.theme, self.tone, self.icon, self.word, small=self._small)
 
 
 def _chip_font(*, small: bool) -> QFont:
