@@ -1,14 +1,19 @@
-"""What elements and their places in the file are called, and the number by which one tells elements apart."""
+"""What elements and their places in the file are called, what tells elements apart, and how many others use them."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
 from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.fields import label_of
+from study_app.authoring.names import ITEMS, references_to
 from study_app.authoring.outline import title_of
 from study_app.protocol.source.document import Path, value_at
+
+USED: Final = frozenset({"liquids", "conditions", "tasks", "questionnaires", "scales", "stimuli", "designs", "methods"})
+"""Sections whose elements other elements use; pages and blocks are steps of the session."""
 
 
 def kind_of(path: Path) -> str:
@@ -56,3 +61,28 @@ def brief(document: Mapping[str, Any], path: Path) -> str:
         if all(key in numbers for key in keys):
             return words.format(**numbers)
     return ""
+
+
+def used_by(document: Mapping[str, Any], path: Path) -> str:
+    """Return how many elements name an element: "used by 3 conditions, 1 block", "not used"; "" of steps and settings.
+
+    Parameters
+    ----------
+    document : mapping
+        The study, sound or not.
+    path : tuple of str or int
+        The element.
+    """
+    if len(path) != 2 or path[0] not in USED:
+        return ""
+    users = {_user(place) for place in references_to(document, path)} - {path}
+    counts = Counter(
+        "step" if user[0] == "sequence" else singular(user[-2] if len(user) > 1 else user[0]) for user in users
+    )
+    words = (f"{count} {word}{'s' * (count != 1)}" for word, count in sorted(counts.items()))
+    return f"used by {', '.join(words)}" if counts else "not used"
+
+
+def _user(place: Path) -> Path:
+    """Return the element that a place belongs to: a question, a table of a section or a step."""
+    return place[:4] if place[2:3] == (ITEMS,) else place[:2]

@@ -7,8 +7,10 @@ from typing import Any
 import pytest
 
 from study_app.authoring.edited_study import read
+from study_app.authoring.writer.edits import Insert, Set
+from study_app.protocol.source.document import Path
 from study_app.protocol.source.files import shipped_file
-from study_app.viewmodels.designer.element_facts import brief
+from study_app.viewmodels.designer.element_facts import brief, used_by
 from study_app.viewmodels.designer.form.form_rows import form
 from study_app.viewmodels.designer.outline_rows import outline_rows
 
@@ -31,6 +33,33 @@ REACH = {"kind": "reach", "count": 12}
 )
 def test_an_element_has_one_fact(section: str, table: Any, words: str) -> None:
     assert brief({section: {"one": table}}, (section, "one")) == words
+
+
+@pytest.mark.parametrize(
+    ("path", "words"),
+    [
+        (("liquids", "water"), "used by 8 conditions"),
+        (("liquids", "honey"), "used by 1 condition"),
+        (("tasks", "reach"), "used by 1 block"),
+        (("scales", "agreement"), "used by 2 questionnaires"),
+        (("questionnaires", "liquid"), "used by 1 block, 1 step"),
+        (("tasks", "spare"), "not used"),
+        (("blocks", "liquids"), ""),
+        (("questionnaires", "liquid", "items", 0), ""),
+    ],
+)
+def test_an_element_says_how_many_others_use_it(path: Path, words: str) -> None:
+    study = read(shipped_file("rek2024").read_bytes(), shipped_file("rek2024").parent)
+    more = Set(("tasks", "spare"), {"kind": "explore", "min_s": 1, "max_s": 2}), Insert(("sequence", 1), "liquid")
+    study, _ = study.edited(*more)
+    assert used_by(study.document, path) == form(study, path).used == words
+
+
+def test_questions_that_use_a_scale_are_counted_one_by_one() -> None:
+    study = read(shipped_file("rek2024").read_bytes(), shipped_file("rek2024").parent)
+    items = ("questionnaires", "liquid", "items")
+    study, _ = study.edited(*(Set((*items, at, "scale"), "agreement") for at in (0, 1)))
+    assert used_by(study.document, ("scales", "agreement")) == "used by 2 questions, 2 questionnaires"
 
 
 def test_outline_and_lists_to_choose_from_say_it() -> None:

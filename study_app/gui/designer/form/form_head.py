@@ -61,7 +61,7 @@ class FormHead(QWidget):
         self._faulty = False
         self.tile = Tile()
         self.title = Elided("card")
-        self.kind = label("", "small", "text2")
+        self.kind = Elided("small", "text2")
         self.followed = Elided("small", "text2")
         self.id = TypedLine("Id")
         self.id.setMinimumWidth(110)
@@ -134,8 +134,8 @@ class FormHead(QWidget):
         self.tile.icon = form.icon
         self.tile.update()
         self.title.show_text(form.title)
-        at = "" if form.position is None else f"  ·  {form.position[0]} of {form.position[1]}"
-        self.kind.setText(f"{form.kind}{at}")
+        at = "" if form.position is None else f"{form.position[0]} of {form.position[1]}"
+        self.kind.show_text("  ·  ".join(filter(None, (form.kind, at, form.used))))
         self.id_line.setVisible(form.id is not None)
         self._read_only = read_only
         self._apply_lock()

@@ -18,7 +18,7 @@ from study_app.protocol.groups.group import sequences_in
 from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.source.line_numbers import Places, places_of
 from study_app.protocol.wording.languages import LANGUAGES, language_name
-from study_app.viewmodels.designer.element_facts import brief, kind_of, place_words
+from study_app.viewmodels.designer.element_facts import brief, kind_of, place_words, used_by
 from study_app.viewmodels.designer.outline_rows import FIRST, icon_of
 from study_app.viewmodels.designer.special import FACTS
 from study_app.viewmodels.designer.special.questions import QuestionLines, question_lines
@@ -152,6 +152,8 @@ class Form:
         What the button says that opens the lab with its liquids, "" where it has none.
     series : bool
         Whether there can be a series of it: elements that differ in one of its numbers.
+    used : str
+        How many other elements use it (`used_by`); "" where that is not said.
     """
 
     path: Path
@@ -167,6 +169,7 @@ class Form:
     around: tuple[tuple[Path, str], ...] = ()
     feel: str = ""
     series: bool = False
+    used: str = ""
 
     @property
     def rows(self) -> tuple[FormRow, ...]:
@@ -203,6 +206,7 @@ def form(study: Study, path: Path) -> Form:
         tuple((path[:length], title_of(document, path[:length])) for length in (1, 2, 4) if length <= len(path)),
         f"Feel {title}" if len(path) == 2 and path[0] in WITH_LIQUIDS else "",
         any(map(_has_numbers, sections)) if is_element(document, path) else bool(series_starts(document, path)),
+        used_by(document, path),
     )  # fmt: skip
 
 
