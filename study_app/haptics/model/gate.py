@@ -55,6 +55,11 @@ def describe_gate(scene: Scene, cost_ns: Mapping[tuple[str, Effect], float] | No
     return tuple(lines[:-1])
 
 
+def _budget_n(scene: Scene, total_n: float) -> float:
+    """Return how much force may be left out."""
+    return max(scene.accuracy.relative * min(total_n, scene.force_limit_n), scene.accuracy.absolute_n)
+
+
 def _verdicts(scene: Scene, liquid: Liquid) -> tuple[Verdict, ...]:
     found = bounds(scene, liquid)
     barred = _barred(scene, liquid, found)
@@ -97,7 +102,7 @@ def _chosen(
     scene: Scene, liquid: Liquid, found: Mapping[Effect, float], barred: Mapping[Effect, str], total_n: float
 ) -> dict[Effect, tuple[bool, str]]:
     """Leave out the smallest while the sum of what is left out stays within the target."""
-    budget_n = max(scene.accuracy.relative * min(total_n, scene.force_limit_n), scene.accuracy.absolute_n)
+    budget_n = _budget_n(scene, total_n)
     judged: dict[Effect, tuple[bool, str]] = {name: (False, why) for name, why in barred.items()}
     left_out_n = 0.0
     for effect in sorted((effect for effect in found if effect not in judged), key=lambda effect: found[effect]):
