@@ -56,11 +56,12 @@ class FocusAreas:
             self._parts.focus_outline()
 
     def return_keyboard(self) -> None:
-        """Go back to where the keyboard was last in outline, form or pane."""
-        if (last := last_focused(self._parts.used)) is not None:
-            last.setFocus(Qt.FocusReason.OtherFocusReason)
-        else:
+        """Go back to where the keyboard was last in outline, form or pane; from *Find* to the selected element."""
+        last = last_focused(self._parts.used)
+        if last is None or last is self._parts.outline.words:
             self.focus_element()
+        else:
+            last.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def focus_pane(self) -> None:
         """Go to the page of the right pane, and from within the pane to its tabs."""

@@ -64,6 +64,18 @@ def test_a_button_of_the_header_gives_the_keyboard_back_to_the_outline(qtbot: An
     assert designer.place.outline.tree.hasFocus()
 
 
+@pytest.mark.parametrize(("width", "area"), [(1600, "outline"), (1366, "form")])
+def test_save_leads_from_find_to_the_selected_element(qtbot: Any, designer: Any, width: int, area: str) -> None:
+    designer.window.resize(width, 768)
+    designer.controller.open("kitchen")
+    designer.editing.ask(SetValue((*BLOCK, "repetitions"), 3))
+    designer.place.parts.focus_find()
+    qtbot.mouseClick(designer.place.header.save, LEFT)
+    parts = {"outline": designer.place.outline.tree, "form": designer.place.form}
+    keyboard = QApplication.focusWidget()
+    assert keyboard is parts[area] or parts[area].isAncestorOf(keyboard)
+
+
 def test_an_undone_step_of_another_element_has_the_keyboard_in_its_form(qtbot: Any, designer: Any) -> None:
     typed(qtbot, designer)
     press(qtbot, KEY.Key_Return)
