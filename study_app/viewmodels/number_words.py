@@ -14,6 +14,14 @@ def minutes(seconds: float) -> str:
     return f"{rest // 60}:{rest % 60:02d}"
 
 
+def duration(seconds: float) -> str:
+    """Return how long something takes, rounded: "45 s", "10 min", "1 h 05 min"; less than 90 s in whole seconds."""
+    if seconds < 89.5:
+        return f"{max(0, round(seconds))} s"
+    hours, rest = divmod(round(seconds / 60), 60)
+    return f"{hours} h {rest:02d} min" if hours else f"{rest} min"
+
+
 def grouped(number: int) -> str:
     """Return 45918 as "45 918" with a thin space."""
     return f"{number:,}".replace(",", THIN_SPACE)

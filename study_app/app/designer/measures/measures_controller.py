@@ -13,6 +13,7 @@ from study_app.app.designer.measures.page_fit import PageFit
 from study_app.app.designer.measures.slow_numbers import SlowNumbers
 from study_app.app.designer.measures.wanted import (
     LAPSES,
+    measuring,
     participants_of,
     planned_of,
     precision_of,
@@ -27,6 +28,7 @@ from study_app.authoring.measures.planned import Detectable, GroupPrecision
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.study_facts import facts
 from study_app.gui.designer.view import DesignerPlace
+from study_app.protocol.checks.expected_precision import threshold_plan
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import Path
 from study_app.viewmodels.designer.measures.level_plots import Simulated
@@ -115,7 +117,8 @@ class MeasuresController(QObject):
         self.slow.want(wanted if self._is_looked_at else tuple(one for one in wanted if isinstance(one, Advising)))
         repairs = {row: self._repairs.get(row, ()) for row in problems}
         parts = self.fit.parts(protocol, focus, path) if self._is_looked_at else None
-        results = replace(self._results(wanted, focus, controls), parts=parts)
+        ranges = {} if protocol is None else self._ranges(protocol)
+        results = replace(self._results(wanted, focus, controls), parts=parts, ranges=ranges)
         view = measures_view(study, facts(study), path, controls, results, repairs)
         view = replace(view, earlier=study is not opened.study)
         if results.warnings != self.warnings:
@@ -160,6 +163,16 @@ class MeasuresController(QObject):
         low, high = focus.plan.stimulus.levels
         threshold = asked if asked is not None and low <= asked <= high else threshold_of(focus.plan)
         return Controls(participants, threshold, self._lapses, precision_of(protocol), planned)
+
+    def _ranges(self, protocol: Protocol) -> dict[str, tuple[float, float] | None]:
+        """Return the thresholds that blocks can measure, of those for which that was simulated."""
+        found = {}
+        for block in protocol.main_blocks:
+            plan = threshold_plan(protocol, block)
+            wanted = None if plan is None else measuring(protocol, plan, block, self._lapses)
+            if wanted is not None and isinstance(known := self.slow.found(wanted), Measurable):
+                found[block.id] = known.ends
+        return found
 
     def _results(self, wanted: tuple[Wanted, ...], focus: Focus, controls: Controls) -> SlowResults:
         """Return what is known of what is wanted; where nothing is, what was known of the block before."""

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from study_app.app.designer.measures.measures_worker import Advising, Detecting, Grouping, Measuring, Observing, Wanted
 from study_app.authoring.measures.participant_texts import text_keys
+from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import ThresholdPlan, threshold_plan
 from study_app.protocol.levels.presented_levels import clipping
 from study_app.protocol.model import Protocol
@@ -28,11 +29,11 @@ def wanted_of(protocol: Protocol, focus: Focus, controls: Controls) -> tuple[Wan
     """Return what is to be simulated, the quickest first."""
     wanted: list[Wanted] = []
     depends = ""
-    if (plan := focus.plan) is not None:
+    if (plan := focus.plan) is not None and focus.block is not None:
         wanted = [
             Observing(plan, controls.threshold, controls.lapses),
             Grouping(plan, controls.participants, controls.precision),
-            Measuring(plan, controls.lapses, least_of(protocol, plan), most_of(protocol, focus)),
+            measuring(protocol, plan, focus.block, controls.lapses),
         ]
     if focus.compares and focus.block is not None:
         depends = _dependencies(protocol)
@@ -81,10 +82,11 @@ def least_of(protocol: Protocol, plan: ThresholdPlan) -> float:
     return 0.0
 
 
-def most_of(protocol: Protocol, focus: Focus) -> float:
-    """Return the largest level that an estimate can be of: the highest one that is presented in full."""
-    found = None if focus.block is None else clipping(protocol, focus.block)
-    return math.inf if found is None or focus.plan is None else found.highest(focus.plan.stimulus)
+def measuring(protocol: Protocol, plan: ThresholdPlan, block: Block, lapses: float) -> Measuring:
+    """Return what asks for the thresholds that a block can measure, up to the highest level that is in full."""
+    found = clipping(protocol, block)
+    most = math.inf if found is None else found.highest(plan.stimulus)
+    return Measuring(plan, lapses, least_of(protocol, plan), most)
 
 
 def _dependencies(protocol: Protocol) -> str:

@@ -157,12 +157,14 @@ class MeasuresPage(Themed, QWidget):
         self.track: TrackView | None = None
         self.forces: ForcesView | None = None
         self.cards: dict[str, Card] = {}
-        self.grid = CardGrid()
-        self.grid.open_asked.connect(self.open_asked)
+        self.blocks, self.grid = CardGrid(), CardGrid()
+        for grid in (self.blocks, self.grid):
+            grid.open_asked.connect(self.open_asked)
         inside = QWidget()
         self.column = QVBoxLayout(inside)
         self.column.setContentsMargins(0, 0, 0, 0)
         self.column.setSpacing(8)
+        self.column.addWidget(self.blocks)
         self.column.addWidget(self.numbers)
         self.curves = QWidget()
         self.plots = QHBoxLayout(self.curves)
@@ -205,6 +207,8 @@ class MeasuresPage(Themed, QWidget):
             return
         self.earlier.setVisible(shown.earlier)
         self.area.widget().setEnabled(not shown.earlier)
+        self.blocks.setVisible(shown.blocks is not None)
+        self.blocks.show_cards(() if shown.blocks is None else (shown.blocks,))
         self.numbers.show_numbers(shown.numbers)
         if (shown.numbers or shown.forces) and not self.cards:
             self._make_plots()
@@ -247,7 +251,7 @@ class MeasuresPage(Themed, QWidget):
             self.plots.addWidget(self.cards[name], 1)
         forces.setMinimumHeight(FORCES_PX)
         forces.setMaximumHeight(HIGHEST_PX)
-        self.column.insertWidget(2, forces, 2)
+        self.column.insertWidget(3, forces, 2)
         for card in self.cards.values():
             card.hide()
             apply_theme_within(card, self.theme)

@@ -15,6 +15,7 @@ from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, Ink, figures, label, set_ink
 from study_app.viewmodels.designer.measures.number_cards import (
     BalanceCard,
+    BlocksCard,
     Line,
     LinesCard,
     NumberCard,
@@ -23,6 +24,7 @@ from study_app.viewmodels.designer.measures.number_cards import (
     TextsCard,
     Verdict,
 )
+from study_app.viewmodels.designer.outline_rows import ElementPath
 from study_app.viewmodels.tones import Tone
 
 INKS: dict[Tone, Ink] = {"ok": "ok", "warn": "warn", "bad": "bad", "accent": "accent", "neutral": "text2"}
@@ -157,6 +159,7 @@ class Made(Card):
         self.aside.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.aside.show_text(aside)
         super().__init__(title, self.aside, padding=16, gap=8)
+        self.buttons: list[ActionButton] = []
         self.setAccessibleName(title)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)  # columns are equally wide
         self.column.addStretch()
@@ -164,6 +167,20 @@ class Made(Card):
     def add(self, part: QWidget) -> None:
         """Add a part below the others."""
         self.column.insertWidget(self.column.count() - 1, part)
+
+    def add_link(self, verdict: Verdict, action: str, path: ElementPath) -> None:
+        """Add a state with a button that opens an element."""
+        row = QWidget()
+        across = QHBoxLayout(row)
+        across.setContentsMargins(0, 0, 0, 0)
+        across.addWidget(verdict_line(verdict), 1)
+        made = ActionButton("", action, height=32)
+        made.setProperty("dense", "true")
+        made.setAccessibleName(f"{action}: {verdict[2]}")
+        made.clicked.connect(lambda: self.open_asked.emit(path))
+        across.addWidget(made)
+        self.buttons.append(made)
+        self.add(row)
 
 
 class SessionPart(Made):
@@ -309,21 +326,21 @@ class TextsPart(Made):
     def __init__(self, shown: TextsCard) -> None:
         super().__init__("Languages", "texts of the study")
         self.add(_lines(shown.languages))
-        self.buttons: list[ActionButton] = []
         if shown.revealing:
             self.add(Rule())
         for words, path in shown.revealing[:MOST_LINES]:
-            row = QWidget()
-            across = QHBoxLayout(row)
-            across.setContentsMargins(0, 0, 0, 0)
-            across.addWidget(verdict_line(("warn", "warning", words)), 1)
-            made = ActionButton("", "Go there", height=32)
-            made.setProperty("dense", "true")
-            made.setAccessibleName(f"Go to {words}")
-            made.clicked.connect(lambda _checked=False, path=path: self.open_asked.emit(path[:2]))
-            across.addWidget(made)
-            self.buttons.append(made)
-            self.add(row)
+            self.add_link(("warn", "warning", words), "Go there", path[:2])
+
+
+class BlocksPart(Made):
+    """The blocks that use an element, each with a button that opens it."""
+
+    wide = True
+
+    def __init__(self, shown: BlocksCard) -> None:
+        super().__init__(shown.title)
+        for words, path in shown.blocks:
+            self.add_link(("neutral", "layers", words), "Open", path)
 
 
 def part_of(card: object) -> Made:
@@ -334,5 +351,7 @@ def part_of(card: object) -> Made:
         return BalancePart(card)
     if isinstance(card, TextsCard):
         return TextsPart(card)
+    if isinstance(card, BlocksCard):
+        return BlocksPart(card)
     assert isinstance(card, LinesCard)  # noqa: S101 - the last kind
     return LinesPart(card)

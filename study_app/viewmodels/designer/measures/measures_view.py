@@ -88,12 +88,15 @@ class SlowResults:
         Sentences.
     parts : int or None
         On how many parts the questions stand on a small screen; None: not known.
+    ranges : mapping
+        The thresholds that other blocks can measure, as far as they are known; None: none.
     """
 
     simulated: Simulated = field(default_factory=Simulated)
     detectable: Detectable | None = None
     warnings: tuple[str, ...] = ()
     parts: int | None = None
+    ranges: Mapping[str, tuple[float, float] | None] = field(default_factory=dict)
 
 
 def focus_of(protocol: Protocol | None, path: Path) -> Focus:
@@ -154,6 +157,11 @@ def measures_view(
     protocol, focus = valid.protocol, focus_of(valid.protocol, path)
     block, values = focus.block, control_values(protocol, focus, controls)
     waiting = slow.simulated.progress.get("observed", FAILED[2] if "observed" in slow.simulated.failed else "")
+    blocks = None
+    if protocol is not None:
+        words = {one.id: _measured(protocol, one, slow) for one in protocol.blocks_in_order}
+        shown_of = "" if block is None else block.id
+        blocks = cards.blocks_card(study, protocol, facts, path, words, shown_of)
     of = None if protocol is None or block is None else level_block(protocol, block, forces=valid.forces)
     if protocol is not None and block is not None and of is not None and focus.plan is not None:
         numbers = number_cards(
@@ -163,10 +171,22 @@ def measures_view(
         return MeasuresView(
             values, numbers, function_plot(of, slow.simulated), track_plot(of, slow.simulated),
             forces_plot(of, problems), (), tuple(_others(study, facts, path, controls, slow)), waiting,
+            blocks=blocks,
         )  # fmt: skip
     shown = tuple(_cards(study, facts, path, focus, controls, slow))
     forces = None if of is None else forces_plot(of, problems)
-    return MeasuresView(values, forces=forces, cards=shown, below=shown[:BELOW], waiting=waiting)
+    return MeasuresView(values, forces=forces, cards=shown, below=shown[:BELOW], waiting=waiting, blocks=blocks)
+
+
+def _measured(protocol: Protocol, block: Block, slow: SlowResults) -> str:
+    """Return what a block measures, with what is known of it."""
+    focus = focus_of(protocol, ("blocks", block.id))
+    if focus.plan is None:
+        return "differences" if focus.compares else ""
+    words = LevelWords(focus.plan.stimulus, focus.plan.design)
+    if (ends := slow.ranges.get(block.id)) is None:
+        return f"{words.name}s" if block.id not in slow.ranges else f"no {words.name}"
+    return f"{words.name} {words.number(ends[0], 2)} – {words.words(ends[1], 2)}"
 
 
 def _others(study: Study, facts: Facts, path: Path, controls: Controls, slow: SlowResults) -> list[Card]:

@@ -283,7 +283,15 @@ class TextsCard:
     revealing: tuple[tuple[str, Path], ...]
 
 
-Card: TypeAlias = SessionCard | BalanceCard | LinesCard | TextsCard
+@dataclass(frozen=True, slots=True)
+class BlocksCard:
+    """The blocks that use an element: what their measures are, and the block that opens them."""
+
+    title: str
+    blocks: tuple[tuple[str, Path], ...]
+
+
+Card: TypeAlias = SessionCard | BalanceCard | LinesCard | TextsCard | BlocksCard
 
 
 @dataclass(frozen=True, slots=True)
@@ -316,7 +324,8 @@ class ControlValues:
 class MeasuresView:
     """What the tab shows: numbers and plots of a block with a method, else cards; and the cards below other tabs.
 
-    ``earlier`` ones are of the last study without faults.
+    Above them it says which ``blocks`` use the element, where it is not a block itself. ``earlier`` numbers are of the
+    last study without faults.
     """
 
     controls: ControlValues
@@ -328,3 +337,4 @@ class MeasuresView:
     below: tuple[Card, ...] = ()
     waiting: str = ""
     earlier: bool = False
+    blocks: BlocksCard | None = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final, TypeAlias
 
 from study_app.authoring.edited_study import Study
@@ -12,6 +12,7 @@ from study_app.authoring.measures.forces import forces
 from study_app.authoring.measures.participant_texts import copied_texts, own_texts, revealing, texts_by_language
 from study_app.authoring.measures.planned import Detectable
 from study_app.authoring.measures.valid_part import valid_part
+from study_app.authoring.names import blocks_using
 from study_app.authoring.outline import title_of
 from study_app.authoring.study_facts import Facts
 from study_app.haptics.model.gate import calls_for
@@ -28,6 +29,7 @@ from study_app.viewmodels.designer.measures.number_cards import (
     ON_AVERAGE,
     UNKNOWN,
     BalanceCard,
+    BlocksCard,
     Line,
     LinesCard,
     SessionCard,
@@ -35,7 +37,7 @@ from study_app.viewmodels.designer.measures.number_cards import (
     Verdict,
     people,
 )
-from study_app.viewmodels.number_words import minutes
+from study_app.viewmodels.number_words import duration, minutes
 from study_app.viewmodels.sessions import counted
 
 SQUARE_NAMES: Final = {"williams": "Williams design", "latin": "Latin square"}
@@ -96,6 +98,42 @@ def questions_card(protocol: Protocol, name: str, parts: int | None) -> SessionC
     if not times:
         asked = ("warn", "warning", "It is never asked")
     return SessionCard("Each time it is asked", figures, verdicts=(*_fit(parts), asked))
+
+
+def blocks_card(
+    study: Study, protocol: Protocol, facts: Facts, path: Path, measured: Mapping[str, str], shown: str
+) -> BlocksCard | None:
+    """Return the blocks that use an element that is not one of them; None where none does.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    protocol : Protocol
+        What of it is valid.
+    facts : Facts
+        Its facts.
+    path : tuple of str or int
+        The element; the study and its settings concern every block.
+    measured : mapping
+        What each block measures, in words.
+    shown : str
+        The block whose numbers are shown, "" where none are.
+    """
+    if path[:1] == ("blocks",) and len(path) > 1:
+        return None
+    used = list(protocol.blocks) if len(path) < 2 else blocks_using(study.document, path)
+    lines = []
+    for block in protocol.blocks_in_order:
+        if block.id in used:
+            lasts = facts.steps_s.get(block.id)
+            known = (measured.get(block.id), None if lasts is None else duration(lasts))
+            words = ", ".join(filter(None, (*known, "shown here" if block.id == shown else "")))
+            lines.append((f"Block {_title(study, block.id)}: {words}", ("blocks", block.id)))
+    if not lines:
+        return None
+    title = "Blocks of the study" if len(path) < 2 else f"Blocks that use {title_of(study.document, path[:2])}"
+    return BlocksCard(title, tuple(dict.fromkeys(lines)))
 
 
 def _word(count: int | None, word: str) -> str:

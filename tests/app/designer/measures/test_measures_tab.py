@@ -276,6 +276,21 @@ def test_a_block_of_statements_shows_what_people_can_show(qtbot: Any, designer: 
     assert [part.accessibleName() for part in facts.grid.parts] == titles[:4]
 
 
+def test_a_row_opens_the_measures_of_a_block_that_uses_an_element(qtbot: Any, designer: Any, worker: Worker) -> None:
+    jnd(designer)
+    qtbot.waitUntil(lambda: bool(worker.orders))
+    worker.answer()
+    shown(qtbot, designer, 2, "93")
+    designer.editing.select(("liquids", "damper"))
+    page = designer.place.measures
+    qtbot.waitUntil(lambda: page.blocks.isVisible() and len(page.blocks.parts) == 1)
+    part = page.blocks.parts[0]
+    assert "JND 5 – 50 %" in part.buttons[1].accessibleName()  # as it was simulated for the block
+    click(part.buttons[1])
+    assert designer.editing.selected == ("blocks", "viscosity")
+    qtbot.waitUntil(lambda: not page.blocks.isVisible())
+
+
 def test_without_a_process_the_other_numbers_stay(qtbot: Any, designer: Any) -> None:
     designer.controller.measures.slow.rest.setInterval(10)
     jnd(designer)

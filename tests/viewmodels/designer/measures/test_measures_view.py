@@ -118,6 +118,41 @@ def test_a_force_that_a_limit_clips_is_said_and_sums_of_a_broken_study_are_not_k
     assert any(isinstance(card, LinesCard) and len(card.lines) == 4 for card in view(broken, ("study",)).cards)
 
 
+@pytest.mark.parametrize(
+    ("name", "path", "title", "blocks"),
+    [
+        ("rek2024", ("liquids", "honey"), "Blocks that use Honey", ("liquids",)),
+        ("rek2024", ("questionnaires", "liquid"), "Blocks that use Liquid", ("liquids",)),
+        ("viscosityjnd", ("study",), "Blocks of the study", ("training", "viscosity")),
+        ("viscosityjnd", ("methods", "adaptive"), "Blocks that use Adaptive", ("viscosity",)),
+        ("viscosityjnd", ("pages", "welcome"), "", ()),
+        ("viscosityjnd", ("blocks", "viscosity"), "", ()),
+    ],
+)
+def test_an_element_that_is_no_block_leads_to_the_measures_of_its_blocks(
+    name: str, path: Path, title: str, blocks: tuple[str, ...]
+) -> None:
+    shown = view(study_of(name), path).blocks
+    if not blocks:
+        assert shown is None
+        return
+    assert shown is not None
+    assert (shown.title, tuple(str(one[1]) for _, one in shown.blocks)) == (title, blocks)
+
+
+def test_the_block_whose_numbers_are_shown_is_named_with_what_it_measures() -> None:
+    study = study_of("viscosityjnd")
+
+    def rows(path: Path, **ranges: tuple[float, float] | None) -> list[str]:
+        card = view(study, path, SlowResults(ranges=ranges)).blocks
+        assert card is not None
+        return [words for words, _ in card.blocks]
+
+    assert rows(("methods", "adaptive")) == ["Block Viscosity: JNDs, 46 min, shown here"]
+    assert rows(("study",), viscosity=(0.05, 0.5))[1] == "Block Viscosity: JND 5 – 50 %, 46 min"
+    assert rows(("study",), viscosity=None)[1] == "Block Viscosity: no JND, 46 min"
+
+
 def test_ticks_are_round_and_few() -> None:
     assert log_ticks(2, 60) == (2, 5, 10, 20, 50)
     assert log_ticks(5, 250) == (5, 10, 20, 50, 100, 200)
