@@ -10,6 +10,7 @@ from study_app.protocol.groups.own_protocol import variants
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s
+from study_app.viewmodels.number_words import duration_range
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,9 +27,9 @@ class Extent:
     expected_s: tuple[float, ...]
 
     @property
-    def minutes(self) -> str:
-        """The expected duration in whole minutes."""
-        return f"{spread([max(1, round(expected_s / 60)) for expected_s in self.expected_s])} min"
+    def duration(self) -> str:
+        """The expected duration, from that of the shortest kind of session to that of the longest."""
+        return duration_range(min(self.expected_s), max(self.expected_s))
 
 
 def extent_of(protocol: Protocol) -> Extent:

@@ -194,7 +194,7 @@ def study_facts(source: str) -> StudyFacts | BrokenFacts:
                 counted_each(extent.answers, "answer"),
             )
         ),
-        duration=f"about {extent.minutes}",
+        duration=f"about {extent.duration}",
         needs=f"Haptic device or mouse; at most {protocol.device.force_limit_n:g} N",
         origin=origin_of(source),
         draft=_draft_note(source),

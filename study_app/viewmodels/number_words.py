@@ -6,7 +6,7 @@ THIN_SPACE = "\u2009"
 
 
 def minutes(seconds: float) -> str:
-    """Return 68 s as "1:08"; an hour and more as "1:02:03"."""
+    """Return the time of a running clock: 68 s as "1:08"; an hour and more as "1:02:03"."""
     whole = max(0, int(seconds))
     hours, rest = divmod(whole, 3600)
     if hours:
@@ -14,12 +14,27 @@ def minutes(seconds: float) -> str:
     return f"{rest // 60}:{rest % 60:02d}"
 
 
-def duration(seconds: float) -> str:
-    """Return how long something takes, rounded: "45 s", "10 min", "1 h 05 min"; less than 90 s in whole seconds."""
-    if seconds < 89.5:
-        return f"{max(0, round(seconds))} s"
+def duration(seconds: float, *, tenths: bool = False) -> str:
+    """Return how long something takes: "45 s", "10 min", "1 h 05 min"; with ``tenths`` "0.6 s" below a minute."""
+    if round(seconds) < 60:
+        return f"{seconds:.3g} s" if tenths else f"{max(0, round(seconds))} s"
     hours, rest = divmod(round(seconds / 60), 60)
     return f"{hours} h {rest:02d} min" if hours else f"{rest} min"
+
+
+def duration_figure(seconds: float) -> tuple[str, str]:
+    """Return a duration as its number and its unit: ("10", "min"), ("1 h 05", "min")."""
+    number, unit = duration(seconds).rsplit(" ", 1)
+    return number, unit
+
+
+def duration_range(least_s: float, most_s: float) -> str:
+    """Return "15 to 32 min", "55 min to 1 h 10 min", or one duration where both read the same."""
+    least, most = duration(least_s), duration(most_s)
+    if least == most:
+        return most
+    number, unit = duration_figure(least_s)
+    return f"{number} to {most}" if most.endswith(f" {unit}") and " h " not in most else f"{least} to {most}"
 
 
 def grouped(number: int) -> str:

@@ -137,7 +137,7 @@ def _rows(
         ("Parts", spread(extent.parts)),
         (f"{extent.setting.capitalize()}s", spread(extent.settings)),
         ("Answers", spread(extent.answers)),
-        ("Expected time", extent.minutes),
+        ("Expected time", extent.duration),
         ("Force limit", f"{protocol.device.force_limit_n:g} N"),
         *((("Expected force error", error),) if asked_error else ()),
         ("Ends about", f"{ends:%H:%M}"),

@@ -11,7 +11,7 @@ from study_app.protocol.orders.schedule import build_schedule
 from study_app.store.broken_limits import beyond_limits
 from study_app.store.tables.column import header
 from study_app.store.tables.columns import TRIALS
-from study_app.viewmodels.number_words import duration_words, grouped, minutes
+from study_app.viewmodels.number_words import duration, duration_range, duration_words, grouped, minutes
 from study_app.viewmodels.operator import MEASURES
 from study_app.viewmodels.session.stages import stages
 from tests.protocol.trials.level_studies import study
@@ -313,6 +313,26 @@ def test_no_word_of_a_view_names_a_condition_a_force_or_a_limiter(told, health):
 def test_times_and_numbers_read_as_people_write_them():
     assert minutes(68) == "1:08"
     assert minutes(3723) == "1:02:03"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [(0.4, "0 s"), (45.2, "45 s"), (59.6, "1 min"), (612, "10 min"), (3599, "1 h 00 min"), (3900, "1 h 05 min")],
+)
+def test_a_duration_is_written_in_one_way(seconds: float, words: str) -> None:
+    assert duration(seconds) == words
+    assert duration_range(seconds, seconds) == words
+
+
+def test_durations_below_a_minute_have_tenths_where_they_are_those_of_fields() -> None:
+    assert [duration(one, tenths=True) for one in (0.6, 11.42, 120)] == ["0.6 s", "11.4 s", "2 min"]
+
+
+def test_a_range_of_durations_names_a_common_unit_once() -> None:
+    assert duration_range(900, 1920) == "15 to 32 min"
+    assert duration_range(3300, 4200) == "55 min to 1 h 10 min"
+    assert duration_range(3700, 7500) == "1 h 02 min to 2 h 05 min"
+    assert duration_range(30, 150) == "30 s to 2 min"
     assert grouped(45918) == "45\u2009918"
     assert duration_words(62e-6) == "62 µs"
     assert duration_words(1.4e-3) == "1.4 ms"

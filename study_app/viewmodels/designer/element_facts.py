@@ -11,6 +11,7 @@ from study_app.authoring.fields import label_of
 from study_app.authoring.names import ITEMS, references_to
 from study_app.authoring.outline import title_of
 from study_app.protocol.source.document import Path, value_at
+from study_app.viewmodels.number_words import duration_range
 
 USED: Final = frozenset({"liquids", "conditions", "tasks", "questionnaires", "scales", "stimuli", "designs", "methods"})
 """Sections whose elements other elements use; pages and blocks are steps of the session."""
@@ -52,15 +53,11 @@ def brief(document: Mapping[str, Any], path: Path) -> str:
         return f"{len(items)} question{'s' * (len(items) != 1)}"
     if path[0] != "tasks":
         return ""
-    numbers = {key: f"{one:g}" for key, one in value.items() if isinstance(one, int | float)}
-    for keys, words in (
-        (("min_s", "max_s"), "{min_s} to {max_s} s"),
-        (("duration_s",), "{duration_s} s"),
-        (("count",), "{count} targets"),
-    ):
-        if all(key in numbers for key in keys):
-            return words.format(**numbers)
-    return ""
+    numbers = {key: one for key, one in value.items() if isinstance(one, int | float)}
+    for least, most in (("min_s", "max_s"), ("duration_s", "duration_s")):
+        if least in numbers and most in numbers:
+            return duration_range(numbers[least], numbers[most])
+    return f"{numbers['count']:g} targets" if "count" in numbers else ""
 
 
 def used_by(document: Mapping[str, Any], path: Path) -> str:

@@ -21,7 +21,7 @@ from study_app.protocol.orders.durations import expected_duration_s, step_durati
 from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.wording.languages import LANGUAGES
 from study_app.viewmodels.designer.outline_rows import icon_of
-from study_app.viewmodels.number_words import minutes
+from study_app.viewmodels.number_words import duration
 
 __all__ = [
     "Answers", "OwnQuestion", "Recovery", "TemplateChoice", "copy_choice", "languages_offered", "template_choice",
@@ -161,7 +161,7 @@ def template_choice(name: str, study: Study) -> TemplateChoice:
         (
             icon_of((section, step), document),
             title_of(document, (section, step)),
-            minutes(step_duration_s(protocol, step, language)),
+            duration(step_duration_s(protocol, step, language)),
         )
         for step in protocol.steps
         for section in STEPS
@@ -192,7 +192,7 @@ def _languages(document: Document) -> tuple[str, ...]:
 
 def _figures(protocol: Protocol) -> Iterator[tuple[str, str]]:
     trials = sum(block.trials for block in orders_of(protocol).blocks)
-    yield "clock", f"{max(1, round(expected_duration_s(protocol) / 60))} min"
+    yield "clock", duration(expected_duration_s(protocol))
     people = None if protocol.analysis is None else protocol.analysis.participants
     if people is not None:
         yield "people", f"{people} planned"

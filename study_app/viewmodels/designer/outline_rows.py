@@ -12,7 +12,7 @@ from study_app.authoring.outline import Element, found, outline
 from study_app.protocol.source.document import Path, entries, names, value_at
 from study_app.viewmodels.designer.element_facts import brief
 from study_app.viewmodels.designer.finding import LABEL, FoundField, found_in_elements
-from study_app.viewmodels.number_words import minutes
+from study_app.viewmodels.number_words import duration
 
 ICONS: Final = {
     "pages": "file", "blocks": "layers", "tasks": "route", "questionnaires": "list", "liquids": "drop",
@@ -95,7 +95,7 @@ def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> 
         if words:
             inner = [row for row in inner if len(row.path) > 1 or heading in {"", SETTINGS}]
             inner = [kept for row in inner if (kept := _found(study, row, words, fields.get(row.path))) is not None]
-        total = minutes(sum(times_s.values())) if times_s and heading == SESSION else ""
+        total = duration(sum(times_s.values())) if times_s and heading == SESSION else ""
         if inner:
             rows += [*([OutlineRow((), heading, note=total, name=heading)] if heading else []), *inner]
     return tuple(rows)
@@ -130,7 +130,7 @@ def icon_of(path: Path, document: Mapping[str, Any]) -> str:
 def _row(study: Study, element: Element, times_s: Mapping[str, float], *, in_session: bool) -> OutlineRow:
     path, note, kind = element.path, "", str(element.path[0])
     if in_session and element.depth == 0:
-        note = minutes(times_s[element.id]) if element.id in times_s else ""
+        note = duration(times_s[element.id]) if element.id in times_s else ""
     elif in_session:
         note = brief(study.document, path)
     elif element.depth == 0 and kind in SECTIONS_OF_TABLES:
@@ -142,21 +142,14 @@ def _row(study: Study, element: Element, times_s: Mapping[str, float], *, in_ses
         note = f"{limit:g} N"
     faults = f"{element.faults} problem{'s' * (element.faults > 1)}" if element.faults else ""
     sort = singular(kind) if len(path) == 2 else "question" if "items" in path else ""
-    spoken, at = _spoken(note) if in_session and element.depth == 0 else note, ""
+    at = ""
     if element.step and isinstance(element.step[-1], int):
         count = len(_at(study.document, element.step[:-1]))
         at = f"{'question' if 'items' in path else 'step'} {element.step[-1] + 1} of {count}"
         sort = "" if "items" in path else sort
-    name = ", ".join(filter(None, (element.title, sort, spoken, at, faults)))
+    name = ", ".join(filter(None, (element.title, sort, note, at, faults)))
     title, step = element.title, element.step
     return OutlineRow(path, title, icon_of(path, study.document), note, element.depth + 1, element.faults, name, step)
-
-
-def _spoken(time: str) -> str:
-    """Return "10:12" as "10 minutes 12"."""
-    parts = [int(part) for part in time.split(":")] if time else []
-    units = ("hours", "minutes")[-(len(parts) - 1) :] if len(parts) > 1 else ()
-    return " ".join([*(f"{part} {unit}" for part, unit in zip(parts, units, strict=False)), *map(str, parts[-1:])])
 
 
 def _at(document: Any, path: Path) -> Any:

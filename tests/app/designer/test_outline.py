@@ -177,7 +177,7 @@ def test_rows_say_what_and_where_they_are_and_contain_the_problems_below_them(de
     count = len(sequence(designer))
     block = next(row for row in rows if row.path == ("blocks", "liquids"))
     at = sequence(designer).index("liquids") + 1
-    assert block.name == f"{block.title}, block, {block.note.replace(':', ' minutes ')}, step {at} of {count}"
+    assert block.name == f"{block.title}, block, {block.note}, step {at} of {count}"
     designer.controller.begin("rek2024", "mine")
     designer.editing.ask(RemoveKey(("questionnaires", "liquid", "items", 1, "text")))
     designer.controller.show_outline()

@@ -20,7 +20,7 @@ REACH = {"kind": "reach", "count": 12}
 @pytest.mark.parametrize(
     ("section", "table", "words"),
     [
-        ("tasks", {"min_s": 30, "max_s": 120.5}, "30 to 120.5 s"),
+        ("tasks", {"min_s": 30, "max_s": 120.5}, "30 s to 2 min"),
         ("tasks", {"duration_s": 30, "timeout_s": 60}, "30 s"),
         ("tasks", REACH, "12 targets"),
         ("tasks", {"min_s": "soon", "max_s": 60}, ""),
@@ -65,6 +65,6 @@ def test_questions_that_use_a_scale_are_counted_one_by_one() -> None:
 def test_outline_and_lists_to_choose_from_say_it() -> None:
     study = read(shipped_file("rek2024").read_bytes(), shipped_file("rek2024").parent)
     task = next(row for row in outline_rows(study, {}) if row.path == ("tasks", "explore") and row.depth == 2)
-    assert (task.note, task.name) == ("30 to 120 s", "Explore, task, 30 to 120 s")
+    assert (task.note, task.name) == ("30 s to 2 min", "Explore, task, 30 s to 2 min")
     row = next(row for row in form(study, ("blocks", "liquids")).rows if row.row.path[-1] == "task")
     assert dict(row.notes)["reach"] == "12 targets"

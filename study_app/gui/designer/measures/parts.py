@@ -173,7 +173,7 @@ class Made(Card):
         row = QWidget()
         across = QHBoxLayout(row)
         across.setContentsMargins(0, 0, 0, 0)
-        across.addWidget(verdict_line(verdict), 1)
+        across.addWidget(verdict_line(verdict), 1, Qt.AlignmentFlag.AlignVCenter)
         made = ActionButton("", action, height=32)
         made.setProperty("dense", "true")
         made.setAccessibleName(f"{action}: {verdict[2]}")

@@ -42,6 +42,7 @@ from study_app.viewmodels.designer.measures.number_cards import (
     people,
 )
 from study_app.viewmodels.designer.problem_rows import ProblemRow
+from study_app.viewmodels.number_words import duration_figure
 
 MOST_LABELS: Final = 9
 AS_ASKED: Final = "Clipped levels are simulated as they are requested"
@@ -146,7 +147,7 @@ def number_cards(
         _one_person(of, simulated),
         _people(simulated, participants, simulated.precision, warned=warned),
         NumberCard(
-            "Lasts", f"{duration_s / 60:.0f}", "min",
+            "Lasts", *duration_figure(duration_s),
             ("neutral", "clock", f"{order.trials} trials{breaks}"),
         ),
     )  # fmt: skip

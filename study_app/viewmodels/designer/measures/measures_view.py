@@ -182,7 +182,7 @@ def _measured(protocol: Protocol, block: Block, slow: SlowResults) -> str:
     """Return what a block measures, with what is known of it."""
     focus = focus_of(protocol, ("blocks", block.id))
     if focus.plan is None:
-        return "differences" if focus.compares else ""
+        return "smallest differences" if focus.compares else ""
     words = LevelWords(focus.plan.stimulus, focus.plan.design)
     if (ends := slow.ranges.get(block.id)) is None:
         return f"{words.name}s" if block.id not in slow.ranges else f"no {words.name}"

@@ -37,7 +37,7 @@ from study_app.viewmodels.designer.measures.number_cards import (
     Verdict,
     people,
 )
-from study_app.viewmodels.number_words import duration, minutes
+from study_app.viewmodels.number_words import duration, duration_figure, duration_range
 from study_app.viewmodels.sessions import counted
 
 SQUARE_NAMES: Final = {"williams": "Williams design", "latin": "Latin square"}
@@ -67,23 +67,23 @@ def session_card(study: Study, facts: Facts, path: Path, parts: int | None = Non
     if facts.expected_s is None or facts.range_s is None:
         unknown = tuple((UNKNOWN, word) for word in ("min", "answers", "trials"))
         return SessionCard("Session", unknown, verdicts=verdicts)
-    least, most = (round(one / 60) for one in facts.range_s)
     figures = (
-        (f"{facts.expected_s / 60:.0f}", "min"),
+        duration_figure(facts.expected_s),
         (str(facts.answers), _word(facts.answers, "answer")),
         (str(facts.trials), _word(facts.trials, "trial")),
     )
     whole = max(1e-9, sum(facts.steps_s.values()))
     chosen = str(path[1]) if len(path) > 1 else ""
     segments = tuple(
-        (f"{_title(study, step)} {minutes(duration)}", duration / whole, step == chosen, _path(study, step))
-        for step, duration in facts.steps_s.items()
+        (f"{_title(study, step)} {duration(step_s)}", step_s / whole, step == chosen, _path(study, step))
+        for step, step_s in facts.steps_s.items()
     )
     longest = sorted(facts.steps_s, key=lambda step: -facts.steps_s[step])[:2]
     named = [chosen, *(one for one in longest if one != chosen)][:2] if chosen in facts.steps_s else longest
-    notes = tuple(f"{_title(study, step)} {minutes(facts.steps_s[step])}" for step in facts.steps_s if step in named)
+    notes = tuple(f"{_title(study, step)} {duration(facts.steps_s[step])}" for step in facts.steps_s if step in named)
     breaks = f"{facts.breaks} break{'s' * (facts.breaks != 1)}" if facts.breaks else ""
-    aside = ", ".join(filter(None, (f"{least} to {most} min" if least != most else "", breaks)))
+    least_to_most = duration_range(*facts.range_s)
+    aside = ", ".join(filter(None, (least_to_most if " to " in least_to_most else "", breaks)))
     return SessionCard("Session", figures, aside, segments, notes, verdicts)
 
 
@@ -93,7 +93,7 @@ def questions_card(protocol: Protocol, name: str, parts: int | None) -> SessionC
     count = len(questionnaire.items)
     blocks = [block for block in protocol.blocks_in_order if block.questionnaire == name]
     times = sum(order_of(protocol, block).trials for block in blocks) + (name in protocol.forms)
-    figures = ((minutes(answering_s(questionnaire)), "min"), (str(count), _word(count, "answer")))
+    figures = (duration_figure(answering_s(questionnaire)), (str(count), _word(count, "answer")))
     asked: Verdict = ("neutral", "info", f"{count * times} answers per session, asked {times} {_word(times, 'time')}")
     if not times:
         asked = ("warn", "warning", "It is never asked")
@@ -155,7 +155,7 @@ def block_card(study: Study, facts: Facts, protocol: Protocol, block: Block) -> 
     answers = 0 if questionnaire is None else len(questionnaire.items)
     duration_s = facts.steps_s.get(block.id)
     figures = (
-        (UNKNOWN if duration_s is None else f"{duration_s / 60:.0f}", "min"),
+        (UNKNOWN, "min") if duration_s is None else duration_figure(duration_s),
         (str(order.trials), _word(order.trials, "trial")),
         (str(order.trials * answers), _word(order.trials * answers, "answer")),
     )
@@ -232,9 +232,7 @@ def force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[s
     sentences: tuple[Verdict, ...] = tuple(("warn", "warning", _sentence(one)) for one in alike)
     if not sentences and len(names) > 1:
         sentences = (("ok", "check", "No pair is hard to tell apart"),)
-    return LinesCard(
-        "Force of each liquid", f"at 0.1 m/s, {LIMIT_NAMES['norm']} {limit_n:g} N", tuple(lines), sentences
-    )
+    return LinesCard("Force of each liquid", f"0.1 m/s, {LIMIT_NAMES['norm']} {limit_n:g} N", tuple(lines), sentences)
 
 
 def effects_card(study: Study, protocol: Protocol, name: str) -> LinesCard:
@@ -271,7 +269,7 @@ def texts_card(study: Study) -> TextsCard:
 
 def detectable_card(study: Study, block: Block, who: str, found: Detectable | None, underway: Underway) -> LinesCard:
     """Return the smallest difference of each statement that studies of so many participants (``who``) show."""
-    title, (progress, failed) = "What participants can show", underway
+    title, (progress, failed) = "Smallest differences", underway
     if not valid_part(study).forces:  # what is answered depends on them
         return LinesCard(title, who, (), (("neutral", "minus", NO_FORCES),))
     if failed:
@@ -286,11 +284,14 @@ def detectable_card(study: Study, block: Block, who: str, found: Detectable | No
         name = title_of(study.document, path)
         number = UNKNOWN if one.detectable is None else f"{one.detectable:.1f}"
         lines.append(Line(name, number, (one.detectable or 0.0) / (found.points - 1)))
-    model = "The smallest difference that 4 of 5 simulated studies show. The answers are a model's, not measured."
+    model = (
+        f"The smallest difference, in points of {found.points}, that 4 of 5 simulated studies show. The answers are a "
+        "model's, not measured."
+    )
     note: Verdict = ("neutral", "info", model)
     if not lines:
         note = ("neutral", "info", "The answer model knows none of the statements.")
-    return LinesCard(title, f"{who}, points of {found.points}", tuple(lines), (note,), progress)
+    return LinesCard(title, who, tuple(lines), (note,), progress)
 
 
 def warnings_card(facts: Facts, more: Sequence[str], failed: str = "") -> LinesCard | None:

@@ -15,6 +15,7 @@ from study_app.protocol.trials.methods.adjustment import Adjustment
 from study_app.protocol.trials.task import AnyTask
 from study_app.protocol.trials.tracks import design_of, method_of
 from study_app.viewmodels.designer.form.row_facts import RowFacts
+from study_app.viewmodels.number_words import duration
 
 PhaseKind: TypeAlias = Literal["interval", "pause", "question", "feedback"]
 
@@ -52,7 +53,7 @@ class Phase:
     @property
     def duration(self) -> str:
         """The duration in words."""
-        return f"{'about ' if self.about else ''}{self.duration_s:.3g} s"
+        return f"{'about ' if self.about else ''}{duration(self.duration_s, tenths=True)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +67,12 @@ class TrialStrip:
     def sentence(self) -> str:
         """The trial in a sentence."""
         listed = ", ".join(f"{phase.name} {phase.duration}" for phase in self.phases)
-        return f"One trial of {self.duration_s:.3g} s: {listed}."
+        return f"One trial of {self.duration}: {listed}."
+
+    @property
+    def duration(self) -> str:
+        """How long it takes, in words."""
+        return duration(self.duration_s, tenths=True)
 
 
 def trial_strip(study: Study, row: Row) -> TrialStrip | None:

@@ -259,7 +259,7 @@ def test_a_block_of_statements_shows_what_people_can_show(qtbot: Any, designer: 
     assert (wanted.block, wanted.participants) == ("liquids", 12)
     grid = designer.place.measures.grid
     titles = [part.accessibleName() for part in grid.parts]
-    assert titles[:4] == ["Session", "Balance", "What participants can show", "Force of each liquid"]
+    assert titles[:4] == ["Session", "Balance", "Smallest differences", "Force of each liquid"]
     worker.answer()
     qtbot.waitUntil(lambda: grid.cards[2].lines != ())
     lines = [(line.title, line.number) for line in grid.cards[2].lines]

@@ -75,7 +75,8 @@ def test_a_block_of_statements_shows_session_balance_power_and_force() -> None:
     assert {count for line in balance.positions for count in line} == {4}
     assert isinstance(power, LinesCard)
     assert [line.number for line in power.lines] == ["1.0", UNKNOWN]
-    assert power.aside == "12 simulated, points of 7"
+    assert power.aside == "12 simulated"
+    assert "in points of 7" in power.sentences[0][2]
     assert isinstance(force, LinesCard)
     assert study.protocol is not None
     names = list(study.protocol.conditions_in("liquids"))
@@ -96,7 +97,7 @@ def test_a_block_of_statements_shows_session_balance_power_and_force() -> None:
 def test_a_questionnaire_shows_each_time_it_is_asked_and_its_languages() -> None:
     asked, texts, *_ = view(study_of("rek2024"), ("questionnaires", "liquid"), SlowResults(parts=2)).cards
     assert isinstance(asked, SessionCard)
-    assert asked.figures == (("0:59", "min"), ("9", "answers"))
+    assert asked.figures == (("59", "s"), ("9", "answers"))
     assert [words for _, _, words in asked.verdicts] == [
         "2 pages at 1366 × 768",
         "27 answers per session, asked 3 times",

@@ -148,7 +148,7 @@ class StripView(Themed, QWidget):
         painter.setPen(QColor(self.theme.text2))
         head = QRectF(0, 0, self.width(), 16)
         painter.drawText(head, Qt.AlignmentFlag.AlignLeft, "One trial")
-        painter.drawText(head, Qt.AlignmentFlag.AlignRight, f"{self.strip.duration_s:.3g} s")
+        painter.drawText(head, Qt.AlignmentFlag.AlignRight, self.strip.duration)
 
 
 def _widths(phases: tuple[Phase, ...], whole: float) -> list[float]:
