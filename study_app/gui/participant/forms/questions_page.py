@@ -159,7 +159,8 @@ class QuestionsPage(PageWidget):
         """Return the height [px] that there is for questions, with the parts' tabs or without."""
         self._head.invalidate()
         title = self._title.sizeHint().height()
-        head = self._head.heightForWidth(self.width()) - self._head_row.sizeHint().height() + title
+        head = self._head.heightForWidth(self.width())  # -1 without an introduction, which wraps
+        head = (head if head >= 0 else self._head.sizeHint().height()) - self._head_row.sizeHint().height() + title
         higher = max(0, round(target_px(self.words_scale)) - title) if tabs else 0
         return self.height() - head - higher - self.foot.height()
 

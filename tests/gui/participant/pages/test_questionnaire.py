@@ -272,6 +272,11 @@ def test_nine_statements_fit_without_scrolling(qtbot: Any, size: tuple[int, int]
         assert words.height() >= row.statement.heightForWidth(words.width()) - 1
 
 
+def test_rows_without_an_introduction_do_not_overlap(qtbot: Any) -> None:
+    shown = Shown(qtbot, questionnaire(intro=""), (1024, 640))
+    assert all(before.geometry().bottom() < after.geometry().top() for before, after in pairwise(shown.rows))
+
+
 @pytest.mark.parametrize("size", [(1366, 768), (1024, 640), (860, 640)], ids=str)
 def test_long_dutch_texts_are_not_clipped(qtbot: Any, size: tuple[int, int]) -> None:
     page = questionnaire((LONG,) * 9, labels=DUTCH_LABELS, intro="In hoeverre bent u het eens met elke uitspraak?")
