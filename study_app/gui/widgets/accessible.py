@@ -7,7 +7,7 @@ from PySide6.QtGui import QAccessible
 from PySide6.QtWidgets import QAccessibleWidget, QLabel, QWidget
 
 _given: list[QAccessibleWidget] = []
-_PRUNED_FROM = 256
+_PRUNED_AT = 256  # and at its multiples
 
 
 def give_role(widget: QWidget, role: QAccessible.Role) -> None:
@@ -16,7 +16,7 @@ def give_role(widget: QWidget, role: QAccessible.Role) -> None:
     Qt owns the interface and deletes it with the widget; Python's reference must outlive it, or it is deleted twice.
     Call it last: Qt forgets the role once a signal is connected to a method that the widget's class has in Python.
     """
-    if len(_given) >= _PRUNED_FROM:
+    if len(_given) % _PRUNED_AT == 0:
         _given[:] = [one for one in _given if shiboken6.isValid(one)]
     made = QAccessibleWidget(widget, role)
     QAccessible.registerAccessibleInterface(made)
