@@ -74,7 +74,7 @@ class PageWidget(QWidget):
         self._clock = clock
         self._text_scale = text_scale
         self.setLayoutDirection(direction(words))
-        self.setAutoFillBackground(False)
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
 
     @property
     def mirrored(self) -> bool:
