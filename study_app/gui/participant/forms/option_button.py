@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, ClassVar, Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
-from PySide6.QtCore import QEvent, QPoint, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QEnterEvent, QFontMetricsF, QInputDevice, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtCore import QEvent, QPoint, QRectF, QSize, Qt
+from PySide6.QtGui import (
+    QColor,
+    QEnterEvent,
+    QFontMetricsF,
+    QImage,
+    QInputDevice,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+)
 from PySide6.QtWidgets import QCheckBox, QRadioButton, QSizePolicy, QWidget
 
-from study_app.gui.participant.forms.question_field import target_px
+from study_app.gui.participant.forms.question_field import question_of, target_px
 from study_app.gui.participant.pages.key_caps import Button
 from study_app.gui.participant.pages.page_widget import page_painter
 from study_app.gui.theme.icons import draw_icon
@@ -46,13 +56,53 @@ def height_of(words: str, scale: float, width_px: float) -> float:
     return QFontMetricsF(font("chosen", scale=scale)).boundingRect(room, CENTRE, words).height()
 
 
+class OpenLook(NamedTuple):
+    """How an answer looks that is not chosen: in a size [px], perhaps pointed at, or with strong words."""
+
+    words: str
+    look: Look
+    scale: float
+    width: int
+    height: int
+    pointed: bool
+    strong: bool
+
+    def paint(self, painter: QPainter) -> None:
+        """Draw it."""
+        theme, scale, pointed = PARTICIPANT, self.scale, self.pointed
+        inset = 0.75 if pointed else 0.5
+        body = QRectF(0, 0, self.width, self.height).adjusted(inset, inset, -inset, -inset)
+        edge = QPen(QColor(theme.text if pointed else theme.ctl), 1.5 if pointed else 1.0)
+        open_ = self.look == "off scale" and not pointed
+        if open_:
+            edge.setDashPattern([3, 3])
+        painter.setPen(edge)
+        painter.setBrush(Qt.BrushStyle.NoBrush if open_ else QColor(theme.hover if pointed else theme.surface))
+        painter.drawRoundedRect(body, RADIUS_CONTROL * scale, RADIUS_CONTROL * scale)
+        painter.setFont(font("cell", scale=scale))
+        painter.setPen(QColor(theme.text if self.strong else theme.text2))
+        painter.drawText(body.adjusted(4, 0, -4, 0), CENTRE, self.words)
+
+
+@lru_cache(maxsize=256)
+def picture_of(look: OpenLook, ground: str) -> QImage:
+    """Return the picture of an answer on a ground of one colour."""
+    made = QImage(look.width, look.height, QImage.Format.Format_RGB32)
+    made.fill(QColor(ground))
+    painter = QPainter(made)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    look.paint(painter)
+    painter.end()
+    return made
+
+
 class OptionLook(Button):
     """How an answer looks: the whole rectangle is clickable; shape, fill and a check mark show that it is chosen.
 
-    ``entered(here)`` says whether the pointer came or went.
+    ``place`` is its number among the answers of its question, which is told where the pointer comes and goes.
     """
 
-    entered: ClassVar[Any]
+    place = -1
 
     def prepare(self, text: str, name: str, description: str, look: Look = "words") -> None:
         """Show ``text``; a screen reader says ``name`` and ``description``."""
@@ -100,42 +150,39 @@ class OptionLook(Button):
         return round(max(target_px(self._scale), needed + 12 * self._scale))
 
     def enterEvent(self, event: QEnterEvent) -> None:  # noqa: N802
-        """Emit that the pointer is here."""
+        """Tell the question that the pointer is here."""
         super().enterEvent(event)
-        self.entered.emit(True)
+        self._tell_pointed(self.place)
 
     def leaveEvent(self, event: QEvent) -> None:  # noqa: N802
-        """Emit that it left."""
+        """Tell it that the pointer left."""
         super().leaveEvent(event)
-        self.entered.emit(False)
+        self._tell_pointed(-1)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802
         """Let a finger that is lifted point at nothing any more."""
         super().mouseReleaseEvent(event)
         if event.device().type() == QInputDevice.DeviceType.TouchScreen:
-            self.entered.emit(False)
+            self._tell_pointed(-1)
+
+    def _tell_pointed(self, place: int) -> None:
+        if (question := question_of(self)) is not None:
+            question.point(place)
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
-        """Draw the answer."""
+        """Draw the answer; a point looks like those of other questions and is drawn once for all of them."""
         painter = page_painter(self)
-        theme, scale = PARTICIPANT, self._scale
+        in_focus = self._in_focus()
+        strong = self._look == "words" or self.pointed or in_focus
+        look = OpenLook(self._words, self._look, self._scale, self.width(), self.height(), self.pointed, strong)
         if self.isChecked():
             self._paint_chosen(painter)
-            painter.end()
-            return
-        inset = 0.75 if self.pointed else 0.5
-        body = QRectF(self.rect()).adjusted(inset, inset, -inset, -inset)
-        edge = QPen(QColor(theme.text if self.pointed else theme.ctl), 1.5 if self.pointed else 1.0)
-        open_ = self._look == "off scale" and not self.pointed
-        if open_:
-            edge.setDashPattern([3, 3])
-        painter.setPen(edge)
-        painter.setBrush(Qt.BrushStyle.NoBrush if open_ else QColor(theme.hover if self.pointed else theme.surface))
-        painter.drawRoundedRect(body, RADIUS_CONTROL * scale, RADIUS_CONTROL * scale)
-        painter.setFont(font("cell", scale=scale))
-        strong = self._look == "words" or self.pointed or self._in_focus()
-        painter.setPen(QColor(theme.text if strong else theme.text2))
-        painter.drawText(body.adjusted(4, 0, -4, 0), CENTRE, self._words)
+        elif self._look == "point" and self.devicePixelRatioF() == 1 and self.window().graphicsProxyWidget() is None:
+            question = question_of(self)
+            lit = in_focus or (question is not None and question.missing)
+            painter.drawImage(0, 0, picture_of(look, PARTICIPANT.selected if lit else PARTICIPANT.window))
+        else:
+            look.paint(painter)
         painter.end()
 
     def _in_focus(self) -> bool:
@@ -167,8 +214,6 @@ class OptionLook(Button):
 class RadioOption(OptionLook, QRadioButton):
     """One of several answers."""
 
-    entered = Signal(bool)
-
     def __init__(
         self, text: str, name: str, description: str, parent: QWidget | None = None, *, look: Look = "words"
     ) -> None:
@@ -178,8 +223,6 @@ class RadioOption(OptionLook, QRadioButton):
 
 class CheckOption(OptionLook, QCheckBox):
     """One of several answers that can be given together."""
-
-    entered = Signal(bool)
 
     def __init__(
         self, text: str, name: str, description: str, parent: QWidget | None = None, *, look: Look = "words"

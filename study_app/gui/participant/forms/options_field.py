@@ -38,7 +38,7 @@ class OptionsField(QuestionField):
         self._group.idToggled.connect(lambda place, on: self._toggle(place, on))  # noqa: PLW0108
         for place, option in enumerate(options):
             self._group.addButton(option, place)
-            option.entered.connect(lambda here, place=place: self.point(place if here else -1))
+            option.place = place
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
 
     @property

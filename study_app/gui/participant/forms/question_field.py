@@ -133,6 +133,9 @@ class QuestionField(QWidget):
         self._tell()
         return height
 
+    def point(self, place: int) -> None:
+        """Point at an answer, at none with -1; what is typed cannot be pointed at."""
+
     def ask(self, *, missing: bool) -> None:
         """Mark the question as still to be answered."""
         self.missing = missing and not self.is_answered

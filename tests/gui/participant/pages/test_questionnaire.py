@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import QPoint, QRect, QRectF, Qt
-from PySide6.QtGui import QFontMetricsF
+from PySide6.QtGui import QColor, QFontMetricsF
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
@@ -275,6 +275,21 @@ def test_nine_statements_fit_without_scrolling(qtbot: Any, size: tuple[int, int]
 def test_rows_without_an_introduction_do_not_overlap(qtbot: Any) -> None:
     shown = Shown(qtbot, questionnaire(intro=""), (1024, 640))
     assert all(before.geometry().bottom() < after.geometry().top() for before, after in pairwise(shown.rows))
+
+
+def test_points_stand_on_the_ground_of_their_row(shown: Shown) -> None:
+    def grounds() -> list[tuple[QColor, QColor]]:
+        image = shown.widget.grab().toImage()
+        corners = [point.mapTo(shown.widget, QPoint(0, 0)) for row in shown.rows for point in row.points]
+        return [(image.pixelColor(corner), image.pixelColor(corner - QPoint(2, 0))) for corner in corners]
+
+    shown.rows[0].point(0)
+    before = grounds()
+    assert all(corner == beside for corner, beside in before)
+    shown.widget.submit()  # every row is marked as missing an answer
+    after = grounds()
+    assert all(corner == beside for corner, beside in after)
+    assert after[-1] != before[-1]
 
 
 @pytest.mark.parametrize("size", [(1366, 768), (1024, 640), (860, 640)], ids=str)
