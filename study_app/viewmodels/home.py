@@ -9,14 +9,9 @@ from dataclasses import dataclass
 from datetime import datetime
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Final
 
 from study_app.authoring.drafts import draft_files, draft_of, unsaved_files
-from study_app.authoring.edited_study import Study
-from study_app.authoring.fields import label_of
 from study_app.authoring.kept_settings import kept_original
-from study_app.authoring.outline import study_title, title_of
-from study_app.authoring.versions.changes import changes
 from study_app.errors import ProtocolError, StudyError
 from study_app.protocol.load import at_hand, is_scene_file, load, parse
 from study_app.protocol.model import Protocol
@@ -31,14 +26,10 @@ from study_app.store.journals import journal
 from study_app.store.progress import progress_of
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.workstation import recent_protocols
-from study_app.viewmodels.designer.problem_rows import element_of
 from study_app.viewmodels.extent import counted_each, extent_of
 from study_app.viewmodels.session.stages import operator_language, step_title
 from study_app.viewmodels.sessions import SessionFacts, counted, started_words
 from study_app.workspace import workspace
-
-NAMED_AT_MOST: Final = 3
-"""So many elements with edits that were not saved are named."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +120,9 @@ def _of_draft(file: Path) -> DraftFacts | None:
     draft = draft_of(file)
     if draft is None:  # it was saved meanwhile
         return None
-    title = study_title(Study(draft.text, file.parent).document)
+    from study_app.viewmodels.drafts import draft_title  # noqa: PLC0415 - the designer's modules: only for a draft
+
+    title = draft_title(draft.text, file.parent)
     note = DraftNote(f"Draft of {time_words(draft.kept_at)}, never saved", draft.kept_at)
     return DraftFacts(str(file), title or file.stem, origin_of(str(file)), note)
 
@@ -207,24 +200,11 @@ def _draft_note(source: str) -> DraftNote | None:
         file = find(source)
         draft, content = None if is_shipped(source) else draft_of(file), file.read_bytes()
         if draft is not None and draft.text.encode() != content:
-            edited = _edited(content.decode("utf-8", "replace"), Study(draft.text, file.parent))
+            from study_app.viewmodels.drafts import edited_words  # noqa: PLC0415 - likewise
+
+            edited = edited_words(content.decode("utf-8", "replace"), draft.text, file.parent)
             return DraftNote(f"Draft of {time_words(draft.kept_at)}, not saved{edited}", draft.kept_at)
     return None
-
-
-def _edited(saved: str, study: Study) -> str:
-    """Return the elements in which a study differs from its file, in words: ": Water, Welcome and 2 more"."""
-    try:
-        found = changes(saved, study)
-    except ValueError:  # the text of one of them is not TOML
-        return ""
-    places = (one.path for one in found if one.path)
-    titles = dict.fromkeys(
-        label_of(path[1]) if path[0] == "study" and len(path) > 1 else title_of(study.document, element_of(study, path))
-        for path in places
-    )
-    named, more = list(titles)[:NAMED_AT_MOST], len(titles) - NAMED_AT_MOST
-    return f": {', '.join(named) or 'comments, order or notation'}{f' and {more} more' if more > 0 else ''}"
 
 
 def time_words(moment: str) -> str:

@@ -1,4 +1,4 @@
-"""What the first windows load: neither the compiler nor the plots, which take longer than all the rest."""
+"""What the first windows load: neither the compiler, nor the plots, nor what the designer alone needs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 pytestmark = pytest.mark.slow
 
-HEAVY = ("matplotlib", "numba", "pandas", "pyarrow", "pyqtgraph", "scipy")
+HEAVY = ("matplotlib", "numba", "pandas", "pyarrow", "pyqtgraph", "scipy", "tomlkit")
 
 HOME = """
 import sys
