@@ -51,6 +51,13 @@ assert live.note.isVisible()
 print(sorted({name.partition(".")[0] for name in sys.modules}))
 """
 
+COMMAND = """
+import sys
+from study_app import app
+before = {name for name in sys.modules if name.startswith("study_app.app.")}
+assert callable(app.run) and callable(app.home)
+print(sorted(before & {"study_app.app.main_controller", "study_app.app.devices_controller"}))
+"""
 
 BESIDE = """
 import gc, sys, threading
@@ -93,6 +100,10 @@ def loaded(program: str, folder: Path) -> list[str]:
 
 def test_home_stands_before_anything_heavy_is_loaded(tmp_path: Path) -> None:
     assert loaded(HOME, tmp_path) == []
+
+
+def test_a_session_by_command_loads_neither_the_main_window_nor_the_devices(tmp_path: Path) -> None:
+    assert said(COMMAND, tmp_path) == "[]"
 
 
 def test_the_note_before_a_session_stands_before_anything_heavy_is_loaded(tmp_path: Path) -> None:

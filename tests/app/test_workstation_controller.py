@@ -275,7 +275,7 @@ def test_from_the_cockpit_a_falcon_is_examined_and_of_what_is_none_it_is_said(qt
         asked.append((name, held))
         return SimpleNamespace(show=lambda: None)
 
-    monkeypatch.setattr("study_app.app.session.live_session.diagnosis", diagnosis)
+    monkeypatch.setattr("study_app.app.devices_controller.diagnosis", diagnosis)
     live = LiveSession(NewSession("demo", "P001", 1, 7, "", "en", device, True, None, Path("nowhere")), LIGHT)
     operator = QMainWindow()
     operator.theme = DARK

@@ -20,7 +20,6 @@ from PySide6.QtGui import QScreen
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.app.crash_trace import CrashTrace
-from study_app.app.devices_controller import diagnosis
 from study_app.app.session.garbage_collection import unfreeze_garbage
 from study_app.app.session.preloading import load_windows
 from study_app.app.session.termination import BY_SIGNAL_S
@@ -273,6 +272,8 @@ class LiveSession(QObject):
 
     def diagnose(self) -> None:
         """Open the diagnosis of the haptic device over the operator's window; the bridge has stopped the force."""
+        from study_app.app.devices_controller import diagnosis  # noqa: PLC0415 - the note comes before it
+
         assert self.bridge is not None  # noqa: S101 - it has just asked
         name = self.chosen.device
         device = descriptor_of(name)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 def load_windows() -> None:
     """Load what a session's windows need while the note is shown: modules, and versions, read from the disk once."""
+    import study_app.app.devices_controller  # noqa: PLC0415
     import study_app.app.session.preflight_controller  # noqa: PLC0415
     import study_app.app.session.session_windows  # noqa: PLC0415
     import study_app.store.receipt  # noqa: PLC0415

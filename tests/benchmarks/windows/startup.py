@@ -39,15 +39,17 @@ class Probe(QObject):
         return False
 
 from study_app import app
-from study_app.app import main_controller
-from study_app.app.session import entry
-made = main_controller.application_here
+if sys.argv[1] == "home":
+    from study_app.app import main_controller as started
+else:
+    from study_app.app.session import entry as started
+made = started.application_here
 def with_probe():
     application = made()
     application.probe = Probe(sys.argv[2].split(","))
     application.installEventFilter(application.probe)
     return application
-entry.application_here = main_controller.application_here = with_probe
+started.application_here = with_probe
 if sys.argv[1] == "home":
     app.home()
 else:
