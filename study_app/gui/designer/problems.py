@@ -20,7 +20,7 @@ from study_app.viewmodels.designer.keys import key_cap, tip
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 
 HIGHEST, NARROW_BELOW = 290, 1000
-HEAD_PX, ROW_PX, NAME_PX, NARROW_NAME_PX, REPAIR_PX, NARROW_REPAIR_PX = 92, 46, 300, 210, 190, 110
+HEAD_PX, ROW_PX, NAME_PX, NARROW_NAME_PX, REPAIR_PX, NARROW_REPAIR_PX = 92, 46, 300, 240, 190, 110
 
 
 class ProblemLine(Themed, QWidget):

@@ -55,12 +55,12 @@ class EntryRow(Themed, QWidget):
         self.row = QHBoxLayout(self)
         self.row.setContentsMargins(24 if grip else 12, 0, 2, 0)
         self.row.setSpacing(2)
-        self.row.addWidget(self.title, 1)
+        self.row.addWidget(self.title)
         if entry.note and entry.note.replace("_", " ") != entry.title.lower():
             note = Elided("small", "text2")
             note.show_text(entry.note)
             note.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-            self.row.addWidget(note, 1)
+            self.row.addWidget(note)
         self.setMinimumHeight(FIELD_PX + 2)
         self.setAccessibleName(words)
 

@@ -96,7 +96,7 @@ class FormHead(QWidget):
         below.addWidget(self.kind)
         below.addWidget(self.followed, 1)
         words.addLayout(below)
-        grid = self._grid = QGridLayout(self)
+        grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(8)
         grid.addWidget(self.tile, 0, 0)
@@ -134,7 +134,8 @@ class FormHead(QWidget):
         self.tile.icon = form.icon
         self.tile.update()
         self.title.show_text(form.title)
-        self._show_kind(form)
+        at = "" if form.position is None else f"{form.position[0]} of {form.position[1]}"
+        self.kind.show_text("  ·  ".join(filter(None, (form.kind, at, form.used))))
         self.id_line.setVisible(form.id is not None)
         self._read_only = read_only
         self._apply_lock()
@@ -175,20 +176,12 @@ class FormHead(QWidget):
         self.comments.setText(words or "Comments")
         self.comments.setVisible(bool(words))
 
-    def _show_kind(self, form: Form) -> None:
-        """Show what the element is, its place, and what uses it, unless what followed its id stands there."""
-        at = "" if form.position is None else f"{form.position[0]} of {form.position[1]}"
-        used = "" if self.followed.whole else form.used
-        self.kind.show_text("  ·  ".join(filter(None, (form.kind, at, used))))
-
     def show_followed(self, words: str) -> None:
-        """Show next to the kind, and say once, what followed the id."""
+        """Show in place of the kind, and say once, what followed the id."""
         if words:
             say(self, words)
-        self.followed.show_text(f"·  {words}" if words else "")
-        if self.form is not None:
-            self._show_kind(self.form)
-            self._grid.activate()  # at once, or it is cut where there was less room
+        self.followed.show_text(words)
+        self.kind.setHidden(bool(words))
 
     def _apply_lock(self) -> None:
         path, why = self._lock

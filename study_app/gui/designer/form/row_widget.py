@@ -58,6 +58,7 @@ class RowWidget(Themed, QWidget):
         self.key = structure_of(row)
         self.refusal = ""
         special, wide = special_editor_of(row), is_wide(row)
+        bare = special is not None and not special.labelled
         self.field = field(row) if special is None else special.make(row)
         self.keys = Segments("Which of the two is given") if row.instead else None
         self.words = label(row.row.label, "label", wraps=True)
@@ -75,12 +76,15 @@ class RowWidget(Themed, QWidget):
         across = QHBoxLayout()
         across.setSpacing(8)
         top = Qt.AlignmentFlag.AlignTop
-        across.addWidget(self.words, int(wide), top)
-        across.addWidget(label(self.field.caption, "small", "text2") if wide else self.field, int(not wide))
-        if self.remove is None:
-            across.addSpacing(FIELD_PX + across.spacing())
+        if bare:
+            across.addWidget(self.field, 1)
         else:
+            across.addWidget(self.words, int(wide), top)
+            across.addWidget(label(self.field.caption, "small", "text2") if wide else self.field, int(not wide))
+        if self.remove is not None:
             across.addWidget(self.remove, 0, top)
+        elif not bare:
+            across.addSpacing(FIELD_PX + across.spacing())
         self.repairs: list[RepairButton] = []
         self._offered: dict[ProblemRow, tuple[str, ...]] = {}
         self._buttons = QVBoxLayout()
@@ -90,10 +94,10 @@ class RowWidget(Themed, QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(4)
         heads = wide and len(row.languages) > 1 and not stacked(row)
-        labelled = row.removable or not (heads or (special is not None and not special.labelled))
-        if labelled:
+        labelled = not bare and (row.removable or not heads)
+        if labelled or bare:
             column.addLayout(across)
-        else:  # the names of the languages, or the editor, say what it is
+        if not labelled:  # the names of the languages, or the editor, say what it is
             self.words.setParent(self)
             self.words.hide()
         if self.keys is not None:
@@ -106,7 +110,7 @@ class RowWidget(Themed, QWidget):
         if heads:
             of = "" if labelled else f"{row.row.label}, "
             column.addLayout(language_heads(tuple((code, f"{of}{language}") for code, language in row.languages)))
-        if wide:
+        if wide and not bare:
             column.addWidget(self.field)
         column.addLayout(self._buttons)
         self.show_row(row)

@@ -163,6 +163,22 @@ class Made(Card):
         self.setAccessibleName(title)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)  # columns are equally wide
         self.column.addStretch()
+        self._beside = True
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Put what is beside the title below it where it would be cut."""
+        super().resizeEvent(event)
+        margins, head = self.column.contentsMargins(), self.column.itemAt(0).layout()
+        needed = self.heading.sizeHint().width() + self.aside.sizeHint().width() + 2 * head.spacing()
+        beside = needed <= self.width() - margins.left() - margins.right()
+        if beside != self._beside:
+            self._beside = beside
+            side = Qt.AlignmentFlag.AlignRight if beside else Qt.AlignmentFlag.AlignLeft
+            self.aside.setAlignment(side | Qt.AlignmentFlag.AlignVCenter)
+            if beside:
+                head.addWidget(self.aside)
+            else:
+                self.column.insertWidget(1, self.aside)
 
     def add(self, part: QWidget) -> None:
         """Add a part below the others."""
@@ -213,7 +229,7 @@ class SessionPart(Made):
                 made.show_text(words)
                 if at:
                     made.setAlignment(Qt.AlignmentFlag.AlignRight)
-                line.addWidget(made, 1)
+                line.addWidget(made)
             self.add(notes)
         if shown.verdicts:
             self.add(Rule())

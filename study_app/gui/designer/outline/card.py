@@ -140,6 +140,7 @@ class OutlineCard(Card):
                 item = QStandardItem(row.title)
                 item.setData(row, ROW_ROLE)
                 item.setData(row.name, Qt.ItemDataRole.AccessibleTextRole)
+                item.setToolTip(row.title)  # it may be cut
                 if not row.path:
                     item.setFlags(Qt.ItemFlag.ItemIsEnabled)
                 depth = max(row.depth - 1, 0)

@@ -355,7 +355,8 @@ def _entries(study: Study, row: Row) -> Iterator[Entry]:
             if row.kind == "references":
                 named = named_at(study.document, path)
                 title = str(row.value[key]) if named is None else title_of(study.document, named)
-                yield Entry(path, title, "" if named is None else str(named[-1]), faults, named or ())
+                note = "" if named is None or isinstance(named[-1], int) else named[-1]
+                yield Entry(path, title, note, faults, named or ())
             else:
                 inner = value_at(study.document, path)
                 note = inner.get("id", "") if isinstance(inner, Mapping) else ""
