@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QStyle, QStyledItemDelegate, QStyleOptionViewItem
 
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.widgets.controls import Choice
-from study_app.viewmodels.designer.designer_view import StudyChoice
+from study_app.viewmodels.designer.designer_view import BETWEEN, StudyChoice
 
 MARK_PX = 28
 TITLE_ROLE = Qt.ItemDataRole.UserRole + 1
@@ -65,6 +65,11 @@ class StudyList(Choice):
         self.setItemData(self.count() - 1, len(study.title), TITLE_ROLE)
         if opened:
             self.setItemData(self.count() - 1, f"{study.words}, open", Qt.ItemDataRole.AccessibleTextRole)
+
+    def fitted(self, words: str, room_px: int) -> str:
+        """Return title and file, the title alone where there is no room for both."""
+        shown = super().fitted(words, room_px)
+        return shown if shown == words else super().fitted(words.partition(BETWEEN)[0], room_px)
 
     def showPopup(self) -> None:  # noqa: N802 - Qt's name
         """Open the list; where no study is open, at its first line."""

@@ -249,6 +249,10 @@ class Choice(Themed, QComboBox):
         """Leave the wheel to what scrolls."""
         event.ignore()
 
+    def fitted(self, words: str, room_px: int) -> str:
+        """Return as much of the chosen words as there is room for."""
+        return self.fontMetrics().elidedText(words, Qt.TextElideMode.ElideRight, room_px)
+
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the field, then the chevron."""
         painter = QStylePainter(self)
@@ -258,7 +262,7 @@ class Choice(Themed, QComboBox):
         whole = self.currentText() or self.placeholderText()
         field = QStyle.SubControl.SC_ComboBoxEditField
         room = self.style().subControlRect(QStyle.ComplexControl.CC_ComboBox, option, field, self).width()
-        shown = self.fontMetrics().elidedText(whole, Qt.TextElideMode.ElideRight, room)
+        shown = self.fitted(whole, room)
         option.currentText = shown  # type: ignore[attr-defined]  # missing in the stubs
         painter.drawControl(QStyle.ControlElement.CE_ComboBoxLabel, option)
         self.setToolTip(whole if shown != whole else "")

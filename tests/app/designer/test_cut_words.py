@@ -13,6 +13,8 @@ from study_app.gui.designer.form.entry_row import EntryRow
 from study_app.gui.designer.form.form_head import FormHead
 from study_app.gui.designer.form.row_widget import RowWidget
 from study_app.gui.designer.measures.parts import LinesPart
+from study_app.gui.designer.study_list import StudyList
+from study_app.viewmodels.designer.designer_view import StudyChoice
 from study_app.viewmodels.designer.form.form_rows import Entry, form
 from study_app.viewmodels.designer.measures.session_cards import LinesCard
 
@@ -73,3 +75,13 @@ def test_words_beside_the_title_of_a_card_go_below_where_there_is_no_room(qtbot:
 def test_a_short_note_leaves_the_room_to_the_title_of_an_entry(qtbot: Any) -> None:
     row = shown(qtbot, EntryRow(Entry((), "Comfortable", "4"), "", grip=True), 150)
     assert row.title.text() == "Comfortable"
+
+
+def test_the_title_of_a_study_gets_the_room_that_its_file_has_not(qtbot: Any) -> None:
+    studies = StudyList()
+    qtbot.addWidget(studies)
+    study = StudyChoice("A first look", "first_look.toml", "first_look")
+    room = studies.fontMetrics().horizontalAdvance(study.words)
+    assert studies.fitted(study.words, room + 10) == study.words
+    assert studies.fitted(study.words, room - 10) == study.title
+    assert studies.fitted(study.words, 30).endswith("…")
