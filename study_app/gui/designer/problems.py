@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 from study_app.gui.designer.repair_button import RepairButton
 from study_app.gui.designer.segments import Segments
 from study_app.gui.designer.tab_order import lead_by_tab
-from study_app.gui.theme.theme import font
+from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme_within, replace_inside
 from study_app.gui.widgets.cards import Card, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
@@ -40,7 +40,6 @@ class ProblemLine(Themed, QWidget):
         self.go.setAccessibleName(f"{row.name}: {row.message}")
         self.go.clicked.connect(self.opened)
         self.go.setFixedSize(NARROW_NAME_PX if narrow else NAME_PX, 24)
-        self.go.setStyleSheet("text-align: left; padding: 0; color: palette(window-text);")
         self.go.setText(self.go.fontMetrics().elidedText(row.name, Qt.TextElideMode.ElideRight, self.go.width() - 4))
         self._place = Elided("small", "text2")
         self._place.setFixedWidth(self.go.width())
@@ -89,6 +88,12 @@ class ProblemLine(Themed, QWidget):
             made.show()  # at once: Tab passes what a layout is still to show
             self.repairs.append(made)
         lead_by_tab(self.go, self.repairs)
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of ``theme``."""
+        super().apply_theme(theme)
+        own = f"QPushButton {{ text-align: left; padding: 0; color: {theme.text}; }}"
+        self.go.setStyleSheet(f"{own} QPushButton:disabled {{ color: {theme.text3}; }}")
 
     def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
         """Open the problem."""

@@ -6,13 +6,18 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import QEvent, QPointF, Qt
-from PySide6.QtGui import QEnterEvent
+from PySide6.QtGui import QColor, QEnterEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.authoring.measures.participant_texts import texts_by_language
 from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.edits import Set
+from study_app.gui.designer.problems import ProblemLine
+from study_app.gui.theme.theme import DARK, LIGHT, Theme
+from study_app.gui.theme.themed import apply_theme
 from study_app.protocol.source.files import shipped_file
+from study_app.protocol.source.problems import Fault
+from study_app.viewmodels.designer.problem_rows import ProblemRow
 from study_app.viewmodels.designer.requests import ChangeLanguage, SetValue
 
 pytestmark = pytest.mark.slow
@@ -147,3 +152,16 @@ def test_every_text_of_a_second_language_is_copied_from_the_list_or_a_field_in_o
     next(button for button in title.repairs if button.text() == words).click()
     assert designer.editing.opened.study.faults == ()
     assert "not translated yet" in designer.row("pages", "welcome", "title").field.copied.text()
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK])
+def test_the_name_of_a_problem_is_in_the_colour_of_text(qtbot: Any, theme: Theme) -> None:
+    fault = Fault(("blocks", "liquids", "order"), "unknown")
+    row = ProblemRow(fault, ("blocks", "liquids"), "Block Liquids, Order", "layers", "Unknown", "", 12)
+    line = ProblemLine(row, (), narrow=False)
+    qtbot.addWidget(line)
+    apply_theme(line, theme)
+    line.show()
+    picture = line.go.grab().toImage()
+    inks = {picture.pixelColor(x, y).name() for x in range(picture.width()) for y in range(picture.height())}
+    assert QColor(theme.text).name() in inks
