@@ -72,7 +72,7 @@ class ProblemSteps(QObject):
             button.setFocus(Qt.FocusReason.ShortcutFocusReason)
             for area in (self._form.area, self._card.area):
                 if area.isAncestorOf(button):
-                    area.ensureWidgetVisible(button, 0, 40)
+                    area.ensureWidgetVisible(button, 0, 8)  # its field stays in sight
 
     def _can_be_repaired(self, row: ProblemRow) -> bool:
         self.repairs_wanted.emit(row)
