@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from functools import lru_cache, partial
 from pathlib import Path
+from typing import Final
 
 from study_app.authoring.drafts import draft_files, draft_of, unsaved_files
 from study_app.authoring.kept_settings import kept_original
@@ -30,6 +31,8 @@ from study_app.viewmodels.extent import counted_each, extent_of
 from study_app.viewmodels.session.stages import operator_language, step_title
 from study_app.viewmodels.sessions import SessionFacts, counted, started_words
 from study_app.workspace import workspace
+
+SHIPPED: Final = "Shipped study"
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +159,7 @@ def is_shipped(source: str) -> bool:
 def origin_of(source: str) -> str:
     """Return where a study is from: "Shipped study", "Copy of demo" or "Own study"."""
     if is_shipped(source):
-        return "Shipped study"
+        return SHIPPED
     with suppress(ProtocolError):
         file = Path(source) if Path(source).suffix == ".toml" else find(source)
         if original := kept_original(file):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TypeAlias
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.theme.theme import font
@@ -133,7 +133,9 @@ class BrokenCard(FileCard):
 
 
 class CardGrid(QWidget):
-    """The cards side by side, as many in a row as there is room for."""
+    """The cards side by side, as many in a row as there is room for; ``laid_out`` comes when heights may differ."""
+
+    laid_out = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -141,15 +143,18 @@ class CardGrid(QWidget):
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setSpacing(GAP)
-        self._across = 0
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self._across, self._least = 0, LEAST_WIDTH
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
 
     @property
     def row_height(self) -> int:
         """The height of the first row of cards at the width that they have."""
-        wide = (self.width() + GAP) // self._across - GAP if self._across else 0
-        first = self.cards[: self._across]
-        return max((max(card.heightForWidth(wide), card.sizeHint().height()) for card in first), default=0)
+        wide = (self.width() - self._grid.contentsMargins().right() + GAP) // max(1, self._across) - GAP
+        heights = (
+            card.heightForWidth(wide) if card.hasHeightForWidth() else card.sizeHint().height()
+            for card in self.cards[: self._across]
+        )
+        return max(heights, default=0)
 
     @property
     def whole_height(self) -> int:
@@ -163,13 +168,23 @@ class CardGrid(QWidget):
             remove_widget(card)
         self.cards = cards
         self._across = 0
+        self._least = max([LEAST_WIDTH, *(card.minimumSizeHint().width() for card in cards)])
         self.arrange(self.width())
+
+    def leave_room(self, width: int) -> None:
+        """Leave so much room free at the right."""
+        self._grid.setContentsMargins(0, 0, width, 0)
+
+    def event(self, event: QEvent) -> bool:
+        """Tell when cards came that are shown now."""
+        done = super().event(event)
+        if event.type() == QEvent.Type.LayoutRequest:
+            self.laid_out.emit()
+        return done
 
     def arrange(self, width: int) -> None:
         """Place the cards for a window that leaves them ``width``; a lone card does not stretch over it."""
-        self.setFixedWidth(width)
-        least = max([LEAST_WIDTH, *(card.minimumSizeHint().width() for card in self.cards)])
-        across = max(1, (width + GAP) // (least + GAP))
+        across = max(1, (width + GAP) // (self._least + GAP))
         if across == self._across:
             return
         for column in range(self._grid.columnCount()):
@@ -177,7 +192,6 @@ class CardGrid(QWidget):
         self._across = across
         for index, card in enumerate(self.cards):
             self._grid.addWidget(card, index // across, index % across)
-            card.show()  # at once, or it has no height yet
         for column in range(min(across, max(2, len(self.cards)))):
             self._grid.setColumnStretch(column, 1)
         self._grid.activate()  # at once, or what is above keeps the room of the arrangement before

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QFileDialog, QHBoxLayout, QLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QFileDialog, QHBoxLayout, QLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.devices.registry import descriptor_of
 from study_app.errors import StudyError
@@ -35,6 +35,7 @@ from study_app.viewmodels.designer.keys import key_cap, with_key
 from study_app.viewmodels.devices.list_view import DeviceShown, looking
 from study_app.viewmodels.extent import extent_of
 from study_app.viewmodels.home import (
+    SHIPPED,
     DraftFacts,
     Interrupted,
     StudyFacts,
@@ -42,7 +43,6 @@ from study_app.viewmodels.home import (
     held,
     holds_liquids_alone,
     interrupted,
-    is_shipped,
     read_studies,
 )
 from study_app.viewmodels.sessions import SessionFacts, sessions
@@ -51,7 +51,7 @@ from study_app.workspace import workspace
 STACKED_BELOW = 1080
 COLUMN_PX = 326
 MARGIN, BAR_PX = 28, 12
-NEXT_ROW_PX = 52
+NEXT_ROW_PX = 44
 """So much of the second row of cards is seen at least, which says that there is one."""
 CARDS_SHARE, BELOW_SHARE = 4, 3
 """How the cards and the sessions share the height."""
@@ -161,6 +161,7 @@ class HomePlace(Place):
         self.below = QWidget()
         self.below.setLayout(self._below)
         self.cards_area = scrolled(self.grid)
+        self.cards_area.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Ignored)  # no more than is free
         inside = QWidget()
         page = self._page = QVBoxLayout(inside)
         page.setSpacing(14)
@@ -175,6 +176,10 @@ class HomePlace(Place):
         row.addWidget(self.area)
         self.below.hide()  # until the cards are there, which would move it
         self.area.verticalScrollBar().rangeChanged.connect(lambda _least, most: self._keep_margin(most > 0))
+        bar = self.cards_area.verticalScrollBar()
+        bar.rangeChanged.connect(lambda _least, most: self.grid.leave_room(0 if most > 0 else BAR_PX))
+        self.grid.leave_room(BAR_PX)
+        self.grid.laid_out.connect(self._share_height)
         self._keep_margin(bar=False)
 
     def _keep_margin(self, bar: bool) -> None:
@@ -215,7 +220,7 @@ class HomePlace(Place):
         cards: list[QWidget] = []
         next_step = next((it for it in shown if it.draft is not None or isinstance(it, StudyFacts)), None)
         for facts in self._facts:
-            ships, first = is_shipped(facts.source), facts is next_step
+            ships, first = facts.origin == SHIPPED, facts is next_step
             card: StudyCard | BrokenCard
             if isinstance(facts, StudyFacts):
                 card = StudyCard(facts, first=first, shipped=ships)
@@ -324,9 +329,13 @@ class HomePlace(Place):
             card.setMinimumWidth(0 if stacked else COLUMN_PX)
             card.setMaximumWidth(QWIDGETSIZE_MAX if stacked else COLUMN_PX)
         self.grid.arrange(self.width() - 2 * MARGIN)
-        whole = self.grid.whole_height
-        self.cards_area.setMinimumHeight(min(whole, self.grid.row_height + NEXT_ROW_PX))
-        self.cards_area.setMaximumHeight(whole)
+        self._share_height()
+
+    def _share_height(self) -> None:
+        """Let the cards have at least their first row, and no more than all of them need."""
+        if (whole := self.grid.whole_height) > 0:  # cards that came just now have no height yet
+            self.cards_area.setMinimumHeight(min(whole, self.grid.row_height + NEXT_ROW_PX))
+            self.cards_area.setMaximumHeight(whole)
 
     def focusNextPrevChild(self, forward: bool) -> bool:  # noqa: N802 - Qt's name
         """Scroll to a card that gets the keyboard from outside the cards, too."""

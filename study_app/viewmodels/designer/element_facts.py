@@ -61,15 +61,7 @@ def brief(document: Mapping[str, Any], path: Path) -> str:
 
 
 def used_by(document: Mapping[str, Any], path: Path) -> str:
-    """Return how many elements name an element: "used by 3 conditions, 1 block", "not used"; "" of steps and settings.
-
-    Parameters
-    ----------
-    document : mapping
-        The study, sound or not.
-    path : tuple of str or int
-        The element.
-    """
+    """Return how many elements name an element: "used by 3 conditions", "not used"; "" of steps and settings."""
     if len(path) != 2 or path[0] not in USED:
         return ""
     users = {_user(place) for place in references_to(document, path)} - {path}

@@ -85,6 +85,7 @@ def test_cards_of_drafts_come_first_say_what_was_not_saved_and_continue_it(qtbot
     begin_settings(fresh, "demo")
     home.enter()
     qtbot.waitUntil(lambda: any(getattr(card.facts, "title", "") == "Fresh" for card in home.grid.cards))
+    qtbot.waitUntil(lambda: all(card.isVisible() for card in home.grid.cards))
     assert {card.facts.title for card in home.grid.cards[:2]} == {"Own", "Fresh"}
     for title, end in (("Own", ", not saved: Title. Sessions use the saved file."), ("Fresh", ", never saved.")):
         words = card_of(title).draft.text()
