@@ -9,7 +9,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QButtonGroup, QLabel, QWidget
 
 from study_app.gui.theme.theme import font
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Rule
 from study_app.gui.widgets.controls import ActionButton, Radio
 from study_app.gui.widgets.labels import label, set_ink
@@ -44,14 +44,11 @@ class DeviceRow(QWidget):
         self.report.setAccessibleName(f"Bench report of {shown.title}")
         self.report.clicked.connect(lambda: self.report_asked.emit(self._report))
         self._report: Path | None = None
-        head = hbox(spacing=10)
-        if not shown.choosable:
-            head.addSpacing(INSET)
-        add_parts(head, self.title, STRETCH, self.chip)
+        inset = () if shown.choosable else (INSET,)
+        head = hbox(*inset, self.title, STRETCH, self.chip, spacing=10)
         words = vbox(self.can, self.why, self.by, self.bench, STRETCH, spacing=4)
-        below = hbox((words, 1), spacing=16, margins=(INSET, 0, 0, 0))
         buttons = vbox(self.diagnose, self.report, STRETCH, spacing=8)
-        below.addLayout(buttons)
+        below = hbox((words, 1), buttons, spacing=16, margins=(INSET, 0, 0, 0))
         vbox(head, below, spacing=2, margins=(0, 6, 0, 6), parent=self)
         self.show_device(shown)
         self.show_bench(None)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QFileDialog, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QFileDialog, QWidget
 
 from study_app.devices.descriptor import DeviceOption
 from study_app.gui.devices.device_rows import LEAST_WORDS, DeviceList
@@ -113,10 +113,8 @@ class DevicesPlace(Place):
         self._lay_out()
 
     def _lay_out(self) -> None:
-        titles = QVBoxLayout()
-        titles.setSpacing(4)
-        titles.addWidget(label("Devices", "title"))
-        titles.addWidget(label("New sessions use the selected device.", "body", "text2", wraps=True))
+        about = label("New sessions use the selected device.", "body", "text2", wraps=True)
+        titles = vbox(label("Devices", "title"), about, spacing=4)
         head = hbox((titles, 1), self.refresh, margins=(SHADOW, 0, SHADOW, 0))
         lists = vbox(self.people, self.simulated, STRETCH, spacing=18)
         column = vbox(*self.options.values(), self.help, STRETCH, spacing=18)

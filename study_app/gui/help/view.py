@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QFrame, QLineEdit, QListWidget, QListWidgetItem
 from study_app import documentation
 from study_app.gui.help.reader import PageReader
 from study_app.gui.theme.theme import Theme, font
-from study_app.gui.widgets.boxes import hbox, vbox
+from study_app.gui.widgets.boxes import add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
@@ -60,9 +60,7 @@ class HelpPlace(Place):
     def _lay_out(self) -> None:
         pages, page = Card(padding=14, gap=10), Card(padding=6, gap=0)
         pages.setFixedWidth(LIST_WIDTH)
-        pages.column.addWidget(self.words)
-        pages.column.addWidget(self.nothing)
-        pages.column.addWidget(self.list, 1)
+        add_parts(pages.column, self.words, self.nothing, (self.list, 1))
         page.column.addWidget(self.reader, 1)
         head = hbox((label("Help", "title"), 1), self.back, margins=(SHADOW, 0, SHADOW, 0))
         body = hbox(pages, (page, 1), spacing=14)

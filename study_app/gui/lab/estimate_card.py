@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from study_app.gui.lab.measurement_cards import LINE, ReadingCard
 from study_app.gui.theme.theme import font
-from study_app.gui.widgets.boxes import STRETCH, hbox
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
 from study_app.gui.widgets.controls import ActionButton, Choice, Toggle
 from study_app.gui.widgets.labels import Clamped, Elided, figures, label, set_ink
 from study_app.viewmodels.estimation import OFF, PARAMETERS, Choices, EstimateRow
@@ -49,8 +49,6 @@ class EstimateCard(ReadingCard):
         self.follow.setToolTip("Apply estimates as they come, slowly, within the slope and force limits")
         self._inside = QWidget()
         buttons = hbox(self.apply, self.follow, STRETCH, spacing=10)
-        column = self.content
-        column.addWidget(self.source)
         inner = QGridLayout(self._inside)
         inner.setContentsMargins(0, 0, 0, 0)
         inner.setVerticalSpacing(6)
@@ -58,8 +56,7 @@ class EstimateCard(ReadingCard):
         inner.addLayout(self._grid, 1, 0)
         inner.addWidget(self.message, 2, 0)
         inner.addLayout(buttons, 3, 0)
-        column.addWidget(self._inside)
-        column.addStretch()
+        add_parts(self.content, self.source, self._inside, STRETCH)
         self.source.activated.connect(lambda index: self.source_chosen.emit(self.source.itemData(index)))
         self.parameters.activated.connect(lambda index: self.parameters_chosen.emit(self.parameters.itemData(index)))
         self.apply.clicked.connect(self.apply_asked)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QHideEvent, QKeySequence, QResizeEvent, QShortcut, QShowEvent
-from PySide6.QtWidgets import QFileDialog, QGridLayout, QVBoxLayout
+from PySide6.QtWidgets import QFileDialog, QGridLayout
 
 from study_app.gui.lab.estimate_card import EstimateCard
 from study_app.gui.lab.flow_curve_cards import FlowCurveRow
@@ -107,9 +107,7 @@ class LabPlace(Place):
         self._middle.setSpacing(GAP)
         self._middle.setColumnStretch(0, 1)
         self._middle.setColumnStretch(1, 1)
-        framed = QVBoxLayout()
-        framed.setContentsMargins(SHADOW, SHADOW - 1, SHADOW, SHADOW)  # as the neighbouring cards
-        framed.addWidget(self.tank)
+        framed = vbox(self.tank, margins=(SHADOW, SHADOW - 1, SHADOW, SHADOW))  # as the neighbouring cards
         self._middle.addLayout(framed, 0, 0, 1, 2)
         self._middle.addWidget(self.force, 1, 0)
         self._middle.addWidget(self.speed, 1, 1)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from study_app.gui.theme.theme import RADIUS_CARD
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.boxes import add_parts, vbox
+from study_app.gui.widgets.boxes import hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
@@ -37,13 +37,11 @@ class Banner(Themed, QWidget):
         self.what = label("", "strong", "bad", wraps=True)
         self.then = label(WHAT_TO_DO, "label", "text", wraps=True)
         words = vbox(self.what, self.then, spacing=4)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(20, 14, 20, 14)
-        row.setSpacing(14)
-        add_parts(row, (Icon("warning", "bad", 24), 0, Qt.AlignmentFlag.AlignTop), (words, 1))
+        sign = Icon("warning", "bad", 24), 0, Qt.AlignmentFlag.AlignTop
         self.reconnect = ActionButton("repeat", "Reconnect", key="C", role="primary")
         self.reconnect.clicked.connect(self.reconnect_asked)
-        row.addWidget(self.reconnect, 0, Qt.AlignmentFlag.AlignVCenter)
+        button = self.reconnect, 0, Qt.AlignmentFlag.AlignVCenter
+        hbox(sign, (words, 1), button, spacing=14, margins=(20, 14, 20, 14), parent=self)
         self.reconnect.hide()
         self.hide()
 

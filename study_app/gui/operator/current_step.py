@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from study_app.gui.theme.theme import TypeRole, font
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Bar
 from study_app.gui.widgets.labels import Elided, figures, label
 from study_app.viewmodels.number_words import minutes
@@ -36,11 +36,9 @@ class Now(QWidget):
         self.bar.setSizePolicy(keep)
         self.least = figures("", "small", "text2")
         self._words, self._time = QWidget(), QWidget()
-        words = _column(self._words, self.part, self.heading, self.setting)
-        words.addStretch()
         row = hbox(self.elapsed_word, STRETCH, self.elapsed)
-        time = _column(self._time)
-        add_parts(time, row, self.bar, self.least, STRETCH)
+        vbox(self.part, self.heading, self.setting, STRETCH, spacing=6, margins=0, parent=self._words)
+        vbox(row, self.bar, self.least, STRETCH, spacing=6, margins=0, parent=self._time)
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setHorizontalSpacing(24)
@@ -134,8 +132,3 @@ class Tally(QWidget):
             self._grid.setColumnStretch(column, int(column in {2, 5} if self._flat else column == 1))
         for row, line in enumerate((self.beyond, self.track), start=len(self.counts)):
             self._grid.addWidget(line, row, 0, 1, 9 if self._flat else 2)
-
-
-def _column(inside: QWidget, *widgets: QWidget) -> QVBoxLayout:
-    column = vbox(*widgets, spacing=6, margins=0, parent=inside)
-    return column

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QPlainTextEdit, QWidget
+from PySide6.QtWidgets import QPlainTextEdit, QWidget
 
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
@@ -51,9 +51,8 @@ class NotesCard(Card):
         self._shown = NOTES_SHOWN
         self._view: OperatorView | None = None
         self._head = QWidget()
-        head = QHBoxLayout(self._head)
-        head.setContentsMargins(0, 0, 0, 0)
-        add_parts(head, label("Notes and marks", "card"), STRETCH, label("stored in the journal", "small", "text2"))
+        stored = label("stored in the journal", "small", "text2")
+        hbox(label("Notes and marks", "card"), STRETCH, stored, margins=0, parent=self._head)
         self.lines = [_NoteRow(newest=number == 0) for number in range(NOTES_SHOWN)]
         self.none = label("No notes yet.", "label", "text2")
         self._list = QWidget()
@@ -62,9 +61,8 @@ class NotesCard(Card):
         self.hint = label("Press Enter to store it with the time", "small", "text3")
         self.add = ActionButton("pen", "Add note", key="N")
         self.mark = ActionButton("flag", "Mark", key="M")
-        add_parts(self.column, self._head, self._list, (self.field, 1), self.hint)
         buttons = hbox((self.add, 1), (self.mark, 1), spacing=12)
-        self.column.addLayout(buttons)
+        add_parts(self.column, self._head, self._list, (self.field, 1), self.hint, buttons)
         self.field.entered.connect(self._keep)
         self.add.clicked.connect(self._add)
         self.mark.clicked.connect(self.mark_set)
@@ -114,11 +112,8 @@ class _NoteRow(QWidget):
         self.time = figures("", "label", "text2")
         self.text = Clamped("", 2, "label", steady=False) if newest else Elided("label")
         self.text.setFont(font("label", weight=400))
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(8)
-        row.addWidget(self.sign, 0, Qt.AlignmentFlag.AlignTop)
-        add_parts(row, (self.time, 0, Qt.AlignmentFlag.AlignTop), (self.text, 1))
+        top = Qt.AlignmentFlag.AlignTop
+        hbox((self.sign, 0, top), (self.time, 0, top), (self.text, 1), spacing=8, margins=0, parent=self)
 
     def show_note(self, kind: str, at: str, text: str) -> None:
         """Show a note or mark."""

@@ -118,12 +118,11 @@ class Header(Themed, QWidget):
         self._lay_out()
 
     def _lay_out(self) -> None:
-        row = hbox(Logo(), _column(self.study, self.who), 8, spacing=12, margins=(24, 8, 24, 8), parent=self)
-        add_parts(row, self.state, self.blind, self.saved)
+        whose, how_long = _column(self.study, self.who), _column(self.clock, self.expected)
+        chips = self.state, self.blind, self.saved
+        row = hbox(Logo(), whose, 8, *chips, spacing=12, margins=(24, 8, 24, 8), parent=self)
         row.addStretch(1)
-        add_parts(
-            row, _column(self.clock, self.expected), _column(self.bar, self.trials), 8, self.page, self.theme_button
-        )
+        add_parts(row, how_long, _column(self.bar, self.trials), 8, self.page, self.theme_button)
 
     def show_view(self, view: OperatorView) -> None:
         """Show the session's head."""
@@ -150,5 +149,4 @@ class Header(Themed, QWidget):
 
 
 def _column(*widgets: QWidget) -> QVBoxLayout:
-    column = vbox(STRETCH, *widgets, STRETCH, spacing=2)
-    return column
+    return vbox(STRETCH, *widgets, STRETCH, spacing=2)

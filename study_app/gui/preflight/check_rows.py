@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QWidget
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Bar
 from study_app.gui.widgets.labels import Ink, figures, label
 from study_app.session.preflight import Check
@@ -42,7 +42,6 @@ class CheckRow(Themed, QWidget):
         value = figures(check.value, "body", "text" if check.verdict == "ok" else ink)
         value.setFont(font("body", weight=600, tabular=True, scale=0.97))
         value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        row = hbox(name, spacing=14)
         said = vbox(STRETCH, about, spacing=6)
         if check.share is not None:
             share = Bar(height=6)
@@ -50,11 +49,9 @@ class CheckRow(Themed, QWidget):
             share.show_share(min(1.0, check.share))
             said.addWidget(share, 0, Qt.AlignmentFlag.AlignLeft)
         said.addStretch()
-        add_parts(row, (said, 1), value)
         self._head = holder = QWidget()
         holder.setMinimumHeight(ROW_HEIGHT)
-        row.setContentsMargins(0, 4, 0, 4)
-        holder.setLayout(row)
+        hbox(name, (said, 1), value, spacing=14, margins=(0, 4, 0, 4), parent=holder)
         column = vbox(holder, spacing=0, margins=(LEFT, 0, 24, 0 if check.verdict == "ok" else 14), parent=self)
         if check.advice:
             advice = label(check.advice, "label", "text", wraps=True)

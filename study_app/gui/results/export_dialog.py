@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QDialog, QFileDialog, QLineEdit, QWidget
 
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import apply_theme
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Bar
 from study_app.gui.widgets.controls import ActionButton, Check
 from study_app.gui.widgets.labels import label, set_ink
@@ -94,17 +94,15 @@ class WriteDialog(QDialog):
         self.cancel.clicked.connect(self.reject)
 
     def _lay_out(self, title: str, why_not: Sequence[str]) -> None:
-        column = vbox(label(title, "title_dense"), self.said, spacing=12, margins=(28, 24, 28, 24), parent=self)
-        self._form = QWidget()
-        form = vbox(*self.extras.values(), spacing=6, margins=0, parent=self._form)
-        for sentence in why_not:
-            form.addWidget(label(sentence, "small", "text2", wraps=True))
-        add_parts(form, 4, label("Folder", "label", "text2"))
+        reasons = [label(sentence, "small", "text2", wraps=True) for sentence in why_not]
         where = hbox((self.to, 1), self.choose, spacing=10)
-        add_parts(form, where, label("Existing files will be overwritten.", "small", "text2"))
-        add_parts(column, self._form, self.bar)
+        warning = label("Existing files will be overwritten.", "small", "text2")
+        folder = label("Folder", "label", "text2"), where, warning
+        self._form = QWidget()
+        vbox(*self.extras.values(), *reasons, 4, *folder, spacing=6, margins=0, parent=self._form)
         foot = hbox(self.cancel, STRETCH, self.go_on)
-        add_parts(column, 6, foot)
+        parts = label(title, "title_dense"), self.said, self._form, self.bar, 6, foot
+        vbox(*parts, spacing=12, margins=(28, 24, 28, 24), parent=self)
 
     def show_progress(self, what: str, share: float) -> None:
         """Say what is being done and how far it is."""

@@ -48,7 +48,6 @@ class SessionsCard(Card):
         self.head = label("", "label")
         self.head.setFont(font("label", weight=600, tabular=True))
         self.why = label("", "small", "text2", wraps=True)
-        filters = hbox((self.search, 1), (self.state, 1), spacing=8)
         self.details = IconButton("file", "Details of the selected session", size=36, role="plain")
         self.details.setEnabled(False)
         self.details.clicked.connect(self.rows.open_chosen)
@@ -57,10 +56,9 @@ class SessionsCard(Card):
         self.version.setEnabled(False)
         self.version.clicked.connect(self.rows.ask_for_version)
         self.rows.chosen_changed.connect(self._enable)
-        add_parts(filters, self.details, self.version)
-        add_parts(self.column, filters, (self.rows, 1), Rule())
+        filters = hbox((self.search, 1), (self.state, 1), self.details, self.version, spacing=8)
         foot = vbox(self.head, self.why, spacing=2, margins=(10, 2, 10, 0))
-        self.column.addLayout(foot)
+        add_parts(self.column, filters, (self.rows, 1), Rule(), foot)
         self.search.textChanged.connect(self._filter)
         self.state.currentIndexChanged.connect(self._filter)
 
@@ -120,9 +118,7 @@ class ExclusionsCard(Card):
         self.area.setAccessibleName("Excluded")
         self.area.setMinimumHeight(96)
         self.lines: list[QWidget] = []
-        add_parts(self.column, self.none, (self.area, 1))
-        foot = hbox(STRETCH, self.open)
-        self.column.addLayout(foot)
+        add_parts(self.column, self.none, (self.area, 1), hbox(STRETCH, self.open))
         self.show_left_out(())
 
     def show_left_out(self, listed: Sequence[LeftOut]) -> None:
@@ -155,13 +151,11 @@ def _line(one: LeftOut, back: ActionButton) -> QWidget:
     made = QWidget()
     what = label(one.what, "label", wraps=True)
     what.setFont(font("label", weight=600))
-    head = hbox((what, 1), back)
-    column = vbox(head, spacing=0, margins=(0, 0, 6, 0), parent=made)
     why = label(one.reason, "label", "text2", wraps=True)
     why.setFont(font("label", weight=400))
-    column.addWidget(why)
     now = datetime.now().astimezone()
     when = "" if one.at is None else f", {started_words(one.at.astimezone(now.tzinfo), now)}"
-    column.addWidget(label(f"{one.by}{when}", "small", "text2"))
+    who = label(f"{one.by}{when}", "small", "text2")
+    vbox(hbox((what, 1), back), why, who, spacing=0, margins=(0, 0, 6, 0), parent=made)
     made.setAccessibleName(f"{one.what}: {one.reason} ({one.by}{when})")
     return made

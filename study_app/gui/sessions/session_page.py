@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, Qt, Signal
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QScrollArea, QWidget
 
 from study_app.errors import StoreError
 from study_app.gui.sessions.decision_dialogs import LeaveOutDialog, TakeBackDialog
@@ -146,17 +146,12 @@ class SessionPage(QDialog):
         self._reader.run(partial(_result, read_record, self.facts.folder))
 
     def _lay_out(self) -> None:
-        head = QHBoxLayout()
-        head.setSpacing(12)
         kind = f"  ·  {self.facts.kind}" if self.facts.kind else ""
-        head.addWidget(label(f"{self.facts.name}  ·  {self.facts.study}{kind}", "title_dense"))
-        add_parts(head, self.status, self.validity, STRETCH)
-        left, right = QVBoxLayout(), QVBoxLayout()
+        title = label(f"{self.facts.name}  ·  {self.facts.study}{kind}", "title_dense")
+        head = hbox(title, self.status, self.validity, STRETCH, spacing=12)
         trials = Card("Trials", padding=16, gap=8)
-        trials.column.addWidget(self.trials, 1)
-        trials.column.addWidget(self.trial)
-        trials.column.addWidget(self.motion)
-        left.addWidget(trials, 1)
+        add_parts(trials.column, (self.trials, 1), self.trial, self.motion)
+        left = vbox((trials, 1))
         out = Card("Excluded", self.leave_out, padding=16, gap=8)
         self._out = out.column
         out.column.addWidget(self.none_out)
@@ -165,10 +160,8 @@ class SessionPage(QDialog):
         files = Card("Files", self.folder, padding=16, gap=8)
         self.files.setFont(font("small", tabular=True))
         files.column.addWidget(self.files)
-        add_parts(right, out, notes, files, STRETCH)
         page = QWidget()
-        page.setLayout(right)
-        right.setContentsMargins(0, 0, 0, 0)
+        vbox(out, notes, files, STRETCH, margins=0, parent=page)
         area = QScrollArea()
         area.setWidgetResizable(True)
         area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -213,9 +206,8 @@ class SessionPage(QDialog):
             back.setAutoDefault(False)
             back.clicked.connect(partial(self._ask_take_back, one, what))
             line = QWidget()
-            row = QHBoxLayout(line)
-            row.setContentsMargins(0, 0, 0, 0)
-            add_parts(row, (label(f"{what}: {one.reason} ({one.rule_or_person})", "label", wraps=True), 1), back)
+            words = label(f"{what}: {one.reason} ({one.rule_or_person})", "label", wraps=True)
+            hbox((words, 1), back, margins=0, parent=line)
             apply_theme_within(line, self._theme)
             self._out.addWidget(line)
             self.lines.append(line)

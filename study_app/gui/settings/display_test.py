@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QRect, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QColor, QKeyEvent, QPainter, QPaintEvent, QScreen
-from PySide6.QtWidgets import QBoxLayout, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLabel, QWidget
 
 from study_app.gui.display.frame_clock import Frames
 from study_app.gui.participant.tank.photodiode_patch import paint_patch, patch_place
@@ -19,7 +19,7 @@ from study_app.gui.settings.measured_number import LEAST_WORDS
 from study_app.gui.settings.pixel_patterns import GreyRamp, LineField
 from study_app.gui.theme.theme import PARTICIPANT
 from study_app.gui.theme.themed import apply_theme
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label
 from study_app.gui.widgets.number_field import NumberField, write_number
@@ -90,10 +90,8 @@ class DisplayTest(QWidget):
     def _lay_out(self, screen_words: str) -> None:
         titles = vbox(label("Display test", "title"), label(screen_words, "body", "text2"), spacing=2)
         head = hbox(titles, STRETCH, (self.leave, 0, Qt.AlignmentFlag.AlignTop))
-        column = QVBoxLayout(self)
-        column.setContentsMargins(40, 32, 40, 32)
-        column.setSpacing(18)
-        add_parts(column, head, self._figures(), (GreyRamp(), 2), (self._fields(), 3), self._foot())
+        ramp, fields = (GreyRamp(), 2), (self._fields(), 3)
+        vbox(head, self._figures(), ramp, fields, self._foot(), spacing=18, margins=(40, 32, 40, 32), parent=self)
 
     def _figures(self) -> QGridLayout:
         """Return the live figures, a name over each."""
@@ -109,10 +107,7 @@ class DisplayTest(QWidget):
 
     def _fields(self) -> QBoxLayout:
         """Return the fields of lines, and what to look for in them."""
-        row = hbox(spacing=16)
-        for thick in (1, 2):
-            for standing in (True, False):
-                row.addWidget(LineField(thick, standing=standing), 2)
+        fields = [(LineField(thick, standing=standing), 2) for thick in (1, 2) for standing in (True, False)]
         words = label(
             "Every line is 1 or 2 pixels wide. If a field looks uniformly grey, shimmers or shows broad bands, the "
             "system scales the picture: set the screen to its native resolution. All seventeen greys above should "
@@ -122,22 +117,15 @@ class DisplayTest(QWidget):
             wraps=True,
         )
         words.setMinimumWidth(LEAST_WORDS)
-        row.addWidget(words, 3)
-        return row
+        return hbox(*fields, (words, 3), spacing=16)
 
     def _foot(self) -> QBoxLayout:
         """Return the patch's interval and the offset, left of where the patch is."""
-        toggling = QVBoxLayout()
-        toggling.setSpacing(6)
-        add_parts(toggling, label("Photodiode's patch", "card"), label("Interval, ms", "label", "text2"), self.interval)
         self.why = label("", "label", "bad", wraps=True)
-        add_parts(toggling, self.why, STRETCH)
+        titles = label("Photodiode's patch", "card"), label("Interval, ms", "label", "text2")
+        toggling = vbox(*titles, self.interval, self.why, STRETCH, spacing=6)
         measured = vbox(label("Display offset", "card"), self.offset, STRETCH, spacing=6)
-        row = QHBoxLayout()
-        row.setContentsMargins(0, 0, 120, 0)  # the patch's corner is free
-        row.setSpacing(48)
-        add_parts(row, toggling, (measured, 1))
-        return row
+        return hbox(toggling, (measured, 1), spacing=48, margins=(0, 0, 120, 0))  # the patch's corner is free
 
     def _connect(self) -> None:
         self.leave.clicked.connect(self.close)

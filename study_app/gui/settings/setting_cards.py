@@ -92,9 +92,7 @@ def _screen_row(screen: ScreenShown) -> tuple[QWidget, Radio]:
     name.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
     head = hbox(radio, (name, 1))
     row = QWidget()
-    column = vbox(head, spacing=0, margins=0, parent=row)
-    below = hbox(about, margins=(30, 0, 0, 0))
-    column.addLayout(below)
+    vbox(head, hbox(about, margins=(30, 0, 0, 0)), spacing=0, margins=0, parent=row)
     return row, radio
 
 
@@ -214,9 +212,7 @@ class SessionsCard(Card):
             ("Device", self.device, self.devices),
             ("Workspace, the folder of protocols and results", self.folder, self.change),
         ):
-            self.column.addWidget(_named(name, field))
-            row = hbox((field, 1), button, spacing=8)
-            self.column.addLayout(row)
+            add_parts(self.column, _named(name, field), hbox((field, 1), button, spacing=8))
         self.camera = QLineEdit()
         self.camera.setFont(font("body"))
         self.camera.setMinimumHeight(40)
@@ -254,8 +250,8 @@ class WindowsCard(Card):
         self.sound.setFont(font("body"))
         self.theme_choice.activated.connect(lambda _index: self.changed.emit("theme", self.theme_choice.currentData()))
         self.sound.clicked.connect(lambda on: self.changed.emit("sound", on))
-        self.column.addWidget(_named("Theme of the operator's windows", self.theme_choice))
-        add_parts(self.column, self.theme_choice, self.sound)
+        named = _named("Theme of the operator's windows", self.theme_choice)
+        add_parts(self.column, named, self.theme_choice, self.sound)
 
     def show_settings(self, settings: MachineSettings) -> None:
         """Show what is set."""

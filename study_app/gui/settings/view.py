@@ -55,15 +55,13 @@ class MachinePlace(Place):
         self._connect()
 
     def _lay_out(self) -> None:
-        titles = vbox(label("This machine", "title"), spacing=4)
         about = "Settings of this computer and its screens, independent of every study. Changes are saved immediately."
-        titles.addWidget(label(about, "body", "text2", wraps=True))
+        titles = vbox(label("This machine", "title"), label(about, "body", "text2", wraps=True), spacing=4)
         head = hbox((titles, 1), self.check, self.undo, spacing=16, margins=(SHADOW, 0, SHADOW, 0))
         self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._body.setSpacing(18)
         for cards in ((self.screens, self.seen, self.outlets), (self.offset, self.sessions, self.windows)):
-            column = vbox(*cards, STRETCH, spacing=18)
-            self._body.addLayout(column, 1)
+            self._body.addLayout(vbox(*cards, STRETCH, spacing=18), 1)
         foot = hbox(self.kept_in, margins=(SHADOW, 0, SHADOW, 0))
         inside = QWidget()
         vbox(head, (self._body, 1), foot, spacing=20, margins=(30, 30, 30, 22), parent=inside)
