@@ -130,7 +130,7 @@ def examined(document: dict[str, Any], *, delay_ticks: int = BELIEVED_TICKS) -> 
     if faults:
         return None, faults
     protocol = Protocol.model_validate(document, strict=True)
-    if faults := list(designs(protocol)):
+    if faults := list(dict.fromkeys(designs(protocol))):
         return None, faults
     return protocol, [*paced(protocol, delay_ticks), *returned(protocol)]
 

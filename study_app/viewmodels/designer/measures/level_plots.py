@@ -113,10 +113,16 @@ class LevelBlock:
         return self.words.at(level), "norm" if self.limits.force == self.limits.lowest else "slope"
 
     @property
+    def as_asked(self) -> str:
+        """That clipped levels are simulated as they are asked; "" where none is clipped, or as they are presented."""
+        simulated = self.clipping is not None and self.clipping.paced
+        return "" if simulated or all(one.clipped_by is None for one in self.shown) else AS_ASKED
+
+    @property
     def clipped_words(self) -> str:
-        """What is simulated of levels that a limit clips, in a sentence; "" where none is clipped."""
+        """Which levels a limit clips, and what is simulated of them; "" where none is clipped."""
         if self.clipping is None:
-            return AS_ASKED if any(one.clipped_by is not None for one in self.shown) else ""
+            return self.as_asked
         highest = self.clipping.highest(self.words.stimulus)
         which = "The standard is" if not 0 < highest < math.inf else f"Levels above {self.words.words(highest)} are"
         if self.clipping.paced:
@@ -145,7 +151,7 @@ def number_cards(
     return (
         _range(of, simulated),
         _one_person(of, simulated),
-        _people(simulated, participants, simulated.precision, warned=warned),
+        _people(of, simulated, participants, warned=warned),
         NumberCard(
             "Lasts", *duration_figure(duration_s),
             ("neutral", "clock", f"{order.trials} trials{breaks}"),
@@ -188,13 +194,15 @@ def _one_person(of: LevelBlock, simulated: Simulated) -> NumberCard:
     if found is None:
         return _unknown("One person", "%", simulated, "observed")
     note: Verdict = ("neutral", "people", f"at a {of.words.name} of {of.words.words(found.threshold)}")
-    return NumberCard("One person", f"± {100 * found.error:.0f}", "%", note, simulated.progress.get("observed", ""))
+    return NumberCard(
+        "One person", f"± {100 * found.error:.0f}", "%", note, simulated.progress.get("observed", ""), of.as_asked
+    )
 
 
-def _people(simulated: Simulated, participants: int, precision: float, *, warned: bool) -> NumberCard:
+def _people(of: LevelBlock, simulated: Simulated, participants: int, *, warned: bool) -> NumberCard:
     found = simulated.group
     if found is None:
-        title = f"{people(participants, simulated.planned)} in ± {100 * precision:g} %"
+        title = f"{people(participants, simulated.planned)} in ± {100 * simulated.precision:g} %"
         return _unknown(title, "% of studies", simulated, "group")
     title = f"{people(found.participants, simulated.planned)} in ± {100 * found.precision:g} %"
     enough = found.share >= ENOUGH
@@ -202,8 +210,7 @@ def _people(simulated: Simulated, participants: int, precision: float, *, warned
     many = f"more than {found.most}" if found.enough is None else f"about {found.enough}"
     needed = f"{100 * ENOUGH:g} % are enough" if enough else f"Needed: {many} participants for {100 * ENOUGH:g} %"
     more = f"{needed}; with {found.more_trials} trials: {100 * found.more_share:.0f} %"
-    if warned:
-        more += f". {ON_AVERAGE}"
+    more = ". ".join(filter(None, (more, ON_AVERAGE if warned else "", of.as_asked)))
     anew = simulated.progress.get("group", "")
     return NumberCard(title, f"{100 * found.share:.0f}", "% of studies", note, anew, more)
 

@@ -5,13 +5,16 @@ from __future__ import annotations
 import pytest
 
 from study_app.authoring.edited_study import Study, read
-from study_app.authoring.measures.planned import Detectable, Finding
+from study_app.authoring.measures.observers import Measurable
+from study_app.authoring.measures.planned import Detectable, Finding, GroupPrecision
+from study_app.authoring.new_study import template
 from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.edits import Set
 from study_app.haptics.model.steady_state import HAND_MPS, steady
 from study_app.protocol.load import shipped
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.files import shipped_file
+from study_app.viewmodels.designer.measures.level_plots import AS_ASKED, Simulated
 from study_app.viewmodels.designer.measures.level_words import even_ticks, log_ticks, rounded
 from study_app.viewmodels.designer.measures.measures_view import Controls, SlowResults, measures_view
 from study_app.viewmodels.designer.measures.number_cards import (
@@ -152,6 +155,30 @@ def test_the_block_whose_numbers_are_shown_is_named_with_what_it_measures() -> N
     assert rows(("methods", "adaptive")) == ["Block Viscosity: JNDs, 46 min, shown here"]
     assert rows(("study",), viscosity=(0.05, 0.5))[1] == "Block Viscosity: JND 5 – 50 %, 46 min"
     assert rows(("study",), viscosity=None)[1] == "Block Viscosity: no JND, 46 min"
+
+
+def test_cards_say_which_levels_are_clipped_and_whether_that_is_simulated() -> None:
+    levels = Set(("stimuli", "damping", "levels"), [0.02, 2.0])
+    free = {"kind": "explore", "min_s": 2, "max_s": 4, "instruction": "Feel."}
+    paced, _ = template("viscosity-jnd").edited(levels, Set(("stimuli", "damping", "standards"), [32]))
+    unpaced, _ = template("viscosity-jnd").edited(
+        levels, Set(("stimuli", "damping", "standards"), [12]), Set(("tasks", "stir"), free)
+    )
+    measured = Simulated(
+        measurable=Measurable((0.02, 0.4), ()), group=GroupPrecision(12, 60, 0.15, 80, 0.9, 107, 1, 60, 9)
+    )
+    for study, said, group in (
+        (paced, "Levels above 65.6 % are clipped: observers are simulated with what the limits leave", ""),
+        (
+            unpaced,
+            f"Levels above 122 % are clipped in fast motions, whose trials are repeated. {AS_ASKED}",
+            f". {AS_ASKED}",
+        ),
+        (template("viscosity-jnd"), "", ""),
+    ):
+        jnds, _, people, _ = view(study, ("blocks", "viscosity"), SlowResults(simulated=measured)).numbers
+        assert jnds.more == said
+        assert people.more == f"80 % are enough; with 107 trials: 100 %{group}"
 
 
 def test_ticks_are_round_and_few() -> None:
