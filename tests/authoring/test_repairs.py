@@ -130,6 +130,12 @@ def test_the_highest_level_is_that_of_fixed_levels_too(
     assert after.document["methods"]["easy"]["levels"] == (most,)
 
 
+def test_a_fault_of_a_table_that_two_blocks_name_counts_once() -> None:
+    changes = Set(("stimuli", "damping", "level"), "value"), Set(("stimuli", "damping", "levels"), [9, 40])
+    study, _ = template("viscosity-jnd").edited(*changes, Set(("methods", "easy", "levels"), [12]))
+    assert [fault.path for fault in study.faults].count(("designs", "pair", "feedback")) == 1
+
+
 def test_every_text_that_a_language_lacks_is_copied_in_one_step() -> None:
     study = study_of("demo")
     edits = with_language(study, "nl")
