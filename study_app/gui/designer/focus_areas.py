@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QWidget
 
 from study_app.gui.designer.arrangement import Arrangement
 from study_app.gui.designer.designer_header import DesignerHeader
+from study_app.gui.designer.form.typed_fields import TypedLine, TypedText
 from study_app.gui.designer.pane.file_editor import FileCard
 from study_app.gui.designer.problems import ProblemsCard
 from study_app.gui.widgets.main_view import last_focused
@@ -34,9 +35,11 @@ class FocusAreas:
         self._parts.form.focus_first()
 
     def focus_field(self, path: ElementPath) -> None:
-        """Go to a field of the form; where it has no row, to the first row."""
+        """Go to a field of the form, with its value selected; where it has no row, to the first row."""
         if not self.focus_row(path):
             self._parts.form.focus_first()
+        elif isinstance(field := self._parts.form.focusWidget(), TypedLine | TypedText):
+            field.selectAll()
 
     def focus_row(self, path: ElementPath) -> bool:
         """Go to a field of the form; return whether it has a row."""

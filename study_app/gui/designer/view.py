@@ -348,7 +348,8 @@ class DesignerPlace(Place):
         self.left.emit()
 
     def focusNextPrevChild(self, forward: bool) -> bool:  # noqa: N802 - Qt's name
-        """Let Tab go through the parts as they are seen."""
+        """Let Tab go through the parts as they are seen, once what is typed is handed on, which may make them anew."""
+        self.flush()
         parts = [self.nothing, self.header, self.banner, *self.parts.in_order]
         return go_on(parts, super().focusNextPrevChild, forward=forward)
 

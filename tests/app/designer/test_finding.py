@@ -42,6 +42,9 @@ def test_enter_goes_to_the_field_whose_label_or_choice_was_found(qtbot: Any, des
     qtbot.keyClick(words, Qt.Key.Key_Return)
     assert designer.editing.selected == ("device",)
     assert has_keyboard(designer, "device", "force_limit_n")
+    assert QApplication.focusWidget().selectedText() == "6"
+    qtbot.keyClicks(QApplication.focusWidget(), "7")
+    assert QApplication.focusWidget().text() == "7"
     titles = find("williams")
     assert titles
     assert all(title.endswith(" · Order") for title in titles)

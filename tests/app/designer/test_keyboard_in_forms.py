@@ -86,6 +86,26 @@ def test_a_field_that_is_added_has_the_keyboard(qtbot: Any, designer: Any) -> No
     assert added.isAncestorOf(keyboard)
 
 
+@pytest.mark.parametrize("back", [False, True])
+def test_a_number_that_is_left_by_tab_at_once_keeps_the_keyboard_in_its_form(
+    qtbot: Any, designer: Any, back: bool
+) -> None:
+    path = ("conditions", "thin", "force_delay_ms")
+    designer.file.write_text(designer.file.read_text().replace("format = 1", "format = 2"))
+    designer.controller.open("kitchen")
+    designer.select(path[:2])
+    designer.row(*path).field.line.setFocus()
+    rows = [row.row.row.path for row in designer.place.form.rows]
+    qtbot.keyClicks(QApplication.focusWidget(), "7")
+    press(qtbot, KEY.Key_Backtab if back else KEY.Key_Tab)  # the key is new in the file: the form is made anew
+    assert designer.editing.opened.study.document["conditions"]["thin"]["force_delay_ms"] == 7
+    if not back:
+        assert QApplication.focusWidget() is designer.row(*path).remove
+        press(qtbot, KEY.Key_Tab)
+    beside = rows[rows.index(path) + (-1 if back else 1)]
+    assert designer.row(*beside).isAncestorOf(QApplication.focusWidget())
+
+
 @pytest.mark.parametrize("width", [1600, 1024])
 def test_ctrl_e_goes_to_the_file_and_back_to_the_same_field(qtbot: Any, designer: Any, width: int) -> None:
     designer.window.resize(width, 640)
