@@ -75,10 +75,7 @@ def renamed(document: Document, thing: Path, name: str) -> tuple[Edit, ...]:
         The name is taken, or is not an id.
     """
     item = _item_id(document, thing)
-    if item is None:
-        taken = {*_siblings(document, thing)} - {str(thing[-1])}
-    else:
-        taken = {str(other["id"]) for path, other in _items(document) if _in_same(thing, path) and path != thing}
+    taken = taken_beside(document, thing)
     title = value_at(document, (*thing, "text" if item is not None else "title"))
     text = next(iter(title.values()), "") if isinstance(title, Mapping) else title
     wanted = id_of(name) or id_of(str(text or ""), MAX_FROM_TEXT) or id_of(str(item or thing[-1])) or "question"
@@ -90,6 +87,13 @@ def renamed(document: Document, thing: Path, name: str) -> tuple[Edit, ...]:
     if item is None:
         return (Rename(thing, name, references_to(document, thing)),)
     return (Set((*thing, "id"), name), *(Set(place, name) for place in references_to(document, thing)))
+
+
+def taken_beside(document: Document, thing: Path) -> set[str]:
+    """Return the names that a table or item cannot have, since others have them."""
+    if _item_id(document, thing) is None:
+        return {*_siblings(document, thing)} - {str(thing[-1])}
+    return {str(other["id"]) for path, other in _items(document) if _in_same(thing, path) and path != thing}
 
 
 def replaced(document: Document, thing: Path, other: str) -> tuple[Edit, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 from study_app.app.designer.element_steps import (
     Step,
@@ -20,6 +20,7 @@ from study_app.app.designer.element_steps import (
 )
 from study_app.app.designer.series_steps import series
 from study_app.authoring.additions import added
+from study_app.authoring.changes.followed_ids import FollowedIds
 from study_app.authoring.changes.initial_values import initial, singular
 from study_app.authoring.changes.languages import following
 from study_app.authoring.changes.short_texts import followed
@@ -55,12 +56,27 @@ from study_app.viewmodels.designer.requests import (
     SwitchKind,
 )
 
+Recorded: TypeAlias = Callable[[Path], frozenset[str]]
+
+
+def no_answers(_element: Path) -> frozenset[str]:
+    """Return that no answers are recorded."""
+    return frozenset()
+
 
 class Steps:
-    """Makes steps; keeps the values that a switch of kind removed, for a switch back."""
+    """Makes steps; keeps the values that a switch of kind removed, and which ids follow their texts.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    recorded : callable
+        Returns the ids beside an element under which answers are recorded: its own then stays.
+    """
+
+    def __init__(self, recorded: Recorded = no_answers) -> None:
         self._left: dict[Path, dict[str, Any]] = {}
+        self._ids = FollowedIds()
+        self._recorded = recorded
 
     def leave(self) -> None:
         """Forget what switches removed: another element is selected."""
@@ -82,7 +98,7 @@ class Steps:
             name = label_of(asked.path[-1])
             return Step(f"Change {name}", (Set(asked.path, asked.value),), None, asked.path if asked.typing else None)
         if isinstance(asked, SetText):
-            return _typed(study, asked)
+            return self._type(study, asked)
         if isinstance(asked, RemoveKey):
             return Step(f"Remove {label_of(asked.path[-1])}", (Unset(asked.path),))
         if isinstance(asked, AddKey):
@@ -96,11 +112,25 @@ class Steps:
             return replace(step, select=None, several=(), fresh=False)
         if isinstance(asked, RenameElement):
             edits = renamed(study.document, asked.path, asked.name)
+            self._ids.forget(study, asked.path, asked.name)
             after = asked.path if isinstance(asked.path[-1], int) else (*asked.path[:-1], asked.name)
             return Step(f"Rename to {asked.name}", edits, after)
         if isinstance(asked, Several):
             return self._several(study, asked, selected)
-        return _of_elements(study, asked, selected)
+        step = _of_elements(study, asked, selected)
+        if isinstance(asked, AddElement | AddNamed) and step.select is not None:
+            self._ids.add(study.trial.edited(*step.edits)[0], step.select)
+        return step
+
+    def _type(self, study: Study, asked: SetText) -> Step:
+        """Return the step of a text, with the copies in other languages, the short text and the id that follow it."""
+        element = asked.path[:-1]
+        field = (*(self._ids.first(study, element) or element), asked.path[-1], asked.language)
+        ids, after = self._ids.followed(study, asked.path, asked.language, asked.text, self._recorded(element))
+        edits: tuple[Edit, ...] = ()
+        for code in (asked.language, *following(study, asked.path, asked.language)):
+            edits += (*_text(study, replace(asked, language=code)), *followed(study, asked.path, code, asked.text))
+        return Step(f"Type {label_of(asked.path[-1])}", (*edits, *ids), None if after == element else after, field)
 
     def _several(self, study: Study, asked: Several, selected: Path) -> Step:
         edits: tuple[Edit, ...] = ()
@@ -141,14 +171,6 @@ def _of_elements(study: Study, asked: Request, selected: Path) -> Step:
     if type(asked) in _OF_ELEMENTS:
         return _OF_ELEMENTS[type(asked)](study, asked)
     raise Refused("this cannot be done with a study")
-
-
-def _typed(study: Study, asked: SetText) -> Step:
-    """Return the step that types a text; copies of it in other languages and short texts follow."""
-    edits: tuple[Edit, ...] = ()
-    for code in (asked.language, *following(study, asked.path, asked.language)):
-        edits += (*_text(study, replace(asked, language=code)), *followed(study, asked.path, code, asked.text))
-    return Step(f"Type {label_of(asked.path[-1])}", edits, None, (*asked.path, asked.language))
 
 
 def _text(study: Study, asked: SetText) -> tuple[Edit, ...]:

@@ -10,7 +10,7 @@ from typing import Final
 
 from PySide6.QtCore import QObject, Signal
 
-from study_app.app.designer.edit_steps import Steps
+from study_app.app.designer.edit_steps import Recorded, Steps, no_answers
 from study_app.app.designer.element_steps import Step
 from study_app.app.designer.known_studies import there
 from study_app.app.designer.open_study import OpenStudy
@@ -48,6 +48,7 @@ class Editing(QObject):
         super().__init__(parent)
         self.results = results
         self.opened: OpenStudy | None = None
+        self.recorded: Recorded = no_answers
         self._steps = Steps()
         self._last: tuple[object, float, Study | None] = (None, 0.0, None)
         self._back: list[Place] = []
@@ -66,7 +67,7 @@ class Editing(QObject):
     def open(self, opened: OpenStudy) -> None:
         """Take another study from now on."""
         self.opened = opened
-        self._steps, self._last, self._back = Steps(), (None, 0.0, None), []
+        self._steps, self._last, self._back = Steps(self.recorded), (None, 0.0, None), []
         self.opened_other.emit()
 
     # selection

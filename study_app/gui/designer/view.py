@@ -277,8 +277,12 @@ class DesignerPlace(Place):
         self.form.flush()
         self.file.editor.flush()
 
-    def _select(self, path: object) -> None:
+    def _select(self, path: ElementPath) -> None:
+        """Select an element; what is being typed may give it, or what it is in, another id before."""
+        before = () if self.form.form is None else self.form.form.path
         self.flush()
+        if before and path[: len(before)] == before and self.form.form is not None:
+            path = (*self.form.form.path, *path[len(before) :])
         self.selected.emit(path)
 
     def _ask(self, asked: SignalInstance) -> None:

@@ -35,6 +35,7 @@ class Renaming(QObject):
         self._unlocked: Path = ()
         self._renamed: tuple[str, int] | None = None
         self._listed: tuple[Path, str, tuple[Comment, ...]] = ((), "", ())
+        editing.recorded = self._recorded
         place.asked.connect(self._note)
         editing.changed.connect(self._lock)
         editing.edited.connect(self._tell)
@@ -56,6 +57,11 @@ class Renaming(QObject):
             return ""
         sessions = self.runs.items.get((str(path[1]), self._id(path)), 0)
         return f"Answers of {counted(sessions, 'session')} are recorded under this id." if sessions else ""
+
+    def _recorded(self, element: Path) -> frozenset[str]:
+        """Return the ids of a question's questionnaire under which answers are recorded."""
+        known = self.runs.items if element[2:3] == ("items",) else ()
+        return frozenset(name for form, name in known if form == element[1])
 
     def _lock(self) -> None:
         path = self.editing.selected

@@ -26,7 +26,7 @@ from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.form.form_changes import added_row, shape_of
 from study_app.viewmodels.designer.form.form_rows import Form, FormRow, Section
 from study_app.viewmodels.designer.problem_rows import ProblemRow
-from study_app.viewmodels.designer.requests import AddKey, RemoveKey, RenameElement
+from study_app.viewmodels.designer.requests import AddKey, RemoveKey, RenameElement, SetText
 from study_app.viewmodels.designer.special.questions import QuestionLine
 
 ACROSS = 2
@@ -65,10 +65,10 @@ class FormCard(Card):
         self.others: list[QuestionRow] = []
         self.adds: dict[tuple[str | int, ...], QWidget] = {}
         self._focused: RowWidget | None = None
-        self._renamed: tuple[str | int, ...] = ()
+        self._may_rename = False
         self._chosen: tuple[tuple[str | int, ...], tuple[int, ...]] | None = None
         self.head = FormHead()
-        self.head.asked.connect(self._ask_by_head)
+        self.head.asked.connect(self._ask)
         self.own = label("", "label", "bad", wraps=True)
         self.inside = QWidget()
         host = QWidget()
@@ -87,11 +87,11 @@ class FormCard(Card):
         super().resizeEvent(event)
         self.foot.setVisible(self.height() >= FOOT_FROM)
 
-    def _ask_by_head(self, asked: object) -> None:
+    def _ask(self, asked: object) -> None:
         """Ask for a step; the form of an element that it renames keeps its editors."""
-        self._renamed = (*asked.path[:-1], asked.name) if isinstance(asked, RenameElement) else ()
+        before, self._may_rename = self._may_rename, isinstance(asked, RenameElement | SetText)
         self.asked.emit(asked)
-        self._renamed = ()
+        self._may_rename = before
 
     def show_form(self, form: Form, *, read_only: bool) -> None:
         """Show a form: in place where its rows stay the same, else anew."""
@@ -100,7 +100,9 @@ class FormCard(Card):
         self.head.show_form(form, read_only=read_only)
         self.own.setText("\n".join(form.faults))
         self.own.setVisible(bool(form.faults))
-        stays = before is not None and form.path in {before.path, self._renamed}
+        stays = before is not None and (
+            form.path == before.path or (self._may_rename and form.path[:-1] == before.path[:-1])
+        )
         same = before is not None and stays and shape_of(before) == shape_of(form) and was_read_only == read_only
         if same and [row.key for row in self.rows] == [structure_of(row) for row in form.rows]:
             for widget, row in zip(self.rows, form.rows, strict=True):
@@ -274,7 +276,7 @@ class FormCard(Card):
 
     def _row(self, row: FormRow) -> RowWidget:
         made = RowWidget(row)
-        made.field.asked.connect(self.asked)
+        made.field.asked.connect(self._ask)
         made.repair_asked.connect(self.repair_asked)
         made.field.open_asked.connect(self.open_asked)
         made.field.write_asked.connect(self.write)
