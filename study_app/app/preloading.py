@@ -17,6 +17,8 @@ def preload_lab_and_designer() -> InitialSettings:
 
     first = prepare_initial_settings()
     import study_app.app.designer.controller  # noqa: F401, PLC0415
+    from study_app.protocol.source.json_schema import schema  # noqa: PLC0415
 
+    schema()  # forms are made from it
     gc.freeze()  # the windows' thread need not look through all that was loaded here
     return first

@@ -28,20 +28,28 @@ DIRECTIONS: Final = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
 """Characters that change the direction of what follows, and so can make a text read as another one."""
 
 
+_APART: Final = re.compile(r"\n[ \t]*\n")
+
+
 def tidy(text: str) -> str:
     """Return ``text`` with single spaces, and one blank line between paragraphs."""
-    return "\n\n".join(" ".join(part.split()) for part in re.split(r"\n[ \t]*\n", text) if part.strip())
+    parts = _APART.split(text) if "\n" in text else (text,)
+    return "\n\n".join(" ".join(part.split()) for part in parts if part.strip())
 
 
 def _tidy_each(value: Any) -> Any:
     if isinstance(value, str):
-        return tidy(_printable(value))
+        return _tidied(value)
     if isinstance(value, dict) and value and all(isinstance(text, str) for text in value.values()):
-        return {language: tidy(_printable(text)) for language, text in value.items()}
+        return {language: _tidied(text) for language, text in value.items()}
     raise PydanticCustomError("text_type", 'a text is a string, or one string per language: {en = "…", nl = "…"}')
 
 
-@lru_cache(maxsize=4096)  # a study that is edited is validated after each change
+@lru_cache(maxsize=16_384)  # a study that is edited is validated after each change
+def _tidied(text: str) -> str:
+    return tidy(_printable(text))
+
+
 def _printable(text: str) -> str:
     """Return ``text`` if a person can read it: something visible, and nothing that hides or reorders what is there."""
     for letter in text:

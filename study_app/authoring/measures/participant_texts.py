@@ -59,10 +59,10 @@ def copied_texts(study: Study) -> dict[str, int]:
     return {code: count for code, count in counted.items() if count}
 
 
-def own_texts(study: Study) -> dict[str, tuple[int, int]]:
-    """Return for each language how many texts it has that are not copied, and how many it should have."""
+def own_texts(study: Study, counts: Mapping[str, tuple[int, int]]) -> dict[str, tuple[int, int]]:
+    """Return for each language how many of its texts, of `texts_by_language`, are not copied, and how many it needs."""
     copied = copied_texts(study)
-    return {code: (there - copied.get(code, 0), wanted) for code, (there, wanted) in texts_by_language(study).items()}
+    return {code: (there - copied.get(code, 0), wanted) for code, (there, wanted) in counts.items()}
 
 
 def to_translate(study: Study) -> tuple[str, ...]:

@@ -11,6 +11,9 @@ from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 
+LONGEST = 20
+"""So many letters of a name a button has room for in a narrow card."""
+
 
 class RepairButton(ActionButton):
     """Makes a repair of ``problem``; ``by_keys`` says whether a key led to it, not a click."""
@@ -62,6 +65,7 @@ class NameRefusal(QWidget):
         """Say why a name is not taken, "" for nothing, and offer one that is free."""
         self._free = free
         self.words.setText(f"{sentence[:1].upper()}{sentence[1:]}")
-        self.use.show_action("", f"Use {free}")
+        self.use.show_action("", f"Use {free if len(free) <= LONGEST else 'it'}")
+        self.use.setAccessibleName(f"Use {free}")
         self.use.setVisible(bool(free))
         self.setVisible(bool(sentence))

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any, TypeAlias
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, Final, TypeAlias
 
 Path: TypeAlias = tuple[str | int, ...]
+_TABLE: Final = (dict, Mapping)
+"""The first one is what is there nearly always, and found sooner."""
 
 
 def has(node: Any, step: str | int) -> bool:
     """Return whether ``node`` is a table with that key or an array with that index."""
     if isinstance(step, int):
         return isinstance(node, tuple) and step < len(node)
-    return isinstance(node, Mapping) and step in node
+    return isinstance(node, _TABLE) and step in node
 
 
 def value_at(document: Any, path: Path) -> Any:
@@ -26,21 +28,19 @@ def value_at(document: Any, path: Path) -> Any:
 
 def entries(document: Any, pattern: str) -> Iterator[tuple[Path, Any]]:
     """Yield what is at the places of ``pattern`` with their paths: "blocks.*.conditions.*", where ``*`` is any."""
-    yield from _entries((), document, tuple(pattern.split(".")))
+    found: list[tuple[Path, Any]] = [((), document)]
+    for step in pattern.split("."):
+        found = [
+            ((*path, key), value)
+            for path, node in found
+            for key, value in (_inside(node) if step == "*" else ((step, node[step]),) if has(node, step) else ())
+        ]
+    return iter(found)
 
 
-def _entries(path: Path, node: Any, steps: tuple[str, ...]) -> Iterator[tuple[Path, Any]]:
-    if not steps:
-        yield path, node
-    elif steps[0] != "*":
-        if has(node, steps[0]):
-            yield from _entries((*path, steps[0]), node[steps[0]], steps[1:])
-    elif isinstance(node, Mapping):
-        for key, value in node.items():
-            yield from _entries((*path, key), value, steps[1:])
-    elif isinstance(node, tuple):
-        for index, value in enumerate(node):
-            yield from _entries((*path, index), value, steps[1:])
+def _inside(node: Any) -> Iterable[tuple[str | int, Any]]:
+    """Return what is in a table or array, with its keys or indices."""
+    return node.items() if isinstance(node, _TABLE) else enumerate(node) if isinstance(node, tuple) else ()
 
 
 def names(document: Any, section: str) -> tuple[str, ...]:

@@ -6,6 +6,8 @@ from functools import cache
 from typing import Any, Final
 
 from pydantic import BaseModel
+from pydantic.json_schema import GenerateJsonSchema
+from pydantic_core import to_jsonable_python
 
 from study_app.protocol.formats import relax
 from study_app.protocol.model import Protocol
@@ -18,10 +20,18 @@ NEED_NO_DENSITY: Final = [{"required": ["file"]}, {"properties": {"drag": LINEAR
 """Liquids without a density: those of a file, and in format 2 dampers."""
 
 
+class _Generator(GenerateJsonSchema):
+    """Writes defaults as they are; pydantic would make a validator for the type of each."""
+
+    def encode_default(self, dft: Any) -> Any:
+        """Return a default as JSON."""
+        return to_jsonable_python(dft)
+
+
 @cache
 def schema(of: type[BaseModel] = Protocol) -> dict[str, Any]:
     """Return the JSON Schema of a protocol file, for editors that complete and check while one writes."""
-    described = of.model_json_schema()
+    described = of.model_json_schema(schema_generator=_Generator)
     for node in described["properties"].values():
         if "patternProperties" in node:
             node["additionalProperties"] = False

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 import tomllib
 from functools import lru_cache
+from operator import attrgetter
 from typing import Literal, NamedTuple, TypeAlias
 
 from study_app.protocol.source.document import Path
@@ -55,7 +56,7 @@ class Node(NamedTuple):
 def scan(text: str) -> tuple[Node, ...]:
     """Return every header, key and array entry of a TOML text, in the order in which they begin."""
     found = _Scan(text).nodes
-    return tuple(sorted(found, key=lambda node: node.start))
+    return tuple(sorted(found, key=attrgetter("start")))
 
 
 class _Scan:

@@ -104,6 +104,20 @@ def test_a_study_whose_name_is_refused_by_check_is_saved(designer: Any, name: st
     assert name in designer.text
 
 
+def test_the_text_of_the_file_follows_as_soon_as_it_is_seen(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.select(("blocks", "delays"))
+    designer.editing.ask(SetValue(("study", "name"), "larder"))
+    editor = designer.place.file.editor
+    assert "larder" not in editor.toPlainText()
+    designer.place.show_tab("file")
+    assert editor.toPlainText() == designer.text
+    line = designer.text.split("\n").index("[blocks.delays]")
+    assert editor.textCursor().blockNumber() <= line <= editor.textCursor().blockNumber() + 3
+    designer.editing.ask(SetValue(("study", "name"), "pantry"))
+    assert editor.toPlainText() == designer.text
+
+
 def test_what_is_being_typed_stays_in_its_study_when_another_is_opened(designer: Any) -> None:
     designer.controller.open("kitchen")
     designer.place.show_tab("file")

@@ -14,6 +14,7 @@ from PySide6.QtGui import (
     QPainter,
     QPaintEvent,
     QResizeEvent,
+    QShowEvent,
     QSyntaxHighlighter,
     QTextCharFormat,
     QTextCursor,
@@ -76,7 +77,7 @@ class _Gutter(QWidget):
 
 
 class FileEditor(Themed, QPlainTextEdit):
-    """The text; ``typed`` carries it within moments."""
+    """The text; ``typed`` carries it within moments. While it is hidden, it is not brought up to date."""
 
     typed = Signal(str)
 
@@ -85,6 +86,7 @@ class FileEditor(Themed, QPlainTextEdit):
         self.shown = FileText()
         self.pending = False
         self._showing = False
+        self._late: bool | None = None
         fixed = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
         fixed.setPixelSize(LETTERS_PX)
         fixed.setStyleHint(QFont.StyleHint.Monospace)
@@ -110,22 +112,37 @@ class FileEditor(Themed, QPlainTextEdit):
 
     def words(self) -> str:
         """Return the text; Qt's own plain text would lose spaces that do not break."""
+        self._catch_up()
         return self.document().toRawText().replace("\u2029", "\n")
 
     def show_file(self, file: FileText, *, scroll: bool) -> None:
-        """Show a file; only what differs is replaced, so that cursor and scroll bar stay."""
+        """Show a file, as soon as the editor is seen; only what differs is replaced: cursor and scroll bar stay."""
         self.shown = file
-        if self.pending:
+        if not self.pending:
+            self._late = scroll or bool(self._late)
+            if self.isVisible():
+                self._catch_up()
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 - Qt's name
+        """Bring the text up to date."""
+        super().showEvent(event)
+        self._catch_up()
+
+    def _catch_up(self) -> None:
+        """Show the file that was given last, and go to the selected element where that was asked for."""
+        if self._late is None:
             return
-        old, new = self.words(), file.text
+        scroll, self._late = self._late, None
+        old, new = self.words(), self.shown.text
         if old != new:
             self._replace(old, new)
         self._mark()
-        if scroll and file.selected and not self.hasFocus():
-            self.go_to(file.selected[0][0])
+        if scroll and self.shown.selected and not self.hasFocus():
+            self.go_to(self.shown.selected[0][0])
 
     def go_to(self, line: int) -> None:
         """Put the cursor on a line, from 0, and show it in the upper part."""
+        self._catch_up()
         block = self.document().findBlockByNumber(line)
         if block.isValid():
             cursor = QTextCursor(block)

@@ -11,7 +11,7 @@ from study_app.authoring.changes.languages import is_copied
 from study_app.authoring.changes.series import NUMBERS, is_element, series_starts
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Choice, Row, label_of, refused_at, row_at, rows, sections_of
-from study_app.authoring.measures.participant_texts import copied_texts, missing_texts, own_texts
+from study_app.authoring.measures.participant_texts import copied_texts, texts_by_language
 from study_app.authoring.names import named_at
 from study_app.authoring.outline import title_of
 from study_app.protocol.groups.group import sequences_in
@@ -342,11 +342,11 @@ def _notes(document: Mapping[str, Any], row: Row) -> Iterator[tuple[str, str]]:
 
 def _entries(study: Study, row: Row) -> Iterator[Entry]:
     if row.path == STUDY_LANGUAGES:
-        lacking, own, copied = missing_texts(study), own_texts(study), copied_texts(study)
+        counts, copied = texts_by_language(study), copied_texts(study)
         for at, code in enumerate(row.value if isinstance(row.value, tuple) else ()):
-            note = "{} of {} texts".format(*own.get(str(code), (0, 0)))
-            note += f", {copied[str(code)]} to translate" if str(code) in copied else ""
-            yield Entry((*row.path, at), language_name(str(code)), note, lacking.get(str(code), 0))
+            (there, wanted), alike = counts.get(str(code), (0, 0)), copied.get(str(code), 0)
+            note = f"{there - alike} of {wanted} texts" + (f", {alike} to translate" if alike else "")
+            yield Entry((*row.path, at), language_name(str(code)), note, wanted - there)
     if row.kind in {"list", "tables", "references"} and isinstance(row.value, tuple | Mapping):
         keys = row.value if isinstance(row.value, Mapping) else range(len(row.value))
         for key in keys:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final, TypeAlias
 
+from study_app.authoring.changes.languages import languages_of
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of
 from study_app.authoring.measures.balance import balance_of
@@ -166,7 +167,7 @@ def block_card(study: Study, facts: Facts, protocol: Protocol, block: Block) -> 
 def text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
     """Return whether texts are missing, and whether a text reveals a condition."""
     missing = ", ".join(f"{count} in {language_name(code)}" for code, count in facts.missing.items())
-    codes = tuple(texts_by_language(study))
+    codes = languages_of(study)
     languages = " and ".join(language_name(code) for code in codes) if len(codes) < 3 else f"{len(codes)} languages"
     found: list[Verdict] = [("bad", "warning", f"Missing texts: {missing}")]
     if not missing:
@@ -252,7 +253,8 @@ def effects_card(study: Study, protocol: Protocol, name: str) -> LinesCard:
 def texts_card(study: Study) -> TextsCard:
     """Return how many texts each language has, and the texts that reveal a condition."""
     lines = []
-    counts, with_own = texts_by_language(study), own_texts(study)
+    counts = texts_by_language(study)
+    with_own = own_texts(study, counts)
     for code, (there, wanted) in counts.items():
         own = with_own[code][0]
         parts = (wanted - there, "missing"), (there - own, "to translate")
