@@ -124,24 +124,21 @@ def _every(protocol: Protocol, blocks: Sequence[Block]) -> dict[Level, Block]:
     return dict(found[key] for key in sorted(found))
 
 
-def clipped_unpaced(protocol: Protocol, block: Block) -> str | None:
+def clipped_unpaced(protocol: Protocol, blocks: Sequence[Block]) -> str | None:
     """Return which levels are clipped in fast motions of a task without a pace, as a warning; None where none is.
 
-    The levels are those of all blocks with this stimulus and task.
+    The blocks have one stimulus and one task.
     """
-    alike = [one for one in protocol.blocks.values() if (one.stimulus, one.task) == (block.stimulus, block.task)]
-    found = [scene for one in alike for *_, scene in ends(protocol, one) if len(scene.liquids) == 1]
-    if isinstance(protocol.tasks[block.task], Follow) or all(steady(one, UNPACED_MPS).limit is None for one in found):
+    task = blocks[0].task
+    found = [scene for one in blocks for *_, scene in ends(protocol, one) if len(scene.liquids) == 1]
+    if isinstance(protocol.tasks[task], Follow) or all(steady(one, UNPACED_MPS).limit is None for one in found):
         return None
-    every = list(_every(protocol, alike))
+    every = list(_every(protocol, blocks))
     some = [one for one in every if one.clipped_by is not None]
     of = f" of {_listed(every, some)}" if some else ""  # a number of the condition changes no force
     by_loop = any(steady(one, UNPACED_MPS).limit == "slope" for one in found)
     limit = "by the slope limit" if by_loop else f"at {protocol.device.force_limit_n:g} N"
-    return (
-        f"tasks.{block.task}: at {UNPACED_MPS:g} m/s the force{of} is clipped {limit}: such trials are repeated: "
-        f"{PACED}"
-    )
+    return f"tasks.{task}: at {UNPACED_MPS:g} m/s the force{of} is clipped {limit}: such trials are repeated: {PACED}"
 
 
 def clipped_at_pace(scene: Scene, task: Follow, what: str) -> Iterator[tuple[str, str]]:

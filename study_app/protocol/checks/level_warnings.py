@@ -75,7 +75,8 @@ def _unpaced(protocol: Protocol, block: Block) -> Iterator[str]:
     task = protocol.tasks[block.task]
     if isinstance(task, Follow) or block.stimulus is None:
         return
-    if (said := clipped_unpaced(protocol, block)) is not None:
+    alike = [one for one in protocol.blocks.values() if (one.stimulus, one.task) == (block.stimulus, block.task)]
+    if (said := clipped_unpaced(protocol, alike)) is not None:
         yield said
     error_percent = protocol.limits.level_error_percent
     if highest_damping(protocol, block) > 0 and error_percent is not None:

@@ -318,7 +318,7 @@ def forces_plot(of: LevelBlock, problems: Mapping[ProblemRow, tuple[str, ...]]) 
     repair = next((RepairOffer(words[0], row) for row in rows if (words := problems[row])), None)
     messages = [fault.message for fault in clipped(of.protocol, [of.block], BELIEVED_TICKS)]
     said = ". ".join(f"{one[:1].upper()}{one[1:]}" for one in messages)
-    warning = said or clipped_unpaced(of.protocol, of.block) or ""
+    warning = said or clipped_unpaced(of.protocol, [of.block]) or ""
     top = max(limit_n, *(bar.asked_n for bar in bars))
     step = max(1, math.ceil(len(bars) / MOST_LABELS))
     standard = "" if of.standard is None else f"standard {rounded(of.standard)} {unit}, "

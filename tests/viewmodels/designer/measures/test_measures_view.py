@@ -178,6 +178,9 @@ def test_cards_say_which_levels_are_clipped_and_whether_that_is_simulated() -> N
     ):
         jnds, _, people, _ = view(study, ("blocks", "viscosity"), SlowResults(simulated=measured)).numbers
         assert jnds.more == said
+        own = view(study, ("blocks", "training")).forces
+        assert own is not None
+        assert own.warning == ""  # it presents no clipped level
         assert people.more == f"80 % are enough; with 107 trials: 100 %{group}"
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPainterPath, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QAbstractButton, QBoxLayout, QHBoxLayout, QWidget
 
 from study_app.gui.designer.form.row_fields import ChoiceField
@@ -18,8 +18,6 @@ from study_app.viewmodels.designer.requests import GoTo
 from study_app.viewmodels.designer.special.trial_strip import Phase, TrialStrip
 
 HEIGHT, PICTURE_PX, GAP = 104, 52, 6
-LEAST_SHARE = 0.12
-"""Of the width, for the shortest phase."""
 
 
 class PhaseButton(Themed, QAbstractButton):
@@ -152,11 +150,12 @@ class StripView(Themed, QWidget):
 
 
 def _widths(phases: tuple[Phase, ...], whole: float) -> list[float]:
-    """Return how wide each phase is: as it is long, but none narrower than its words."""
-    least = LEAST_SHARE * whole
-    rest = whole - least * len(phases)
-    total = sum(phase.duration_s for phase in phases) or 1.0
-    return [least + max(0.0, rest) * phase.duration_s / total for phase in phases]
+    """Return how wide each phase is: wide enough for its words, and the longer it is, the wider."""
+    metrics = QFontMetrics(font("small"))
+    words = [max(map(metrics.horizontalAdvance, (phase.name, phase.duration))) + GAP for phase in phases]
+    rest, total = max(0.0, whole - sum(words)), sum(phase.duration_s for phase in phases) or 1.0
+    share = min(1.0, whole / sum(words))
+    return [share * least + rest * phase.duration_s / total for least, phase in zip(words, phases, strict=True)]
 
 
 class DesignField(ChoiceField):
