@@ -1,7 +1,5 @@
 """What is found by importing the modules of one folder: kinds of questions, their widgets, measures and figures."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 from collections.abc import Iterator

@@ -4,8 +4,6 @@ A page is plain Markdown. A comment in it, ``<!-- generated: MODULE:FUNCTION -->
 returns. The pages of a section are those that the section's own page links to in its lists; all others are how-to.
 """
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from importlib import import_module

@@ -17,8 +17,6 @@
     └── DisplayError           no screen to open a window on
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Files are deterministic: no dates, SVG ids from a fixed salt. SVG keeps text as text; PDF embeds TrueType (type 42).
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Ids, and short names of studies: made from a text, and free among those that are taken."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Iterable

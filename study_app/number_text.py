@@ -1,7 +1,5 @@
 """Numbers as people type them, and as titles and ids contain them."""
 
-from __future__ import annotations
-
 import math
 import re
 from decimal import Decimal

@@ -1,7 +1,5 @@
 """Where the user's settings of this program are: calibrations, and what this machine is like; apart from results."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Final

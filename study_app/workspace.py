@@ -4,8 +4,6 @@
 where that has both folders (a clone has), else `Liquid Study` in the user's documents.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """From a study to all that can be said about it: the one place that decides which tests apply to which block."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

@@ -3,8 +3,6 @@
 The libraries and tables of an evaluation stay in that process.
 """
 
-from __future__ import annotations
-
 from typing import TypeAlias
 
 from study_app.analysis.worker_messages import Answer, Order

@@ -1,7 +1,5 @@
 """Orders to the worker process that reads and evaluates studies, and its answers, as frozen values."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -4,8 +4,6 @@
 Each command imports what it needs when it runs, so that ``--help`` loads neither Qt nor the compiler.
 """
 
-from __future__ import annotations
-
 import errno
 import io
 import logging

@@ -1,7 +1,5 @@
 """The commands that read, prove and evaluate results folders."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from pathlib import Path

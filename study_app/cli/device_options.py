@@ -1,7 +1,5 @@
 """The option ``--device``, and the options that devices bring with them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The commands that say what is at hand: the workspace, its studies, their sessions."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The commands about the force model alone."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

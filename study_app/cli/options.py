@@ -1,7 +1,5 @@
 """The arguments, options, groups and exit codes that commands share."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The command that sets what sessions on this machine send to other programs."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import click

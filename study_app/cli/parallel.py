@@ -1,7 +1,5 @@
 """Where commands compute their cases: ``--workers`` and ``--cluster``, and what an interrupted start has finished."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Progress on the terminal, for every command that may take over two seconds."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

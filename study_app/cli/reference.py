@@ -1,7 +1,5 @@
 """The commands as text: the page Commands of the documentation, made from the commands themselves."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """The command that takes pictures of every window."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The commands that describe and hold sessions."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

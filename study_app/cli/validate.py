@@ -1,7 +1,5 @@
 """The command that measures how often the report's verdicts are wrong."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 Looks, and opens nothing. Loads no compiler, and drivers only as far as looking needs them.
 """
 
-from __future__ import annotations
-
 from study_app.devices.descriptor import NOT_AVAILABLE, Backend, DeviceDescriptor
 from study_app.devices.registry import ENTRY_POINTS, discover
 

@@ -4,8 +4,6 @@ An exchange's record has the fields of ``GATE``. A call uses the connection betw
 refuses further calls and waits for the one under way; a call that outlasts it ends the force before it leaves.
 """
 
-from __future__ import annotations
-
 import time
 from typing import Any, Final
 

@@ -1,7 +1,5 @@
 """The result of a device's diagnosis: what was tested, and what was found."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from textwrap import fill
 from typing import TYPE_CHECKING, Final, Literal

@@ -1,7 +1,5 @@
 """A device opened and run at rest by its servo, as its doctor does: without force, in the time of its clock."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Any, Final, Protocol, TypeVar

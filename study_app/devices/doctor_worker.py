@@ -4,8 +4,6 @@ Ended early, the process leaves by way of the driver, which sends packets of zer
 killed, and the driver's own guard sends them.
 """
 
-from __future__ import annotations
-
 import signal
 import sys
 from collections.abc import Mapping, Sequence

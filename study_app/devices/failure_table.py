@@ -1,7 +1,5 @@
 """What can go wrong with a device, as data: what is tested, the symptom, cause and cure. Loads no compiler."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

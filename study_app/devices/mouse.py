@@ -5,8 +5,6 @@ falls behind the pointer by force / stiffness, and goes on after the pointer has
 free space it follows smoothly, 20 ms behind (two low-passes of 10 ms, which make one motion of a pointer's steps).
 """
 
-from __future__ import annotations
-
 from study_app.devices.simulated.hand import POINT
 from study_app.devices.simulated.simulated_device import SimulatedDevice
 from study_app.haptics.kernels.plant import new_handle

@@ -1,7 +1,5 @@
 """How devices may be named, and the name of the default device."""
 
-from __future__ import annotations
-
 from typing import Final
 
 NAME_PATTERN: Final = "[a-z][a-z0-9-]*"

@@ -1,7 +1,5 @@
 """A device that a simulated person moves: along a given motion, or reaching as people do, with tremor and encoders."""
 
-from __future__ import annotations
-
 from random import Random
 from typing import Any
 

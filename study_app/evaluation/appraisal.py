@@ -1,7 +1,5 @@
 """What is found of a scene that was appraised: what it costs, and how true it is."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -1,7 +1,5 @@
 """What a scene of one liquid costs and how true it is: short enough to be asked for while somebody feels it."""
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

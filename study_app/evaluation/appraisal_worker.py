@@ -3,8 +3,6 @@
 It has the lowest priority of the computer, so that it takes no time from a servo.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 

@@ -1,7 +1,5 @@
 """What a scene costs: nanoseconds a tick by the servo's own code, and how many of them each effect takes."""
 
-from __future__ import annotations
-
 import statistics
 import time
 from collections.abc import Mapping

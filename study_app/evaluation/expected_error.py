@@ -4,8 +4,6 @@ The hand strokes to and fro with the greatest speed and acceleration of the scen
 encoder, through the scene's own velocity estimator. The force is that of the effects, before safety limits it.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

@@ -1,7 +1,5 @@
 """The error of a force against a reference solution."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple

@@ -1,7 +1,5 @@
 """Motions of a hand with exact velocities, for measuring models along."""
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

@@ -4,8 +4,6 @@ The steady force is that of ``haptics.model.laws.rheology``; the states are inte
 share no code with the kernel.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Final
 

@@ -1,7 +1,5 @@
 """Intervals in recordings: the scenes that they presented, and what they delivered, compared with the journal."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final

@@ -5,8 +5,6 @@ definition, not from ``haptics.kernels.effects``, which it shares no code with. 
 rounding of long sums.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

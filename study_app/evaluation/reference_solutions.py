@@ -5,8 +5,6 @@ a real sphere meets, as far as that is known: measured steady drag and the exact
 shares code with ``haptics.kernels.effects``.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Final

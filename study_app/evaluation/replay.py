@@ -9,8 +9,6 @@ A recording begins shortly before its trial, so that the force it begins with is
 a pause goes on from where that one was. What cannot be computed again is named: a proof says what it is not about.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

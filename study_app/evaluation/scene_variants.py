@@ -1,7 +1,5 @@
 """Variants of a scene: another wake, other effects, another drag law."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from study_app.haptics.model.effects.drag import Drag

@@ -4,8 +4,6 @@ Written from the law's equations, with exact exponentials for every step, and wi
 given. It shares no code and no constants with the kernel.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

@@ -1,7 +1,5 @@
 """The one Qt application of this program, made when the first window is asked for."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

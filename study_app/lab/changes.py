@@ -4,8 +4,6 @@ Beyond ``haptics.model.overrides`` it knows components of vectors, effects one b
 that the liquid does not have yet.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Final
 

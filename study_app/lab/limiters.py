@@ -1,7 +1,5 @@
 """Which limiter acted, and in how many of the last 10 s' ticks."""
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import dataclass
 from typing import Any, Final

@@ -6,8 +6,6 @@ as ``haptics.model.overrides`` takes them; ``.x``, ``.y``, ``.z`` after a name m
 effect.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """The liquids at hand, and a setting kept as a preset: a scene file that every command takes."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path

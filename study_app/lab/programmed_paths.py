@@ -1,7 +1,5 @@
 """Programmed paths for a hand: those of the figures (``haptics.model.paths``), as large as the workspace permits."""
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import numpy as np

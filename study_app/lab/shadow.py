@@ -6,8 +6,6 @@ forces are the servo's to the last bit; the other side continues with a copy of 
 force that was sent: it moved the hand. Nothing here can delay the servo.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 

@@ -1,7 +1,5 @@
 """What a setting's steady flow is like: its flow curve, and the force over the speed of the hand."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 

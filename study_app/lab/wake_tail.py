@@ -1,7 +1,5 @@
 """The wake as places on a screen: where the body left what it meets now."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 

@@ -1,7 +1,5 @@
 """How the servo's clock maps to that of the Lab Streaming Layer: measured at the start, and again while it runs."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Final

@@ -4,8 +4,6 @@ A marker holds codes and counts alone, by a list of what may be said: no conditi
 somebody wrote, and nothing that the journal seals.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ neither a window nor the disk delays the stream. It runs from before the first p
 recordings or without. Every sample has the time at which the device was read.
 """
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Mapping
 from typing import Any, Final

@@ -3,8 +3,6 @@
 One that cannot be opened, or fails later, is named in `Outlets.lost` with the reason; the session goes on without it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass

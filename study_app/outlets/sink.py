@@ -4,8 +4,6 @@ A session hands a marker over and goes on at once. A sink that fails, or that ha
 the servo: it gets no more markers, and `SinkThread.lost` says why.
 """
 
-from __future__ import annotations
-
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping

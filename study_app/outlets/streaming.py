@@ -1,7 +1,5 @@
 """What the two streams of the Lab Streaming Layer have in common; the library is the extra ``lsl``."""
 
-from __future__ import annotations
-
 import platform
 import time
 from collections.abc import Sequence

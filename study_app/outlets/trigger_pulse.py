@@ -3,8 +3,6 @@
 Two events of one moment come one after the other, each as a pulse of its own.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping
 from typing import Any, Final, Protocol

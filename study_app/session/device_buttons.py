@@ -1,7 +1,5 @@
 """The buttons of the device: the events that they make, and steps of an adjustment while one is held."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 

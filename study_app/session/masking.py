@@ -1,7 +1,5 @@
 """How the sound of a haptic device's motors was masked: audible motors can reveal a viscosity."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Final, Literal, TypeAlias
 

@@ -3,8 +3,6 @@
 Texts are already in the participant's language. Lengths are metres in the hand frame, times seconds.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 

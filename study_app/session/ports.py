@@ -1,7 +1,5 @@
 """What the runner asks of the world, as small protocols: a servo, a journal, a recorder, a screen and a clock."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol

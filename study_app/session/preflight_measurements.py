@@ -1,7 +1,5 @@
 """Measures what ``preflight`` judges: two seconds of the servo at rest, and the disk that the results will be on."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What an operator chose before a session, as a value. No Qt here."""
 
-from __future__ import annotations
-
 import secrets
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Where a session that was interrupted goes on: at the trial that was under way, or at the beginning of its block."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 from collections.abc import Callable, Iterable, Mapping

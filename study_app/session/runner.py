@@ -13,8 +13,6 @@ Where the disk takes nothing, the session stalls: zero force, a calm page, and w
 again until it is done, in order and once. Then the session is paused, and goes on when the operator resumes it.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any

@@ -10,8 +10,6 @@ dwell time. Leaving starts the dwell anew. The next target lights up with the sa
 entered by a later sample at the earliest.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias

@@ -4,8 +4,6 @@ Until that frame there is no force, the task's clock stands at zero and nothing 
 to show the tank. Without a window, whoever runs the session reports the first frame at once.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -4,8 +4,6 @@ The ticks before it make the recording complete in itself: they hold whatever th
 every force of the trial can be computed again from the recording alone.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from typing import Any
 

@@ -3,8 +3,6 @@
 Nothing here names the requested delay: only the achieved one less the requested is kept.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

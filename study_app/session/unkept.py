@@ -1,7 +1,5 @@
 """A session that is kept nowhere, for rehearsals whose answers are not asked for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Writing that is whole or absent: a reader, or the next start after a power cut, never meets half a file."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import os

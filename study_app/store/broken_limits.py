@@ -1,7 +1,5 @@
 """Which of a trial's measures break the limits of its protocol."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, TypeAlias
 

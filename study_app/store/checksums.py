@@ -1,7 +1,5 @@
 """``checksums.sha256``: what every file of a session was when it had ended, in the form that ``sha256sum -c`` reads."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections.abc import Collection, Mapping

@@ -1,7 +1,5 @@
 """The clock of a session: seconds since one origin."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from datetime import datetime, timedelta

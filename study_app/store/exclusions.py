@@ -1,7 +1,5 @@
 """What the analysis leaves out, by which rule or person and why. Data are never deleted; this list says what counts."""
 
-from __future__ import annotations
-
 import codecs
 import contextlib
 import csv

@@ -1,7 +1,5 @@
 """Files and folders handed to the user: all of them whole, or none."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import os

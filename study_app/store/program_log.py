@@ -5,8 +5,6 @@ record is written with the words alone, and of what stands in them only the sent
 is written as its type and the places in the source that it left, without its own sentence.
 """
 
-from __future__ import annotations
-
 import logging
 import re
 import traceback

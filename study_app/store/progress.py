@@ -3,8 +3,6 @@
 Whoever resumes, shows or checks a session reads it here, so that they agree.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path

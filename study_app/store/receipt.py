@@ -6,8 +6,6 @@ screens and the clock's origin. It is written before the first trial, when the s
 the status, at the end.
 """
 
-from __future__ import annotations
-
 import json
 import platform
 from collections.abc import Mapping

@@ -9,8 +9,6 @@ Positions, velocities and forces are in the frames of ``haptics.model.layout.SAM
 Parquet reader gives the columns, with unit and meaning in each column's metadata.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

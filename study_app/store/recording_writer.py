@@ -1,7 +1,5 @@
 """Recordings being written: samples group by group while a trial runs, frames at its end."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

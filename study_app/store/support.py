@@ -4,8 +4,6 @@ It holds no participant's id, no answer, no value of a liquid and nothing of a k
 traces of crashes, and of these the places in the source.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import re

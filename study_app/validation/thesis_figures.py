@@ -1,7 +1,5 @@
 """The thesis' Figs 3 to 8 drawn anew: force over time per axis, by the servo's own tick."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path

@@ -4,8 +4,6 @@ Rek 2024, §5.1: density 1000 kg/m³, a ball of 68 mm, N = S = 5000, y = 1, λ =
 neighbouring elements; motions at 1 m/s with their exact velocity.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Opening and scaling videos with PyAV, which is an optional extra and imported here alone."""
 
-from __future__ import annotations
-
 import os
 import sys
 import threading

@@ -1,7 +1,5 @@
 """Footage: a file that is played from the beginning of each trial, again and again; decoded in a thread of its own."""
 
-from __future__ import annotations
-
 import threading
 from collections import deque
 from collections.abc import Iterator

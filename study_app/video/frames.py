@@ -1,7 +1,5 @@
 """What the tank is given of a video: frames ready to be painted, and where they come from."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 

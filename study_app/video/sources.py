@@ -1,7 +1,5 @@
 """The videos of a study: opened before its session, described in its receipt, closed after it."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What is measured of the video in a trial: frames shown, late and lost, and how old the camera's pictures were."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from study_app.video.frames import VideoFrame

@@ -1,7 +1,5 @@
 """The client of a worker process: it gives orders and collects answers, and never waits for the process."""
 
-from __future__ import annotations
-
 import threading
 from contextlib import suppress
 from multiprocessing.connection import wait

@@ -1,7 +1,5 @@
 """An executor on a Dask cluster, whose workers must hold the same program, Python and libraries as this computer."""
 
-from __future__ import annotations
-
 import logging
 import re
 import socket

@@ -1,7 +1,5 @@
 """What a case's result depends on besides the case: the program's files, Python and the numerical libraries."""
 
-from __future__ import annotations
-
 import hashlib
 import platform
 from collections.abc import Iterator, Mapping

@@ -5,8 +5,6 @@ Every start appends to a file of its own, so that two programs need no lock. A c
 used. The files hold pickles, as those of the compiler's cache do: the folder is this user's alone.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import io

@@ -1,7 +1,5 @@
 """What a worker process may answer to any order, besides the values of its task."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from study_app.errors import StudyError

@@ -1,7 +1,5 @@
 """An executor of local processes that outlasts the loss of one: the cases not finished are computed again."""
 
-from __future__ import annotations
-
 import heapq
 import os
 import threading

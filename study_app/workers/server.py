@@ -1,7 +1,5 @@
 """The worker process: it carries out one order after the other, by one function, until its client is gone."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """How worker processes begin: by spawn, and without Ctrl+C, which the terminal sends to all processes of a program."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

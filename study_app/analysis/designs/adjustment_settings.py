@@ -1,7 +1,5 @@
 """Settings of blocks whose levels participants set: PSE, JND, constant error and hysteresis, of each and of all."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 

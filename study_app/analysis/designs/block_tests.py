@@ -1,7 +1,5 @@
 """The tests of one block's answers: which apply, in which families, and why others are not there."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, TypeVar

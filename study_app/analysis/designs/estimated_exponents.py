@@ -3,8 +3,6 @@
 An exponent of n is Stevens' power law, answer ∝ levelⁿ (Stevens 1957, Psychological Review 64, 153).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How a block of levels was conducted: what was delivered, what was repeated and why, and answers to catch trials."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator
 

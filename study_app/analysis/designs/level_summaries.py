@@ -1,7 +1,5 @@
 """Blocks of levels, summarised: times to answer by code; once the key is open, the answers at each level."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The 95 % bands of participants' psychometric functions, where a block has one standard."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Final
 

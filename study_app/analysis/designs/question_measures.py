@@ -1,7 +1,5 @@
 """The questions that no block of statements holds, measured; scores computed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any, Final
 

@@ -4,8 +4,6 @@ A block of levels has them over all levels of a standard, a block of conditions 
 each level against the lowest.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence

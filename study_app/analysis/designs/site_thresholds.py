@@ -1,7 +1,5 @@
 """Whether participants of different sites have the same thresholds."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

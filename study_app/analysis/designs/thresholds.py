@@ -4,8 +4,6 @@ Fits take all counted answers of a participant at the levels delivered to the ha
 at the mean of their delivered levels.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

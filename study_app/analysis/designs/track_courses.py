@@ -1,7 +1,5 @@
 """How the tracks of a participant ran at a standard: levels, answers, reversals, and the narrowing interval."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any

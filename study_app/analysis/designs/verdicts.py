@@ -1,7 +1,5 @@
 """From p to what may be said: families, corrections, and what so few participants could not have shown at all."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final, TypeAlias
 

@@ -3,8 +3,6 @@
 An exponent of 1 is Weber's law, JND ∝ standard; 0 is a constant JND.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The codebook of an export: the columns of every file, every statement, level and setting, and what was left out."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict

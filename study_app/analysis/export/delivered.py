@@ -1,7 +1,5 @@
 """A table that is handed out: its columns and its frame, and what every table says of whether its rows count."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

@@ -1,7 +1,5 @@
 """Tidy tables of all participants in files, with a codebook that explains every column, statement and level."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The tables of a study with levels: intervals; once the key is open, trials, thresholds, settings and exponents."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """The files of a study that a folder to share has as materials: its own file, its liquid files and its footage."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple

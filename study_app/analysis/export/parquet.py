@@ -3,8 +3,6 @@
 Answers are Int8, not ordered categories: categories of whole numbers come back as floats without their order.
 """
 
-from __future__ import annotations
-
 import io
 from typing import Final
 

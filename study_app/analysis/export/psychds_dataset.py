@@ -1,7 +1,5 @@
 """An export as a Psych-DS folder of its own, to share: tables, report, script, and the study's file."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict

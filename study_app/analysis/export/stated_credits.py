@@ -1,7 +1,5 @@
 """Authors, licence and citation of a study: the same words in every file that is handed out."""
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 from study_app.analysis.tables.study_tables import Study

@@ -1,7 +1,5 @@
 """The tables of a study with their codebook, as files: CSV, and further formats that are asked for."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final, Literal, TypeAlias

@@ -4,8 +4,6 @@ Settings are codes until the key was opened, and the sealed columns are left out
 (asked for, and achieved) are columns.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any, Final
 

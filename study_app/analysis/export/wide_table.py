@@ -1,7 +1,5 @@
 """The answers as a wide table: a row a participant, a column a statement and setting; for SPSS, JASP and jamovi."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass
 

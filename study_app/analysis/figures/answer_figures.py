@@ -1,7 +1,5 @@
 """The figures of a study: agreement for each liquid, and answers over delay; by code until the key is opened."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 

@@ -1,7 +1,5 @@
 """What figures say of themselves: titles, n, and captions that stand on their own."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Final
 

@@ -1,7 +1,5 @@
 """The figure of motion over delay: a small plot per measure of reaching, every participant shown."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final

@@ -1,7 +1,5 @@
 """A figure laid out like a page: every place in points from the upper left corner, every text measured."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """A figure of the report: what it is drawn from, and its bytes in each form."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """Every figure of a study's answers as files: of statements, of other questions, and of levels."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from itertools import chain
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The figure of a detection threshold: the share that noticed at each delay, and the curve where one is fitted."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Final
 

@@ -1,7 +1,5 @@
 """The figures of questions that no block of statements holds, each as PNG, SVG and PDF with its caption."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Final

@@ -3,8 +3,6 @@
 Darker means more, and every count stands in its cell, so that nothing depends on colour alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Final
 

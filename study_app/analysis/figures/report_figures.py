@@ -1,7 +1,5 @@
 """The figures of a report: of the answers of each block, and of its findings."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial

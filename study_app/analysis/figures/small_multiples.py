@@ -1,7 +1,5 @@
 """The figure of answers over delay: one small plot per statement, all seven levels up, every participant shown."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final

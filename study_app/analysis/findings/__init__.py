@@ -3,8 +3,6 @@
 Modules of folders in this one, such as ``factors``, are findings, too.
 """
 
-from __future__ import annotations
-
 import sys
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Equivalence of each delay to the shortest one, and difference from it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final

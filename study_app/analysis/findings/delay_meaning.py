@@ -1,7 +1,5 @@
 """What a delay in milliseconds can and cannot mean: the sentence that is most easily said too strongly."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Final
 

@@ -1,7 +1,5 @@
 """Page's test of a trend over the delay, in every statement whose direction was stated."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Final
 

@@ -1,7 +1,5 @@
 """The detection threshold of a delay: a psychometric function fitted to the answers to one statement."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Final
 

@@ -1,7 +1,5 @@
 """The first page's answer to which liquids, or views, were distinguished."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import Final

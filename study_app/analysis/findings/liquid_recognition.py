@@ -1,7 +1,5 @@
 """Recognition of liquids: the statement rated highest names one."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final

@@ -1,7 +1,5 @@
 """The lowest delay at which a trend shows, stepping down from the longest."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final

@@ -1,7 +1,5 @@
 """The figure of how participants reach under a delay, measured from recordings."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from study_app.analysis.figures import movement_plots, small_multiples

@@ -1,7 +1,5 @@
 """The first page's answer to the delay from which participants notice a difference."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 

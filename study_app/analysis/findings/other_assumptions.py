@@ -1,7 +1,5 @@
 """The same questions under other assumptions: the mixed model, and a test with incomplete participants."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final

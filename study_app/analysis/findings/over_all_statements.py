@@ -1,7 +1,5 @@
 """Differences between settings at all: one test over all statements of a block."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Final
 

@@ -1,7 +1,5 @@
 """The comparison of settings two by two, in the statements that differ at all."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Differences between settings, statement by statement."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Final
 

@@ -1,7 +1,5 @@
 """The first page's answer to the delay up to which answers do not change by a relevant amount."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Final
 

@@ -1,7 +1,5 @@
 """Sliders and numbers: median, quartiles, range."""
 
-from __future__ import annotations
-
 from typing import Final
 
 import pandas as pd

@@ -1,7 +1,5 @@
 """A measure of the answers to one question: what it computes, and how a table shows it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias

@@ -1,7 +1,5 @@
 """Choices: how often each option was chosen."""
 
-from __future__ import annotations
-
 from typing import Final
 
 import pandas as pd

@@ -1,7 +1,5 @@
 """Ratings of any length: counts of all points, median, quartiles."""
 
-from __future__ import annotations
-
 from typing import Final
 
 import pandas as pd

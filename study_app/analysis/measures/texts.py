@@ -1,7 +1,5 @@
 """Texts: each of them, in the order of the participants."""
 
-from __future__ import annotations
-
 from typing import Final
 
 import pandas as pd

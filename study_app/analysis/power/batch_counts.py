@@ -1,7 +1,5 @@
 """One batch of simulated studies, from people to counts of what the protocol's tests found; counts add up."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from functools import partial

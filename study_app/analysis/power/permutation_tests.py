@@ -4,8 +4,6 @@ All of them meet the same random rearrangements of participants' answers; sums o
 matrices of whole numbers, exact in single precision. Each p is (1 + those as extreme) / (1 + ``DRAWS``).
 """
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import numpy as np

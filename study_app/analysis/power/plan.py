@@ -1,7 +1,5 @@
 """What is planned: the blocks of a protocol, what their conditions feel like, and what was decided to be tested."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias

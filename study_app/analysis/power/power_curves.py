@@ -1,7 +1,5 @@
 """From counts to what a planner reads: the power of every test at every size, and the smallest effect it finds."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

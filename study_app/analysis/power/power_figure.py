@@ -5,8 +5,6 @@ without any effect. Under them the smallest difference that 80 % of studies show
 row for the lowest delay that shows and one for equivalence, a line a delay.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final

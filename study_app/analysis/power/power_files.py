@@ -1,7 +1,5 @@
 """The power of a study written out: tables and figures."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from study_app import figure_style as style

@@ -1,7 +1,5 @@
 """The power of a study as tables: a row a test and size as CSV, and Markdown to read and to paste."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 

@@ -5,8 +5,6 @@ people with the same noise answer at every size of the effect, and the first of 
 curves are smooth; the studies are independent of each other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

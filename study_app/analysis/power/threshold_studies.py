@@ -5,8 +5,6 @@ differ by a factor of 1.2: in their thresholds about a mean that is drawn from t
 and exponents about the value that `check` assumes.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor

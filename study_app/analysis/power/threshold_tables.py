@@ -1,7 +1,5 @@
 """The precision of thresholds, d′, d_a and exponents as tables: CSV with a row for each pair of sizes, and Markdown."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What the blocks of a protocol ask, and how each is analysed, in sentences for a preregistration."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Final
 

@@ -1,7 +1,5 @@
 """The part of a preregistration that the report compares with: hash, participants, precision and exclusion rules."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import asdict, dataclass

@@ -1,7 +1,5 @@
 """Where a study left its preregistration, or the number of participants that its protocol plans."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 

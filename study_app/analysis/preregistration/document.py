@@ -1,7 +1,5 @@
 """The preregistration of a study in Markdown, from its protocol alone."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from study_app import __version__

@@ -1,7 +1,5 @@
 """The sections of the page: tables of every test, in the order of the study's blocks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 

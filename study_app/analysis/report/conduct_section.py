@@ -1,7 +1,5 @@
 """The sections on how the study was run: sessions, exclusions, delays achieved, orders, motion and force."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Final

@@ -1,7 +1,5 @@
 """The findings in a few sentences: what is shown, and what these participants could not show."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from study_app.analysis.figures.levels.level_figure import level_words, with_unit

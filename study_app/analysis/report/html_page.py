@@ -1,7 +1,5 @@
 """The page and its parts: one HTML file with its style and its pictures inside, without scripts, nothing fetched."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache

@@ -1,7 +1,5 @@
 """How tests of single statements are printed: their table, and sentences about them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 from study_app.analysis.report.html_page import heading, paragraph, table

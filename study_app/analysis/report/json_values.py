@@ -1,7 +1,5 @@
 """Results as the values of JSON."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass

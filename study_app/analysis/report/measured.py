@@ -4,8 +4,6 @@ Measured by ``liquid-study validate-report --studies 1000``: studies of rek2024 
 1000 by the answer model and 1000 by the ordinal probit model.
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 from study_app.analysis.power.power_curves import interval

@@ -1,7 +1,5 @@
 """The paragraph for a paper: what was done, so that it could be done again."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from study_app import __version__

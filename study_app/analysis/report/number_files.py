@@ -1,7 +1,5 @@
 """Every number in files: a row a test, a row a measure of motion, and all of it as JSON."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict

@@ -1,7 +1,5 @@
 """A short script in base R that computes the main numbers again and says where they differ from the report's."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Final
 

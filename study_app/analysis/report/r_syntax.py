@@ -1,7 +1,5 @@
 """Values and calls in the syntax of R."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 
 from study_app.analysis.results.block_results import BlockFound

@@ -1,7 +1,5 @@
 """The rows of tests.csv: a row a test."""
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 from study_app.analysis.designs.verdicts import ALONE

@@ -1,7 +1,5 @@
 """The page's typeface, inside the page: the signs of Inter that a text needs, as CSS."""
 
-from __future__ import annotations
-
 import base64
 import io
 from importlib import resources

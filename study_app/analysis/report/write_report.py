@@ -1,7 +1,5 @@
 """The report of a study, written whole or not at all: the page, every number, figures, tables, and how to repeat it."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial

@@ -3,8 +3,6 @@
 Nothing in them is NaN or infinite: what does not exist is None.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any

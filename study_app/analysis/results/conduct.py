@@ -1,7 +1,5 @@
 """How the study was run: whether delays were what they should be, and in which orders settings came."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pandas as pd

@@ -1,7 +1,5 @@
 """Delays as they were displayed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

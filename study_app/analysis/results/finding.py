@@ -1,7 +1,5 @@
 """The descriptor of a finding: what was asked, how it is tested, and what each output of the analysis says of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, Literal, TypeAlias, TypeVar, cast

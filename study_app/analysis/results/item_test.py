@@ -1,7 +1,5 @@
 """The test of one item of a questionnaire."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 

@@ -1,7 +1,5 @@
 """What was found in a block of levels: times to answer and, once the key is open, the answers at each level."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal, Protocol, TypeAlias

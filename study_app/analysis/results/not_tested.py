@@ -1,7 +1,5 @@
 """What was not tested, and why."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -1,7 +1,5 @@
 """What was answered to a question that no block of statements holds, and the scores of questionnaires."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

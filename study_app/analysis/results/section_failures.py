@@ -1,7 +1,5 @@
 """Parts of an evaluation that fail: each is said in its place, and everything else goes on."""
 
-from __future__ import annotations
-
 import traceback
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

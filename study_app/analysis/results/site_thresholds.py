@@ -1,7 +1,5 @@
 """The thresholds of a block of levels at each site of a merged study, compared at one standard."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from study_app.analysis.statistics.independent_groups import GroupsDiffer

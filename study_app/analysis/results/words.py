@@ -1,7 +1,5 @@
 """How numbers and findings are put into words: nowhere is the lack of evidence called evidence of a lack."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Final
 

@@ -4,8 +4,6 @@ Cohen (1960), Educ. Psychol. Meas. 20, 37–46; its standard error: Fleiss, Cohe
 323–327.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Final

@@ -4,8 +4,6 @@ logit P(answer ≤ j) = θ_j − x·β − σ u, u ~ N(0, 1); McCullagh (1980), 
 u is an adaptive Gauss-Hermite quadrature around each participant's mode; Liu & Pierce (1994), Biometrika 81, 624–629.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final

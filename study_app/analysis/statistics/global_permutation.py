@@ -4,8 +4,6 @@ A participant's answers to all statements move together, so that statements may 
 The statistic is the sum of the statements' Friedman statistics (nonparametric combination; Pesarin & Salmaso 2010).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import permutations

@@ -5,8 +5,6 @@ values of each (a profile): the same share of the sum of squares between groups,
 Austral Ecol. 26, 32–46, with Euclidean distances).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Corrections for asking several questions at once; who belongs to a family the caller says."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ Single missing answers are allowed. Settings are tested by the likelihood ratio;
 curvature of the quadrature, not from Laplace's approximation, whose are too small.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final

@@ -3,8 +3,6 @@
 A result never holds NaN: what cannot be computed is None, and ``note`` or ``no_interval`` says why.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

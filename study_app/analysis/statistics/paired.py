@@ -1,7 +1,5 @@
 """Two settings compared within participants: exact signed ranks, matched rank-biserial, superiority of pairs."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import lru_cache

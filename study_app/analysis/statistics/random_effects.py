@@ -3,8 +3,6 @@
 Between-person variance by Paule & Mandel 1982, interval by Hartung & Knapp 2001 with Student's t.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ What a participant names is the single label rated highest ("this liquid behaves
 undecided. Chance is what remains when the settings are exchanged within each participant.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache

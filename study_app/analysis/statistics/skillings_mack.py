@@ -4,8 +4,6 @@ Skillings & Mack (1981), Technometrics 23, 171–177. A participant contributes 
 settings or more; answers must be missing for reasons that have nothing to do with them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The 95 % interval of a mean by Student's t."""
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

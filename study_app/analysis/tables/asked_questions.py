@@ -1,7 +1,5 @@
 """The questions of a study that no block of statements holds: of other kinds after trials, and all of forms."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final

@@ -4,8 +4,6 @@ While the key is sealed a setting is its code and nothing else. Texts are in Eng
 in its first language.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias, get_args

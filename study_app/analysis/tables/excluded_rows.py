@@ -1,7 +1,5 @@
 """What ``exclusions.csv`` leaves out, marked in the rows it is about: they are kept, and do not count."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import pandas as pd

@@ -3,8 +3,6 @@
 Without groups or sites, and until the study is unblinded, there is nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, TypeAlias

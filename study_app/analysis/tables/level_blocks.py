@@ -1,7 +1,5 @@
 """Blocks of levels: how their trials are built and, once the key is open, what they vary."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

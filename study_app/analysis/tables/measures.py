@@ -4,8 +4,6 @@ One statement is ordinal, so there are no means. Quartiles are linear (Hyndman &
 All seven levels are always there, chosen or not.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Final, TypeAlias

@@ -4,8 +4,6 @@ Measures of trials stand in the trials' tables; those of reaches come out of the
 first reach of a trial begins wherever the hand was and is left out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

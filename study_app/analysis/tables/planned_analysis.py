@@ -1,7 +1,5 @@
 """What was decided about the analysis before the first session, as the receipts hold it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, TypeAlias

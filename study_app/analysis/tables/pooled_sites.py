@@ -4,8 +4,6 @@ Each site has a key of its own, so that L1 of one is not L1 of another. Until al
 each site has settings of its own; then a code is the id of its condition, and the sites have the same settings.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeAlias, TypeVar

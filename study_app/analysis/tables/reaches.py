@@ -3,8 +3,6 @@
 Times and places are the device's, undelayed: the same clock that decided when a target was reached.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final

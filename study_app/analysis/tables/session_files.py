@@ -1,7 +1,5 @@
 """The sessions of a results folder, read from their receipts and their tables and checked against each other."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

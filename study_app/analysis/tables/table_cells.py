@@ -1,7 +1,5 @@
 """The cells of a table of a results folder, as text: each column as the texts that occur and the place of each cell."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Sequence

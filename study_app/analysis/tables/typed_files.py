@@ -1,7 +1,5 @@
 """Reading files of a results folder into typed columns, or saying exactly what is wrong with one and where."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The command that compares models of a liquid with a fluid solver."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

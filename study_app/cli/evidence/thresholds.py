@@ -1,7 +1,5 @@
 """The commands about thresholds: known ones are recovered, and two procedures are compared on the same people."""
 
-from __future__ import annotations
-
 import os
 import time
 from pathlib import Path

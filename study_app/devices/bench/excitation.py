@@ -6,8 +6,6 @@ with one. The force ends at once where the handle oscillates or moves too far, w
 where device or host are silent; then it stays zero until the next excitation.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cache

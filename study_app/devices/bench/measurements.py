@@ -1,7 +1,5 @@
 """What the samples of a bench say: regularity, noise, mass and friction, delay, gain of the force."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple

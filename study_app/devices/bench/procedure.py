@@ -1,7 +1,5 @@
 """The fixed protocol of ten minutes: rest, mass and friction, force against a scale, greatest stable damping."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """The report of a bench, for people and for programs: Markdown and JSON without anything of this computer's folders."""
 
-from __future__ import annotations
-
 import json
 import platform
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Answers of a device's own simulated hand to what a bench asks the operator for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

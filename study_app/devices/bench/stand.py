@@ -1,7 +1,5 @@
 """A device on the bench: the servo's own loop around it, excitations for a time, and the samples of that time."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from types import TracebackType

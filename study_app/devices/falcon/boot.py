@@ -4,8 +4,6 @@ What each step waits for is read as a stream, whatever packets the bridge makes 
 attempt; the next one begins with the bridge opened anew, which is how it succeeds for those who have a Falcon.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from statistics import median
 from typing import Final

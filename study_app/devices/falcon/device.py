@@ -1,7 +1,5 @@
 """The Falcon as a device: opened with its program loaded, homed and guarded; closed without torque."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final

@@ -4,8 +4,6 @@ All of the driver is the real one, down to pyusb and the C function; the emulato
 is open, the emulator's time is that of the servo's ticks, so that it runs as fast as a rehearsal does.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from random import Random

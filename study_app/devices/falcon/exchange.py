@@ -6,8 +6,6 @@ nothing new, and what came last is never given twice. Force passes a gate: all a
 then half a second from none to all. Which replies are believed: see ``replies``.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any, Final
 

@@ -3,8 +3,6 @@
 `Facts` are what a transport, the boot, homing or a test run saw; errors carry theirs. `failure_modes` lists the modes.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

@@ -5,8 +5,6 @@ from what owners of Falcons reported of other drivers, and from the documentatio
 seen by us on a Falcon. Loads neither the compiler nor a driver.
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 from study_app.devices.falcon.facts import ALL_HOMED, OPEN, OTHER, Facts, Mode, Shows

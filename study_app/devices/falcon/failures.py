@@ -1,7 +1,5 @@
 """What can go wrong on the way to the Falcon: a kind, libusb's code for it, and a sentence."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from study_app.devices.falcon.facts import Facts

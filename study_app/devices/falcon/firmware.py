@@ -5,8 +5,6 @@ zeros, the entry point, then blocks of (count, destination, words) and a count o
 one first (TI SPRUI33, boot data stream of 8 bits).
 """
 
-from __future__ import annotations
-
 import hashlib
 import re
 import struct

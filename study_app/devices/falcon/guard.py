@@ -6,8 +6,6 @@ They keep the homing flag, and nothing of the bridge is set: what runs and is ho
 ``python -m study_app.devices.falcon.guard NAME``, NAME being one of ``transport.open_transport``.
 """
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

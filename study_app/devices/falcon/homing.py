@@ -4,8 +4,6 @@ Arms find their index on the way in; before that the encoders count from anywher
 after it shows that positions are right, and that the hand is where the device wants it when the force comes in.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, Final
 

@@ -1,7 +1,5 @@
 """Which Falcons are connected, and why one cannot be used. Looks, and opens nothing; loads no compiler."""
 
-from __future__ import annotations
-
 import sys
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any

@@ -6,8 +6,6 @@ than the servo's slew limit in a tick; all that lowers it, and all that takes en
 once. All of this works on the exchange's record (``exchange.FALCON``), in the Falcon's frame.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Final
 

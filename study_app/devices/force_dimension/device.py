@@ -1,7 +1,5 @@
 """A Force Dimension device: opened and checked through the maker's library, closed with zero force."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, Final, Protocol
 

@@ -4,8 +4,6 @@ The servo's part of the driver is the real one: it calls these functions, compil
 at their addresses. No C compiler is needed. Opening through a loaded library is not part of it.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from random import Random
 from typing import Any

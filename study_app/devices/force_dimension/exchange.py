@@ -8,8 +8,6 @@ The maker's axes are x toward the participant, y to the right, z up (examples of
 turned by a permutation, see ``_from_maker``.
 """
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """What can go wrong with a Force Dimension device. None of it was seen by us on a device."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from study_app.devices.failure_table import FailureMode, FailureTable

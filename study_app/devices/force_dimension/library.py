@@ -4,8 +4,6 @@ Signatures follow ``dhdc.h`` and ``drdc.h`` of the Force Dimension SDK 3.17.5 (p
 ``externals/DHD/include``); nothing of the maker's is part of this program. Loads no compiler.
 """
 
-from __future__ import annotations
-
 import ctypes
 import math
 import os

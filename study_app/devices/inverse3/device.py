@@ -1,7 +1,5 @@
 """The Inverse3 as a device: its session opened with neutral settings, and ended with zero force and silence."""
 
-from __future__ import annotations
-
 import math
 import secrets
 from collections.abc import Callable

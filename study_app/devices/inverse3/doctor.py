@@ -3,8 +3,6 @@
 Everything is done by the driver that a session uses, so what fails there fails here; `failures` has cause and cure.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 

@@ -4,8 +4,6 @@ All of the driver is the real one, down to the bytes of the WebSocket; in place 
 of the emulator. Once it is open, the emulator's time is that of the servo's ticks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from random import Random
 

@@ -8,8 +8,6 @@ nothing. Commands are applied once and forgotten, and a device without commands 
 silence is what ends the force where this program ends or hangs.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any, Final
 

@@ -3,8 +3,6 @@
 The causes follow from docs.haply.co, versions 3.4.x and 3.5.x; none was seen by us on a device.
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 from study_app.devices.failure_table import FailureMode, FailureTable

@@ -4,8 +4,6 @@ A client masks what it sends; a server must not (§5.1). The service answers eac
 fragments (§5.4) are not expected and count as a violation of the protocol.
 """
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import numpy as np

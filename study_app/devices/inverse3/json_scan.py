@@ -8,8 +8,6 @@ Documented in docs.haply.co, version 3.5.x: "WebSocket Protocol", steps 1 and 2 
 [m], ``state.cursor_velocity`` [m/s], ``status``) and "HTTP", Devices (``verse_grip``, ``wireless_verse_grip``).
 """
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The byte stream to the service: a TCP socket, for Python while the device is opened, for compiled code afterwards."""
 
-from __future__ import annotations
-
 import ctypes
 import socket
 import sys

@@ -1,7 +1,5 @@
 """Numbers and texts written into bytes by compiled code."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How a connection is opened: RFC 6455's handshake, the service's inventory, and the first message's settings."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

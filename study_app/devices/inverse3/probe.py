@@ -1,7 +1,5 @@
 """Whether an Inverse Service answers here and which Inverse3 it lists. Opens no session; loads no compiler."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import urllib.request

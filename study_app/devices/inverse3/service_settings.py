@@ -4,8 +4,6 @@ Documents: docs.haply.co 3.5.x, "Device Configuration" (availability matrix, pre
 pipeline), "Mount & Workspace Transforms" (presets), "WebSocket Protocol" step 1 (shape of ``config``).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Final
 

@@ -8,8 +8,6 @@ Everything is made of sums, products, divisions and square roots, which IEEE 754
 hand moves to the same bit on every machine.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

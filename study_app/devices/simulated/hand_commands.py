@@ -1,7 +1,5 @@
 """Commands to a simulated hand, from any thread but one at a time."""
 
-from __future__ import annotations
-
 from random import Random
 from typing import Any
 

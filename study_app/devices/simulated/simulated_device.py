@@ -3,8 +3,6 @@
 Its read steps hand and handle to the time given, inside the servo's loop; its write holds the force for the next step.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

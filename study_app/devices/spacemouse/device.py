@@ -4,8 +4,6 @@ Felt is nothing; seen is what the mouse shows: the handle hangs on its pointer b
 on the handle. A thread of its own reads the device and says where the pointer is, as a window does for the mouse.
 """
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable

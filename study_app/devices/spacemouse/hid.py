@@ -5,8 +5,6 @@ Known ways to fail: on Linux the device's node belongs to the administrator (a r
 of which one reports motion. Loads no compiler, and hidapi only when asked to.
 """
 
-from __future__ import annotations
-
 import sys
 from importlib import import_module
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """Which SpaceMice are connected, and why one cannot be used. Looks, and opens nothing."""
 
-from __future__ import annotations
-
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 

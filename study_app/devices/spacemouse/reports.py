@@ -6,8 +6,6 @@ deflection is about 350. Sources: pyspacemouse's table of devices, whose own obs
 a device. Loads neither the compiler nor a driver.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

@@ -5,8 +5,6 @@ count as independent as n (1 − ρ)/(1 + ρ), with ρ their correlation from on
 J. R. Stat. Soc. Suppl. 8:184, for a first-order process).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass

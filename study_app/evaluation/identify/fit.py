@@ -4,8 +4,6 @@ The sum over rows and axes of (measured − simulated force)² is made least wit
 permit (``search``); ``estimates`` computes confidence intervals and warnings.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

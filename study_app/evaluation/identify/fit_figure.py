@@ -1,7 +1,5 @@
 """A fit as a picture: the force measured and fitted, what is left of it over time, and over speed."""
 
-from __future__ import annotations
-
 import textwrap
 from typing import Any, Final
 

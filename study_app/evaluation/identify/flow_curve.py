@@ -4,8 +4,6 @@ The sum of (fitted/measured stress − 1)² is made least, since flow curves spa
 share of the stress. The curve is `study_app.haptics.model.laws.rheology.stress_pa`, that of steady shear.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final

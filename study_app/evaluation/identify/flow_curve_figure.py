@@ -1,7 +1,5 @@
 """A fitted flow curve as a picture: shear stress over shear rate, and what is left of it."""
 
-from __future__ import annotations
-
 import textwrap
 from typing import Final
 

@@ -1,7 +1,5 @@
 """Measured motion and force, or a flow curve, from a file; a measured motion as one that `simulate` can follow."""
 
-from __future__ import annotations
-
 import csv
 import math
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The numbers of a liquid that a fit may vary: found by name, within the ranges of the scene's own models."""
 
-from __future__ import annotations
-
 import dataclasses
 import difflib
 import math

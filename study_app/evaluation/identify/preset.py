@@ -1,7 +1,5 @@
 """What a fit leaves behind: a report, a preset that other commands take, the residuals as a table, and a figure."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 from typing import Final

@@ -6,8 +6,6 @@ force is known at whole lengths alone: between them it is interpolated; the sear
 it finds is rounded, and the others are fitted once more.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar, Final, NamedTuple

@@ -1,7 +1,5 @@
 """A row for each device: whether it is the one to begin with, its state, what it can do, and why it cannot be used."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A device's diagnosis: what goes on while it is examined, then every mode of failure, found or not."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TypeAlias

@@ -1,7 +1,5 @@
 """A row for each mode of failure: its state, its symptom and, opened, cause, cure, how it is known, what to paste."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGridLayout, QLineEdit, QWidget

@@ -3,8 +3,6 @@
 It draws values and says what is asked for; it opens no device.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path

@@ -3,8 +3,6 @@
 Nothing in this file imports Qt.
 """
 
-from __future__ import annotations
-
 import ctypes
 import importlib.util
 import os

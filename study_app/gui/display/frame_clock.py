@@ -5,8 +5,6 @@ twice and others never; here every deadline is a multiple of the refresh from on
 swapped, the origin is its last swap, and a frame is drawn shortly before the next.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Final

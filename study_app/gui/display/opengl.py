@@ -1,7 +1,5 @@
 """Whether there is a graphics card to draw with: only then is an OpenGL surface quicker than painting in software."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Final
 

@@ -1,7 +1,5 @@
 """Which window stands on which screen, and what a receipt should record of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import Any

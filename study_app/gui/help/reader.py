@@ -1,7 +1,5 @@
 """One page of the documentation, drawn from Markdown in the colours of the theme."""
 
-from __future__ import annotations
-
 import posixpath
 from pathlib import Path
 from typing import Any

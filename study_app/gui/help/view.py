@@ -1,7 +1,5 @@
 """The place Help: the list of pages, a search, and one page."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from PySide6.QtCore import QEvent, QObject, QSize, Qt

@@ -1,7 +1,5 @@
 """The right column's first card: drag and wake as measured force says, with intervals, and applied on request."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal

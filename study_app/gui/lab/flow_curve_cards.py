@@ -1,7 +1,5 @@
 """Of non-Newtonian liquids: shear stress over shear rate, and the steady force over the speed of the hand."""
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

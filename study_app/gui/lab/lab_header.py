@@ -1,7 +1,5 @@
 """The head of the lab: which side is felt, blinding, device and motion, undo, the force stop, and saving."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget

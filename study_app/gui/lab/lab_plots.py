@@ -1,7 +1,5 @@
 """Below the tank: the force on the hand, and how fast body and wake are, over the last seconds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

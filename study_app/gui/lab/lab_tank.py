@@ -3,8 +3,6 @@
 With the mouse as the device a click takes the pointer for the ball, as in a session; a click or Esc lets it go.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import TypeAlias

@@ -1,7 +1,5 @@
 """The right column: what a tick of the felt setting costs, how far it is from its reference, which limiter acts."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from PySide6.QtCore import QRectF, Qt

@@ -1,7 +1,5 @@
 """The left column: which liquid a side has, and every parameter of the side that is felt."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QGridLayout, QStackedLayout, QWidget
 

@@ -1,7 +1,5 @@
 """A row for each parameter: slider and field, a list, or a switch. It draws a `FormRow` and says what is asked for."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QLabel, QWidget
 

@@ -3,8 +3,6 @@
 Everything here is places in px for one camera; ``tank`` paints it.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What lies over the tank when something must be said: what is waited for, what went wrong, that the force is off."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QEvent, QObject, QTimer, Signal
 from PySide6.QtWidgets import QProgressBar, QWidget
 

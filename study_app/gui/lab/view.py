@@ -3,8 +3,6 @@
 It draws a `LabView` and says what is asked for; it knows no device and no servo.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from PySide6.QtCore import QEvent, QSize, Qt, Signal

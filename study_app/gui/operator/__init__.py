@@ -3,8 +3,6 @@
 The window is imported when it is first used, since other places need its texts without plots.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:

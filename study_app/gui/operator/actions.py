@@ -1,7 +1,5 @@
 """What the operator can do with the session: pause, repeat a trial for a reason, end; and the two questions."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QButtonGroup, QLineEdit, QSizePolicy, QWidget
 

@@ -5,8 +5,6 @@ rail shows its dots alone, and where the session is stands at the head of the mi
 force stop keeps its place and size in every state.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

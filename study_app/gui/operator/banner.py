@@ -1,7 +1,5 @@
 """What went wrong and what to do, above everything else in the middle; away while all is well."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget

@@ -3,8 +3,6 @@
 In the rail they stand above and below the steps; in a small window they lie flat at the head of the middle.
 """
 
-from __future__ import annotations
-
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget

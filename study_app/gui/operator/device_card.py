@@ -1,7 +1,5 @@
 """The device's card: what the participant feels with, whether it answers, and the way to its diagnoses."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QLabel
 

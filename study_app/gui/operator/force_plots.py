@@ -1,7 +1,5 @@
 """Force and wake of the last ten seconds, for the operator of a single-blind study, where they are hidden otherwise."""
 
-from __future__ import annotations
-
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QSize
 from PySide6.QtGui import QColor

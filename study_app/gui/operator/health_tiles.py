@@ -1,7 +1,5 @@
 """Is it healthy: four numbers, each with a verdict and what it is compared with."""
 
-from __future__ import annotations
-
 from PySide6.QtWidgets import QGridLayout, QWidget
 
 from study_app.gui.widgets.boxes import STRETCH, hbox

@@ -1,7 +1,5 @@
 """The operator's notes and marks, which go into the journal with their time."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QPlainTextEdit, QWidget

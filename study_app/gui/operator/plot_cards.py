@@ -1,7 +1,5 @@
 """The middle of the operator's window: lateness of ticks, the hand's position, and the force that stays hidden."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QSize, Qt
 
 from study_app.gui.operator.force_plots import FIELD

@@ -1,7 +1,5 @@
 """What the operator needs where both windows share one screen: the state and the force stop, on the participant's."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget

@@ -1,7 +1,5 @@
 """A journal that reports its lines to the operator's window: what was written counts as progress, nothing else."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -3,8 +3,6 @@
 It draws an ``OperatorView`` and two plots, and says what the operator asks for; it knows no runner and no servo.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 from PySide6.QtCore import QSize, Signal

@@ -1,7 +1,5 @@
 """One thing that was looked at, as a row: its verdict, its name, of what, how much of its limit, and the value."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QWidget

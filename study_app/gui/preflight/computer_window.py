@@ -1,7 +1,5 @@
 """The page of the first start: what of this computer is fit for sessions, and what to do where something is not."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QProgressBar, QScrollArea, QWidget
 

@@ -1,7 +1,5 @@
 """Whether to begin: every check with its value, what will run, and one button that says what is accepted by it."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QAccessible, QCloseEvent, QKeyEvent
 from PySide6.QtWidgets import QAbstractSlider, QGridLayout, QLabel, QWidget

@@ -1,7 +1,5 @@
 """Handing results on: where to, what of it, how far it is, and then the way to what was written."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """A figure of the analysis in the colours of the theme, sharp at every size, drawn in the background."""
 
-from __future__ import annotations
-
 import queue
 import re
 import threading

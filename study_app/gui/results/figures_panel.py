@@ -1,7 +1,5 @@
 """The figures one below the other, as large as fits, and what is still being worked on."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from PySide6.QtCore import QSize, Qt, Signal

@@ -1,7 +1,5 @@
 """The sidebar of the figures: the sessions with their filters, and what is excluded from the analysis."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from datetime import datetime
 

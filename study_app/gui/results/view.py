@@ -1,7 +1,5 @@
 """Results: choose a study, see who counts and what they said, leave out, unblind, and hand it on."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Final
 

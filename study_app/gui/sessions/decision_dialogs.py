@@ -1,7 +1,5 @@
 """Decisions about a study, each with a name and a reason: leaving a session or a trial out, opening the sealed key."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from PySide6.QtCore import Qt

@@ -1,7 +1,5 @@
 """The hand's motion in one trial: its place along three axes over time."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt

@@ -1,7 +1,5 @@
 """A session's page: trials, limits and which were broken, notes, motion, files, exclusions and taking them back."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path

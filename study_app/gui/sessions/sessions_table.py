@@ -1,7 +1,5 @@
 """A table of sessions: who, which study, when, how it ended, whether it kept to the limits, how much of it is there."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from datetime import datetime
 from typing import Any

@@ -1,7 +1,5 @@
 """What a photodiode said of the display: its offset, how much it varies, and how that was measured."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QWidget
 

@@ -3,8 +3,6 @@
 Frames are asked for as a session asks for them, and the time of each painting is kept; the patch is the tank's own.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """A measured number with its unit: typed, taken if it is in range, and forgotten where the field is emptied."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 

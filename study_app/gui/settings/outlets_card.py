@@ -1,7 +1,5 @@
 """The card of the machine's place that sets what sessions send to other programs."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QLineEdit
 

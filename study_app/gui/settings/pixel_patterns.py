@@ -1,7 +1,5 @@
 """What shows whether a screen shows pixels as they are: a ramp of greys, and lines of one and two device pixels."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 from PySide6.QtCore import QRect, QRectF, Qt

@@ -1,7 +1,5 @@
 """A big number on each screen, for a moment: which is which."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QRectF, Qt, QTimer
 from PySide6.QtGui import QColor, QGuiApplication, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QScreen
 from PySide6.QtWidgets import QWidget

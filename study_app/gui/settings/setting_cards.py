@@ -1,7 +1,5 @@
 """The cards of the machine's place: screens, what is seen of them, the display's offset, sessions, windows."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import (

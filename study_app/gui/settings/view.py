@@ -3,8 +3,6 @@
 It draws `MachineSettings` and the screens there are, and says what is to be changed; it reads and writes no file.
 """
 
-from __future__ import annotations
-
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QGuiApplication, QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import QBoxLayout, QWidget

@@ -3,8 +3,6 @@
 Sizes are logical px, so that they grow with the screen's scaling and with nothing else.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib import resources

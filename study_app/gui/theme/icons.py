@@ -5,8 +5,6 @@ circle, ``R x y w h r`` a rounded rectangle.
 A path after ``fill`` is filled instead of stroked.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 from PySide6.QtCore import QRectF, QSize, Qt

@@ -5,8 +5,6 @@ distances between states and between traces for normal, protan, deutan and trita
 colour **and** icon **and** word.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from study_app.gui.theme.fonts import TYPE, Type, TypeRole, font, load_fonts

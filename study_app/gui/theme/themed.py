@@ -1,7 +1,5 @@
 """How a change of theme reaches what the style sheet does not: parts that paint themselves, marks, selections."""
 
-from __future__ import annotations
-
 from PySide6.QtGui import QColor, QPalette
 from PySide6.QtWidgets import QScrollArea, QWidget
 

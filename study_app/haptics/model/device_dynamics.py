@@ -1,7 +1,5 @@
 """What the loop must know of a device beyond its force limit: delay, encoder count and least mass."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple

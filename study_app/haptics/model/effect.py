@@ -5,8 +5,6 @@ An effect is two files of one name: the descriptor in ``haptics.model.effects``,
 their folder (``haptics.model.effects.EFFECTS``).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

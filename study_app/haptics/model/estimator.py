@@ -5,8 +5,6 @@ An estimator is a descriptor in ``haptics.model.estimators``, a kernel in ``hapt
 their folder (``haptics.model.estimators.ESTIMATORS``).
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 from collections.abc import Callable

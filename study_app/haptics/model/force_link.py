@@ -1,7 +1,5 @@
 """The link between the force model and the hand: by how much a study delays the force, and how unevenly."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Final
 

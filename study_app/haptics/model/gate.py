@@ -8,8 +8,6 @@ stays within the same target of the reference law at every speed. A wake is neve
 that density and viscosity could tell.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 

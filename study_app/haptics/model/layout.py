@@ -4,8 +4,6 @@ Records are rows of ``np.recarray``: compiled they are plain structs, uncompiled
 have attributes. Positions and forces are float64; unless a name says otherwise, m, m/s, N, s.
 """
 
-from __future__ import annotations
-
 from typing import Any, TypeAlias
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Motions and what became of them as tables: strict to read, exact and atomic to write."""
 
-from __future__ import annotations
-
 import csv
 import math
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Parameters of a scene set by name, as ``simulate --set`` does."""
 
-from __future__ import annotations
-
 import difflib
 import tomllib
 from collections.abc import Mapping

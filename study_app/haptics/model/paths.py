@@ -4,8 +4,6 @@ All are horizontal (y = 0), in the scene frame, start at full speed, and are sam
 is at its final place and the velocity is exactly zero from that tick on.
 """
 
-from __future__ import annotations
-
 import difflib
 import math
 from collections.abc import Callable

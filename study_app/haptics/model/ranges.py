@@ -1,7 +1,5 @@
 """Values that a file may give: ranges of numbers, each with its reason, which a message about it repeats."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Final, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field

@@ -4,8 +4,6 @@ The table is ``slope_limits.csv`` in this folder, measured by ``validation.stabi
 tick; how its numbers follow from the measurement is said there.
 """
 
-from __future__ import annotations
-
 import csv
 from functools import cache, lru_cache
 from importlib import resources

@@ -1,7 +1,5 @@
 """The force of an even motion by arithmetic: what the servo will send, computed without the compiler."""
 
-from __future__ import annotations
-
 import math
 from typing import Final, Literal, NamedTuple
 

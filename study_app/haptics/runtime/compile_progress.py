@@ -1,7 +1,5 @@
 """Progress while the force model is compiled: how many functions were, and what is expected in all."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """A scene becomes the memory the compiled code reads: allocated once, here, and refilled in place."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

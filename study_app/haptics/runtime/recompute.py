@@ -5,8 +5,6 @@ tick takes from outside. So the same tick outside the servo, with a model and a 
 the same force to the last bit, or with that of another liquid on the same motion.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A liquid becomes the record its effects read, and rows of the model's arrays for those effects that own some."""
 
-from __future__ import annotations
-
 from collections import namedtuple
 from collections.abc import Mapping
 from typing import Any, Final, TypeAlias

@@ -1,7 +1,5 @@
 """The servo as the rest of the program knows it: started and stopped, given scenes, asked for faults and telemetry."""
 
-from __future__ import annotations
-
 import threading
 import weakref
 from types import TracebackType

@@ -3,8 +3,6 @@
 SIGSTOP cannot be refused. Loads no compiler.
 """
 
-from __future__ import annotations
-
 import signal
 import threading
 from typing import Final

@@ -4,8 +4,6 @@ Whatever ends the host ends the loop, and with it the force: being stopped, an e
 servo, the interpreter's exit, and those signals that would otherwise kill the process on the spot.
 """
 
-from __future__ import annotations
-
 import signal
 import threading
 import time

@@ -6,8 +6,6 @@ estimate makes the slope limit act that did not act before. The force limit alwa
 at most `MOST_PER_S`. The length of the wake is applied at once only: another length empties the wake.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

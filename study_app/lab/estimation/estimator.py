@@ -5,8 +5,6 @@ scaling of the wake the newest rows are searched once a second of the stream (``
 let an executor do so. A value counts only where the motion identifies it (``information``).
 """
 
-from __future__ import annotations
-
 import math
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace

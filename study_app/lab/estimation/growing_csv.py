@@ -1,7 +1,5 @@
 """Measured motion and force from a CSV file that another program appends to."""
 
-from __future__ import annotations
-
 import csv
 import math
 from pathlib import Path

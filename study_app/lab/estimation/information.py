@@ -10,8 +10,6 @@ first-order process). A motion identifies the parameters where the smallest eige
 every direction of the parameters the half width of the 95 % interval is then 5 % or less.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

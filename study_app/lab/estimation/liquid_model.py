@@ -4,8 +4,6 @@ With the constant law of drag the force is C_d·g + h: g depends on the wake, h 
 does not depend on C_d, so one run along a motion serves every C_d.
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 import numpy as np

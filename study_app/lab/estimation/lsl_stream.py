@@ -4,8 +4,6 @@ A stream counts whose channels are labelled as the columns of a CSV file (``grow
 own time stamps are the times of the rows.
 """
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import math

@@ -6,8 +6,6 @@ rows, weighted by their age (the information form of recursive least squares; Lj
 §11.2), and residuals at the present estimate follow from the same sums.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

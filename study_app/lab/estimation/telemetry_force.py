@@ -3,8 +3,6 @@
 Samples hold the velocity after the knee, so the liquids here have none.
 """
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import numpy as np

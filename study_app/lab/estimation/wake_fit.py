@@ -6,8 +6,6 @@ liquid is at rest before the first row of a stream; where older rows were droppe
 fill the wake and do not count.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Markers as a stream of the Lab Streaming Layer, each with the time of its event."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

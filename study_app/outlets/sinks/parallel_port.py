@@ -4,8 +4,6 @@ The code is put on the data lines first and the strobe pulsed then, so that a re
 lines that are settled; one that watches the lines reads them for as long as the code is held.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """Trigger codes on a serial port, by pyserial (extra ``triggers``): one byte, 8N1, without flow control."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """SIMULATED settings: an observer who adjusts until the strength equals the remembered one, as it is taken."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from study_app.session.simulated.design_observer import Comparison, Draw

@@ -6,8 +6,6 @@ same machine, orders, answer model and files, and every row says that it is simu
 participant felt answers word for word as in the rehearsal.
 """
 
-from __future__ import annotations
-
 import time
 import typing
 from collections.abc import Callable, Mapping, Sequence

@@ -4,8 +4,6 @@ Only sums, products, quotients and square roots of the numbers drawn are used, s
 everywhere.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import TypeAlias
 

@@ -4,8 +4,6 @@ What such a participant knows is what a person would know: the pages, the tank a
 and the force on the hand. Nothing here knows a condition.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """What every simulated participant does with a page of questions: notice, answer by what was felt, and confirm."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 

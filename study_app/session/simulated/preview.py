@@ -3,8 +3,6 @@
 No sealed key is read: the codes are drawn from the seed, so that a preview reveals nothing of a study that is run.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final

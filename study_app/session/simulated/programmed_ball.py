@@ -1,7 +1,5 @@
 """A ball that moves through a task along a programmed path, without a device: what the tank shows meanwhile."""
 
-from __future__ import annotations
-
 from typing import Final, TypeAlias
 
 import numpy as np

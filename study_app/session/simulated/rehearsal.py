@@ -8,8 +8,6 @@ What a participant does and answers in a trial is drawn from streams of that tri
 resumed answers as one that was not: from what is felt in the whole session, which is computed again for that.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from datetime import datetime

@@ -1,7 +1,5 @@
 """The worker process that rehearses a protocol for a window."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TypeAlias

@@ -3,8 +3,6 @@
 What the participant does and answers in a trial is drawn from streams of that trial.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any

@@ -5,8 +5,6 @@ requested and feels nothing else, so that no force is computed. The journal note
 session counts as simulated.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from pathlib import Path

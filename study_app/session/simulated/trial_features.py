@@ -5,8 +5,6 @@ is and how late the picture was, too. So the conditions are felt as a rehearsal 
 again for answers without a servo and for power analysis.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Final, TypeAlias
 

@@ -1,7 +1,5 @@
 """What the machine does with answers: a question is shown, answered, taken back, and all are confirmed. Pure."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -4,8 +4,6 @@ The order of every list: safety of the hand first (``StopForce``, ``StopTrial``,
 (``Write``, ``WriteTables``), then what the participant feels and sees (``FadeIn``, ``StartTrial``, ``ShowPage``).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias

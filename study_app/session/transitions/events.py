@@ -3,8 +3,6 @@
 ``at_s`` is seconds on the session's monotonic clock (0 = the session's clock origin).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 

@@ -1,7 +1,5 @@
 """What each row of the machine's table does: a state and an event in, the next state and the commands out. Pure."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from study_app.errors import SessionError

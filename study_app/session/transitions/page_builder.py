@@ -1,7 +1,5 @@
 """Pages made of a session's state: the protocol's texts and the interface's words, in the participant's language."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Sequence
 from dataclasses import replace

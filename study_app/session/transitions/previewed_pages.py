@@ -1,7 +1,5 @@
 """The pages of a session that is not run: what the participant would see at a step of a preview."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias

@@ -1,7 +1,5 @@
 """Where a session is: one frozen value, changed only by `table.advance`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum

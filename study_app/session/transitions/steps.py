@@ -1,7 +1,5 @@
 """How a step of the schedule is entered: pages, forms, and trials with their intervals and rests. Pure."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final, TypeAlias

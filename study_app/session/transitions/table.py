@@ -22,8 +22,6 @@ session is paused, and the operator resumes it. A disk that takes nothing stalls
 session is paused.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 

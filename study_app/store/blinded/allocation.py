@@ -6,8 +6,6 @@ again. The file has the entry, the participant, and, sealed, the group, which fo
 (`protocol.groups.allocation`).
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, field
 from pathlib import Path

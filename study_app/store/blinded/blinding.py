@@ -7,8 +7,6 @@ encrypts what tells a condition in the journals (see ``sealing``). A real study'
 randomness, a rehearsal's from its seed, and a folder holds one or the other.
 """
 
-from __future__ import annotations
-
 import base64
 import contextlib
 import hashlib

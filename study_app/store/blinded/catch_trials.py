@@ -3,8 +3,6 @@
 Any earlier, the count would reveal which answers were correct.
 """
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterator
 from pathlib import Path

@@ -6,8 +6,6 @@ laws of each liquid tell a condition: the receipt holds them as one sealed text,
 liquid, the file names its effects, so they hold at every level.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

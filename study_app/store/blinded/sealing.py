@@ -8,8 +8,6 @@ text is found (a synthetic initialisation vector as in RFC 5297, with the standa
 texts equally long.
 """
 
-from __future__ import annotations
-
 import hashlib
 import hmac
 import json

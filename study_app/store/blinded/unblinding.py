@@ -3,8 +3,6 @@
 If the program ends in between, the journals hold everything, and opening the study again finishes it.
 """
 
-from __future__ import annotations
-
 import contextlib
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The protocol of a session, from its receipt and the study's key: the receipt lacks what the key holds."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Final
 

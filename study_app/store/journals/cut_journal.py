@@ -1,7 +1,5 @@
 """Whether other files of a session tell more than its journal: then it has lost lines, and nothing is made from it."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Iterator, Sequence

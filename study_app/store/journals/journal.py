@@ -9,8 +9,6 @@ leave out and count; anything else that is no line is damage. Lines that are not
 background, in order: a power cut may take the last of them, but none that was waited for and none before it.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

@@ -1,7 +1,5 @@
 """The journal's dictionary: every event, what it says, and its fields besides ``n``, ``event``, ``t_s`` and ``at``."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

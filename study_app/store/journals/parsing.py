@@ -1,7 +1,5 @@
 """JSON, and names in it, of files that anyone may have changed."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """Beginning a session: its place on the disk is claimed once, and what must be there before the first trial written."""
 
-from __future__ import annotations
-
 import contextlib
 import shutil
 from collections.abc import Mapping

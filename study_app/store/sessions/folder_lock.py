@@ -5,8 +5,6 @@ killed program left differs from a living one's, and can be removed without touc
 marker first and then looks for others: of two that come at once none or one goes on, never both.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Participant IDs: which are valid, which are used, and the next one."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """All that follows from a session's journal, made again from it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Going on with a session whose program had ended: the journal is opened where it stopped, and says so."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import time

@@ -4,8 +4,6 @@ Nothing happened in them, so their number is free again. Who takes one over has 
 A program that is ended while it claims a session, or lets go of it, leaves a hidden folder next to it.
 """
 
-from __future__ import annotations
-
 import contextlib
 import shutil
 import time

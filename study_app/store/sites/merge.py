@@ -5,8 +5,6 @@ they do not count; then its list of sites is replaced in one step. A program tha
 new one, and perhaps folders that the next merge removes. Each site keeps its key: as sealed, or as opened, as it was.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Mapping

@@ -12,8 +12,6 @@ exclusion or an opened key at a site is in them at once. In them a participant i
 site nor an ID holds a dash, so that equal IDs of two sites are two participants.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Iterable

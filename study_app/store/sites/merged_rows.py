@@ -1,7 +1,5 @@
 """Lists of studies and sessions that merged studies are in, too."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Opening a merged study: the key of each site, every one recorded in its own folder."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Whether a merged study is what its sites are: every site by itself, and what must agree between them."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterable
 from dataclasses import replace

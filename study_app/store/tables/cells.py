@@ -1,7 +1,5 @@
 """What the cells of a column look like: a pattern, and a schema.org description of the column."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from study_app.store.tables.column import MISSING, Column, Kind

@@ -1,7 +1,5 @@
 """What a column of a table is."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal, TypeAlias

@@ -3,8 +3,6 @@
 ``python -m study_app.store.tables.column_dictionary`` prints it.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 

@@ -4,8 +4,6 @@ Headers, ``dataset_description.json`` and every check of a finished folder are m
 name mean the same in every table.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """CSV files: tables with the columns of ``columns``, and columns of numbers to their last digit."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

@@ -4,8 +4,6 @@ The session asks at the end of each interval, the analysis of the recording of t
 recordings have them, so that both compute the same.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final

@@ -3,8 +3,6 @@
 Source: OWASP, "CSV Injection". Numbers are not texts: a negative number stays a number.
 """
 
-from __future__ import annotations
-
 import re
 from typing import Final
 

@@ -3,8 +3,6 @@
 A program killed while it writes leaves a table that is the beginning of what the journal gives.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from itertools import accumulate
 from pathlib import Path

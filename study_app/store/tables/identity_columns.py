@@ -1,7 +1,5 @@
 """The columns that say which session and which trial a row is about."""
 
-from __future__ import annotations
-
 from study_app.store.tables.column import Column, optional
 
 STUDY = Column("study", "text", "Short name of the study, from its protocol.")

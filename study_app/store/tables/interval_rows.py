@@ -1,7 +1,5 @@
 """Rows of the intervals of trials, and what a trial's row says of them together."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 

@@ -1,7 +1,5 @@
 """Columns of what is known of blocks of levels once the key is open: of tracks, thresholds, settings and exponents."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Final
 

@@ -1,7 +1,5 @@
 """The table of all sessions of a study, made from their journals."""
 
-from __future__ import annotations
-
 import contextlib
 import csv
 from collections.abc import Iterable, Mapping, Sequence

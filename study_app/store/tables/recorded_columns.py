@@ -1,7 +1,5 @@
 """The columns of a trial's recording: samples of the servo, and frames shown; said once, as those of the tables are."""
 
-from __future__ import annotations
-
 from study_app.store.tables.column import Column
 
 _AXES = (("x", "to the right"), ("y", "up"), ("z", "toward the participant"))

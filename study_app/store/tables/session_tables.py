@@ -4,8 +4,6 @@ A row is a dictionary from column name to value; ``csv_bytes`` writes rows with 
 order, the same bytes for the same rows on every machine.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 

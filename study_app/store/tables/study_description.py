@@ -4,8 +4,6 @@ Psych-DS 1.5 wants every header of every table listed in ``variableMeasured``, a
 folder are written whole, headers included, before this file.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 from collections.abc import Mapping

@@ -5,8 +5,6 @@ journal and compared with it by `verify`. Each study's ``fingerprints.txt`` has 
 copy of it that is kept elsewhere proves that none of them was changed, added or removed since.
 """
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import re

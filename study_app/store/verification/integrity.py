@@ -3,8 +3,6 @@
 `verify` checks everything and takes its time; this looks at the few files behind every number, each time they are read.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import zip_longest

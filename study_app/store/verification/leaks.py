@@ -6,8 +6,6 @@ the sealed key, for the statements (whose words are shown to the participant any
 the recordings, where forces and the ages of frames are measured.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import re

@@ -4,8 +4,6 @@ Errors make a folder no Psych-DS dataset; warnings are what the schema recommend
 schema.org itself only what the rules name is known: types of objects are looked at, their properties are not.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import re

@@ -5,8 +5,6 @@ the key, in memory alone, and compared with those that follow from the answers b
 presented, so that a difference does not propagate. No level is printed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

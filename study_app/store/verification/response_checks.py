@@ -1,7 +1,5 @@
 """Whether the answers in a journal's confirmations are those that were chosen before."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

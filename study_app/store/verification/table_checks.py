@@ -1,7 +1,5 @@
 """Whether a table holds what the column dictionary says: header, kinds, ranges, levels."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

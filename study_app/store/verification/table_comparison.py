@@ -3,8 +3,6 @@
 Of a session that has not ended, a table may be an earlier state of what its journal gives: that is a warning alone.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """The entries of the allocation to groups against the sessions, and against what the sealed key gives."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Collection
 

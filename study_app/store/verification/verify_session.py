@@ -4,8 +4,6 @@ Of a session that runs in a program only what that program does not change again
 and fingerprint follow its journal. A session that a program wrote while it was checked is checked again.
 """
 
-from __future__ import annotations
-
 import contextlib
 import time
 from collections.abc import Mapping

@@ -4,8 +4,6 @@ A line for every output in ``outputs.jsonl`` of the program's data folder. Resul
 them never changes them.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 from collections.abc import Mapping

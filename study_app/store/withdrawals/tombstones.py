@@ -1,7 +1,5 @@
 """``withdrawals.jsonl``: a tombstone for each participant whose data were erased, and nothing that this person gave."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from dataclasses import asdict, dataclass

@@ -4,8 +4,6 @@ The tombstone is written first. A program that ends before all is erased leaves 
 command then finishes it. Erased files are unlinked: disks and back-ups may still hold their blocks.
 """
 
-from __future__ import annotations
-
 import re
 import shutil
 from collections.abc import Callable, Iterable, Iterator

@@ -4,8 +4,6 @@ Above, ways to compute one definition; below, models of a real liquid. Errors th
 strip of their own, so that fifteen decades of nothing do not squeeze the rest.
 """
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Sequence
 from typing import Any, Final

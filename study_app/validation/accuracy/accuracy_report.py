@@ -1,7 +1,5 @@
 """The findings of ``accuracy`` as files: CSV for machines, Markdown and a figure for people."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Which rungs are compared: from what costs most to what costs least, and from what is truest to what is cheapest."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from study_app.evaluation.scene_variants import _only, with_effects, with_wake

@@ -5,8 +5,6 @@ ticks be timed in batches. Compiled rungs all run the servo's own tick, door and
 between their times is the model alone.
 """
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What accuracy costs in time: every rung against its truth, and all of them against the clock in one run."""
 
-from __future__ import annotations
-
 import math
 import statistics
 import time

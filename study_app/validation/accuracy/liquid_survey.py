@@ -1,7 +1,5 @@
 """Accuracy of the force of each liquid, up to which speed, and what a tick costs; and how far drag laws differ."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

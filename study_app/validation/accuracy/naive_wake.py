@@ -4,8 +4,6 @@ They are alternatives to ``haptics.kernels.effects.wake`` whose computation time
 list. Each keeps the elements in a ring and answers two questions a tick: `wake` and, after the force, `follow`.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """What is solved: a ball in liquids of a shipped protocol, that starts and stops, and motions to fit a law to."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ Every model is fitted to every motion by ``identify.fit``; what it found is then
 speed, where nothing is fitted any more: a parameter of a liquid must not change with the hand.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -12,8 +12,6 @@ integral of stresses. In time: backward differences of order 2, convection extra
 steps.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Callable, Sequence

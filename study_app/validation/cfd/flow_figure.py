@@ -1,7 +1,5 @@
 """The solver's force and what models make of it as a figure: one column of a page, readable in grey."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, Final
 

@@ -4,8 +4,6 @@ The equations of the law are fitted along motions whose speed and acceleration a
 then those of the flow, and no delay of a tick or of a velocity estimator is fitted into them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

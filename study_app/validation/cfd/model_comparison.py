@@ -1,7 +1,5 @@
 """The fluid solver against published drag and our laws, and models against the solver, as text tables and as CSV."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path

@@ -3,8 +3,6 @@
 Numbers are in ball diameters D, speeds U and liquid densities: times in D/U, forces in ρU²D².
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import dataclass

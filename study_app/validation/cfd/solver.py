@@ -4,8 +4,6 @@ Every motion is solved three times: as it is; on a coarser grid with steps twice
 the exact force is known. A solution that misses one of the two by more than is permitted is not stored.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor

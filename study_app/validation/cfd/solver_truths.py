@@ -1,7 +1,5 @@
 """The solved flows as truths that models of a liquid are measured against."""
 
-from __future__ import annotations
-
 import math
 from importlib.resources.abc import Traversable
 

@@ -1,7 +1,5 @@
 """Solved flows as CSV files, with comment lines ``# name: value`` on what made them; read without the solver."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -9,8 +9,6 @@ flow is found by Newton's method from the one with a larger ε. The table has th
 Newtonian liquid with the viscosity K (U/D)^(n−1). The liquid is unbounded: it moves only near the ball.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor

@@ -10,8 +10,6 @@ A loop counts as unstable by the criteria of `stability.verdict`: not finite, li
 above 40 Hz that exceeds that of the loop with either fixed setting by more than 0.05 N.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

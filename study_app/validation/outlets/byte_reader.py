@@ -4,8 +4,6 @@ It prints "ready", reads the file descriptor until its other end is closed, and 
 servo's clock [ns], as JSON.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

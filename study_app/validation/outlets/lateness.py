@@ -1,7 +1,5 @@
 """What outlets cost the servo: its lateness with and without them, a quarter second at a time."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable, Sequence

@@ -5,8 +5,6 @@ samples (count, SHA-256 of their channels, longest gap between their times), and
 the servo's clock and the time of its arrival [ns].
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import sys

@@ -1,7 +1,5 @@
 """The listener's process and what it received, and a stream of samples that is compared with that."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import subprocess

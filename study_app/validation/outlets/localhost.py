@@ -1,7 +1,5 @@
 """The Lab Streaming Layer on this computer alone, apart from all other streams: for measurements and tests."""
 
-from __future__ import annotations
-
 import atexit
 import os
 import tempfile

@@ -1,7 +1,5 @@
 """What was found of outlets, as text."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Progress of a measurement that lasts so many seconds."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable, Iterator

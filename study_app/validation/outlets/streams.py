@@ -1,7 +1,5 @@
 """What arrives of a session's streams in another process: how right the markers' times are, and what is lost."""
 
-from __future__ import annotations
-
 import json
 import threading
 from collections.abc import Callable

@@ -5,8 +5,6 @@ shares nothing with it. In an empty study no setting differs from another; in a 
 first, and delays of the lower half equal the shortest; a full one has all effects.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias, get_args

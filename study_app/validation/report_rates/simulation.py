@@ -1,7 +1,5 @@
 """All cells by an executor: batches of every cell alternate, so that any part of them is a smaller whole."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from functools import partial

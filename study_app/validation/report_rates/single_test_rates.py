@@ -1,7 +1,5 @@
 """Rates of single tests: equivalence where a few notice strongly, coverage of thresholds, planned sizes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Final, TypeAlias

@@ -1,7 +1,5 @@
 """One batch of simulated studies through the report's own tests, and what is wrong in their verdicts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final, TypeAlias

@@ -5,8 +5,6 @@ telemetry alone, by the definition, each stored velocity is kept as it was, with
 when asked, the whole list is decayed and summed with ``math.fsum``. It shares no code with ``haptics.kernels.effects``.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Final
 

@@ -5,8 +5,6 @@ virtual clock goes wrong at the same readings again. What it did is counted in i
 telemetry has of it, and so is every force that was written: the last witness before the hand.
 """
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from typing import Any, Final

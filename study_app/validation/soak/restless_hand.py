@@ -1,7 +1,5 @@
 """A scripted hand that never does the same for long: reaches, circles, sharp turns, and on request true stillness."""
 
-from __future__ import annotations
-
 import math
 from random import Random
 from typing import Final

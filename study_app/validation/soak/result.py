@@ -1,7 +1,5 @@
 """What a soak found: its numbers as text and as a table for machines, and what of it is wrong."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass

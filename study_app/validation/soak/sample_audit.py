@@ -5,8 +5,6 @@ the slew limit, unless a force stop, a fault or the passivity controller let go 
 a deadline every period, but for those passed over; every tick in telemetry, or counted as dropped.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Final
 

@@ -9,8 +9,6 @@ Every sample is looked at (``audit``), the wake is compared with its definition 
 tenth. On a virtual clock the same loop ticks as fast as it computes.
 """
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable, Mapping

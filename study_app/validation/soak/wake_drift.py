@@ -1,7 +1,5 @@
 """How far the servo's wakes are from their definition, followed from scene to scene."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -17,8 +17,6 @@ at most 25 µs instead of backward Euler in steps of 50 µs, smooth friction ins
 of forces.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Every group is drawn from the seed and its own name, so that the cases of one do not depend on the others.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math

@@ -6,8 +6,6 @@ tick again without the force acting on anything. All sizes are at the hand.
 What belongs to a device's own delay acts after the force link of the scene.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Final
 

@@ -1,7 +1,5 @@
 """The maximum stable damping of a free handle, measured with the real tick, and the table of limits."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterable, Iterator

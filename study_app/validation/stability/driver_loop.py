@@ -10,8 +10,6 @@ of the case. Samples, encoders and delay are those of the Falcon. What is judged
 - *force*: compared with that of the scripted device in place of the motion without feedback.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import threading

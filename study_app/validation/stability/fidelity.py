@@ -6,8 +6,6 @@ choice of effects: 5 % or 0.05 N, whichever is more, taken of the mean square ro
 further off: a wake that breaks or a hand that turns back may change the force by more than the slew limit permits.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor

@@ -8,8 +8,6 @@ Buoyancy is left out: it is constant. Counted is from the second second on.
 - *withheld*: Σ|F_a - F_b| / Σ|F_a| of the two, as ``withheld_share`` of a trial.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path

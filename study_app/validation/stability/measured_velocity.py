@@ -1,7 +1,5 @@
 """The velocity that a device measures itself, compiled: the handle's, filtered with a lag, with noise and counts."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, Final
 

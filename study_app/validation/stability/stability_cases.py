@@ -1,7 +1,5 @@
 """The cases of the stability sweep: which liquid, loop, device and hand, each a line of words that reproduces it."""
 
-from __future__ import annotations
-
 import difflib
 import zlib
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """The map of stability: the limit of a free handle, what its friction proves, what limits allow, what a sweep finds."""
 
-from __future__ import annotations
-
 import collections
 import textwrap
 from collections.abc import Mapping, Sequence

@@ -4,8 +4,6 @@ What a case is made of is said in `cases`, which cases there are in `groups`, wh
 what safety takes away where it is not needed in `fidelity`, the maximum stable damping in `boundary`.
 """
 
-from __future__ import annotations
-
 import collections
 import itertools
 import math

@@ -1,7 +1,5 @@
 """What is measured on the trace of a closed loop, compiled."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -23,8 +23,6 @@ micrometres: what happens once is no restlessness. A hand that shakes a handle m
 the motors off, too: hence the first of the three, also for a hand that lets go later.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator

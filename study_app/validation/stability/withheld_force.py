@@ -6,8 +6,6 @@ stirring after 0.9 s of such a stroke, in circles of the radius 30 mm. Each moti
 itself, whatever the force; and by a hand that holds the handle firmly enough to follow a stroke of 8 Hz.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator, Sequence

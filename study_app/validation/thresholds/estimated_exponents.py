@@ -5,8 +5,6 @@ speed. The exponent over the varied number is therefore n times the slope of y o
 from which n follows.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """What is planted in a study, and many simulated studies of it on an executor."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from functools import partial

@@ -3,8 +3,6 @@
 What is presented is what was requested, so that errors are those of methods and estimates.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

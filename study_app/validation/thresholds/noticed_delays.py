@@ -6,8 +6,6 @@ A delay reaches a person with Gaussian noise, whose spread follows from the pers
 of rehearsals. Both sets of answers are analysed as in the report.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final

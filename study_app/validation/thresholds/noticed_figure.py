@@ -1,7 +1,5 @@
 """The figure of detected and of rated delays: the shares over the delay, and both thresholds over the criterion."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final

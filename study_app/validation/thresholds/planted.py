@@ -1,7 +1,5 @@
 """The studies that are validated, and the threshold that their simulated observers have."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

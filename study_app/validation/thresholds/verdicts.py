@@ -1,7 +1,5 @@
 """What is judged of validated thresholds: each value with its limit."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

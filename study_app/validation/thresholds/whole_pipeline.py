@@ -1,7 +1,5 @@
 """Three participants with a planted threshold through servo, store, unblinding and analysis."""
 
-from __future__ import annotations
-
 import math
 import tempfile
 from collections.abc import Iterator

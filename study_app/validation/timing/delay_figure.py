@@ -1,7 +1,5 @@
 """Errors of the delay over the requested delay: one panel per screen, loads abreast, ½ frame and 1 frame marked."""
 
-from __future__ import annotations
-
 import textwrap
 from typing import Any, Final
 

@@ -1,7 +1,5 @@
 """How well delays were kept, as text, Markdown, CSV and a figure."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final

@@ -5,8 +5,6 @@ the end of its painting, or to the surface's swap, less the delay. It holds ``se
 same at every delay.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

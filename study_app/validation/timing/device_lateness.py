@@ -3,8 +3,6 @@
 All take quarter seconds in turn, as the loops of `measurement` do, so that the machine's load strikes all alike.
 """
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack

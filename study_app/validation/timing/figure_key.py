@@ -1,7 +1,5 @@
 """The key above the panels of a figure."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from matplotlib.figure import Figure

@@ -1,7 +1,5 @@
 """What the loops' lateness comes to: percentiles, ratios to the bare loop, and whether they are within limits."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final

@@ -3,8 +3,6 @@
 Both axes are logarithmic, so that one tick in ten thousand is visible.
 """
 
-from __future__ import annotations
-
 import textwrap
 from typing import Any, Final
 

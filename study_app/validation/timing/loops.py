@@ -3,8 +3,6 @@
 All count alike: a deadline every millisecond; one that a tick ran past is passed over and counted, never made up for.
 """
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """What else the machine does while the loops are timed; windows are lent by ``app.windows_load``."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

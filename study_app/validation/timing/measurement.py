@@ -1,7 +1,5 @@
 """One run: all loops in short ticks, round about, so that what else the machine does strikes all alike."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable

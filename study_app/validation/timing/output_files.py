@@ -1,7 +1,5 @@
 """What a measurement of timing leaves in a folder: the same texts, tables and pictures, whichever it was."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from matplotlib.figure import Figure

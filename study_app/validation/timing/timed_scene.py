@@ -1,7 +1,5 @@
 """What a tick has to do while it is timed: a scene with every effect on, and a hand that costs nothing itself."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any, Final
 

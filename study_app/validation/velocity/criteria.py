@@ -1,7 +1,5 @@
 """Acceptance limits of the Kalman filter, measured, with other estimators of the same run as references."""
 
-from __future__ import annotations
-
 import statistics
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple

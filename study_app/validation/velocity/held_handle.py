@@ -5,8 +5,6 @@ withholds, and buoyancy and weight, which need no velocity. The error is the RMS
 law's force.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from typing import Any, Final

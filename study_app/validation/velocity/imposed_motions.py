@@ -4,8 +4,6 @@ The error is that of a force as the square of the velocity, v·|v|: RMS of the e
 jitter by 40 µs, known to the filter, and no force moves the handle: the filter has to find out that it is held.
 """
 
-from __future__ import annotations
-
 import math
 import statistics
 from collections.abc import Mapping

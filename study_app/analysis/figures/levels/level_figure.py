@@ -1,7 +1,5 @@
 """Answers over levels: a panel for all participants with 95 % intervals, and one for each participant."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial

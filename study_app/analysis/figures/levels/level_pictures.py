@@ -1,7 +1,5 @@
 """The figures of blocks of levels, each in every form with its caption."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Final, TypeAlias

@@ -1,7 +1,5 @@
 """What the figures of levels share: a sheet of panels, and axes of levels over trials."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Final

@@ -1,7 +1,5 @@
 """Settings in their order for each participant and standard, with the point of subjective equality and the standard."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 from typing import Final

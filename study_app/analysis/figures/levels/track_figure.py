@@ -1,7 +1,5 @@
 """Tracks of adaptive methods: level over trial for each participant and standard, with the narrowing interval."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 from typing import Final

@@ -1,7 +1,5 @@
 """Weber fractions over standards: participants as thin lines, the group with its interval."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 from typing import Final

@@ -1,7 +1,5 @@
 """Sliders and numbers: every answer as a dot, quartiles as a band, the median as a line."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Final
 

@@ -1,7 +1,5 @@
 """What the figures of questions share: a row for each setting, its name at the left and its n at the right."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final, TypeAlias

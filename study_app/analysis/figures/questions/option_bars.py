@@ -1,7 +1,5 @@
 """Choices: how often each option was chosen, a bar for each option of each setting."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from study_app import figure_style as style

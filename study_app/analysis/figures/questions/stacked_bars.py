@@ -1,7 +1,5 @@
 """Ratings of any length: the share of each point as a stacked bar, a bar for each setting."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from matplotlib.colors import LinearSegmentedColormap, to_hex

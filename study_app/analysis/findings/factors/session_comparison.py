@@ -1,7 +1,5 @@
 """The comparison of sessions in every statement, by the participants who came to all of them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Final
 

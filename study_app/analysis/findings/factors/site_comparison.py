@@ -4,8 +4,6 @@ Comparisons of settings are within participants, so that a difference in level b
 can is a difference between settings that is another at another site.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """The part of a block's section on what was delivered, repeated and missed: levels, motion, and catch trials."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator
 

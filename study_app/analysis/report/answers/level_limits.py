@@ -1,7 +1,5 @@
 """What the thresholds of a block of levels cannot show, a sentence each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 

@@ -1,7 +1,5 @@
 """The sentences of the methods paragraph about blocks with a design: design, method, function, prior, estimator."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Final
 

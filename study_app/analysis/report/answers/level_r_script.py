@@ -1,7 +1,5 @@
 """The part of the script in R about blocks with a design: d′ and criterion, reversal means, group means, settings."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Final
 

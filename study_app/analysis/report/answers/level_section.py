@@ -1,7 +1,5 @@
 """The section of a block of levels: times to answer and, once the key is open, the answers at each level."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

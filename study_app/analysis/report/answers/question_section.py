@@ -1,7 +1,5 @@
 """The sections of forms, and of questions of other kinds after trials: a table of each, its figure, texts, scores."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 
 from study_app.analysis.designs.question_measures import MEASURES

@@ -1,7 +1,5 @@
 """The part of a block's section about levels that participants set."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 from study_app.analysis.figures.levels.level_figure import level_words

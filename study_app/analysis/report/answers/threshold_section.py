@@ -1,7 +1,5 @@
 """The part of a block's section that only a block with a design has: thresholds, sensitivity and bias."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Final
 

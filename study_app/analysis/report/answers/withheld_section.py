@@ -1,7 +1,5 @@
 """What safety withheld of a force that a study sent late, with jitter or loss: a row for each range of levels."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import takewhile
 

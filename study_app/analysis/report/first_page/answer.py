@@ -3,8 +3,6 @@
 The p that decide stand in the sections that follow.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

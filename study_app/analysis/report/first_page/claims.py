@@ -1,7 +1,5 @@
 """The answers of the first page, block by block, and which of them may claim something."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The first page: three answers each with a picture, the limits below them, and how often it is wrong."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Sequence
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """The small pictures of the three answers of the first page."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Final
 

@@ -5,8 +5,6 @@ resamples hold none of them: their standard error is small, they lie far away, a
 within the bound.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import Final

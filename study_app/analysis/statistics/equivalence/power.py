@@ -4,8 +4,6 @@ All studies meet the same random changes of signs; sums over participants are th
 single precision for whole numbers and their halves.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import Final

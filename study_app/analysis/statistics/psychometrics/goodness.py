@@ -4,8 +4,6 @@ Wichmann & Hill 2001, Percept. Psychophys. 63, 1293–1313: deviance (eq. 4), it
 correlation with the order of the trials.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

@@ -1,7 +1,5 @@
 """A participant's threshold: the posterior of a psychometric function, whatever method chose the levels."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 

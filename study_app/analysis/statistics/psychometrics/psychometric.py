@@ -6,8 +6,6 @@
 so that it does not depend on starting values.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product

@@ -5,8 +5,6 @@ Here each participant's answers change places among the levels presented to him 
 however participants differ from each other.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Final
 

@@ -1,7 +1,5 @@
 """Settings of the method of adjustment: point of subjective equality, just-noticeable difference, hysteresis."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ by what participants differ from each other. A number is given only where notici
 that were presented hold it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final

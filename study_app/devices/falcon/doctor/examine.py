@@ -4,8 +4,6 @@ Everything is done by the driver that a session uses, so what fails there fails 
 and ``failure_modes`` what that shows.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence

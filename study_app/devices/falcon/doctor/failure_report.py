@@ -3,8 +3,6 @@
 Loads neither the compiler nor a driver, and goes from one process to another as it is.
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 from study_app.devices.doctor_report import Finding

@@ -5,8 +5,6 @@ friction and the grip's own weight are separated from the load. `calibration.fit
 the notes.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass

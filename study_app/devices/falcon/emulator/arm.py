@@ -5,8 +5,6 @@ rod, drawn as a vector in space, is as long as it is, found by search; and the f
 ``F . dp = sum tau_i dtheta_i``, with the angles' changes taken by moving the grip a little.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -5,8 +5,6 @@ point, then blocks of (count, destination, words) until a count of 0, whereupon 
 understand it meets with silence, until it is pinged anew.
 """
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import numpy as np

@@ -5,8 +5,6 @@ the emulator's memory, and the bridge's control requests. Everything happens in 
 depends on nothing but its commands and the ``random`` it was made with.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cached_property
 from random import Random

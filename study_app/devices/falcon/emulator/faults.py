@@ -1,7 +1,5 @@
 """What can go wrong with an emulated Falcon, on purpose: by chance, so many times, or as long as it is switched on."""
 
-from __future__ import annotations
-
 from random import Random
 from typing import Any, Final
 

@@ -4,8 +4,6 @@ What is invented, because it is not published: mass, friction and hand (those of
 indices are, how fast it answers, that a torque stays until the next packet, and that one beyond the range is cut off.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Final
 

@@ -9,8 +9,6 @@ Time is what stands at the address ``clock``, and goes ahead of it by no more th
 clock it is the emulator's own, which every transfer moves.
 """
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import numpy as np

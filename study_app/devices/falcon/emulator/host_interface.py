@@ -3,8 +3,6 @@
 A transfer goes on in emulated time from byte to byte that reaches the device, until it is done or its time is out.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

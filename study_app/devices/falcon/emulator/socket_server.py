@@ -5,8 +5,6 @@ transfer out is computed at once up to where it ends, and its answer is held bac
 in goes on from event to event of the bridge, so that it may be pending while others are carried out.
 """
 
-from __future__ import annotations
-
 import math
 import select
 import socket

@@ -4,8 +4,6 @@ The descriptors are those of an FT232R with the Falcon's ids: one configuration,
 two bulk endpoints. Refusals raise what pyusb's own backend of libusb would raise.
 """
 
-from __future__ import annotations
-
 import errno
 from collections.abc import Iterator
 from dataclasses import dataclass

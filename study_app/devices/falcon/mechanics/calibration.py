@@ -5,8 +5,6 @@ gain that gives the weaker forces is used, and the receipt says that none was. A
 serial number among the user's settings, not with results.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import asdict, dataclass

@@ -9,8 +9,6 @@ Sources: ``libnifalcon`` and ``zm-redux``: libnifalcon's geometry of 2019 and of
 Manipulator", ACRA 2009, at second hand. Loads no compiler.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Final

@@ -10,8 +10,6 @@ outside. Forward: Newton's method on the three g for p, from the position before
 derivation is our own: the Jacobian that is in wide use has a wrong column for z.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Final
 

@@ -5,8 +5,6 @@ bytes at address ``data`` out, or at most as many in; write how many were moved 
 return 0 or a negative libusb error.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from numba import types

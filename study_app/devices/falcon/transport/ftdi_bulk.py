@@ -1,7 +1,5 @@
 """The C function that puts FTDI's library (``transport_ftdi``) where libusb would be: ``FT_Read`` and ``FT_Write``."""
 
-from __future__ import annotations
-
 import ctypes
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """The C function that puts a socket (``transport_socket``) where libusb would be: POSIX ``send`` and ``recv``."""
 
-from __future__ import annotations
-
 import sys
 from functools import cache
 from typing import Any

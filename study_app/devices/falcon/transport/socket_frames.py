@@ -21,8 +21,6 @@ The bridge has one interface: while one client has it, any other's first request
 client goes, nothing changes: the last torque persists.
 """
 
-from __future__ import annotations
-
 import struct
 from typing import Final
 

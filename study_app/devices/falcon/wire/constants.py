@@ -4,8 +4,6 @@ Sources: FTDI AN232B-04 and the FT232R data sheet; TI SPRUI33 (boot ROM of the T
 of the protocol (BSD). Loads neither the compiler nor a driver.
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 VENDOR_ID: Final = 0x0403

@@ -6,8 +6,6 @@ parser believes a packet only if every byte of it is where it may be, keeps what
 gives each packet once.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

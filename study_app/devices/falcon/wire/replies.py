@@ -13,8 +13,6 @@ not do, a leap of an arm away from its motion, therefore needs a second reply th
 the out-stroke and arms no longer homed. All of this works on the exchange's record (``exchange.FALCON``).
 """
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 from study_app.haptics.kernels.compiled import kernel

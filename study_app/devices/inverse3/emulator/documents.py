@@ -5,8 +5,6 @@ Written from docs.haply.co: "WebSocket Protocol" 3.5.x, step 1 (inventory) and c
 Not shown there, so a guess: that a state update has a ``session_id``, and the values of ``control_mode`` but "idle".
 """
 
-from __future__ import annotations
-
 import copy
 import json
 from typing import Any, Final

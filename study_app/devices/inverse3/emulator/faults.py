@@ -1,7 +1,5 @@
 """What can go wrong with an emulated Inverse Service, on purpose."""
 
-from __future__ import annotations
-
 import json
 import struct
 from typing import Any, Final

@@ -4,8 +4,6 @@ Its thread leaves Python once a session is open: commands are received, carried 
 quickly as by a service in C++.
 """
 
-from __future__ import annotations
-
 import ctypes
 import json
 import socket

@@ -6,8 +6,6 @@ Documents: see ``documents``; "Device Configuration" 3.5.x for what ``configure`
 handshake.
 """
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

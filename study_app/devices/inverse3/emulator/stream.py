@@ -5,8 +5,6 @@ in place of the system's. Frames are those of a server (RFC 6455 §5.1: it must 
 masked). A message that does more than command a force waits in ``complex`` for `service.Service`.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any, Final
 

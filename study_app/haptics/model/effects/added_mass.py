@@ -1,7 +1,5 @@
 """Added mass: to move the ball is to move the liquid around it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Final

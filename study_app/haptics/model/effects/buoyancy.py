@@ -1,7 +1,5 @@
 """Buoyancy: the liquid carries the ball, and the ball has a weight."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

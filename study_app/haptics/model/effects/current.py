@@ -1,7 +1,5 @@
 """Current: a liquid that flows by itself."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal, TypeAlias

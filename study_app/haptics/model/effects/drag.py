@@ -1,7 +1,5 @@
 """Drag: the liquid resists motion relative to it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Self, TypeAlias

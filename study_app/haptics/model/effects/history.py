@@ -1,7 +1,5 @@
 """History: the boundary layer around the ball remembers how it was accelerated."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Final

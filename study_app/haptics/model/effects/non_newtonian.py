@@ -1,7 +1,5 @@
 """Non-Newtonian drag: a liquid with a yield stress, shear thinning or thickening, or elasticity resists motion."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """Surface: how much of the ball is under the top face of a liquid, for the effects that depend on it."""
 
-from __future__ import annotations
-
 from study_app.haptics.model.effect import FLOAT, Effect, ExtremesLike, Fields, LiquidLike
 
 BIT = 1 << 5

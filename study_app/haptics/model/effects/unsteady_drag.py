@@ -1,7 +1,5 @@
 """Unsteady drag: drag, added mass and history of a ball in one law that holds at finite Reynolds numbers, too."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any, Final

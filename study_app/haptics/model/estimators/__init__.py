@@ -1,7 +1,5 @@
 """The velocity estimators: one descriptor per module, found by importing every module of this folder."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import Final

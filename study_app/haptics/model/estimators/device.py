@@ -1,7 +1,5 @@
 """The velocity that the device measures."""
 
-from __future__ import annotations
-
 import math
 from typing import Final, Literal
 

@@ -6,8 +6,6 @@ a line is all delay, that of a filter mostly a lower gain where a loop would osc
 8 N. [choice]
 """
 
-from __future__ import annotations
-
 from typing import Any, Literal
 
 from study_app.haptics.model.estimator import EstimatorKind, ewma_response, fill_ewma

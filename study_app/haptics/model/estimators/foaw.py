@@ -1,7 +1,5 @@
 """First-order adaptive windowing: the slope of the longest line that fits."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """A velocity that comes with the motion."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from study_app.haptics.model.estimator import EstimatorKind

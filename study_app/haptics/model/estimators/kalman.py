@@ -1,7 +1,5 @@
 """A Kalman filter of velocity that knows the force: its state, all at the hand."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, Final, Literal
 

@@ -1,7 +1,5 @@
 """EWMA with lead: a light EWMA plus a share of its smoothed acceleration."""
 
-from __future__ import annotations
-
 import cmath
 from typing import Any, Final, Literal
 

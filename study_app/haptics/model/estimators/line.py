@@ -1,7 +1,5 @@
 """The slope of the least-squares line through the newest positions."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field

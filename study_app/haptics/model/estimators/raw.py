@@ -1,7 +1,5 @@
 """The newest difference of positions."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from study_app.haptics.model.estimator import EstimatorKind, line_share

@@ -5,8 +5,6 @@ infinite. Above Re = 2·10⁵ the drag coefficient keeps its value there: the la
 ``effects.drag`` compiles these functions as they stand; ``gate`` calls them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Final, Literal, TypeAlias

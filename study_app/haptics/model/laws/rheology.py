@@ -4,8 +4,6 @@ The functions of plain numbers are compiled as they stand (``kernels.effects.non
 thixotropy, impact, and yielding in unsteady flow other than by the elastic-plastic state of that kernel.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, Final, Literal, Self, TypeAlias
 

@@ -4,8 +4,6 @@
 runs as fast as it computes. Both have what the loop takes: ``now``, ``sleep`` (see ``cfunctions``) and ``context``.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from functools import cache

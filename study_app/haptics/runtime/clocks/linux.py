@@ -3,8 +3,6 @@
 An ordinary user is granted it by a limit (``rtprio``), or SCHED_RR by the desktop's real-time service.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import sys

@@ -1,7 +1,5 @@
 """macOS: ``mach_absolute_time`` and ``mach_wait_until``; the time-constraint policy of audio threads."""
 
-from __future__ import annotations
-
 import ctypes
 from typing import Any
 

@@ -5,8 +5,6 @@ Three calls of four strings need no library: a message is a header of typed fiel
 (D-Bus specification, "Message protocol" and "Authentication protocol").
 """
 
-from __future__ import annotations
-
 import os
 import socket
 import struct

@@ -3,8 +3,6 @@
 The thread is one of the multimedia class scheduler's where that service runs, else time-critical within its process.
 """
 
-from __future__ import annotations
-
 import ctypes
 import sys
 import weakref
