@@ -48,7 +48,7 @@ class FollowedIds:
             The text.
         language, text : str
             Its language, and what it will be; of several languages the first one counts.
-        recorded : set of str
+        recorded : sequence of str
             Ids beside it under which answers are recorded: none of them changes, or is given to another element.
         """
         element, document = path[:-1], study.document

@@ -182,6 +182,7 @@ class FormHead(QWidget):
             say(self, words)
         self.followed.show_text(words)
         self.kind.setHidden(bool(words))
+        self.layout().activate()  # at once, or the words are cut where there was less room
 
     def _apply_lock(self) -> None:
         path, why = self._lock

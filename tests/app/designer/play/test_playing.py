@@ -244,6 +244,7 @@ def test_another_device_is_asked_for_and_a_fault_ahead_is_named(
     assert (opened[0].device, opened[0].pilot, opened[0].windowed) == ("mouse", True, True)
     likert.controller.playing.pilot.session.over.emit()
     likert.editing.select(("pages", "thanks"))
+    likert.place.pane.show_tab("file")
     field = likert.place.file.editor
     field.setPlainText(field.toPlainText().replace("[pages.thanks]\n", "[pages.thanks]\nnonsense = 3\n", 1))
     press_f5(qtbot, likert)
