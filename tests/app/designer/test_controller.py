@@ -187,6 +187,7 @@ def test_a_version_that_was_run_is_saved_under_another_number(designer: Any) -> 
     assert designer.file.read_text() == designer.text
 
 
+@pytest.mark.variants(4)
 @pytest.mark.parametrize("name", shipped())
 def test_a_shipped_study_is_read_only_and_can_be_copied(designer: Any, name: str) -> None:
     before = shipped_file(name).read_bytes()

@@ -245,6 +245,7 @@ def test_everything_that_takes_the_keyboard_has_a_name(designer: Any) -> None:
     assert not nameless
 
 
+@pytest.mark.variants(3)
 @pytest.mark.parametrize("size", [(1600, 1000), (1366, 768), (1024, 640)])
 @pytest.mark.parametrize("theme", [LIGHT, DARK])
 def test_the_place_fits_its_window(designer: Any, size: tuple[int, int], theme: Any) -> None:

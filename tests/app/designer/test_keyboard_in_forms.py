@@ -30,6 +30,7 @@ def first_row(designer: Any) -> QWidget:
     return designer.place.form.rows[0]
 
 
+@pytest.mark.variants(4)
 @pytest.mark.parametrize("width", [1600, 1366])
 @pytest.mark.parametrize("area", ["form", "outline"])
 @pytest.mark.parametrize(

@@ -36,6 +36,7 @@ def typed(qtbot: Any, designer: Any) -> Any:
     return field
 
 
+@pytest.mark.variants(3)
 @pytest.mark.parametrize("how", ["click", "space"])
 @pytest.mark.parametrize("width", [1600, 1366, 1100])
 def test_a_button_of_the_header_that_is_disabled_gives_the_keyboard_back(

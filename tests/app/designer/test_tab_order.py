@@ -66,6 +66,7 @@ def test_tab_goes_through_the_parts_as_they_are_seen(qtbot: Any, dutch: Any, wid
     assert rail.isAncestorOf(passed(qtbot, lambda part: not place.isAncestorOf(part))[-1])
 
 
+@pytest.mark.variants(4)
 @pytest.mark.parametrize(
     "path", [("blocks", "liquids"), ("questionnaires", "liquid"), ("tasks", "reach"), ("liquids", "thin"), ("study",)]
 )

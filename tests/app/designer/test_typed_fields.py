@@ -14,6 +14,7 @@ from study_app.gui.designer.form.typed_fields import HAND_ON_MS, TypedSentence, 
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.variants(3)
 @pytest.mark.parametrize("kind", [TypedText, TypedSentence])
 @pytest.mark.parametrize("text", ["a\rb", "a\u2029b", "a\r\nb"])
 def test_a_shown_text_that_qt_normalises_is_no_edit(qtbot: Any, kind: type[TypedText], text: str) -> None:

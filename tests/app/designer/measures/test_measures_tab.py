@@ -300,6 +300,7 @@ def test_without_a_process_the_other_numbers_stay(qtbot: Any, designer: Any) -> 
     assert designer.place.measures.numbers.parts[3].number.text() == "17"
 
 
+@pytest.mark.variants(3)
 @pytest.mark.parametrize("size", [(1600, 1000), (1366, 768), (1024, 640)])
 @pytest.mark.parametrize("theme", [LIGHT, DARK])
 def test_every_element_has_measures_that_fit(

@@ -188,6 +188,7 @@ def test_a_study_that_was_never_sound_shows_what_is_sound(designer: Any) -> None
     assert designer.controller.preview.tab.view.note == "Reach has a problem (is missing): an initial value is shown."
 
 
+@pytest.mark.variants(6)
 @pytest.mark.parametrize(
     "broken",
     [
@@ -263,6 +264,7 @@ def test_the_tab_is_as_high_as_the_page_its_note_and_its_rows_of_buttons(designe
     assert pane._stack.maximumHeight() == tab.most_px
 
 
+@pytest.mark.variants(4)
 @pytest.mark.parametrize("screen", [0, 1])
 @pytest.mark.parametrize("path", [ITEM, ("pages", "welcome"), ("questionnaires", "delay"), ("liquids", "thick")])
 def test_at_100_percent_the_page_is_that_of_a_session_pixel_by_pixel(
