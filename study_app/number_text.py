@@ -1,4 +1,4 @@
-"""Numbers as people type them, and as titles and ids contain them."""
+"""Numbers as people type them, as titles and ids contain them, and with what they count."""
 
 import math
 import re
@@ -48,3 +48,8 @@ def exact_text(value: float) -> str:
     """Return a number with every digit that it needs, without an exponent: "1000.0001", "0.00002"."""
     text = format(Decimal(repr(value + 0)), "f")
     return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def counted(number: int, noun: str) -> str:
+    """Return "1 part", "2 parts"."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

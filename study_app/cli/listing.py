@@ -6,6 +6,7 @@ from pathlib import Path
 import click
 
 from study_app.cli.options import RESULTS, Target, study_at
+from study_app.number_text import counted
 
 STARTED = 16  # letters of a time down to the minute
 
@@ -55,7 +56,7 @@ def studies() -> None:
             continue
         count = len(sessions_in(places.values()))
         sites = "" if "" in places else f", sites {', '.join(prefix[:-1] for prefix in places)}"
-        click.echo(f"  {folder.name}  {count} session{'' if count == 1 else 's'}{sites}")
+        click.echo(f"  {folder.name}  {counted(count, 'session')}{sites}")
 
 
 @click.command()

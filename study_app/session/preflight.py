@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, UNKNOWN, Dynamics
 from study_app.haptics.model.slope_limits import refuses
 from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
+from study_app.number_text import counted
 from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.checks.clipped_levels import beyond_slope_limit, by_stimulus
 from study_app.protocol.levels.presented_levels import highest_damping
@@ -169,7 +170,7 @@ def _levels(facts: Facts, protocol: Protocol) -> list[Check]:
 
 
 def _ticks(count: int) -> str:
-    return f"{count} tick{'' if count == 1 else 's'}"
+    return counted(count, "tick")
 
 
 def _rate(facts: Facts, protocol: Protocol) -> Check:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from study_app.errors import VideoError
+from study_app.number_text import counted
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.liquid_files import file_hash
 from study_app.protocol.trials.stimuli import DELAY, MOST_DELAY_MS
@@ -129,7 +130,7 @@ class Videos:
                 age = "age unknown" if age_ns is None else f"{age_ns / 1e6:.0f} ms old"
                 yield f"camera, {one.size[0]} × {one.size[1]}, {1e9 / one.newest.period_ns:.3g} Hz, {age}"
         if count := sum(isinstance(one, Footage) for one in self._open.values()):
-            yield f"footage, {count} file{'' if count == 1 else 's'}"
+            yield f"footage, {counted(count, 'file')}"
 
 
 def missing_here(protocol: Protocol, folder: Path, camera: str, now_ns: Callable[[], int]) -> str:

@@ -14,6 +14,7 @@ from typing import Final
 from study_app.authoring.drafts import draft_files, draft_of, unsaved_files
 from study_app.authoring.kept_settings import kept_original
 from study_app.errors import ProtocolError, StudyError
+from study_app.number_text import counted
 from study_app.protocol.load import at_hand, is_scene_file, load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial
@@ -29,7 +30,7 @@ from study_app.store.sessions.folder_lock import is_open
 from study_app.store.workstation import recent_protocols
 from study_app.viewmodels.extent import counted_each, extent_of
 from study_app.viewmodels.session.stages import operator_language, step_title
-from study_app.viewmodels.sessions import SessionFacts, counted, started_words
+from study_app.viewmodels.sessions import SessionFacts, started_words
 from study_app.workspace import workspace
 
 SHIPPED: Final = "Shipped study"

@@ -155,11 +155,6 @@ def _exclusions(study: Path) -> tuple[Exclusion, ...]:
     return ()
 
 
-def counted(number: int, word: str) -> str:
-    """Return "1 part", "2 parts"."""
-    return f"{number} {word}" if number == 1 else f"{number} {word}s"
-
-
 def started_words(started: datetime, now: datetime) -> str:
     """Return when a session began as people say it: "Today 09:31", "Yesterday 16:11", "18 Nov 15:20"."""
     days = (now.date() - started.date()).days

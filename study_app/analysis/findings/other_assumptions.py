@@ -17,9 +17,10 @@ from study_app.analysis.results.item_test import Tested
 from study_app.analysis.results.not_tested import NotTested
 from study_app.analysis.results.words import interval, number, p_value, short, statistic
 from study_app.analysis.statistics.ordinal import Ordinal, ordinal
-from study_app.analysis.statistics.outcome import FEW, counted
+from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.statistics.skillings_mack import skillings_mack
 from study_app.analysis.tables.measures import Array
+from study_app.number_text import counted
 
 OTHERS: Final = "the same asked with other assumptions"
 
@@ -83,7 +84,7 @@ def _no_model(answers: Asked) -> str:
     if answers.sites and not answers.block.revealed:
         return "each site has settings of its own until the keys of all sites are open"
     if answers.n < FEW:
-        return f"with {counted(answers.n)}, below {FEW}, its estimates and errors would not hold"
+        return f"with {counted(answers.n, 'participant')}, below {FEW}, its estimates and errors would not hold"
     if answers.n > MANY:
         return f"it is left out above {MANY} participants, where it takes minutes"
     return ""

@@ -19,8 +19,9 @@ from study_app.analysis.results.item_test import Tested
 from study_app.analysis.results.not_tested import NotTested
 from study_app.analysis.results.words import interval, name, number, p_value, short
 from study_app.analysis.statistics.multiple_comparisons import holm
-from study_app.analysis.statistics.outcome import Outcome, counted
+from study_app.analysis.statistics.outcome import Outcome
 from study_app.analysis.statistics.paired import Paired, paired
+from study_app.number_text import counted
 
 PAIRS: Final = "comparison of two settings"
 
@@ -42,9 +43,9 @@ def pairs_of(answers: Asked, omnibus: tuple[Tested, ...]) -> tuple[tuple[Pair, .
     corrected = smallest_of_pairs(answers.k, answers.n)
     if corrected > answers.decided.alpha:
         why = (
-            f"{counted(answers.n)} cannot show it: the smallest p that {counted(answers.n, 'pair')} can give is "
-            f"{smallest_of_pairs(2, answers.n):.4g}, after Holm's correction over {count} pairs {corrected:.4g}, which "
-            f"is above {answers.decided.alpha:g}"
+            f"{counted(answers.n, 'participant')} cannot show it: the smallest p that {counted(answers.n, 'pair')} can "
+            f"give is {smallest_of_pairs(2, answers.n):.4g}, after Holm's correction over {count} pairs "
+            f"{corrected:.4g}, which is above {answers.decided.alpha:g}"
         )
         return (), (NotTested(PAIRS, why),)
     differing = [one.item for one in omnibus if one.verdict in ("shown", "suggested")]

@@ -121,11 +121,6 @@ def draws_for(alpha: float, usual: int, members: int = 1) -> int:
     return min(MOST_DRAWS, max(usual, math.ceil(members / (FLOOR * alpha))))
 
 
-def counted(count: int, noun: str = "participant") -> str:
-    """Return "1 participant", "5 participants"."""
-    return f"{count} {noun}" + ("" if count == 1 else "s")
-
-
 @lru_cache(maxsize=4096)
 def clopper_pearson(count: int, n: int) -> Interval:
     """Return the exact 95 % interval of a share of ``count`` in ``n``."""

@@ -28,11 +28,11 @@ from study_app.analysis.statistics.outcome import (
     Whole,
     checked,
     complete,
-    counted,
     percentiles,
     resamples,
 )
 from study_app.errors import AnalysisError
+from study_app.number_text import counted
 
 Direction: TypeAlias = Literal["increasing", "decreasing"]
 
@@ -181,12 +181,12 @@ def step_down(
 def _note(first: Step, lowest: float | None) -> str:
     if lowest is None:
         return (
-            f"no trend was shown up to {first.longest_ms:g} ms with {counted(first.page.n)}; "
+            f"no trend was shown up to {first.longest_ms:g} ms with {counted(first.page.n, 'participant')}; "
             "that is not evidence that there is none"
         )
     return (
-        f"{lowest:g} ms is an upper bound: the lowest delay at which the answers of {counted(first.page.n)} show a "
-        "trend; shorter delays may be noticed too"
+        f"{lowest:g} ms is an upper bound: the lowest delay at which the answers of "
+        f"{counted(first.page.n, 'participant')} show a trend; shorter delays may be noticed too"
     )
 
 

@@ -21,11 +21,11 @@ from study_app.authoring.writer.refused import Refused, free_in
 from study_app.errors import StudyError
 from study_app.gui.designer.versions.save_card import SaveCard
 from study_app.gui.designer.view import DesignerPlace
+from study_app.number_text import counted
 from study_app.viewmodels.designer.designer_view import Banner, BannerAction
 from study_app.viewmodels.designer.versions.changes_view import FILE
 from study_app.viewmodels.designer.versions.standing import save_prompt
 from study_app.viewmodels.home import time_words
-from study_app.viewmodels.sessions import counted
 
 DRAFT_MS: Final = 50
 RETRY_MS: Final = 2_000

@@ -29,11 +29,10 @@ from study_app.authoring.names import references_to
 from study_app.authoring.outline import title_of
 from study_app.authoring.writer.edits import Edit, Set
 from study_app.authoring.writer.refused import Refused
-from study_app.number_text import exact_text
+from study_app.number_text import counted, exact_text
 from study_app.protocol.source.document import Path, value_at
 from study_app.viewmodels.designer.prompts import SeriesPlan, SeriesWay, refused_plan
 from study_app.viewmodels.designer.requests import MakeSeries
-from study_app.viewmodels.sessions import counted
 
 _NAMED: Final = 3
 _TITLE: Final = 28

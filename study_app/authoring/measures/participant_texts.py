@@ -12,6 +12,7 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import is_localised, label_of
 from study_app.authoring.outline import title_of
 from study_app.authoring.schema_nodes import alternatives
+from study_app.number_text import counted
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.json_schema import schema
@@ -69,7 +70,7 @@ def to_translate(study: Study) -> tuple[str, ...]:
     """Return a warning for each language with copied texts; they prevent no session."""
     first = language_name(languages_of(study)[0])
     return tuple(
-        f"study.languages: {count} text{'s' * (count != 1)} to translate to {language_name(code)}, as in {first} so far"
+        f"study.languages: {counted(count, 'text')} to translate to {language_name(code)}, as in {first} so far"
         for code, count in copied_texts(study).items()
     )
 

@@ -12,6 +12,7 @@ from typing import Any, Final
 from study_app.authoring.versions.contents import content_hash, keep_content, kept_content
 from study_app.authoring.writer.refused import Refused
 from study_app.errors import StoreError
+from study_app.number_text import counted
 from study_app.protocol.source.liquid_files import with_liquid_files
 from study_app.store import receipt
 from study_app.store.folders import StudyFolder
@@ -206,9 +207,9 @@ def check_saving(hash_: str, version: str, known: tuple[Run, ...]) -> None:
     """
     others = sum(run.sessions for run in known if run.version == version and run.hash != hash_)
     if others:
-        counted = f"{others} session{'s' * (others > 1)}"
         raise Refused(
-            f"version {version} was run by {counted} with another content: save it as version {next_version(version)}"
+            f"version {version} was run by {counted(others, 'session')} with another content: "
+            f"save it as version {next_version(version)}"
         )
 
 

@@ -13,8 +13,9 @@ from study_app.gui.theme.theme import font
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import Elided, label
+from study_app.number_text import counted
 from study_app.viewmodels.session.columns import Column
-from study_app.viewmodels.sessions import KINDS, SessionFacts, counted
+from study_app.viewmodels.sessions import KINDS, SessionFacts
 
 COLUMNS = (
     Column("participant", "Participant", 110, 62),

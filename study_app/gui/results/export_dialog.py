@@ -13,7 +13,7 @@ from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Bar
 from study_app.gui.widgets.controls import ActionButton, Check
 from study_app.gui.widgets.labels import label, set_ink
-from study_app.viewmodels.sessions import counted
+from study_app.number_text import counted
 
 WIDTH = 600
 WARNED = 3

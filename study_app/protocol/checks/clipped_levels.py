@@ -10,6 +10,7 @@ from study_app.haptics.model.overrides import override
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import slope_limit
 from study_app.haptics.model.steady_state import steady
+from study_app.number_text import counted
 from study_app.protocol.blocks import Block
 from study_app.protocol.levels.presented_levels import (
     FASTER,
@@ -171,7 +172,7 @@ def floored(value: float, digits: int) -> float:
 def _loop(scene: Scene, delay_ticks: int) -> tuple[float, str]:
     """Return the slope limit [N·s/m] of a scene's loop, and what it is called."""
     limit_nspm = slope_limit(1 / scene.rate_hz, delay_ticks, scene.velocity)
-    ticks = f"{delay_ticks} tick{'s' * (delay_ticks > 1)}"
+    ticks = counted(delay_ticks, "tick")
     return limit_nspm, f"the slope limit ({scene.rate_hz:g} Hz, {scene.velocity.kind}, {ticks})"
 
 

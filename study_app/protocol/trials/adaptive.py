@@ -9,16 +9,12 @@ from typing import Annotated
 from pydantic import Field
 
 from study_app.haptics.model.ranges import within
+from study_app.number_text import counted
 from study_app.protocol.streams import Draw
 from study_app.protocol.trials.method import Heard, Method, TrackSetting
 from study_app.protocol.trials.stimuli import Stimulus
 
 Count = Annotated[int, within(1, 1000, "no participant answers more in one track")]
-
-
-def counted(number: int, name: str) -> str:
-    """Return a number with the name of what it counts."""
-    return f"{number} {name}{'' if number == 1 else 's'}"
 
 
 class Adaptive(Method):

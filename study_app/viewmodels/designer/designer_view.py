@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
+from study_app.number_text import counted
 from study_app.viewmodels.designer.file_text import FileText
 from study_app.viewmodels.designer.form.form_rows import Form
 from study_app.viewmodels.designer.problem_rows import ProblemRow
@@ -112,7 +113,7 @@ class DesignerView:
 def problems_chip(count: int, warnings: int) -> tuple[Tone, str, str]:
     """Return tone, icon and words of the chip of problems."""
     if count:
-        return "bad", "warning", f"{count} problem{'s' * (count > 1)}"
+        return "bad", "warning", counted(count, "problem")
     if warnings:
-        return "warn", "warning", f"{warnings} warning{'s' * (warnings > 1)}"
+        return "warn", "warning", counted(warnings, "warning")
     return "ok", "check", "No problems"

@@ -10,6 +10,7 @@ from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.fields import label_of
 from study_app.authoring.names import ITEMS, references_to
 from study_app.authoring.outline import title_of
+from study_app.number_text import counted
 from study_app.protocol.source.document import Path, value_at
 from study_app.viewmodels.number_words import duration_range
 
@@ -50,7 +51,7 @@ def brief(document: Mapping[str, Any], path: Path) -> str:
     if not isinstance(value, Mapping) or len(path) != 2:
         return ""
     if path[0] == "questionnaires" and isinstance(items := value.get("items"), tuple | list):
-        return f"{len(items)} question{'s' * (len(items) != 1)}"
+        return counted(len(items), "question")
     if path[0] != "tasks":
         return ""
     numbers = {key: one for key, one in value.items() if isinstance(one, int | float)}
@@ -68,7 +69,7 @@ def used_by(document: Mapping[str, Any], path: Path) -> str:
     counts = Counter(
         "step" if user[0] == "sequence" else singular(user[-2] if len(user) > 1 else user[0]) for user in users
     )
-    words = (f"{count} {word}{'s' * (count != 1)}" for word, count in sorted(counts.items()))
+    words = (counted(count, word) for word, count in sorted(counts.items()))
     return f"used by {', '.join(words)}" if counts else "not used"
 
 

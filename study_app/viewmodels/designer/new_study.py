@@ -15,6 +15,7 @@ from study_app.authoring.new_study import Answers
 from study_app.authoring.outline import study_title, title_of
 from study_app.authoring.templates import QUESTIONS
 from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
+from study_app.number_text import counted
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s, step_duration_s
@@ -196,7 +197,7 @@ def _figures(protocol: Protocol) -> Iterator[tuple[str, str]]:
     people = None if protocol.analysis is None else protocol.analysis.participants
     if people is not None:
         yield "people", f"{people} planned"
-    yield "layers", f"{trials} trial{'s' * (trials != 1)}"
+    yield "layers", counted(trials, "trial")
 
 
 def _tags(protocol: Protocol) -> tuple[tuple[str, str], ...]:

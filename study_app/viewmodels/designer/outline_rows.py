@@ -9,6 +9,7 @@ from typing import Any, Final, TypeAlias
 from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.edited_study import Study
 from study_app.authoring.outline import Element, found, outline
+from study_app.number_text import counted
 from study_app.protocol.source.document import Path, entries, names, value_at
 from study_app.viewmodels.designer.element_facts import brief
 from study_app.viewmodels.designer.finding import LABEL, FoundField, found_in_elements
@@ -140,7 +141,7 @@ def _row(study: Study, element: Element, times_s: Mapping[str, float], *, in_ses
         note = " ".join(str(code).upper() for _, code in entries(study.document, "study.languages.*"))
     elif path == ("device",) and isinstance(limit := value_at(study.document, FORCE_LIMIT), int | float):
         note = f"{limit:g} N"
-    faults = f"{element.faults} problem{'s' * (element.faults > 1)}" if element.faults else ""
+    faults = counted(element.faults, "problem") if element.faults else ""
     sort = singular(kind) if len(path) == 2 else "question" if "items" in path else ""
     at = ""
     if element.step and isinstance(element.step[-1], int):

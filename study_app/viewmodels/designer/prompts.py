@@ -10,10 +10,9 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Row, label_of
 from study_app.authoring.outline import title_of
 from study_app.authoring.writer.refused import Refused
-from study_app.number_text import exact_text
+from study_app.number_text import counted, exact_text
 from study_app.protocol.source.document import Path
 from study_app.viewmodels.designer.requests import AskSeries, MakeSeries
-from study_app.viewmodels.sessions import counted
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Literal, NamedTuple, TypeAlias
 
-from study_app.viewmodels.sessions import SessionFacts, counted
+from study_app.number_text import counted
+from study_app.viewmodels.sessions import SessionFacts
 
 Name: TypeAlias = Literal["participant", "study", "started", "status", "validity", "answers", "version"]
 Tone: TypeAlias = Literal["ok", "warn", "bad", "accent", "neutral"]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from study_app.devices.registry import discover
 from study_app.errors import StoreError
+from study_app.number_text import counted
 from study_app.store.blinded.sealing import opened, opened_key
 from study_app.store.broken_limits import beyond_limits
 from study_app.store.exclusions import Exclusion, exclusions
@@ -23,7 +24,7 @@ from study_app.store.progress import Given, progress_of
 from study_app.store.tables import session_tables
 from study_app.store.tables.participants import row_of
 from study_app.viewmodels.session.columns import incidents
-from study_app.viewmodels.sessions import SessionFacts, counted, session_facts
+from study_app.viewmodels.sessions import SessionFacts, session_facts
 
 MOST_POINTS = 2000  # of a drawn curve
 LIMIT_WORDS: Mapping[str, tuple[str, str]] = {

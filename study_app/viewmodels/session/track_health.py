@@ -12,10 +12,10 @@ from itertools import groupby
 from statistics import median
 from typing import Final
 
+from study_app.number_text import counted
 from study_app.protocol.orders.schedule import Schedule, Trial
 from study_app.store.progress import Progress, TrialAnswer
 from study_app.viewmodels.number_words import grouped
-from study_app.viewmodels.sessions import counted
 
 LONG_RUN: Final = 8
 """So many equal answers in a row are marked."""

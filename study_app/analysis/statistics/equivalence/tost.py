@@ -16,9 +16,10 @@ from numpy.typing import ArrayLike
 from scipy.special import stdtr, stdtrit
 
 from study_app.analysis.statistics.equivalence.bootstrap_t import p_within, resamples_for
-from study_app.analysis.statistics.outcome import DRAWS, Array, Interval, Outcome, checked, clopper_pearson, counted
+from study_app.analysis.statistics.outcome import DRAWS, Array, Interval, Outcome, checked, clopper_pearson
 from study_app.analysis.statistics.paired import Alternative, signed, signed_p
 from study_app.errors import AnalysisError
+from study_app.number_text import counted
 
 Verdict: TypeAlias = Literal["equivalent", "different", "inconclusive", "out of reach"]
 
@@ -182,7 +183,11 @@ def _compared(
 def _described(kept: Array, bound: float, alpha: float) -> Equivalence:
     """Return what can be said before any test."""
     n = len(kept)
-    reason = f"all {n} differences are equal: no spread for an interval" if n > 1 else f"{counted(n)}: no spread"
+    reason = (
+        f"all {n} differences are equal: no spread for an interval"
+        if n > 1
+        else f"{counted(n, 'participant')}: no spread"
+    )
     return Equivalence(
         test="equivalence, two one-sided t tests",
         n=n,

@@ -29,6 +29,7 @@ from study_app.gui.designer.participant.participant_tab import ParticipantTab
 from study_app.gui.designer.view import DesignerPlace
 from study_app.gui.display.screens import choose_screens
 from study_app.gui.widgets.main_view import make_shortcuts
+from study_app.number_text import counted
 from study_app.protocol.forms.show_if import Value
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial
@@ -47,7 +48,6 @@ from study_app.viewmodels.designer.participant_page import (
     moment_words,
     step_words,
 )
-from study_app.viewmodels.sessions import counted
 
 NO_ANSWERS: Final[Mapping[str, Value]] = {}
 
@@ -341,7 +341,7 @@ class ParticipantPreview(QObject):
         if len(lacks) == count:
             return f"{counted(count, 'text')} missing in {language_name(self._language)}: shown in another language."
         values = "only valid parts" if self._valid is None else "the last valid values"
-        return f"{count} problem{'s' * (count > 1)} elsewhere: {values} are shown."
+        return f"{counted(count, 'problem')} elsewhere: {values} are shown."
 
     def _holds(self, protocol: Protocol, study: Study) -> bool:
         """Return whether the selected table, or question, is in the protocol that is shown."""

@@ -12,9 +12,9 @@ from study_app.authoring.names import references_to
 from study_app.authoring.writer.comments import Comment, comments_naming
 from study_app.gui.designer.versions.rename_cards import CommentsCard, UnlockCard, title_of
 from study_app.gui.designer.view import DesignerPlace
+from study_app.number_text import counted
 from study_app.protocol.source.document import Path, value_at
 from study_app.viewmodels.designer.requests import RenameElement, Request
-from study_app.viewmodels.sessions import counted
 
 BREAKS: Final = (
     "answers before and after are in different columns of the tables",

@@ -96,7 +96,7 @@ class FormHead(QWidget):
         below.addWidget(self.kind)
         below.addWidget(self.followed, 1)
         words.addLayout(below)
-        grid = QGridLayout(self)
+        grid = self._grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(8)
         grid.addWidget(self.tile, 0, 0)
@@ -182,7 +182,7 @@ class FormHead(QWidget):
             say(self, words)
         self.followed.show_text(words)
         self.kind.setHidden(bool(words))
-        self.layout().activate()  # at once, or the words are cut where there was less room
+        self._grid.activate()  # at once, or the words are cut where there was less room
 
     def _apply_lock(self) -> None:
         path, why = self._lock

@@ -10,6 +10,7 @@ from typing import Final
 from study_app.authoring.measures.observers import Measurable, Observed
 from study_app.authoring.measures.planned import ENOUGH, GroupPrecision
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
+from study_app.number_text import counted
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.clipped_levels import clipped, clipped_unpaced
 from study_app.protocol.levels.presented_levels import (
@@ -147,7 +148,7 @@ def number_cards(
 
     ``warned``: whether ``check`` warns that the planned participants are too few.
     """
-    breaks = f", {order.breaks} break{'s' * (order.breaks > 1)}" if order.breaks else ""
+    breaks = f", {counted(order.breaks, 'break')}" if order.breaks else ""
     return (
         _range(of, simulated),
         _one_person(of, simulated),

@@ -17,6 +17,7 @@ from study_app.authoring.names import blocks_using
 from study_app.authoring.outline import title_of
 from study_app.authoring.study_facts import Facts
 from study_app.haptics.model.gate import calls_for
+from study_app.number_text import counted
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import order_of
@@ -39,7 +40,6 @@ from study_app.viewmodels.designer.measures.number_cards import (
     people,
 )
 from study_app.viewmodels.number_words import duration, duration_figure, duration_range
-from study_app.viewmodels.sessions import counted
 
 SQUARE_NAMES: Final = {"williams": "Williams design", "latin": "Latin square"}
 Underway: TypeAlias = tuple[str, str]
@@ -82,7 +82,7 @@ def session_card(study: Study, facts: Facts, path: Path, parts: int | None = Non
     longest = sorted(facts.steps_s, key=lambda step: -facts.steps_s[step])[:2]
     named = [chosen, *(one for one in longest if one != chosen)][:2] if chosen in facts.steps_s else longest
     notes = tuple(f"{_title(study, step)} {duration(facts.steps_s[step])}" for step in facts.steps_s if step in named)
-    breaks = f"{facts.breaks} break{'s' * (facts.breaks != 1)}" if facts.breaks else ""
+    breaks = counted(facts.breaks, "break") if facts.breaks else ""
     least_to_most = duration_range(*facts.range_s)
     aside = ", ".join(filter(None, (least_to_most if " to " in least_to_most else "", breaks)))
     return SessionCard("Session", figures, aside, segments, notes, verdicts)
@@ -160,7 +160,7 @@ def block_card(study: Study, facts: Facts, protocol: Protocol, block: Block) -> 
         (str(order.trials), _word(order.trials, "trial")),
         (str(order.trials * answers), _word(order.trials * answers, "answer")),
     )
-    aside = f"{order.breaks} break{'s' * (order.breaks != 1)}" if order.breaks else ""
+    aside = counted(order.breaks, "break") if order.breaks else ""
     return SessionCard(_title(study, block.id), figures, aside)
 
 

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from study_app.authoring.versions.runs import Run, Standing
+from study_app.number_text import counted
 from study_app.viewmodels.designer.versions.change_rows import ChangeGroup
-from study_app.viewmodels.sessions import counted
 from study_app.viewmodels.tones import Tone
 
 
