@@ -124,7 +124,7 @@ def _of_draft(file: Path) -> DraftFacts | None:
     draft = draft_of(file)
     if draft is None:  # it was saved meanwhile
         return None
-    from study_app.viewmodels.drafts import draft_title  # noqa: PLC0415 - the designer's modules: only for a draft
+    from study_app.viewmodels.designer.draft_words import draft_title  # noqa: PLC0415 - the designer's modules: only for a draft
 
     title = draft_title(draft.text, file.parent)
     note = DraftNote(f"Draft of {time_words(draft.kept_at)}, never saved", draft.kept_at)
@@ -204,7 +204,7 @@ def _draft_note(source: str) -> DraftNote | None:
         file = find(source)
         draft, content = None if is_shipped(source) else draft_of(file), file.read_bytes()
         if draft is not None and draft.text.encode() != content:
-            from study_app.viewmodels.drafts import edited_words  # noqa: PLC0415 - likewise
+            from study_app.viewmodels.designer.draft_words import edited_words  # noqa: PLC0415 - likewise
 
             edited = edited_words(content.decode("utf-8", "replace"), draft.text, file.parent)
             return DraftNote(f"Draft of {time_words(draft.kept_at)}, not saved{edited}", draft.kept_at)

@@ -22,7 +22,7 @@ from study_app.viewmodels.designer.play import under_way
 pytestmark = pytest.mark.slow
 
 SHIFT = Qt.KeyboardModifier.ShiftModifier
-PAGE = Path(__file__).parents[3] / "docs" / "designer.md"
+PAGE = Path(__file__).parents[4] / "docs" / "designer.md"
 
 
 def test_every_key_of_the_place_is_one_shortcut(designer: Any) -> None:

@@ -1,0 +1,199 @@
+"""Elements and keys of a study: added, copied, moved, renamed, switched, removed, deleted and repaired."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+
+from study_app.viewmodels.designer.addable import addable
+from study_app.viewmodels.designer.form.form_rows import position_of
+from study_app.viewmodels.designer.requests import (
+    AddElement,
+    AddKey,
+    DeleteElement,
+    DuplicateElement,
+    MoveElement,
+    RemoveKey,
+    RenameElement,
+    SwitchKind,
+)
+
+pytestmark = pytest.mark.slow
+
+
+def test_elements_are_added_copied_moved_renamed_and_deleted(designer: Any) -> None:
+    controller = designer.controller
+    controller.open("kitchen")
+    first = designer.text
+
+    controller.editing.ask(AddElement(("liquids",)))
+    assert controller.editing.opened.history.selected == ("liquids", "liquid")
+    controller.editing.ask(RenameElement(("liquids", "liquid"), "syrup2"))
+    assert designer.place.view.form.id == "syrup2"
+
+    controller.editing.ask(DuplicateElement(("blocks", "liquids")))
+    assert controller.editing.opened.history.selected == ("blocks", "liquids_2")
+    assert controller.editing.opened.study.faults == ()
+    steps = controller.editing.opened.study.document["sequence"]
+    assert steps.index("liquids_2") == steps.index("liquids") + 1
+    controller.editing.ask(MoveElement(("blocks", "liquids_2"), -1))
+    moved = controller.editing.opened.study.document["sequence"]
+    assert moved.index("liquids_2") == moved.index("liquids") - 1
+
+    controller.ask_to_delete(("tasks", "explore"))
+    assert designer.place.prompt is not None
+    designer.place.prompt.all.click()
+    assert "explore" not in controller.editing.opened.study.document["tasks"]
+
+    while controller.editing.opened.history.done:
+        controller.editing.undo()
+    assert designer.text == first
+
+
+@pytest.mark.parametrize("path", [("questionnaires", "liquid", "items", 0), ("pages", "thanks"), ("pages", "welcome")])
+def test_a_copy_comes_right_after_its_original(designer: Any, path: tuple[str | int, ...]) -> None:
+    text = designer.file.read_text()
+    designer.file.write_text(text.replace('\nintro = "', '\nintro.en = "'))
+    designer.controller.open("kitchen")
+    at = position_of(designer.editing.opened.study.document, path)
+    designer.editing.select(path)
+    designer.place.form.head.copy.click()
+    study = designer.editing.opened.study
+    assert {fault.message for fault in study.faults} <= {"reads as an earlier item does"}
+    assert at is not None
+    assert position_of(study.document, designer.editing.opened.history.selected) == (at[0] + 1, at[1] + 1)
+
+
+def test_what_can_be_added_is_filtered_by_typing_and_comes_after_the_selected_element(
+    designer: Any, qtbot: Any
+) -> None:
+    designer.controller.open("kitchen")
+    of_format_1 = addable(designer.editing.opened.study, ("questionnaires", "liquid", "items", 0))
+    assert len([one for one in of_format_1 if one.words.startswith("Question")]) == 2
+    designer.controller.begin("template:questionnaire-only", "asked")
+    form = next(iter(designer.editing.opened.study.document["questionnaires"]))
+    items = ("questionnaires", form, "items")
+    designer.editing.select((*items, 0))
+    designer.place.ask_to_add()
+    assert designer.place.adding.list.item(0).data(Qt.ItemDataRole.UserRole).asks.section == items
+    adding = designer.place.adding
+    adding.words.setText("questi slid")
+    assert adding.list.count() == 1
+    qtbot.keyClick(adding.words, Qt.Key.Key_Return)
+    assert designer.place.view.form.path == (*items, 1)
+    assert designer.editing.opened.study.document["questionnaires"][form]["items"][1]["kind"] == "slider"
+    assert designer.editing.opened.study.faults == ()
+
+
+def test_a_question_can_be_added_wherever_there_is_a_questionnaire(designer: Any, qtbot: Any) -> None:
+    designer.controller.begin("template:compare-liquids", "asked")
+    adding = designer.place.adding
+
+    def offered(selected: tuple[str, ...], words: str = "question") -> list[str]:
+        designer.editing.select(selected)
+        designer.place.ask_to_add()
+        adding.words.setText(words)
+        every = [adding.list.item(at).data(Qt.ItemDataRole.UserRole) for at in range(adding.list.count())]
+        return [one.words for one in every if isinstance(one.asks, AddElement)]
+
+    assert offered(("pages", "welcome")) == ["Question", "Questionnaire"]
+    for words in ("design", "2ifc"):
+        assert offered(("pages", "welcome"), words) == ["Trial design"]
+    designer.editing.ask(AddElement(("questionnaires",)))
+    questions = [words for words in offered(("pages", "welcome")) if words.startswith("Question of")]
+    assert questions == ["Question of Liquid", "Question of Questionnaire"]
+    assert "Question of Liquid" in offered(("blocks", "liquids"))
+    assert "Question of Questionnaire" not in offered(("blocks", "liquids"))
+    before = len(designer.editing.opened.study.document["questionnaires"]["liquid"]["items"])
+    adding.list.setCurrentRow(offered(("blocks", "liquids")).index("Question of Liquid"))
+    qtbot.keyClick(adding.words, Qt.Key.Key_Return)
+    assert designer.place.view.form.path == ("questionnaires", "liquid", "items", before)
+
+
+def test_an_id_that_is_refused_can_be_replaced_by_one_that_is_free(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.select(("liquids", "thin"))
+    designer.editing.ask(RenameElement(("liquids", "thin"), "thick"))
+    head = designer.place.form.head
+    assert head.refusal.text() == 'The name "thick" is taken: "thick_2" is free.'
+    head.refusal.use.setFocus()
+    qtbot.keyClick(head.refusal.use, Qt.Key.Key_Return)
+    assert (head.id.text(), designer.editing.selected) == ("thick_2", ("liquids", "thick_2"))
+    assert head.id.hasFocus()
+    assert not head.refusal.isVisible()
+
+
+def test_a_kind_is_switched_and_back_without_losing_values(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.select(("tasks", "explore"))
+    before = designer.editing.opened.study.document["tasks"]["explore"]
+    designer.editing.ask(SwitchKind(("tasks", "explore"), "reach"))
+    assert designer.editing.opened.study.document["tasks"]["explore"]["kind"] == "reach"
+    designer.editing.ask(SwitchKind(("tasks", "explore"), "explore"))
+    assert designer.editing.opened.study.document["tasks"]["explore"] == before
+
+
+def test_one_key_is_given_in_place_of_another_and_back_without_losing_its_value(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    task = ("tasks", "reach")
+    designer.editing.select(task)
+    before = designer.text
+    row = designer.row(*task, "count")
+    assert row.remove is None
+    assert not [one for one in designer.place.form.rows if one.row.row.path[-1] == "duration_s"]
+    row.keys.buttons[1].click()
+    study = designer.editing.opened.study
+    assert study.faults == ()
+    assert "count" not in study.document["tasks"]["reach"]
+    designer.row(*task, "duration_s").keys.buttons[0].click()
+    assert designer.editing.opened.study.document["tasks"]["reach"]["count"] == 6
+    designer.editing.undo()
+    designer.editing.undo()
+    assert designer.text == before
+    designer.editing.select(("blocks", "liquids"))
+    designer.row("blocks", "liquids", "conditions").keys.buttons[1].click()
+    assert "nothing that Stimulus can name" in designer.row("blocks", "liquids", "conditions").wrong.sentence.text()
+
+
+def test_an_optional_key_is_written_and_removed(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    before = designer.text
+    designer.editing.ask(AddKey(("blocks", "liquids", "break_every")))
+    assert "break_every" in designer.editing.opened.study.document["blocks"]["liquids"]
+    designer.editing.ask(RemoveKey(("blocks", "liquids", "break_every")))
+    assert designer.text == before
+
+
+def test_every_optional_key_of_a_liquid_can_be_added_and_undone(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.select(("liquids", "thick"))
+    before = designer.text
+    absent = [row.path for section in designer.place.view.form.sections for row in section.absent]
+    assert len(absent) > 5
+    for path in absent:
+        designer.editing.ask(AddKey(path))
+        assert path[-1] in designer.editing.opened.study.document["liquids"]["thick"], path
+        designer.editing.undo()
+        assert designer.text == before
+
+
+def test_a_broken_file_is_repaired_by_a_button(designer: Any, qtbot: Any) -> None:
+    text = designer.file.read_text()
+    designer.file.write_text(text.replace('liquid = "thick"', 'liquid = "thik"', 1))
+    designer.controller.open("kitchen")
+    assert designer.place.header.problems.words == "1 problem"
+    designer.place.header.problems.click()
+    qtbot.waitUntil(lambda: bool(designer.place.problems.lines[0].repairs))
+    designer.place.problems.lines[0].repairs[0].click()
+    assert designer.text == text
+    assert designer.place.header.problems.words != "1 problem"
+
+
+def test_deleting_with_gaps_leaves_faults_and_undo_takes_them_back(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.ask(DeleteElement(("liquids", "thick")))
+    assert designer.editing.opened.study.faults
+    designer.editing.undo()
+    assert not designer.editing.opened.study.faults

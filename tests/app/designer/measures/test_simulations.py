@@ -1,0 +1,139 @@
+"""Numbers of Measures that take simulations: ordered, given up, kept, counted, failed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from study_app.app.designer.measures.measures_worker import (
+    Advising,
+    Counted,
+    Grouping,
+    MeasureOrder,
+    Measuring,
+    Observing,
+    start_measure_worker,
+)
+from study_app.authoring.new_study import template
+from study_app.authoring.writer.edits import Set
+from study_app.protocol.checks.expected_precision import threshold_plan
+from study_app.viewmodels.designer.measures.number_cards import (
+    ANEW,
+    FAILED,
+    UNKNOWN,
+)
+from study_app.workers.messages import Crashed
+from tests.app.designer.measures.conftest import Worker, jnd, shown
+
+pytestmark = pytest.mark.slow
+
+
+def test_slow_numbers_come_are_given_up_and_are_kept(qtbot: Any, designer: Any, worker: Worker) -> None:
+    jnd(designer)
+    page = designer.place.measures
+    qtbot.waitUntil(lambda: bool(worker.orders))
+    assert [type(one) for one in worker.orders[0].wanted] == [Observing, Grouping, Measuring, Advising]
+    assert page.numbers.parts[0].number.text() == UNKNOWN
+    assert page.numbers.parts[0].note.text() == ANEW
+    assert page.numbers.parts[3].number.text() != UNKNOWN  # how long it lasts is known at once
+    worker.answer()
+    shown(qtbot, designer, 0, "5 – 50")
+    shown(qtbot, designer, 1, "± 26")
+    shown(qtbot, designer, 2, "93")
+    assert designer.place.header.problems.words == "1 warning"  # that of the precision takes simulated observers
+    assert page.function.accessibleDescription().startswith("Share of answers that are correct")
+    assert "19 %" in page.track.accessibleDescription()
+    assert page.forces.accessibleDescription().startswith("Force at 31 levels")
+
+    designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 60))
+    qtbot.waitUntil(lambda: len(worker.orders) == 2)
+    assert page.numbers.parts[1].note.text() == ANEW  # grey, with the number of before
+    assert page.numbers.parts[1].number.text() == "± 26"
+    assert page.function.shown.anew
+    designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 100))
+    qtbot.waitUntil(lambda: worker.stops == 1)  # what was under way is given up
+    qtbot.waitUntil(lambda: len(worker.orders) == 3)
+    assert worker.orders[2].wanted[0].plan.trials == 100
+    designer.editing.undo()
+    designer.editing.undo()
+    qtbot.waitUntil(lambda: not page.function.shown.anew)  # kept by what it depends on
+    qtbot.wait(120)
+    assert len(worker.orders) == 3
+    designer.editing.make("Change", Set(("pages", "welcome", "title"), "Hello"))
+    qtbot.wait(120)
+    assert len(worker.orders) == 3  # nothing depends on a text
+
+    designer.window.go("home")
+    assert not worker.works  # a session may begin: nothing is simulated any more
+    designer.controller.measures.fit.found.emit()  # as what was looked for when it was left
+    qtbot.wait(120)
+    assert not designer.controller.measures.slow.rest.isActive()
+    designer.window.go("designer")
+    designer.editing.make("Break", Set(("study", "version"), 1))
+    qtbot.wait(120)
+    assert page.numbers.isVisible()  # nothing of them depends on the version
+    before = [part.number.text() for part in page.numbers.parts]
+    designer.editing.make("Break", Set(("device", "force_limit_n"), 60))
+    qtbot.waitUntil(lambda: page.cards["forces"].chips[0].word == "– of 31 as asked")
+    assert page.forces.shown.bars == ()
+    assert [part.number.text() for part in page.numbers.parts] == before  # no threshold depends on the device
+    assert page.area.widget().isEnabled()
+    assert not page.earlier.isVisible()
+
+
+def test_a_card_says_how_far_its_simulations_are_and_that_one_crashed(
+    qtbot: Any, designer: Any, worker: Worker
+) -> None:
+    jnd(designer)
+    qtbot.waitUntil(lambda: bool(worker.orders))
+    observing, _, *others = worker.orders[0].wanted
+    one, people, *_ = designer.place.measures.numbers.parts[1:]
+    worker.given.append((1, Counted(observing, 240, 400)))
+    qtbot.waitUntil(lambda: one.note.text() == "240 of 400 simulated")
+    assert people.note.text() == ANEW  # it waits for its turn
+    assert designer.place.measures.cards["function"].legend.text() == "240 of 400 simulated"
+    worker.answer(Observing)
+    worker.given.append((1, Crashed(1)))
+    qtbot.waitUntil(lambda: people.note.text() == FAILED[2])
+    assert (people.number.text(), one.number.text()) == (UNKNOWN, "± 26")
+    assert people.more.text() == "The process ended with exit code 1; the terminal may show why."
+    qtbot.waitUntil(lambda: len(worker.orders) == 2)
+    assert worker.orders[1].wanted == tuple(others)  # those after it are simulated all the same
+    worker.given.append((2, Crashed(-9)))
+    qtbot.waitUntil(lambda: len(worker.orders) == 3)
+    worker.given.append((3, Crashed(-9)))
+    qtbot.waitUntil(lambda: ANEW not in [part.note.text() for part in designer.place.measures.numbers.parts])
+    designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 60))
+    qtbot.waitUntil(lambda: len(worker.orders) == 4)
+    assert people.note.text() == ANEW  # another study, another try
+
+
+def test_without_a_process_the_other_numbers_stay(qtbot: Any, designer: Any) -> None:
+    designer.controller.measures.slow.rest.setInterval(10)
+    jnd(designer)
+    part = designer.place.measures.numbers.parts[1]
+    qtbot.waitUntil(lambda: part.note.text() == FAILED[2])
+    assert part.more.text() == "The process of the simulations does not start."
+    assert designer.place.measures.numbers.parts[3].number.text() == "17"
+
+
+@pytest.mark.nightly
+def test_the_worker_process_simulates_observers_and_studies() -> None:
+    protocol = template("viscosity-jnd").protocol
+    assert protocol is not None
+    plan = threshold_plan(protocol, protocol.blocks["viscosity"])
+    assert plan is not None
+    client = start_measure_worker()
+    plan = plan.with_trials(20)
+    client.order(MeasureOrder((Observing(plan, 0.2, 0.02), Grouping(plan, 6, 0.5))))
+    found: list[Any] = []
+    for _ in range(600):
+        found += client.answers(0.5)
+        if found and found[-1][1] is None:
+            break
+    client.close()
+    observed, group = (answer[1] for _, answer in found if isinstance(answer, tuple))
+    assert observed.threshold == 0.2
+    assert 0.0 <= group.share <= 1.0
+    assert group.more_trials > group.trials == 20
