@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QPushButton, QVBoxLayout, QWidget
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Chip, Logo
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, figures
@@ -118,9 +118,9 @@ class Header(Themed, QWidget):
     def _lay_out(self) -> None:
         whose, how_long = _column(self.study, self.who), _column(self.clock, self.expected)
         chips = self.state, self.blind, self.saved
-        row = hbox(Logo(), whose, 8, *chips, spacing=12, margins=(24, 8, 24, 8), parent=self)
-        row.addStretch(1)
-        add_parts(row, how_long, _column(self.bar, self.trials), 8, self.page, self.theme_button)
+        left = Logo(), whose, 8, *chips
+        right = how_long, _column(self.bar, self.trials), 8, self.page, self.theme_button
+        hbox(*left, (STRETCH, 1), *right, spacing=12, margins=(24, 8, 24, 8), parent=self)
 
     def show_view(self, view: OperatorView) -> None:
         """Show the session's head."""

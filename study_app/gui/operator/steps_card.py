@@ -8,7 +8,7 @@ from study_app.gui.operator.current_step import Now, Tally
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.boxes import add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Rule, scrolled
 from study_app.gui.widgets.labels import Elided, figures, set_ink
 from study_app.viewmodels.operator import OperatorView, StepRow
@@ -99,8 +99,7 @@ class Rail(Card):
         self.lines: list[StepLine] = []
         self._slim = False
         self._steps = QWidget()
-        self._steps_column = vbox(spacing=0, parent=self._steps)
-        self._steps_column.addStretch(1)
+        self._steps_column = vbox((STRETCH, 1), spacing=0, parent=self._steps)
         self.steps_area = scrolled(self._steps)
         self._rules = Rule(), Rule()
         add_parts(self.column, self._rules[0], (self.steps_area, 1), self._rules[1])

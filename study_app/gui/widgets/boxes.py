@@ -7,7 +7,7 @@ from typing import Any, Final, TypeAlias, TypeVar
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLayout, QVBoxLayout, QWidget
 
 STRETCH: Final = "stretch"
-"""A gap that takes the room that is left."""
+"""A gap that takes the room that is left; in a tuple with its stretch."""
 Part: TypeAlias = QWidget | QLayout | int | str | tuple[Any, ...]
 """A widget or layout, or a tuple with its stretch, and with its alignment; a gap [px]; or `STRETCH`."""
 Margins: TypeAlias = int | tuple[int, int, int, int] | None
@@ -52,4 +52,4 @@ def add_parts(box: QBoxLayout, *parts: Part) -> None:
         elif isinstance(added, int):
             box.addSpacing(added)
         else:
-            box.addStretch()
+            box.addStretch(*how)
