@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFileDialog, QGridLayout, QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QGridLayout, QLineEdit, QWidget
 
 from study_app.devices.descriptor import DeviceOption
 from study_app.devices.registry import descriptor_of
 from study_app.gui.home.form_fields import add_field, field_with_button, text_field
+from study_app.gui.widgets.boxes import vbox
 from study_app.gui.widgets.controls import ActionButton
 from study_app.viewmodels.devices.list_view import window_options
 
@@ -31,8 +32,7 @@ class DeviceOptionFields(QWidget):
         self.fields: dict[str, QLineEdit] = {}
         self._rows: dict[str, QWidget] = {}
         self._asked: tuple[DeviceOption, ...] = ()
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
+        column = vbox(margins=0, parent=self)
         for option in window_options():
             field = text_field(option.title)
             field.setText(str(values.get(option.name, "")))

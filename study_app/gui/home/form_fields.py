@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QLineEdit, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QLineEdit, QWidget
 
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import STRETCH, hbox
 from study_app.gui.widgets.labels import label
 
 
@@ -19,11 +20,7 @@ def text_field(name: str) -> QLineEdit:
 def field_with_button(field: QWidget, button: QWidget) -> QWidget:
     """Return a row with a field and a button."""
     both = QWidget()
-    row = QHBoxLayout(both)
-    row.setContentsMargins(0, 0, 0, 0)
-    row.setSpacing(8)
-    row.addWidget(field, 1)
-    row.addWidget(button)
+    hbox((field, 1), button, spacing=8, margins=0, parent=both)
     return both
 
 
@@ -32,10 +29,7 @@ def add_field(
 ) -> None:
     """Add a field below its label to column ``place``, with a hint on the right of the label."""
     named = label(name, "label", "text2")
-    head = QHBoxLayout()
-    head.setContentsMargins(0, 6 if row else 0, 0, 0)
-    head.addWidget(named)
-    head.addStretch()
+    head = hbox(named, STRETCH, margins=(0, 6 if row else 0, 0, 0))
     if hint:
         head.addWidget(label(hint, "small", "text3") if isinstance(hint, str) else hint)
     named.setBuddy(field)

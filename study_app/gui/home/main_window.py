@@ -7,13 +7,14 @@ from types import MappingProxyType
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QKeySequence, QResizeEvent, QShortcut
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QMainWindow, QStackedWidget, QWidget
 from shiboken6 import isValid
 
 from study_app.errors import StudyError
 from study_app.gui.home.navigation import DESTINATIONS, Rail
 from study_app.gui.theme.theme import DARK, LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme, apply_theme_within
+from study_app.gui.widgets.boxes import hbox, vbox
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.dialogs import Notice, Question
 from study_app.gui.widgets.labels import label
@@ -33,8 +34,7 @@ def bug_words(error: BaseException) -> str:
 def _waiting_place() -> Place:
     """Return a line in the middle, in place of what is being prepared."""
     made = Place()
-    column = QVBoxLayout(made)
-    column.addWidget(label("Preparing …", "card", "text2"), 0, Qt.AlignmentFlag.AlignCenter)
+    vbox((label("Preparing …", "card", "text2"), 0, Qt.AlignmentFlag.AlignCenter), parent=made)
     return made
 
 
@@ -87,11 +87,7 @@ class MainWindow(QMainWindow):
         whole = QWidget()
         whole.setProperty("role", "window")
         whole.setAccessibleName("Liquid Study")
-        row = QHBoxLayout(whole)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(0)
-        row.addWidget(self.rail)
-        row.addWidget(self.stack, 1)
+        hbox(self.rail, (self.stack, 1), spacing=0, margins=0, parent=whole)
         self.setCentralWidget(whole)
         whole.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.rail.theme_asked.connect(self._change_theme)

@@ -7,11 +7,12 @@ from typing import NamedTuple
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Logo
 from study_app.gui.widgets.controls import PressedByEnter
 from study_app.gui.widgets.labels import label
@@ -133,24 +134,11 @@ class Rail(Themed, QWidget):
         super().__init__()
         names = set(names)
         self.name = label("Liquid Study", "card")
-        self.buttons: dict[str, RailButton] = {}
         self.switch = RailButton("moon", "Dark theme", "Dark")
         self.switch.clicked.connect(self.theme_asked)
-        self._head = head = QHBoxLayout()
-        head.setSpacing(10)
-        head.addWidget(Logo())
-        head.addWidget(self.name)
-        head.addStretch()
-        self._column = column = QVBoxLayout(self)
-        column.setSpacing(6)
-        column.addLayout(head)
-        column.addSpacing(22)
-        for place in DESTINATIONS:
-            if place.name in names:
-                self.buttons[place.name] = self._button(place)
-                column.addWidget(self.buttons[place.name])
-        column.addStretch()
-        column.addWidget(self.switch)
+        self._head = hbox(Logo(), self.name, STRETCH, spacing=10)
+        self.buttons = {place.name: self._button(place) for place in DESTINATIONS if place.name in names}
+        self._column = vbox(self._head, 22, *self.buttons.values(), STRETCH, self.switch, spacing=6, parent=self)
 
     def _button(self, place: Destination) -> RailButton:
         made = RailButton(place.icon, place.word, place.short)

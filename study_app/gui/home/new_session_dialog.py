@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
     QGridLayout,
-    QHBoxLayout,
     QVBoxLayout,
     QWidget,
 )
@@ -25,6 +24,7 @@ from study_app.gui.home.study_folder_state import StudyFolderState, read_study_f
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.background import Background
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, Number
 from study_app.gui.widgets.labels import label, set_ink
@@ -151,13 +151,6 @@ class NewSessionDialog(QDialog):
         self.cancel.setAutoDefault(False)
 
     def _lay_out(self) -> None:
-        column = QVBoxLayout(self)
-        column.setContentsMargins(32, 28, 32, 24)
-        column.setSpacing(10)
-        column.addWidget(label("New session", "title_dense"))
-        about = f"{self.facts.title}  ·  {self.facts.extent}  ·  {self.facts.duration}"
-        column.addWidget(label(about, "body", "text2", wraps=True))
-        column.addSpacing(6)
         self._inside = QWidget()
         grid = QGridLayout(self._inside)
         grid.setContentsMargins(0, 0, 0, 0)
@@ -179,28 +172,19 @@ class NewSessionDialog(QDialog):
         add_field(grid, 6, 0, "Language of the participant's pages", self.language)
         add_field(grid, 6, 1, "Device", self.device)
         add_field(grid, 8, 0, "Participant's screen", self.screen_choice)
-        both = QVBoxLayout()
-        both.setSpacing(2)
-        both.addWidget(self.windowed)
-        both.addWidget(self.pilot)
-        grid.addLayout(both, 8, 1, 2, 1, Qt.AlignmentFlag.AlignBottom)
+        grid.addLayout(vbox(self.windowed, self.pilot, spacing=2), 8, 1, 2, 1, Qt.AlignmentFlag.AlignBottom)
         folder = field_with_button(self.results, change)
         add_field(grid, 10, 0, "Results folder of this study", folder, hint=self.where, across=2)
         if self.facts.protocol.assigns_rows:
             add_field(grid, 12, 0, "Replaces participant", self.row_of, hint=ROW_HINT, across=2)
         grid.addWidget(self.device_options, 14, 0, 1, 2)
         self._area = scrolled(self._inside)
-        column.addWidget(self._area, 1)
-        column.addSpacing(10)
-        column.addWidget(Rule())
-        foot = QHBoxLayout()
-        foot.setSpacing(16)
-        foot.addWidget(self.cancel)
-        foot.addWidget(label("Nothing is created until you begin.", "label", "text2"))
-        foot.addStretch()
-        foot.addWidget(self.begin)
-        column.addSpacing(4)
-        column.addLayout(foot)
+        head = label("New session", "title_dense")
+        about = f"{self.facts.title}  ·  {self.facts.extent}  ·  {self.facts.duration}"
+        told = label(about, "body", "text2", wraps=True)
+        note = label("Nothing is created until you begin.", "label", "text2")
+        foot = hbox(self.cancel, note, STRETCH, self.begin, spacing=16)
+        vbox(head, told, 6, (self._area, 1), 10, Rule(), 4, foot, spacing=10, margins=(32, 28, 32, 24), parent=self)
 
     def _fit(self) -> None:
         """Be as high as the questions are, but no higher than the screen: then they scroll, and the foot stays."""
@@ -216,22 +200,12 @@ class NewSessionDialog(QDialog):
 
     def _judge(self) -> QVBoxLayout:
         """Return the place of the verdict, and below it the ways on where an id is used."""
-        verdict = QHBoxLayout()
-        verdict.setSpacing(8)
-        verdict.addWidget(self.verdict_icon, 0, Qt.AlignmentFlag.AlignTop)
-        verdict.addWidget(self.verdict, 1)
+        verdict = hbox((self.verdict_icon, 0, Qt.AlignmentFlag.AlignTop), (self.verdict, 1), spacing=8)
         self._ways_row = QWidget()
-        ways = QHBoxLayout(self._ways_row)
-        ways.setContentsMargins(26, 0, 0, 0)
+        hbox(*self.ways, STRETCH, margins=(26, 0, 0, 0), parent=self._ways_row)
         for way in self.ways:
             way.setAutoDefault(False)
-            ways.addWidget(way)
-        ways.addStretch()
-        below = QVBoxLayout()
-        below.setSpacing(6)
-        below.addLayout(verdict)
-        below.addWidget(self._ways_row)
-        return below
+        return vbox(verdict, self._ways_row, spacing=6)
 
     def _choose_folder(self) -> None:
         chosen = QFileDialog.getExistingDirectory(self, "Results folder of this study", self.results.text())

@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QProgressBar, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QProgressBar, QWidget
 
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.controls import ActionButton, Number
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.session.simulated.rehearsal_worker import TASK, RehearsalClient, RehearsalOrder
@@ -72,28 +73,12 @@ class RehearsalDialog(QDialog):
         self._listening.timeout.connect(self._listen)
 
     def _lay_out(self) -> None:
-        column = QVBoxLayout(self)
-        column.setContentsMargins(28, 24, 28, 24)
-        column.setSpacing(12)
-        column.addWidget(label(f"Rehearse {self._facts.title}", "title_dense"))
-        column.addWidget(self.said)
-        row = QHBoxLayout()
-        row.setSpacing(16)
+        row = hbox(spacing=16)
         for name, field in (("Simulated participants", self.participants), ("Seed", self.seed)):
             field.setAccessibleName(name)
-            one = QVBoxLayout()
-            one.setSpacing(6)
-            one.addWidget(label(name, "label", "text2"))
-            one.addWidget(field)
-            row.addLayout(one, 1)
-        column.addLayout(row)
-        column.addWidget(self.progress)
-        foot = QHBoxLayout()
-        foot.addWidget(self.cancel)
-        foot.addStretch()
-        foot.addWidget(self.start)
-        column.addSpacing(6)
-        column.addLayout(foot)
+            row.addLayout(vbox(label(name, "label", "text2"), field, spacing=6), 1)
+        title, foot = label(f"Rehearse {self._facts.title}", "title_dense"), hbox(self.cancel, STRETCH, self.start)
+        vbox(title, self.said, row, self.progress, 6, foot, spacing=12, margins=(28, 24, 28, 24), parent=self)
 
     def _start(self) -> None:
         if self.over:

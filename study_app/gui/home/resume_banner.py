@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from study_app.gui.theme.theme import RADIUS_CARD
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
@@ -26,16 +27,9 @@ class ResumeBanner(Themed, QWidget):
         self.line = label("", "label", "warn", wraps=True)
         self.resume = ActionButton("play", "Resume", role="primary")
         self.resume.clicked.connect(lambda: self.resume_asked.emit(self._shown))
-        words = QVBoxLayout()
-        words.setSpacing(4)
-        words.addWidget(self.heading)
-        words.addWidget(self.line)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(SHADOW + 22, 14, SHADOW + 18, 14)
-        row.setSpacing(18)
-        row.addWidget(Icon("clock", "warn", 26))
-        row.addLayout(words, 1)
-        row.addWidget(self.resume)
+        words = vbox(self.heading, self.line, spacing=4)
+        margins = (SHADOW + 22, 14, SHADOW + 18, 14)
+        hbox(Icon("clock", "warn", 26), (words, 1), self.resume, spacing=18, margins=margins, parent=self)
         self.hide()
 
     def show_interrupted(self, session: Interrupted | None) -> None:

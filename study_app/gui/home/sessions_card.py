@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from datetime import datetime
 
 from PySide6.QtCore import QSignalBlocker, Signal
-from PySide6.QtWidgets import QHBoxLayout
 
 from study_app.gui.sessions.sessions_table import SessionsTable
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import add_parts, hbox
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import Elided, label
@@ -58,17 +58,9 @@ class SessionsCard(Card):
         self.details = ActionButton("file", "Details", role="plain", height=34)
         self.all = ActionButton("chevron", "All results", role="plain", height=34)
         self.all.clicked.connect(self.all_asked)
-        head = QHBoxLayout()
-        head.setContentsMargins(12, 0, 12, 0)
-        head.setSpacing(12)
-        head.addWidget(label("Sessions", "card"))
-        head.addWidget(self.kind)
-        head.addWidget(self.where, 1)
-        head.addWidget(self.details)
-        head.addWidget(self.all)
-        self.column.addLayout(head)
+        parts = (label("Sessions", "card"), self.kind, (self.where, 1), self.details, self.all)
         self.rows = SessionsTable(COLUMNS, NONE[""])
-        self.column.addWidget(self.rows, 1)
+        add_parts(self.column, hbox(*parts, spacing=12, margins=(12, 0, 12, 0)), (self.rows, 1))
         self.none = self.rows.none
         self.kind.currentIndexChanged.connect(self._filter)
         self.rows.opened.connect(self.open_asked)

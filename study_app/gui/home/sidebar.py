@@ -7,9 +7,10 @@ from itertools import pairwise
 
 from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPainterPath, QPaintEvent, QPen, QRadialGradient
-from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QSpacerItem, QVBoxLayout
+from PySide6.QtWidgets import QSizePolicy, QSpacerItem
 
 from study_app.gui.theme.theme import RADIUS_CARD, TANK, font
+from study_app.gui.widgets.boxes import add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
@@ -30,12 +31,7 @@ class DeviceCard(Card):
         self.icon = Icon("device", "text2", 22)
         self.name = label("", "card")
         self.state = Chip(small=True)
-        row = QHBoxLayout()
-        row.setSpacing(10)
-        row.addWidget(self.icon)
-        row.addWidget(self.name, 1)
-        row.addWidget(self.state)
-        self.column.addLayout(row)
+        self.column.addLayout(hbox(self.icon, (self.name, 1), self.state, spacing=10))
         self.about, self.why, self.screens = (label("", "label", "text2", wraps=True) for _ in range(3))
         for line in (self.about, self.why, self.screens):
             line.setFont(font("label", weight=400, tabular=True))
@@ -44,12 +40,7 @@ class DeviceCard(Card):
         self.display = ActionButton("", "Display test", height=38)
         self.devices.clicked.connect(self.devices_asked)
         self.display.clicked.connect(self.display_asked)
-        buttons = QHBoxLayout()
-        buttons.setSpacing(12)
-        buttons.addWidget(self.devices, 1)
-        buttons.addWidget(self.display, 1)
-        self.column.addSpacing(4)
-        self.column.addLayout(buttons)
+        add_parts(self.column, 4, hbox((self.devices, 1), (self.display, 1), spacing=12))
 
     def show_device(self, shown: DeviceShown) -> None:
         """Show the device that sessions begin with, as it was found."""
@@ -80,14 +71,7 @@ class LabCard(Card):
         self.open = ActionButton("", "Open", height=38)
         self.open.setAccessibleName("Open the liquid lab")
         self.open.clicked.connect(self.lab_asked)
-        words = QVBoxLayout()
-        words.setSpacing(4)
-        words.addWidget(label("Liquid lab", "card"))
-        words.addWidget(about)
-        foot = QHBoxLayout()
-        foot.addLayout(words, 1)
-        foot.addWidget(self.open)
-        self.column.addLayout(foot)
+        self.column.addLayout(hbox((vbox(label("Liquid lab", "card"), about, spacing=4), 1), self.open))
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the card, and into its upper part the water, the wake and the ball."""

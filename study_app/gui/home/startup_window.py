@@ -7,11 +7,12 @@ from collections.abc import Callable
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QAccessible, QCloseEvent, QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QProgressBar, QWidget
 
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.accessible import give_role
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Logo
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label
@@ -44,25 +45,9 @@ class OpeningWindow(QWidget):
         bar.setRange(0, 0)
         bar.setTextVisible(False)
         bar.setFixedHeight(8)
-        words = QVBoxLayout()
-        words.setSpacing(2)
-        words.addWidget(label(title, "card"))
-        words.addWidget(label(who, "label", "text2"))
-        head = QHBoxLayout()
-        head.setSpacing(14)
-        head.addWidget(Logo(40))
-        head.addLayout(words, 1)
-        foot = QHBoxLayout()
-        foot.addWidget(self.cancel)
-        foot.addStretch()
-        foot.addWidget(self.lasted)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(28, 24, 28, 24)
-        column.setSpacing(14)
-        column.addLayout(head)
-        column.addWidget(self.step, 1)
-        column.addWidget(bar)
-        column.addLayout(foot)
+        head = hbox(Logo(40), (vbox(label(title, "card"), label(who, "label", "text2"), spacing=2), 1), spacing=14)
+        foot = hbox(self.cancel, STRETCH, self.lasted)
+        vbox(head, (self.step, 1), bar, foot, spacing=14, margins=(28, 24, 28, 24), parent=self)
         self._now_s, self._since_s = now_s, now_s()
         self._timer = QTimer(self)
         self._timer.timeout.connect(self._tell)

@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import TypeAlias
 
 from PySide6.QtCore import QEvent, Qt, Signal
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import remove_widget
+from study_app.gui.widgets.boxes import hbox, vbox
 from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Clamped, Elided, label
@@ -45,19 +46,13 @@ class FileCard(Card):
         self.facts = facts
         self.title = Clamped(title, TITLE_LINES, "card", steady=False)
         self.title.setFont(font("card", scale=1.12))
-        head = QHBoxLayout()
-        head.setSpacing(8)
+        head = hbox(spacing=8)
         if sign:
             head.addWidget(Icon(sign, "warn", 20), 0, Qt.AlignmentFlag.AlignTop)
         head.addWidget(self.title, 1)
         self.origin = Elided("small", "text2")
         self.origin.show_text(f"{facts.origin}  ·  {Path(facts.source).stem}.toml")
-        names = QVBoxLayout()
-        names.setSpacing(2)
-        names.addLayout(head)
-        names.addWidget(self.origin)
-        top = QHBoxLayout()
-        top.addLayout(names, 1)
+        top = hbox((vbox(head, self.origin, spacing=2), 1))
         self.column.addLayout(top)
         self.draft = label("" if facts.draft is None else f"{facts.draft.words}.", "small", "warn", wraps=True)
         self.pen: ActionButton | IconButton
@@ -69,10 +64,7 @@ class FileCard(Card):
         else:
             self.pen = ActionButton("pen", "Continue", role="primary" if first else "", height=38)
             self.pen.setAccessibleName(f"Continue {title}, {Path(facts.source).stem}")
-            row = QHBoxLayout()
-            row.setSpacing(12)
-            row.addWidget(self.draft, 1, Qt.AlignmentFlag.AlignTop)
-            row.addWidget(self.pen, 0, Qt.AlignmentFlag.AlignTop)
+            row = hbox((self.draft, 1, Qt.AlignmentFlag.AlignTop), (self.pen, 0, Qt.AlignmentFlag.AlignTop), spacing=12)
             self.column.addLayout(row)
         self.pen.clicked.connect(lambda: self.edit.emit(facts))
 
@@ -96,11 +88,7 @@ class StudyCard(FileCard):
         self.column.addStretch()
         time = f"{facts.duration}  ·  {facts.languages}"
         for icon, words in (("layers", facts.extent), ("clock", time), ("device", facts.needs)):
-            row = QHBoxLayout()
-            row.setSpacing(10)
-            row.addWidget(Icon(icon, "text2", 18))
-            row.addWidget(label(words, "body"), 1)
-            self.column.addLayout(row)
+            self.column.addLayout(hbox(Icon(icon, "text2", 18), (label(words, "body"), 1), spacing=10))
         self.held = label("", "label", "text2")
         self.column.addWidget(self.held)
         self.new = ActionButton("plus", "New session", role="primary" if first and facts.draft is None else "")
@@ -109,11 +97,7 @@ class StudyCard(FileCard):
         self.rehearse.setAccessibleName(f"Rehearse {facts.title}, {facts.file_name}")
         self.new.clicked.connect(lambda: self.new_session.emit(facts))
         self.rehearse.clicked.connect(lambda: self.rehearsal.emit(facts))
-        buttons = QHBoxLayout()
-        buttons.setSpacing(12)
-        buttons.addWidget(self.new, 1)
-        buttons.addWidget(self.rehearse, 1)
-        self.column.addLayout(buttons)
+        self.column.addLayout(hbox((self.new, 1), (self.rehearse, 1), spacing=12))
 
 
 class BrokenCard(FileCard):

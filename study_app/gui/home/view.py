@@ -10,7 +10,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QFileDialog, QHBoxLayout, QLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QFileDialog, QHBoxLayout, QLayout, QSizePolicy, QWidget
 
 from study_app.devices.registry import descriptor_of
 from study_app.errors import StudyError
@@ -25,6 +25,7 @@ from study_app.gui.home.study_cards import BrokenCard, CardGrid, Facts, StudyCar
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.background import Background
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
@@ -138,42 +139,33 @@ class HomePlace(Place):
             self.show_studies()
 
     def _lay_out(self) -> None:
-        titles = QVBoxLayout()
-        titles.setSpacing(4)
-        titles.addWidget(label("Studies", "title"))
-        titles.addWidget(label("Start a session, or resume an interrupted one.", "body", "text2"))
-        titles.addWidget(self.folder)
-        head = QHBoxLayout()
-        head.setContentsMargins(SHADOW, 0, SHADOW, 0)
-        head.addLayout(titles, 1)
-        head.addWidget(self.open_protocol)
-        head.addWidget(self.new_study)
+        about = label("Start a session, or resume an interrupted one.", "body", "text2")
+        titles = vbox(label("Studies", "title"), about, self.folder, spacing=4)
+        head = hbox((titles, 1), self.open_protocol, self.new_study, margins=(SHADOW, 0, SHADOW, 0))
         self._below = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._below.setContentsMargins(0, 0, 0, 0)
         self._below.setSpacing(18)
         self._below.addWidget(self.sessions, 1)
         self._beside = QBoxLayout(QBoxLayout.Direction.TopToBottom)
         self._beside.setSpacing(18)
-        self._beside.addWidget(self.device)
-        self._beside.addWidget(self.lab)
-        self._beside.addStretch()
+        add_parts(self._beside, self.device, self.lab, STRETCH)
         self._below.addLayout(self._beside)
         self.below = QWidget()
         self.below.setLayout(self._below)
         self.cards_area = scrolled(self.grid)
         self.cards_area.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Ignored)  # no more than is free
         inside = QWidget()
-        page = self._page = QVBoxLayout(inside)
-        page.setSpacing(14)
-        page.addLayout(_beside_bar(head))
-        page.addLayout(_beside_bar(self.banner))
-        page.addWidget(self.waiting, 1, Qt.AlignmentFlag.AlignCenter)
-        page.addWidget(self.cards_area, CARDS_SHARE)
-        page.addLayout(_beside_bar(self.below), BELOW_SHARE)
+        self._page = vbox(
+            _beside_bar(head),
+            _beside_bar(self.banner),
+            (self.waiting, 1, Qt.AlignmentFlag.AlignCenter),
+            (self.cards_area, CARDS_SHARE),
+            (_beside_bar(self.below), BELOW_SHARE),
+            spacing=14,
+            parent=inside,
+        )
         self.area = scrolled(inside)
-        row = QVBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.addWidget(self.area)
+        vbox(self.area, margins=0, parent=self)
         self.below.hide()  # until the cards are there, which would move it
         self.area.verticalScrollBar().rangeChanged.connect(lambda _least, most: self._keep_margin(most > 0))
         bar = self.cards_area.verticalScrollBar()
@@ -353,10 +345,7 @@ class HomePlace(Place):
 
 def _beside_bar(part: QWidget | QLayout) -> QHBoxLayout:
     """Return a part in a row that leaves room for the scroll bar of the cards."""
-    row = QHBoxLayout()
-    row.setContentsMargins(0, 0, BAR_PX, 0)
-    row.addWidget(part) if isinstance(part, QWidget) else row.addLayout(part)
-    return row
+    return hbox(part, margins=(0, 0, BAR_PX, 0))
 
 
 def _buttons(card: StudyCard | BrokenCard) -> tuple[QWidget, ...]:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QLineEdit, QWidget
+from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget
 
 from study_app.gui.theme.theme import Theme, font
+from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.dialogs import Question
 from study_app.gui.widgets.labels import label
@@ -31,11 +32,7 @@ class WorkspaceDialog(Question):
         self.choose = ActionButton("", "Choose …", height=40)
         self.choose.setAutoDefault(False)
         self.choose.clicked.connect(self._choose)
-        row = QHBoxLayout()
-        row.setSpacing(8)
-        row.addWidget(self.path, 1)
-        row.addWidget(self.choose)
-        self.column.addLayout(row)
+        self.column.addLayout(hbox((self.path, 1), self.choose, spacing=8))
         holds = label("It will contain the folders protocols and results.", "label", "text2")
         self.column.addWidget(holds)
         self.add_buttons("Not now", ActionButton("check", "Use this folder", role="primary"))
