@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRect, QRectF, Qt
 from PySide6.QtGui import QAccessible, QColor, QFont, QFontMetrics, QFontMetricsF, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QStyle, QWidget
+from PySide6.QtWidgets import QStyle, QWidget
 
 from study_app.gui.participant.pages.key_caps import GoButton, draw_key, key_size
 from study_app.gui.participant.pages.page_widget import beginning, page_painter
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.accessible import give_role
+from study_app.gui.widgets.boxes import STRETCH, hbox
 
 if TYPE_CHECKING:
     from study_app.protocol.wording.languages import Words
@@ -35,9 +36,7 @@ class Foot(QWidget):
         self._scale = 1.0
         self._message, self._count, self._answer_keys = "", "", ""
         self.button = GoButton(words.continue_, words.enter_key, self)
-        self._row = QHBoxLayout(self)
-        self._row.addStretch(1)
-        self._row.addWidget(self.button)
+        self._row = hbox((STRETCH, 1), self.button, parent=self)
         give_role(self, QAccessible.Role.StaticText)
 
     def set_scale(self, scale: float, margin: int, *, tight: bool) -> None:

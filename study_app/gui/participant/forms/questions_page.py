@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QLayout, QPushButton, QWidget
 
 from study_app.gui.participant.forms.foot import Foot
 from study_app.gui.participant.forms.question_field import MARGIN, QuestionField, question_of, target_px
@@ -16,6 +16,7 @@ from study_app.gui.participant.pages.progress_line import ProgressLine
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.accessible import HeadingLabel
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.protocol.forms.show_if import shown
 from study_app.protocol.questions.question import ItemView
 from study_app.session.pages import QuestionnairePage
@@ -96,26 +97,14 @@ class QuestionsPage(PageWidget):
         raise NotImplementedError
 
     def _lay_out_once(self) -> None:
-        whole = QVBoxLayout(self)
-        whole.setSizeConstraint(QLayout.SizeConstraint.SetNoConstraint)  # the window's size is given
-        whole.setSpacing(0)
-        whole.setContentsMargins(0, 0, 0, 0)
-        self._head_row, self._tab_row = QHBoxLayout(), QHBoxLayout()
-        self._head_row.addWidget(self._title, 1)
-        self._head_row.addLayout(self._tab_row)
-        self.questions = QVBoxLayout()
-        self.questions.setSpacing(0)
+        self._tab_row = hbox()
+        self._head_row = hbox((self._title, 1), self._tab_row)
+        self._head = vbox(self._progress, self._head_row, self._intro)
+        self.questions = vbox(*self.fields, (STRETCH, 1), spacing=0)
         for field in self.fields:
-            self.questions.addWidget(field)
             field.hide()
-        self.questions.addStretch(1)
-        self._head = QVBoxLayout()
-        self._head.addWidget(self._progress)
-        self._head.addLayout(self._head_row)
-        self._head.addWidget(self._intro)
-        whole.addLayout(self._head)
-        whole.addLayout(self.questions, 1)
-        whole.addWidget(self.foot)
+        whole = vbox(self._head, (self.questions, 1), self.foot, spacing=0, margins=0, parent=self)
+        whole.setSizeConstraint(QLayout.SizeConstraint.SetNoConstraint)  # the window's size is given
 
     @property
     def asked(self) -> tuple[QuestionField, ...]:

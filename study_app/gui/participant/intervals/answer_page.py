@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFont, QShowEvent
-from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 
 from study_app.gui.participant.pages.page_widget import PageWidget
 from study_app.gui.participant.pages.progress_line import ProgressLine
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import STRETCH, vbox
 from study_app.protocol.forms.show_if import Value
 from study_app.session.pages import DesignPage
 from study_app.session.transitions.events import Chosen, ItemShown, Submitted
@@ -43,11 +44,7 @@ class AnswerPage(PageWidget):
         self.question.setWordWrap(True)
         self.question.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.setAccessibleName(page.item.text)
-        self._column = QVBoxLayout(self)
-        self._column.addWidget(self._progress)
-        self._column.addStretch(2)
-        self._column.addWidget(self.question)
-        self._column.addSpacing(36)
+        self._column = vbox(self._progress, (STRETCH, 2), self.question, 36, parent=self)
 
     def lay_out(self, scale: float) -> None:
         """Write the question as large as words must be read."""

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QLabel, QPushButton, QWidget
 
 from study_app.gui.participant.intervals.answer_page import AnswerPage, sized
 from study_app.gui.participant.pages.key_caps import KeyCap
 from study_app.gui.theme.theme import PARTICIPANT, font
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
 from study_app.session.pages import ChoicePage
 
 if TYPE_CHECKING:
@@ -40,9 +41,6 @@ class ChoiceWidget(AnswerPage):
         text_scale: float = 1.0,
     ) -> None:
         super().__init__(page, words, clock, parent, text_scale=text_scale)
-        row = QHBoxLayout()
-        row.setSpacing(GAP_PX)
-        row.addStretch()
         self.buttons: list[QPushButton] = []
         self._values = [value for value, _ in page.item.options]
         for value, text in page.item.options:
@@ -52,20 +50,11 @@ class ChoiceWidget(AnswerPage):
             button.setAutoDefault(False)
             button.pressed.connect(lambda value=value: self.answer(value))
             button.installEventFilter(self)
-            row.addWidget(button)
             self.buttons.append(button)
-        row.addStretch()
         self._cap, self._hint = KeyCap(self), QLabel(words.key_answer, self)
         self._hint.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
-        keys = QHBoxLayout()
-        keys.addStretch()
-        keys.addWidget(self._cap)
-        keys.addWidget(self._hint)
-        keys.addStretch()
-        self._column.addLayout(row)
-        self._column.addSpacing(28)
-        self._column.addLayout(keys)
-        self._column.addStretch(3)
+        row = hbox(STRETCH, *self.buttons, STRETCH, spacing=GAP_PX)
+        add_parts(self._column, row, 28, hbox(STRETCH, self._cap, self._hint, STRETCH), (STRETCH, 3))
 
     def lay_out(self, scale: float) -> None:
         """Make the buttons as large as they must be at least."""

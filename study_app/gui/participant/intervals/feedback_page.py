@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from study_app.gui.participant.pages.page_widget import PageWidget
 from study_app.gui.participant.pages.reading_page import Badge
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.accessible import HeadingLabel
+from study_app.gui.widgets.boxes import STRETCH, vbox
 from study_app.session.pages import FeedbackPage
 
 if TYPE_CHECKING:
@@ -41,11 +42,8 @@ class FeedbackWidget(PageWidget):
         sign, colour = ("check", PARTICIPANT.ok) if page.right else ("minus", PARTICIPANT.text2)
         self._badge, self._word = Badge(sign, colour, self), HeadingLabel(self._text)
         self._word.setStyleSheet(f"color: {PARTICIPANT.text}; background: transparent;")
-        self._column = QVBoxLayout(self)
-        self._column.addStretch(2)
-        self._column.addWidget(self._badge, alignment=CENTRED)
-        self._column.addWidget(self._word, alignment=CENTRED)
-        self._column.addStretch(3)
+        badge, word = (self._badge, 0, CENTRED), (self._word, 0, CENTRED)
+        self._column = vbox((STRETCH, 2), badge, word, (STRETCH, 3), parent=self)
 
     def lay_out(self, _scale: float) -> None:
         """Grow with the page."""

@@ -14,6 +14,7 @@ from study_app.gui.participant.pages.digit_pad import DigitPad
 from study_app.gui.participant.pages.key_caps import GoButton
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import PARTICIPANT
+from study_app.gui.widgets.boxes import STRETCH, add_parts
 from study_app.gui.widgets.number_field import read_number
 from study_app.protocol.questions.question import plain_number
 from study_app.session.pages import NumberPage
@@ -56,11 +57,8 @@ class NumberWidget(AnswerPage):
         self.keys = self._pad.keys
         self.button = GoButton(words.continue_, words.enter_key, self)
         self.button.clicked.connect(self._confirm)
-        for widget in (self.field, self.wrong, self._pad):
-            self._column.addWidget(widget, alignment=CENTRED)
-        self._column.addSpacing(24)
-        self._column.addWidget(self.button, alignment=CENTRED)
-        self._column.addStretch(3)
+        above = ((widget, 0, CENTRED) for widget in (self.field, self.wrong, self._pad))
+        add_parts(self._column, *above, 24, (self.button, 0, CENTRED), (STRETCH, 3))
 
     def lay_out(self, scale: float) -> None:
         """Make field and keys as large as they must be at least."""

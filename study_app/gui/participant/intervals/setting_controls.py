@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Final
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent, QWheelEvent
-from PySide6.QtWidgets import QHBoxLayout, QPushButton, QWidget
+from PySide6.QtWidgets import QPushButton, QWidget
 
 from study_app.gui.participant.intervals.answer_page import sized
 from study_app.gui.participant.pages.key_caps import GoButton
+from study_app.gui.widgets.boxes import hbox
 from study_app.session.device_buttons import STEP_S
 from study_app.session.pages import TaskPage
 from study_app.session.transitions.events import Stepped, Submitted
@@ -54,9 +55,7 @@ class SettingControls(QWidget):
         self.setCursor(Qt.CursorShape.ArrowCursor)
         self.less, self.more = (QPushButton(text, self) for text in (f"← {words.less}", f"{words.more} →"))
         self.done = GoButton(words.done, words.enter_key, self)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(GAP_PX)
+        hbox(self.less, self.more, self.done, spacing=GAP_PX, margins=0, parent=self)
         for button, name, way in ((self.less, words.less, -1), (self.more, words.more, 1)):
             button.setAccessibleName(name)
             button.setAccessibleDescription(page.question)
@@ -64,9 +63,7 @@ class SettingControls(QWidget):
             button.setAutoRepeatDelay(STEP_MS)
             button.setAutoRepeatInterval(STEP_MS)
             button.clicked.connect(lambda _=False, way=way: self._step(way))
-            row.addWidget(button)
         self.done.clicked.connect(self._confirm)
-        row.addWidget(self.done)
         for one in (self.less, self.more, self.done):
             one.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setVisible(self._adjusts and buttons)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QKeyEvent, QPaintEvent, QPen
-from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QScroller, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QScroller, QWidget
 
 from study_app.gui.participant.pages.key_caps import GoButton
 from study_app.gui.participant.pages.page_widget import PageWidget, page_painter
@@ -16,6 +16,7 @@ from study_app.gui.participant.pages.progress_line import ProgressLine
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.accessible import HeadingLabel
+from study_app.gui.widgets.boxes import STRETCH, vbox
 
 if TYPE_CHECKING:
     from study_app.protocol.wording.languages import Words
@@ -79,12 +80,8 @@ class Column(QWidget):
         self._body = QLabel()
         self._body.setWordWrap(True)
         self._body.setTextFormat(Qt.TextFormat.RichText)
-        self._layout = QVBoxLayout(self)
-        self._layout.setContentsMargins(0, 0, 0, 0)
-        self._layout.addWidget(self._badge, 0, Qt.AlignmentFlag.AlignLeading)
-        self._layout.addWidget(self._title)
-        self._layout.addWidget(self._body)
-        self._layout.addStretch(1)
+        badge = (self._badge, 0, Qt.AlignmentFlag.AlignLeading)
+        self._layout = vbox(badge, self._title, self._body, (STRETCH, 1), margins=0, parent=self)
         for label, ink in ((self._title, PARTICIPANT.text), (self._body, PARTICIPANT.text2)):
             label.setStyleSheet(f"color: {ink}; background: transparent;")
             label.setAlignment(Qt.AlignmentFlag.AlignAbsolute | self._start)

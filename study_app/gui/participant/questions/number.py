@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar, Final
 
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QLineEdit, QPushButton, QWidget
 
 from study_app.gui.participant.forms.question_field import target_px
 from study_app.gui.participant.forms.typed_field import EntryKeys, TypedField
 from study_app.gui.participant.pages.digit_pad import DigitPad
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import PARTICIPANT, font
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.number_field import read_number, write_number
 from study_app.protocol.forms.show_if import Value
 from study_app.protocol.questions.number import NumberView
@@ -49,17 +50,9 @@ class NumberField(TypedField):
         self._wrong.setWordWrap(True)
         self._wrong.setStyleSheet(f"color: {PARTICIPANT.warn}; background: transparent;")
         self._wrong.hide()
-        row = QHBoxLayout()
-        row.addWidget(self.entry)
-        row.addWidget(self._unit)
-        row.addStretch(1)
-        row.addWidget(self._pad)
+        self._row = hbox(self.entry, self._unit, (STRETCH, 1), self._pad)
         area = QWidget(self)
-        whole = QVBoxLayout(area)
-        whole.setContentsMargins(0, 0, 0, 0)
-        whole.addLayout(row)
-        whole.addWidget(self._wrong)
-        self._row = row
+        vbox(self._row, self._wrong, margins=0, parent=area)
         self.put(area)
         self.type_into(self.entry, WAIT_MS, self._take)
 

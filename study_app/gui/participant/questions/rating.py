@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar, Final
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from study_app.gui.participant.forms.scale_field import ScaleField
 from study_app.gui.theme.theme import PARTICIPANT, font
+from study_app.gui.widgets.boxes import hbox
 from study_app.protocol.questions.question import ItemView
 from study_app.protocol.questions.rating import RatingView
 
@@ -32,9 +33,7 @@ class RatingField(ScaleField):
         scale.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
         self.cells = QGridLayout(scale)
         self.cells.setContentsMargins(0, 0, 0, 0)
-        self.row = QHBoxLayout(area)
-        self.row.setContentsMargins(0, 0, 0, 0)
-        self.row.addWidget(scale, len(self.points))
+        self.row = hbox((scale, len(self.points)), margins=0, parent=area)
         if self.judge is not None:
             self.row.addWidget(self.judge, JUDGE_SHARE, Qt.AlignmentFlag.AlignBottom)
         self.put(area)

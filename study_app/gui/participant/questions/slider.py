@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING, ClassVar, Final
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFocusEvent, QKeyEvent, QMouseEvent, QPaintEvent, QPen, QWheelEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QSlider, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QSizePolicy, QSlider, QWidget
 
 from study_app.gui.participant.forms.question_field import QuestionField, question_of, target_px
 from study_app.gui.participant.pages.page_widget import page_painter
 from study_app.gui.theme.theme import PARTICIPANT, font
+from study_app.gui.widgets.boxes import hbox, vbox
 from study_app.protocol.forms.show_if import Value
 from study_app.protocol.questions.question import ItemView
 from study_app.protocol.questions.slider import SliderView
@@ -168,17 +169,12 @@ class SliderField(QuestionField):
         self.line.setAccessibleName(view.text)
         self.line.set_to.connect(lambda step: self.give(view.at(step)))
         self._ends = (QLabel(view.low), QLabel(words.no_answer_yet), QLabel(view.high))
-        names = QHBoxLayout()
         for end, side in zip(self._ends, (Qt.AlignmentFlag.AlignLeft, None, Qt.AlignmentFlag.AlignRight), strict=True):
             end.setWordWrap(side is not None)
             end.setAlignment((side or Qt.AlignmentFlag.AlignHCenter) | ABSOLUTE | Qt.AlignmentFlag.AlignTop)
             end.setStyleSheet(f"color: {PARTICIPANT.text2 if side else PARTICIPANT.text3}; background: transparent;")
-            names.addWidget(end, 1)
-        whole = QVBoxLayout(area)
-        whole.setContentsMargins(0, 0, 0, 0)
-        whole.setSpacing(0)
-        whole.addWidget(self.line)
-        whole.addLayout(names)
+        names = hbox(*((end, 1) for end in self._ends))
+        vbox(self.line, names, spacing=0, margins=0, parent=area)
         self.put(area)
         self.setFocusProxy(self.line)
         self._tell_line()
