@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QLayout, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLayout, QScrollArea, QSizePolicy, QWidget
 
 from study_app.gui.theme.icons import draw_icon, draw_logo
 from study_app.gui.theme.theme import RADIUS_CARD, RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.boxes import STRETCH, hbox
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.labels import Ink, label
 from study_app.viewmodels.tones import Tone
 
@@ -25,15 +25,11 @@ class Card(Themed, QWidget):
     def __init__(self, title: str = "", aside: QWidget | None = None, *, padding: int = 20, gap: int = 12) -> None:
         super().__init__()
         inside = padding + SHADOW
-        self.column = QVBoxLayout(self)
-        self.column.setContentsMargins(inside, padding - 2 + SHADOW, inside, padding - 2 + SHADOW)
-        self.column.setSpacing(gap)
+        above = padding - 2 + SHADOW
+        self.column = vbox(spacing=gap, margins=(inside, above, inside, above), parent=self)
         if title:
             self.heading = label(title, "card")
-            row = hbox(self.heading, STRETCH)
-            if aside is not None:
-                row.addWidget(aside)
-            self.column.addLayout(row)
+            self.column.addLayout(hbox(self.heading, STRETCH, *([] if aside is None else [aside])))
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the surface, its edge and, in light, a shadow of at most 6 % black."""

@@ -12,10 +12,11 @@ from types import FrameType, TracebackType
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QGraphicsItem, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QGraphicsItem, QWidget
 
 from study_app.gui.theme.theme import LIGHT, RADIUS_CARD
 from study_app.gui.theme.themed import Themed, apply_theme_within
+from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.cards import SHADOW, Card, Icon
 from study_app.gui.widgets.labels import label
 
@@ -30,10 +31,8 @@ class FailedPanel(Themed, QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # nothing below it is painted any more
         self.line = label(f"{name}: this panel failed. The session continues.", "label", "bad", wraps=True)
         self.setToolTip(self.line.text())
-        row = QHBoxLayout(self)
-        row.setContentsMargins(14, 8, 14, 8)
-        row.addWidget(Icon("warning", "bad", 20), 0, Qt.AlignmentFlag.AlignTop)
-        row.addWidget(self.line, 1, Qt.AlignmentFlag.AlignTop)
+        top = Qt.AlignmentFlag.AlignTop
+        hbox((Icon("warning", "bad", 20), 0, top), (self.line, 1, top), margins=(14, 8, 14, 8), parent=self)
         panel.installEventFilter(self)
         self._fit(panel)
 
