@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRect, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QResizeEvent
-from PySide6.QtWidgets import QApplication, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QSizePolicy, QWidget
 
 from study_app.gui.designer.form.element_form import FormCard
 from study_app.gui.designer.outline.card import OutlineCard
@@ -14,6 +14,7 @@ from study_app.gui.designer.segments import Segments
 from study_app.gui.designer.tab_order import lead_by_tab
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Icon
 from study_app.gui.widgets.controls import ActionButton, PressedByEnter
 from study_app.viewmodels.designer.form.form_rows import Form
@@ -72,14 +73,8 @@ class PathBar(QWidget):
         self.steps: list[Crumb] = []
         self._parts: list[QWidget] = []
         self._shown: object = None
-        self.row = QHBoxLayout(self)
-        self.row.setContentsMargins(0, 0, 0, 0)
-        self.row.setSpacing(4)
-        self.row.addWidget(self.outline)
-        self._steps = QHBoxLayout()
-        self._steps.setSpacing(0)
-        self.row.addLayout(self._steps)
-        self.row.addStretch()
+        self._steps = hbox(spacing=0)
+        self.row = hbox(self.outline, self._steps, STRETCH, spacing=4, margins=0, parent=self)
 
     def show_form(self, form: Form) -> None:
         """Show the way to an element."""
@@ -116,31 +111,14 @@ class Arrangement(QWidget):
         self.sides = Segments("Side")
         self.sides.tips = {"form": tip("form"), "pane": tip("views")}
         self.sides.chosen.connect(lambda side: self.show_side(str(side)))
-        self.prompts = QVBoxLayout()
+        self.prompts = vbox()
         self.prompt: QWidget | None = None  # in that layout: its items outlive their widgets in Python
-        self._across = across = QHBoxLayout()
-        across.setSpacing(GAP)
-        self._left = QVBoxLayout()
-        self._left.setSpacing(12 - 2 * SHADOW)
-        self._left.addWidget(form, 1)
-        across.addLayout(self._left, FORM_SHARE)
-        across.addWidget(pane, 100 - FORM_SHARE)
+        self._left = vbox((form, 1), spacing=12 - 2 * SHADOW)
+        self._across = hbox((self._left, FORM_SHARE), (pane, 100 - FORM_SHARE), spacing=GAP)
         self.top = QWidget()
-        top = QHBoxLayout(self.top)
-        top.setContentsMargins(SHADOW, 0, SHADOW, 0)
-        top.addWidget(self.path, 1)
-        top.addWidget(self.sides)
-        self._right = right = QVBoxLayout()
-        right.setSpacing(12 - 2 * SHADOW)
-        right.addWidget(self.top)
-        right.addLayout(self.prompts)
-        right.addLayout(across, 1)
-        right.addWidget(problems)
-        self._whole = QHBoxLayout(self)
-        self._whole.setContentsMargins(0, 0, 0, 0)
-        self._whole.setSpacing(GAP)
-        self._whole.addWidget(outline)
-        self._whole.addLayout(right, 1)
+        hbox((self.path, 1), self.sides, margins=(SHADOW, 0, SHADOW, 0), parent=self.top)
+        self._right = vbox(self.top, self.prompts, (self._across, 1), problems, spacing=12 - 2 * SHADOW)
+        self._whole = hbox(outline, (self._right, 1), spacing=GAP, margins=0, parent=self)
         outline.setFixedWidth(OUTLINE_PX)
         application = QApplication.instance()
         assert isinstance(application, QApplication)  # noqa: S101 - a window has one

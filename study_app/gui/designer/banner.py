@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout
 
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import RADIUS_CARD
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
+from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.cards import SHADOW, Card, Icon
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import label
@@ -32,11 +32,7 @@ class BannerCard(Card):
         self.close_button.clicked.connect(lambda: self.asked.emit("close"))
         self._banner: Banner | None = None
         self._other = False
-        self._row = QHBoxLayout()
-        self._row.setSpacing(10)
-        self._row.addWidget(self.sign)
-        self._row.addWidget(self.words, 1)
-        self._row.addWidget(self.close_button)
+        self._row = hbox(self.sign, (self.words, 1), self.close_button, spacing=10)
         self.column.addLayout(self._row)
         self.hide()
 

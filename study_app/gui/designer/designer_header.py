@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFocusEvent, QPainter, QPaintEvent, QPen, QResizeEvent
-from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QSizePolicy, QWidget
 
 from study_app.gui.designer.play.play_controls import PlayControls
 from study_app.gui.designer.play.play_strip import PlayStrip
@@ -12,6 +12,7 @@ from study_app.gui.designer.study_list import StudyList
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Chip, chip_size, paint_chip
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
 from study_app.gui.widgets.labels import label
@@ -109,23 +110,12 @@ class DesignerHeader(QWidget):
         self.play = PlayControls()
         self.strip = PlayStrip()
         self.strip.left.connect(self.play.play.setFocus)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        row = self._row = QHBoxLayout()
-        column.addLayout(row)
-        column.addWidget(self.strip)
-        row.setContentsMargins(SHADOW, 0, SHADOW, 0)
-        row.setSpacing(10)
+        self._row = hbox(spacing=10, margins=(SHADOW, 0, SHADOW, 0))
+        vbox(self._row, self.strip, margins=0, parent=self)
         self.title = label("Study designer", "title")
         self.title.setContentsMargins(0, 0, 6, 0)  # room that goes with it where it is hidden
-        row.addWidget(self.title)
-        row.addWidget(self.study)
-        row.addWidget(self.problems)
-        row.addWidget(self.draft)
-        row.addWidget(self.version)
-        row.addStretch()
-        for part in (self.keys, self.undo, self.redo, self.play, self.save):
-            row.addWidget(part)
+        left = self.title, self.study, self.problems, self.draft, self.version
+        add_parts(self._row, *left, STRETCH, self.keys, self.undo, self.redo, self.play, self.save)
         self.study.activated.connect(self._choose)
         self.problems.clicked.connect(self.problems_asked)
         self.undo.clicked.connect(self.undo_asked)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QApplication, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QHBoxLayout, QWidget
 from shiboken6 import isValid
 
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Rule, scrolled
 from study_app.gui.widgets.controls import Cap, IconButton
 from study_app.gui.widgets.labels import label
@@ -29,16 +30,10 @@ class KeysCard(Card):
         self._before: QWidget | None = None
         self.close_button = IconButton("cross", "Close the list of keys", "Close (Esc)", size=36, role="plain")
         self.close_button.clicked.connect(self.put_away)
-        top = QHBoxLayout()
-        top.addWidget(label("Keys", "card"))
-        top.addStretch()
-        top.addWidget(self.close_button)
-        across = QHBoxLayout()
-        across.setContentsMargins(0, 0, 8, 0)
-        across.setSpacing(28)
+        top = hbox(label("Keys", "card"), STRETCH, self.close_button)
+        across = hbox(spacing=28, margins=(0, 0, 8, 0))
         for groups in COLUMNS:
-            column = QVBoxLayout()
-            column.setSpacing(5)
+            column = vbox(spacing=5)
             for group in groups:
                 column.addWidget(label(GROUPS[group], "strong"))
                 for one in (one for one in KEYS if one.group == group):
@@ -47,9 +42,7 @@ class KeysCard(Card):
             column.addStretch()
             across.addLayout(column, 1)
         self.area = scrolled(across)
-        self.column.addLayout(top)
-        self.column.addWidget(Rule())
-        self.column.addWidget(self.area, 1)
+        add_parts(self.column, top, Rule(), (self.area, 1))
         self.hide()
         application = QApplication.instance()
         assert isinstance(application, QApplication)  # noqa: S101 - a window has one
@@ -57,15 +50,10 @@ class KeysCard(Card):
 
     @staticmethod
     def _row(one: Keys) -> QHBoxLayout:
-        row = QHBoxLayout()
-        row.setSpacing(5)
         where = f" ({one.within})" if "outline" in one.within else ""
         words = label(f"{one.words}{where}", "label", "text2", wraps=True)
         words.setAccessibleName(f"{one.words}{where}: {' or '.join(one.shown)}")
-        row.addWidget(words, 1)
-        for key in one.shown:
-            row.addWidget(Cap(key))
-        return row
+        return hbox((words, 1), *(Cap(key) for key in one.shown), spacing=5)
 
     def switch(self) -> None:
         """Show the list, or put it away."""

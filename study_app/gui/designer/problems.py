@@ -6,13 +6,14 @@ from collections.abc import Mapping
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QMouseEvent, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QScrollArea, QVBoxLayout, QWidget
 
 from study_app.gui.designer.repair_button import RepairButton
 from study_app.gui.designer.segments import Segments
 from study_app.gui.designer.tab_order import lead_by_tab
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme_within, replace_inside
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
 from study_app.gui.widgets.labels import Clamped, Elided, Ink, label
@@ -44,24 +45,17 @@ class ProblemLine(Themed, QWidget):
         self._place = Elided("small", "text2")
         self._place.setFixedWidth(self.go.width())
         self.setCursor(Qt.CursorShape.PointingHandCursor)
-        across = QHBoxLayout(self)
-        across.setContentsMargins(10, 2, 6, 2)
-        across.setSpacing(10)
         self.mark = Icon("warning", "warn" if row.warning else "bad", 18)
-        across.addWidget(self.mark)
-        across.addWidget(Icon(row.icon, "text2", 18))
-        across.addLayout(_column(self.go, self._place))
+        signs = self.mark, Icon(row.icon, "text2", 18)
         said, hint = Clamped(row.message, 2, "label", steady=False), Elided("small", "text2")
         hint.show_text(row.hint)
         self.setToolTip("\n".join(filter(None, (row.name, row.message, row.hint))))
-        across.addLayout(_column(said, *([hint] if row.hint else [])), 1)
+        words = _column(said, *([hint] if row.hint else []))
         buttons = QWidget()
         buttons.setMinimumWidth(NARROW_REPAIR_PX if narrow else REPAIR_PX)
-        self._repairs = QHBoxLayout(buttons)
-        self._repairs.setContentsMargins(0, 0, 0, 0)
-        self._repairs.setSpacing(6)
-        self._repairs.addStretch()
-        across.addWidget(buttons)
+        self._repairs = hbox(STRETCH, spacing=6, margins=0, parent=buttons)
+        parts = (*signs, _column(self.go, self._place), (words, 1), buttons)
+        hbox(*parts, spacing=10, margins=(10, 2, 6, 2), parent=self)
         self.repairs: list[RepairButton] = []
         self.setMinimumHeight(ROW_PX)
         self.show_repairs(repairs)
@@ -108,13 +102,7 @@ class ProblemLine(Themed, QWidget):
 
 def _column(*parts: QWidget) -> QVBoxLayout:
     """Return lines of text, in the middle of their row."""
-    made = QVBoxLayout()
-    made.setSpacing(0)
-    made.addStretch()
-    for part in parts:
-        made.addWidget(part)
-    made.addStretch()
-    return made
+    return vbox(STRETCH, *parts, STRETCH, spacing=0)
 
 
 class ProblemsCard(Card):
@@ -144,19 +132,13 @@ class ProblemsCard(Card):
         self.next.setToolTip(tip("next problem"))
         self.next.setProperty("dense", "true")
         self.close_button = IconButton("cross", "Close the list of problems", size=36, role="plain")
-        top = QHBoxLayout()
-        top.setSpacing(10)
-        top.addWidget(self.heading)
-        top.addWidget(label("the same as liquid-study check prints", "small", "text2"))
-        top.addStretch()
-        for part in (self.limit, self.next, self.close_button):
-            top.addWidget(part)
-        self.column.addLayout(top)
+        words = self.heading, label("the same as liquid-study check prints", "small", "text2")
+        top = hbox(*words, STRETCH, self.limit, self.next, self.close_button, spacing=10)
         self.area = QScrollArea()
         self.area.setWidgetResizable(True)
         self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.column.addWidget(self.area, 1)
+        add_parts(self.column, top, (self.area, 1))
         self.close_button.clicked.connect(self.close_asked)
 
     def show_problems(
@@ -193,9 +175,7 @@ class ProblemsCard(Card):
             self._keep_places(listed)
             return
         inside = QWidget()
-        self._column = column = QVBoxLayout(inside)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
+        self._column = column = vbox(spacing=0, margins=0, parent=inside)
         if rows and not listed:
             column.addWidget(label(f"None in this element, {len(rows)} in others", "label", "text2"))
         column.addStretch()

@@ -6,9 +6,10 @@ from itertools import zip_longest
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLineEdit, QScrollArea, QWidget
 
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import label
@@ -37,10 +38,7 @@ class Prompt(Card):
         self.column.addWidget(said)
         self.cancel = ActionButton("", "Cancel", height=40)
         self.cancel.clicked.connect(self.given_up)
-        self.buttons = QHBoxLayout()
-        self.buttons.setSpacing(10)
-        self.buttons.addWidget(self.cancel)
-        self.buttons.addStretch()
+        self.buttons = hbox(self.cancel, STRETCH, spacing=10)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
         """Give up at Esc."""
@@ -58,10 +56,7 @@ class DeleteCard(Prompt):
         places = "It is used in 1 place:" if count == 1 else f"It is used in {count} places:"
         super().__init__(f"Delete {asked.title}?", places)
         inside = QWidget()
-        column = QVBoxLayout(inside)
-        column.setContentsMargins(0, 0, 0, 0)
-        for words in asked.references:
-            column.addWidget(label(words, "label"))
+        vbox(*(label(words, "label") for words in asked.references), margins=0, parent=inside)
         area = QScrollArea()
         area.setWidgetResizable(True)
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -85,8 +80,7 @@ class DeleteCard(Prompt):
         self.other.activated.connect(
             lambda at: self.answered.emit(DeleteElement(asked.path, "other", self.other.itemData(at)))
         )
-        for part in (self.gaps, self.other, self.all):
-            self.buttons.addWidget(part)
+        add_parts(self.buttons, self.gaps, self.other, self.all)
         self.column.addLayout(self.buttons)
         self.other.setVisible(bool(asked.others))
         self.first: QWidget = self.all
@@ -129,20 +123,13 @@ class SeriesCard(Prompt):
         self.values.setFont(font("body"))
         self.values.setAccessibleName("Values of the series")
         self.values.setPlaceholderText("Values, such as 0 60 120 240")
-        line = QHBoxLayout()
-        line.setSpacing(10)
-        for part in (self.elements, self.number):
-            line.addWidget(part)
-        line.addWidget(self.values, 1)
-        self.column.addLayout(line)
+        self.column.addLayout(hbox(self.elements, self.number, (self.values, 1), spacing=10))
         self.refusal = label("", "label", "bad", wraps=True)
         self.lines = label("", "label")
         said = QWidget()
-        column = QVBoxLayout(said)
-        column.setContentsMargins(0, 0, 0, 0)
+        vbox((self.refusal, 1), (self.lines, 1), margins=0, parent=said)
         for text in (self.refusal, self.lines):
             text.setAlignment(Qt.AlignmentFlag.AlignTop)
-            column.addWidget(text, 1)
         self.area = QScrollArea()
         self.area.setWidgetResizable(True)
         self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -152,15 +139,11 @@ class SeriesCard(Prompt):
         self.ways = [ActionButton("", "", height=WAY_PX) for _ in range(MOST_WAYS)]
         room = QWidget()
         room.setFixedHeight(WAY_PX)
-        offered = QHBoxLayout(room)
-        offered.setContentsMargins(0, 0, 0, 0)
-        offered.setSpacing(10)
+        hbox(*self.ways, STRETCH, spacing=10, margins=0, parent=room)
         for at, way in enumerate(self.ways):
             way.setProperty("dense", "true")
             way.setFont(font("label"))
             way.clicked.connect(lambda _checked=False, at=at: self.answered.emit(self.plan.ways[at].asks))
-            offered.addWidget(way)
-        offered.addStretch()
         self.column.addWidget(room)
         self.make = ActionButton("bars", "", role="primary", height=40)
         self.make.clicked.connect(self._make)

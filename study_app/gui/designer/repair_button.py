@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFocusEvent, QMouseEvent
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.problem_rows import ProblemRow
@@ -50,11 +51,7 @@ class NameRefusal(QWidget):
         self.use.setProperty("dense", "true")
         self.use.setFont(font("label"))
         self.use.clicked.connect(lambda: self.chosen.emit(self._free))
-        line = QHBoxLayout(self)
-        line.setContentsMargins(0, 0, 0, 0)
-        line.setSpacing(8)
-        line.addWidget(self.words, 1)
-        line.addWidget(self.use)
+        hbox((self.words, 1), self.use, spacing=8, margins=0, parent=self)
         self.show_refusal("")
 
     def text(self) -> str:

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 
 from PySide6.QtCore import QEvent, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
 
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
+from study_app.gui.widgets.boxes import hbox
 
 INSIDE, BETWEEN = 3, 4
 
@@ -73,9 +74,7 @@ class Segments(Themed, QWidget):
         self._values: tuple[object, ...] = ()
         self.tips: Mapping[object, str] = {}
         self.buttons: list[_Segment] = []
-        self._row = QHBoxLayout(self)
-        self._row.setContentsMargins(INSIDE, INSIDE, INSIDE, INSIDE)
-        self._row.setSpacing(BETWEEN)
+        self._row = hbox(spacing=BETWEEN, margins=INSIDE, parent=self)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self._add_button()
 

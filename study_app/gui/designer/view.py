@@ -6,7 +6,7 @@ from functools import partial
 
 from PySide6.QtCore import Qt, Signal, SignalInstance
 from PySide6.QtGui import QKeyEvent, QResizeEvent
-from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QStackedWidget, QWidget
 
 from study_app.gui.designer.arrangement import Arrangement
 from study_app.gui.designer.banner import BannerCard
@@ -27,6 +27,7 @@ from study_app.gui.designer.selected_elements import SelectedElements
 from study_app.gui.designer.tab_order import go_on
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
+from study_app.gui.widgets.boxes import vbox
 from study_app.gui.widgets.main_view import Place, make_shortcuts
 from study_app.viewmodels.designer.addable import Addable
 from study_app.viewmodels.designer.designer_view import DesignerView, HeaderState
@@ -95,9 +96,7 @@ class DesignerPlace(Place):
 
     def _lay_out(self) -> None:
         main = QWidget()
-        column = QVBoxLayout(main)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(10)
+        column = vbox(spacing=10, margins=0, parent=main)
         column.addWidget(self.nothing, 1)  # first in the order of Tab
         column.insertWidget(0, self.header)
         column.insertWidget(1, self.banner)
@@ -105,9 +104,7 @@ class DesignerPlace(Place):
         self.stack = QStackedWidget()
         self.stack.addWidget(main)
         self.stack.addWidget(self.new_page)
-        page = QVBoxLayout(self)
-        page.setContentsMargins(20, 14, 20, 14)
-        page.addWidget(self.stack)
+        vbox(self.stack, margins=(20, 14, 20, 14), parent=self)
 
     def _connect(self) -> None:
         undo, redo, save = self._steps

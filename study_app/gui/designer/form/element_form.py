@@ -20,6 +20,7 @@ from study_app.gui.designer.form.row_widget import RowWidget, is_wide, language_
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
 from study_app.gui.designer.repair_button import RepairButton
 from study_app.gui.theme.themed import apply_theme_within
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Rule, scrolled
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import label
@@ -72,15 +73,10 @@ class FormCard(Card):
         self.own = label("", "label", "bad", wraps=True)
         self.inside = QWidget()
         host = QWidget()
-        self._host = QVBoxLayout(host)
-        self._host.setContentsMargins(0, 0, 0, 0)
-        self._host.addWidget(self.inside)
+        self._host = vbox(self.inside, margins=0, parent=host)
         self.area = scrolled(host)
         self.foot = FormFoot()
-        for part in (self.head, Rule(), self.own):
-            self.column.addWidget(part)
-        self.column.addWidget(self.area, 1)
-        self.column.addWidget(self.foot)
+        add_parts(self.column, self.head, Rule(), self.own, (self.area, 1), self.foot)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Leave the room to the editors where there is little."""
@@ -127,9 +123,7 @@ class FormCard(Card):
         self._focused = None
         self.flush()
         inside = QWidget()
-        whole = QVBoxLayout(inside)
-        whole.setContentsMargins(0, 2, 8, 2)
-        whole.setSpacing(7)
+        whole = vbox(spacing=7, margins=(0, 2, 8, 2), parent=inside)
         self._made, self.adds, self.others = [], {}, []
         self._unmade = self._fill(form, whole)
         room = self.area.viewport().height() if before is None else QWIDGETSIZE_MAX
@@ -168,11 +162,8 @@ class FormCard(Card):
         at = next((at for at, line in enumerate(lines) if line.path == form.path), 0)
         if lines:
             panel = Panel()
-            sections = QVBoxLayout(panel)
-            sections.setContentsMargins(10, 8, 4, 8)
-            sections.setSpacing(7)
-            whole.addWidget(self._others(lines[:at], form.questions.languages))
-            whole.addWidget(panel)
+            sections = vbox(spacing=7, margins=(10, 8, 4, 8), parent=panel)
+            add_parts(whole, self._others(lines[:at], form.questions.languages), panel)
             yield ROW_PX * at
         for number, section in enumerate(form.sections):
             if number:
@@ -264,9 +255,7 @@ class FormCard(Card):
         self.focus((*path, "text"))
 
     def _heading(self, section: Section, *, removable: bool) -> QHBoxLayout:
-        heading = QHBoxLayout()
-        heading.addWidget(label(section.title, "strong"))
-        heading.addStretch()
+        heading = hbox(label(section.title, "strong"), STRETCH)
         if removable:
             away = IconButton("cross", f"Remove {section.title} from the file", size=FIELD_PX, role="plain")
             away.clicked.connect(lambda: self.asked.emit(RemoveKey(self._now(section.path))))

@@ -6,12 +6,13 @@ from typing import Final
 
 from PySide6.QtCore import QEvent, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QGuiApplication, QKeyEvent, QKeySequence, QMouseEvent, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QApplication, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.gui.designer.form.typed_fields import FIELD_PX
 from study_app.gui.designer.outline.rows import paint_grip
 from study_app.gui.theme.theme import RADIUS_CONTROL
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import Elided
 from study_app.viewmodels.designer.form.form_rows import Entry
@@ -52,10 +53,7 @@ class EntryRow(Themed, QWidget):
         self.faulty = bool(entry.faults)
         self.title = Elided("label", "bad" if self.faulty else "text")
         self.title.show_text(entry.title)
-        self.row = QHBoxLayout(self)
-        self.row.setContentsMargins(24 if grip else 12, 0, 2, 0)
-        self.row.setSpacing(2)
-        self.row.addWidget(self.title)
+        self.row = hbox(self.title, spacing=2, margins=(24 if grip else 12, 0, 2, 0), parent=self)
         if entry.note and entry.note.replace("_", " ") != entry.title.lower():
             note = Elided("small", "text2")
             note.show_text(entry.note)

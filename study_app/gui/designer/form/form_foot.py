@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from study_app.gui.theme.theme import RADIUS_CONTROL
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import hbox, vbox
 from study_app.gui.widgets.labels import Elided, label
 
 WORDS_PX = 50
@@ -24,14 +25,7 @@ class FormFoot(Themed, QWidget):
         self.words = label("", "small", "text2", wraps=True)
         self.words.setMinimumHeight(WORDS_PX)
         self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
-        top = QHBoxLayout()
-        top.addWidget(self.title)
-        top.addWidget(self.place, 1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(12, 8, 12, 8)
-        column.setSpacing(3)
-        column.addLayout(top)
-        column.addWidget(self.words)
+        vbox(hbox(self.title, (self.place, 1)), self.words, spacing=3, margins=(12, 8, 12, 8), parent=self)
 
     def show_help(self, title: str, place: str, words: str) -> None:
         """Show the help of a field."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QWidget
 
 from study_app.gui.designer.form.typed_fields import TypedLine
 from study_app.gui.designer.repair_button import NameRefusal
@@ -12,6 +12,7 @@ from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Elided, label
@@ -88,35 +89,18 @@ class FormHead(QWidget):
         self.down = IconButton("arrow_down", "Move down", tip("down"), size=34)
         self.copy = IconButton("copy", "Duplicate", tip("duplicate"), size=34)
         self.delete = IconButton("trash", "Delete", f"{tip('delete')} in the outline", size=34, role="danger")
-        words = QVBoxLayout()
-        words.setSpacing(0)
-        words.addWidget(self.title)
-        below = QHBoxLayout()
-        below.setSpacing(8)
-        below.addWidget(self.kind)
-        below.addWidget(self.followed, 1)
-        words.addLayout(below)
+        words = vbox(self.title, hbox(self.kind, (self.followed, 1), spacing=8), spacing=0)
         grid = self._grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(8)
         grid.addWidget(self.tile, 0, 0)
         grid.addLayout(words, 0, 1)
-        buttons = QHBoxLayout()
-        buttons.setSpacing(8)
-        for part in (self.feel, self.series, self.up, self.down, self.copy, self.delete):
-            buttons.addWidget(part)
-        grid.addLayout(buttons, 0, 2)
+        grid.addLayout(hbox(self.feel, self.series, self.up, self.down, self.copy, self.delete, spacing=8), 0, 2)
         self.id_line = QWidget()
-        line = QHBoxLayout(self.id_line)
-        line.setContentsMargins(0, 4, 0, 0)
-        line.setSpacing(8)
         words_of_id = label("Id", "label")
         words_of_id.setFixedWidth(LABEL_PX)
-        line.addWidget(words_of_id)
-        line.addWidget(self.id, 8)
-        line.addWidget(self.unlock)
-        line.addWidget(self.comments)
-        line.addStretch(1)
+        parts = (words_of_id, (self.id, 8), self.unlock, self.comments, (STRETCH, 1))
+        hbox(*parts, spacing=8, margins=(0, 4, 0, 0), parent=self.id_line)
         grid.addWidget(self.id_line, 1, 0, 1, 3)
         grid.addWidget(self.refusal, 2, 0, 1, 3)
         grid.setColumnStretch(1, 1)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
 from study_app.gui.theme.theme import TypeRole, font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Ink, figures, label
@@ -36,11 +37,7 @@ class QuestionRow(Themed, QWidget):
         self.setMinimumHeight(38)
         number = figures(str(line.number), "label", "bad" if line.faults else "text2")
         number.setFixedWidth(NUMBER_PX)
-        across = QHBoxLayout(self)
-        across.setContentsMargins(0, 3, 0, 3)
-        across.setSpacing(8)
-        across.addWidget(number)
-        across.addWidget(Icon(line.icon, "text2", ICON_PX))
+        across = hbox(number, Icon(line.icon, "text2", ICON_PX), spacing=8, margins=(0, 3, 0, 3), parent=self)
         self.write: ActionButton | None = None
         for at, text in enumerate(line.texts):
             across.addWidget(self._text(text, line.note if at == 0 else ""), 1)
@@ -54,29 +51,20 @@ class QuestionRow(Themed, QWidget):
         if not note:
             return _column_text(text, "label")
         both = QWidget()
-        column = QVBoxLayout(both)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addWidget(_column_text(text, "label"))
-        column.addWidget(_column_text(note, "small", "text2"))
+        vbox(_column_text(text, "label"), _column_text(note, "small", "text2"), spacing=0, margins=0, parent=both)
         both.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Minimum)
         return both
 
     def _missing(self) -> QWidget:
         made = QWidget()
         made.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Minimum)
-        across = QHBoxLayout(made)
-        across.setContentsMargins(0, 0, 0, 0)
-        across.setSpacing(6)
-        across.addWidget(Icon("warning", "bad", 16))
-        across.addWidget(label("Missing", "label", "bad"))
-        across.addStretch()
         self.write = ActionButton("", "Write", height=32)
         self.write.setProperty("dense", "true")
         self.write.setFont(font("label"))
         self.write.setAccessibleName(f"Write the missing text of question {self.line.number}")
         self.write.clicked.connect(self.opened)
-        across.addWidget(self.write)
+        missing = Icon("warning", "bad", 16), label("Missing", "label", "bad")
+        hbox(*missing, STRETCH, self.write, spacing=6, margins=0, parent=made)
         return made
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
@@ -122,9 +110,7 @@ class QuestionRows(QWidget):
 
     def __init__(self, lines: tuple[QuestionLine, ...], languages: tuple[str, ...] = ()) -> None:
         super().__init__()
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
+        column = vbox(spacing=0, margins=0, parent=self)
         if len(languages) > 1:
             column.addWidget(LanguageNames(languages))
         self.rows: list[QuestionRow] = []
@@ -132,8 +118,7 @@ class QuestionRows(QWidget):
             made = QuestionRow(line)
             made.opened.connect(lambda path=line.path: self.write_asked.emit(path))
             made.joined.connect(lambda all_between, path=line.path: self.join_asked.emit(path, all_between))
-            column.addWidget(made)
-            column.addWidget(Rule())
+            add_parts(column, made, Rule())
             self.rows.append(made)
 
 
@@ -142,11 +127,8 @@ class LanguageNames(QWidget):
 
     def __init__(self, languages: tuple[str, ...], right: int = OPEN_PX) -> None:
         super().__init__()
-        heads = QHBoxLayout(self)
-        heads.setContentsMargins(INSET_PX, 0, right + 8, 0)
-        heads.setSpacing(8)
-        for language in languages:
-            heads.addWidget(_column_text(language, "small", "text2"), 1)
+        heads = ((_column_text(language, "small", "text2"), 1) for language in languages)
+        hbox(*heads, spacing=8, margins=(INSET_PX, 0, right + 8, 0), parent=self)
 
 
 class Panel(Themed, QWidget):

@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QWidget
 
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine
 from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButton, Toggle
 from study_app.gui.widgets.labels import Elided, label
 from study_app.number_text import number_of, typed_numbers
@@ -42,9 +43,7 @@ class Field(QWidget):
         super().__init__()
         self.row = row
         self.refusal = ""
-        self.box: QBoxLayout = QHBoxLayout(self)
-        self.box.setContentsMargins(0, 0, 0, 0)
-        self.box.setSpacing(8)
+        self.box: QBoxLayout = hbox(spacing=8, margins=0, parent=self)
 
     def show_row(self, row: FormRow) -> None:
         """Show the value of a row of the same kind and choices."""
@@ -145,8 +144,7 @@ class SwitchField(Field):
         self.toggle.setFont(font("label"))
         self.toggle.setAccessibleName(row.row.label)
         self.toggle.clicked.connect(lambda checked: self.set_value(bool(checked)))
-        self.box.addWidget(self.toggle)
-        self.box.addStretch()
+        add_parts(self.box, self.toggle, STRETCH)
         self.setFocusProxy(self.toggle)
         self.show_value()
 
@@ -167,8 +165,7 @@ class ChoiceField(Field):
         self.list: Choice | None = None
         if self.segments is not None:
             self.segments.chosen.connect(self._choose)
-            self.box.addWidget(self.segments)
-            self.box.addStretch()
+            add_parts(self.box, self.segments, STRETCH)
         else:
             self.list = Choice()
             self.list.setProperty("dense", "true")

@@ -20,6 +20,7 @@ from study_app.gui.designer.repair_button import RepairButton
 from study_app.gui.designer.segments import Segments
 from study_app.gui.designer.tab_order import lead_by_tab, stops
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
+from study_app.gui.widgets.boxes import hbox, vbox
 from study_app.gui.widgets.cards import Icon
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import label
@@ -36,12 +37,9 @@ class FaultLine(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        across = QHBoxLayout(self)
-        across.setContentsMargins(LABEL_PX + 8, 0, 0, 0)
-        across.setSpacing(8)
-        across.addWidget(Icon("warning", "bad", 16), 0, Qt.AlignmentFlag.AlignTop)
+        icon = (Icon("warning", "bad", 16), 0, Qt.AlignmentFlag.AlignTop)
         self.sentence = label("", "label", "bad", wraps=True)
-        across.addWidget(self.sentence, 1)
+        hbox(icon, (self.sentence, 1), spacing=8, margins=(LABEL_PX + 8, 0, 0, 0), parent=self)
 
 
 class RowWidget(Themed, QWidget):
@@ -73,8 +71,7 @@ class RowWidget(Themed, QWidget):
             self.remove = IconButton("cross", removes, with_key(removes, "remove"), size=FIELD_PX, role="plain")
             self.remove.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # no stop of Tab at each field
             self.remove.clicked.connect(self._remove)
-        across = QHBoxLayout()
-        across.setSpacing(8)
+        across = hbox(spacing=8)
         top = Qt.AlignmentFlag.AlignTop
         if bare:
             across.addWidget(self.field, 1)
@@ -87,12 +84,8 @@ class RowWidget(Themed, QWidget):
             across.addSpacing(FIELD_PX + across.spacing())
         self.repairs: list[RepairButton] = []
         self._offered: dict[ProblemRow, tuple[str, ...]] = {}
-        self._buttons = QVBoxLayout()
-        self._buttons.setContentsMargins(LABEL_PX + 32, 0, 0, 0)
-        self._buttons.setSpacing(6)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(4)
+        self._buttons = vbox(spacing=6, margins=(LABEL_PX + 32, 0, 0, 0))
+        column = vbox(spacing=4, margins=0, parent=self)
         heads = wide and len(row.languages) > 1 and not stacked(row)
         labelled = not bare and (row.removable or not heads)
         if labelled or bare:
@@ -103,9 +96,7 @@ class RowWidget(Themed, QWidget):
         if self.keys is not None:
             self.keys.show_values(row.instead, row.row.path[-1])
             self.keys.chosen.connect(self._switch)
-            above = QHBoxLayout()
-            above.setContentsMargins(0 if wide else LABEL_PX + 8, 0, 0, 0)
-            above.addWidget(self.keys, 0, Qt.AlignmentFlag.AlignLeft)
+            above = hbox((self.keys, 0, Qt.AlignmentFlag.AlignLeft), margins=(0 if wide else LABEL_PX + 8, 0, 0, 0))
             column.insertLayout(0, above)
         if heads:
             of = "" if labelled else f"{row.row.label}, "
@@ -230,9 +221,5 @@ def structure_of(row: FormRow) -> object:
 
 def language_heads(languages: tuple[tuple[str, str], ...], inset: tuple[int, int] = (0, 0)) -> QHBoxLayout:
     """Return the names of languages above the columns of their texts; ``inset`` is the room left and right [px]."""
-    heads = QHBoxLayout()
-    heads.setContentsMargins(inset[0], 0, inset[1], 0)
-    heads.setSpacing(8)
-    for _code, language in languages:
-        heads.addWidget(label(language, "small", "text2"), 1)
-    return heads
+    heads = ((label(language, "small", "text2"), 1) for _code, language in languages)
+    return hbox(*heads, spacing=8, margins=(inset[0], 0, inset[1], 0))

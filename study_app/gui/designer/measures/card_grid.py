@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QEvent, Signal
 from PySide6.QtGui import QHideEvent
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from study_app.gui.designer.measures.parts import Made, part_of
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
+from study_app.gui.widgets.boxes import hbox, vbox
 
 
 class CardGrid(Themed, QWidget):
@@ -24,9 +25,7 @@ class CardGrid(Themed, QWidget):
         super().__init__()
         self.cards: tuple[object, ...] = ()
         self.parts: list[Made] = []
-        self.grid = QVBoxLayout(self)
-        self.grid.setContentsMargins(0, 0, 0, 0)
-        self.grid.setSpacing(8)
+        self.grid = vbox(spacing=8, margins=0, parent=self)
 
     def show_cards(self, cards: tuple[object, ...]) -> None:
         """Show other cards."""
@@ -45,11 +44,7 @@ class CardGrid(Themed, QWidget):
         for at, card in enumerate(cards):
             self.parts.append(kept[at] if at in kept else self._made(card))
         for some in _rows(self.parts):
-            row = QHBoxLayout()
-            row.setSpacing(8)
-            for part in some:
-                row.addWidget(part, 1)
-            self.grid.addLayout(row)
+            self.grid.addLayout(hbox(*((part, 1) for part in some), spacing=8))
         self.grid.addStretch(1)
         self.cards = cards
         for part, (height, title) in zip(self.parts, heights, strict=False):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from study_app.gui.widgets.boxes import STRETCH, hbox
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.number_field import NumberField
 from study_app.viewmodels.designer.measures.number_cards import ControlValues
@@ -23,12 +24,8 @@ class Control(QWidget):
         self.words, self.unit = label(words, "small", "text2"), label(unit, "small", "text2")
         self.field = NumberField()
         self.field.setFixedWidth(FIELD_PX)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(6)
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Preferred)
-        for part in (self.words, self.field, self.unit):
-            row.addWidget(part)
+        hbox(self.words, self.field, self.unit, spacing=6, margins=0, parent=self)
         self.show_words(words, unit)
         self.field.entered.connect(self.entered)
         self.field.unread.connect(lambda _text: self.field.put_back())
@@ -60,12 +57,7 @@ class MeasureControls(QWidget):
         self.threshold = Control("simulated JND", "%", 1.0)
         self.lapses = Control("lapses", "%", 1.0)
         self.participants = Control("participants", "", 1.0)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(10)
-        row.addStretch()
-        for part in (self.threshold, self.lapses, self.participants):
-            row.addWidget(part)
+        hbox(STRETCH, self.threshold, self.lapses, self.participants, spacing=10, margins=0, parent=self)
         self.threshold.entered.connect(self.threshold_asked)
         self.lapses.entered.connect(self.lapses_asked)
         self.participants.entered.connect(self.participants_asked)

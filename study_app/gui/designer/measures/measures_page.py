@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QScrollArea, QWidget
 
 from study_app.gui.designer.measures.card_grid import CardGrid
 from study_app.gui.designer.measures.controls import MeasureControls
 from study_app.gui.designer.measures.parts import NumberPart
 from study_app.gui.theme.themed import Themed, apply_theme_within
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Icon, paint_ground
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
@@ -68,11 +69,9 @@ class PlotCard(Card):
         self.heading_unit = Elided("small", "text2")
         self.heading_unit.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         super().__init__(title, padding=14, gap=4)
-        self.column.addWidget(self.heading_unit)
         self.heading_unit.setAlignment(Qt.AlignmentFlag.AlignLeft)
         self.legend = label(legend, "small", "text2", wraps=True)
-        self.column.addWidget(self.legend)
-        self.column.addWidget(plot, 1)
+        add_parts(self.column, self.heading_unit, self.legend, (plot, 1))
         self._legend = legend
 
     def show_heading(self, words: str, waiting: str) -> None:
@@ -98,27 +97,17 @@ class ForcesCard(Card):
         super().__init__(padding=14, gap=4)
         self.plot = plot
         self.shown: ForcesPlot | None = None
-        head = QHBoxLayout()
-        head.addWidget(label("Force at each level", "card"))
         self.unit = Elided("small", "text2")
-        head.addWidget(self.unit, 1)
         self.chips = [Chip(small=True), Chip(small=True)]
-        for chip in self.chips:
-            head.addWidget(chip)
-        self.column.addLayout(head)
-        self.column.addWidget(plot, 1)
+        head = hbox(label("Force at each level", "card"), (self.unit, 1), *self.chips)
         self.bar = WarningBar()
-        across = QHBoxLayout(self.bar)
-        across.setContentsMargins(12, 6, 8, 6)
-        across.setSpacing(10)
-        across.addWidget(Icon("warning", "warn", 18))
         self.words = label("", "small", wraps=True)
-        across.addWidget(self.words, 1)
         self.repair = ActionButton("", "Repair", height=34)
         self.repair.setProperty("dense", "true")
         self.repair.clicked.connect(self._ask)
-        across.addWidget(self.repair)
-        self.column.addWidget(self.bar)
+        parts = (Icon("warning", "warn", 18), (self.words, 1), self.repair)
+        hbox(*parts, spacing=10, margins=(12, 6, 8, 6), parent=self.bar)
+        add_parts(self.column, head, (plot, 1), self.bar)
 
     def show_forces(self, shown: ForcesPlot) -> None:
         """Show other forces."""
@@ -161,19 +150,11 @@ class MeasuresPage(Themed, QWidget):
         for grid in (self.blocks, self.grid):
             grid.open_asked.connect(self.open_asked)
         inside = QWidget()
-        self.column = QVBoxLayout(inside)
-        self.column.setContentsMargins(0, 0, 0, 0)
-        self.column.setSpacing(8)
-        self.column.addWidget(self.blocks)
-        self.column.addWidget(self.numbers)
         self.curves = QWidget()
-        self.plots = QHBoxLayout(self.curves)
-        self.plots.setContentsMargins(0, 0, 0, 0)
-        self.plots.setSpacing(8)
+        self.plots = hbox(spacing=8, margins=0, parent=self.curves)
         self.curves.setMaximumHeight(HIGHEST_PX)
-        self.column.addWidget(self.curves, 3)
-        self.column.addWidget(self.grid, 1)
-        self.column.addStretch()
+        parts = (self.blocks, self.numbers, (self.curves, 3), (self.grid, 1), STRETCH)
+        self.column = vbox(*parts, spacing=8, margins=0, parent=inside)
         self.area = QScrollArea()
         self.area.setWidgetResizable(True)
         self.area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -183,10 +164,7 @@ class MeasuresPage(Themed, QWidget):
         inside.setObjectName("earlier")
         self.earlier = label(EARLIER, "label", "warn", wraps=True)
         self.earlier.hide()
-        whole = QVBoxLayout(self)
-        whole.setContentsMargins(0, 0, 0, 0)
-        whole.addWidget(self.earlier)
-        whole.addWidget(self.area)
+        vbox(self.earlier, self.area, margins=0, parent=self)
         self.setFocusProxy(self.area)
 
     def show_measures(self, shown: MeasuresView) -> None:

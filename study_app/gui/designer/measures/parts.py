@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
 from study_app.gui.widgets.cards import Bar, Card, Icon, Rule
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, Ink, figures, label, set_ink
@@ -37,11 +38,9 @@ def verdict_line(verdict: Verdict) -> QWidget:
     """Return a state as icon and words that wrap."""
     tone, icon, words = verdict
     made = QWidget()
-    row = QHBoxLayout(made)
-    row.setContentsMargins(0, 0, 0, 0)
-    row.setSpacing(8)
-    row.addWidget(Icon(icon or "info", INKS[tone], 16), 0, Qt.AlignmentFlag.AlignTop)
-    row.addWidget(label(words, "small", "text" if tone != "neutral" else "text2", wraps=True), 1)
+    sign = (Icon(icon or "info", INKS[tone], 16), 0, Qt.AlignmentFlag.AlignTop)
+    said = label(words, "small", "text" if tone != "neutral" else "text2", wraps=True)
+    hbox(sign, (said, 1), spacing=8, margins=0, parent=made)
     return made
 
 
@@ -56,19 +55,9 @@ class NumberPart(Card):
         self.number, self.unit = figures("", "number"), label("", "small", "text2")
         self.icon, self.note = Icon("info", "text2", 14), label("", "small", "text2", wraps=True)
         self.more = label("", "small", "text2", wraps=True)
-        across, below = QHBoxLayout(), QHBoxLayout()
-        across.setSpacing(6)
-        across.addWidget(self.number)
-        across.addWidget(self.unit, 0, Qt.AlignmentFlag.AlignBottom)
-        across.addStretch()
-        below.setSpacing(6)
-        below.addWidget(self.icon, 0, Qt.AlignmentFlag.AlignTop)
-        below.addWidget(self.note, 1)
-        self.column.addWidget(self.title)
-        self.column.addLayout(across)
-        self.column.addLayout(below)
-        self.column.addWidget(self.more)
-        self.column.addStretch()
+        across = hbox(self.number, (self.unit, 0, Qt.AlignmentFlag.AlignBottom), STRETCH, spacing=6)
+        below = hbox((self.icon, 0, Qt.AlignmentFlag.AlignTop), (self.note, 1), spacing=6)
+        add_parts(self.column, self.title, across, below, self.more, STRETCH)
 
     def show_card(self, shown: NumberCard) -> None:
         """Show another number."""
@@ -187,14 +176,11 @@ class Made(Card):
     def add_link(self, verdict: Verdict, action: str, path: ElementPath) -> None:
         """Add a state with a button that opens an element."""
         row = QWidget()
-        across = QHBoxLayout(row)
-        across.setContentsMargins(0, 0, 0, 0)
-        across.addWidget(verdict_line(verdict), 1, Qt.AlignmentFlag.AlignVCenter)
         made = ActionButton("", action, height=32)
         made.setProperty("dense", "true")
         made.setAccessibleName(f"{action}: {verdict[2]}")
         made.clicked.connect(lambda: self.open_asked.emit(path))
-        across.addWidget(made)
+        hbox((verdict_line(verdict), 1, Qt.AlignmentFlag.AlignVCenter), made, margins=0, parent=row)
         self.buttons.append(made)
         self.add(row)
 
@@ -205,15 +191,11 @@ class SessionPart(Made):
     def __init__(self, shown: SessionCard) -> None:
         super().__init__(shown.title, shown.aside)
         numbers = QWidget()
-        row = QHBoxLayout(numbers)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(6)
+        row = hbox(spacing=6, margins=0, parent=numbers)
         for value, word in shown.figures:
             number = figures(value, "number")
             number.setAccessibleName(f"{value} {word}")
-            row.addWidget(number)
-            row.addWidget(label(word, "small", "text2"), 0, Qt.AlignmentFlag.AlignBottom)
-            row.addSpacing(8)
+            add_parts(row, number, (label(word, "small", "text2"), 0, Qt.AlignmentFlag.AlignBottom), 8)
         row.addStretch()
         self.add(numbers)
         if shown.segments:
@@ -222,8 +204,7 @@ class SessionPart(Made):
             self.strip.show_segments(shown.segments)
             self.add(self.strip)
             notes = QWidget()
-            line = QHBoxLayout(notes)
-            line.setContentsMargins(0, 0, 0, 0)
+            line = hbox(margins=0, parent=notes)
             for at, words in enumerate(shown.notes):
                 made = Elided("small", "text2")
                 made.show_text(words)
@@ -243,14 +224,11 @@ class BalancePart(Made):
     def __init__(self, shown: BalanceCard) -> None:
         super().__init__("Balance", f"{shown.block}, {shown.people}")
         tables = QWidget()
-        row = QHBoxLayout(tables)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(18)
         places = [str(number + 1) for number in range(len(shown.positions))]
-        row.addWidget(_table("position", shown.codes, places, shown.positions), 0, Qt.AlignmentFlag.AlignTop)
+        at = _table("position", shown.codes, places, shown.positions)
         after = _table("comes after", shown.codes, list(shown.codes), shown.follows)
-        row.addWidget(after, 0, Qt.AlignmentFlag.AlignTop)
-        row.addStretch()
+        top = Qt.AlignmentFlag.AlignTop
+        hbox((at, 0, top), (after, 0, top), STRETCH, spacing=18, margins=0, parent=tables)
         self.wide = len(shown.codes) > NARROW_CODES
         if shown.codes:
             self.add(tables)

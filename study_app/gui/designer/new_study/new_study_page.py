@@ -12,6 +12,7 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QGridLayout,
     QHBoxLayout,
+    QLayout,
     QLineEdit,
     QScrollArea,
     QVBoxLayout,
@@ -23,6 +24,7 @@ from study_app.gui.designer.new_study.new_study_questions import Questions
 from study_app.gui.designer.new_study.recovery_bar import RecoveryBar
 from study_app.gui.designer.repair_button import NameRefusal
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget, replace_inside
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule
 from study_app.gui.widgets.controls import ActionButton, Check, IconButton
 from study_app.gui.widgets.labels import Elided, figures, label
@@ -47,15 +49,14 @@ class NoStudyCard(Card):
         self.new = ActionButton("plus", "New study …", cap=key_cap("new"), role="primary")
         self.new.setAccessibleName(tip("new"))
         self.new.setToolTip(tip("new"))
-        self.column.addStretch(2)
-        for part in (
+        parts = (
             Icon("designer", "accent", 44),
             label("No study is open", "card"),
             label("Choose a study above, or begin a new one.", "body", "text2"),
             self.new,
-        ):
-            self.column.addWidget(part, 0, Qt.AlignmentFlag.AlignHCenter)
-        self.column.addStretch(3)
+        )
+        centred = ((part, 0, Qt.AlignmentFlag.AlignHCenter) for part in parts)
+        add_parts(self.column, (STRETCH, 2), *centred, (STRETCH, 3))
 
     def show_studies(self, studies: tuple[StudyChoice, ...]) -> None:
         """Offer to continue the studies with a draft that is not saved."""
@@ -85,39 +86,23 @@ class ChosenCard(Card):
         self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         inside = QWidget()
-        self.inside = QVBoxLayout(inside)
-        self.inside.setContentsMargins(0, 0, 8, 0)
-        self.inside.setSpacing(10)
         self.about, self.details, self.begin = QWidget(), QWidget(), QWidget()
-        column = _column(self.begin)
-        column.addWidget(label("Begin with", "strong"))
-        column.addWidget(self.questions)
-        for part in (self.about, self.details, self.begin):
-            self.inside.addWidget(part)
-        self.inside.addStretch()
+        _column(self.begin, label("Begin with", "strong"), self.questions)
+        parts = (self.about, self.details, self.begin, STRETCH)
+        self.inside = vbox(*parts, spacing=10, margins=(0, 0, 8, 0), parent=inside)
         self.area.setWidget(inside)
-        self.column.addWidget(self.title)
-        self.column.addWidget(self.area, 1)
-        self.column.addWidget(self.refusal)
-        self.column.addWidget(self.make)
         foot = label("Nothing is written until you save it.", "small", "text2")
         foot.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.column.addWidget(foot)
+        add_parts(self.column, self.title, (self.area, 1), self.refusal, self.make, foot)
 
     def show_choice(self, choice: TemplateChoice) -> None:
         """Show a template or a copy."""
         self.title.setText(choice.title)
         before = (self.about, self.details)
         self.about, self.details = QWidget(), QWidget()
-        column = _column(self.about)
-        column.addWidget(label(choice.description, "label", "text2", wraps=True))
-        tags = QHBoxLayout()
-        tags.setSpacing(8)
-        for icon, words in choice.tags:
-            tags.addWidget(Chip("neutral", icon, words, small=True))
-        tags.addStretch()
-        column.addLayout(tags)
-        column.addWidget(Rule())
+        tags = (Chip("neutral", icon, words, small=True) for icon, words in choice.tags)
+        described = label(choice.description, "label", "text2", wraps=True)
+        _column(self.about, described, hbox(*tags, STRETCH, spacing=8), Rule())
         column = _column(self.details)
         if choice.session:
             column.addWidget(label("The session", "strong"))
@@ -126,18 +111,13 @@ class ChosenCard(Card):
         if choice.session:
             column.addWidget(Rule())
         if choice.recovery is not None:
-            head = QHBoxLayout()
-            head.addWidget(label("Known answer", "strong"))
-            head.addStretch()
             good = choice.recovery.recovered
             state = ("ok", "check", "recovered") if good else ("warn", "warning", "not recovered")
-            head.addWidget(Chip(*state, small=True))  # type: ignore[arg-type]  # a tone
-            column.addLayout(head)
+            chip = Chip(*state, small=True)  # type: ignore[arg-type]  # a tone
             bar = RecoveryBar()
             bar.show_recovery(choice.recovery)
-            column.addWidget(bar)
-            column.addWidget(label(choice.recovery.sentence, "small", "text2", wraps=True))
-            column.addWidget(Rule())
+            head = hbox(label("Known answer", "strong"), STRETCH, chip)
+            add_parts(column, head, bar, label(choice.recovery.sentence, "small", "text2", wraps=True), Rule())
         for old, new in zip(before, (self.about, self.details), strict=True):
             apply_theme_within(new, self.theme)
             self.inside.replaceWidget(old, new)
@@ -151,22 +131,14 @@ class ChosenCard(Card):
         self.inside.insertWidget(1 if self.height() < LOW_BELOW else 2, self.begin)
 
 
-def _column(of: QWidget) -> QVBoxLayout:
-    made = QVBoxLayout(of)
-    made.setContentsMargins(0, 0, 0, 0)
-    made.setSpacing(8)
-    return made
+def _column(of: QWidget, *parts: QWidget | QLayout) -> QVBoxLayout:
+    return vbox(*parts, spacing=8, margins=0, parent=of)
 
 
 def _step(icon: str, title: str, time: str) -> QHBoxLayout:
-    line = QHBoxLayout()
-    line.setSpacing(10)
     shown = Elided("label")
     shown.show_text(title)
-    line.addWidget(Icon(icon, "text2", 16))
-    line.addWidget(shown, 1)
-    line.addWidget(figures(time, "label", "text2"))
-    return line
+    return hbox(Icon(icon, "text2", 16), (shown, 1), figures(time, "label", "text2"), spacing=10)
 
 
 class NewStudyPage(Themed, QWidget):
@@ -183,31 +155,18 @@ class NewStudyPage(Themed, QWidget):
         self._group = QButtonGroup(self)
         self.back = IconButton("chevron_left", "Back", role="plain")
         self.back.clicked.connect(self.given_up)
-        head = QHBoxLayout()
-        head.setContentsMargins(SHADOW, 0, SHADOW, 0)
-        head.setSpacing(12)
-        head.addWidget(self.back)
-        head.addWidget(label("New study", "title"))
         aside = Elided("label", "text2")
         aside.show_text("Choose what you want to find out. Everything can be changed afterwards.")
-        head.addWidget(aside, 1)
         self.file = ActionButton("file", "From a file …")
         self.file.clicked.connect(self._open_file)
-        head.addWidget(self.file)
+        parts = (self.back, label("New study", "title"), (aside, 1), self.file)
+        head = hbox(*parts, spacing=12, margins=(SHADOW, 0, SHADOW, 0))
         self.area = QScrollArea()
         self.area.setWidgetResizable(True)
         self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.card = ChosenCard()
-        below = QHBoxLayout()
-        below.setSpacing(12)
-        below.addWidget(self.area, 1)
-        below.addWidget(self.card)
-        page = QVBoxLayout(self)
-        page.setContentsMargins(0, 0, 0, 0)
-        page.setSpacing(12)
-        page.addLayout(head)
-        page.addLayout(below, 1)
+        vbox(head, (hbox((self.area, 1), self.card, spacing=12), 1), spacing=12, margins=0, parent=self)
         self.card.make.clicked.connect(self._begin)
         self.card.questions.entered.connect(self._begin)
         self.card.refusal.chosen.connect(self._take_name)
@@ -232,21 +191,14 @@ class NewStudyPage(Themed, QWidget):
         """Show what a study can begin from."""
         self._choices = choices
         inside = QWidget()
-        column = QVBoxLayout(inside)
-        column.setContentsMargins(0, 0, 12 - RING, 0)
-        column.setSpacing(12)
+        column = vbox(spacing=12, margins=(0, 0, 12 - RING, 0), parent=inside)
         self.buttons = []
         for heading, aside, copies, across in (
             ("Templates", "", False, ACROSS),
             ("Or a copy of a study", "with its comments; the original stays as it is", True, COPIES_ACROSS),
         ):
-            line = QHBoxLayout()
-            line.setContentsMargins(RING, 0, 0, 0)
-            line.setSpacing(10)
-            line.addWidget(label(heading, "card"))
-            line.addWidget(label(aside, "small", "text2"))
-            line.addStretch()
-            column.addLayout(line)
+            words = label(heading, "card"), label(aside, "small", "text2")
+            column.addLayout(hbox(*words, STRETCH, spacing=10, margins=(RING, 0, 0, 0)))
             grid = QGridLayout()
             grid.setSpacing(14 - 2 * RING)
             columns = across if self.width() >= NARROW_BELOW else 2

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any, Final
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLineEdit, QWidget
+from PySide6.QtWidgets import QGridLayout, QLineEdit, QWidget
 
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
+from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.controls import Check
 from study_app.gui.widgets.labels import label
 from study_app.ids import short_name_of
@@ -97,10 +98,7 @@ class Questions(Themed, QWidget):
             field.setToolTip(question.bounds)
             field.setAccessibleDescription(question.bounds)
             beside = QWidget()
-            across = QHBoxLayout(beside)
-            across.setContentsMargins(0, 0, 0, 0)
-            across.setSpacing(8)
-            across.addWidget(field, 1)
+            across = hbox((field, 1), spacing=8, margins=0, parent=beside)
             if question.unit:
                 across.addWidget(label(question.unit, "label", "text2"))
             self._own += [self._add(row, question.words, beside), beside]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QFrame, QLineEdit, QListWidget, QListWidgetItem, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QLineEdit, QListWidget, QListWidgetItem, QWidget
 
 from study_app.gui.theme.icons import icon
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import vbox
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.addable import Addable
 from study_app.viewmodels.designer.finding import words_sought
@@ -44,12 +45,7 @@ class AddList(Themed, QFrame):
         self.help = label("", "small", "text2", wraps=True)
         self.help.setMinimumHeight(HELP_PX)
         self.help.setAlignment(Qt.AlignmentFlag.AlignTop)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(10, 10, 10, 10)
-        column.setSpacing(8)
-        column.addWidget(self.words)
-        column.addWidget(self.list, 1)
-        column.addWidget(self.help)
+        vbox(self.words, (self.list, 1), self.help, spacing=8, margins=10, parent=self)
         self.words.textChanged.connect(self._type)
         self.words.installEventFilter(self)
         self.list.currentItemChanged.connect(lambda item: self.help.setText(item.toolTip() if item else ""))

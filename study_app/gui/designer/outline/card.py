@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QItemSelectionModel, QModelIndex, QObject, QPoint, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QStandardItem, QStandardItemModel
-from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QMenu
+from PySide6.QtWidgets import QLineEdit, QMenu
 
 from study_app.gui.designer.outline.rows import ROW_ROLE, Index
 from study_app.gui.designer.outline.tree import Tree
 from study_app.gui.theme.icons import icon
 from study_app.gui.theme.theme import Theme, font
+from study_app.gui.widgets.boxes import add_parts, hbox
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton
 from study_app.viewmodels.designer.keys import key_cap, key_words, keys_of, tip, with_key
@@ -67,14 +68,8 @@ class OutlineCard(Card):
         self.duplicate.setToolTip(tip("duplicate"))
         for button in (self.add, self.duplicate):
             button.setFont(font("label", weight=600))
-        self.column.addWidget(self.words)
-        self.column.addWidget(self.tree, 1)
-        buttons = QHBoxLayout()
-        buttons.setSpacing(8)
         self.add.setMaximumWidth(self.add.minimumSizeHint().width())
-        buttons.addWidget(self.add)
-        buttons.addWidget(self.duplicate, 1)
-        self.column.addLayout(buttons)
+        add_parts(self.column, self.words, (self.tree, 1), hbox(self.add, (self.duplicate, 1), spacing=8))
         self.words.textChanged.connect(self.find_changed)
         self.words.returnPressed.connect(self._open_first)
         self.words.installEventFilter(self)

@@ -20,13 +20,14 @@ from PySide6.QtGui import (
     QTextCursor,
     QTextDocument,
 )
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QPlainTextEdit, QWidget
+from PySide6.QtWidgets import QFrame, QPlainTextEdit, QWidget
 
 from study_app.gui.designer.form.typed_fields import HAND_ON_MS, KEYS_OF_PLACE
 from study_app.gui.designer.pane.text_lines import visible_lines
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Theme
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.labels import Elided, label
 from study_app.viewmodels.designer.file_text import FileText
@@ -265,13 +266,8 @@ class FileCard(Card):
         self.editor.typed.connect(self.typed)
         self.setFocusProxy(self.editor)
         self.aside = QWidget()
-        across = QHBoxLayout(self.aside)
-        across.setContentsMargins(0, 0, 0, 0)
-        across.setSpacing(6)
-        across.addWidget(Icon("check", "ok", 16))
-        across.addWidget(label("comments and order are kept", "small", "text2"))
-        across.addSpacing(10)
-        across.addWidget(self.name)
+        kept = Icon("check", "ok", 16), label("comments and order are kept", "small", "text2")
+        hbox(*kept, 10, self.name, spacing=6, margins=0, parent=self.aside)
         self.column.addWidget(self.editor, 1)
 
     def show_file(self, file: FileText, *, scroll: bool, read_only: bool) -> None:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QScrollArea, QWidget
 
 from study_app.gui.designer.measures.card_grid import CardGrid
 from study_app.gui.designer.measures.measures_page import NumbersRow
+from study_app.gui.widgets.boxes import vbox
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.measures.number_cards import EARLIER, MeasuresView
 
@@ -37,12 +38,7 @@ class FactsRow(QScrollArea):
         self.earlier.hide()
         inside = QWidget()
         inside.setObjectName("earlier")
-        self._inside = column = QVBoxLayout(inside)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(8)
-        column.addWidget(self.earlier)
-        column.addWidget(self.numbers)
-        column.addWidget(self.grid, 1)
+        self._inside = vbox(self.earlier, self.numbers, (self.grid, 1), spacing=8, margins=0, parent=inside)
         self.setWidget(inside)
         self._window_px = self._left_px = 0
         self.make_room(0, 0)

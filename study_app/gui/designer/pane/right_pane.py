@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QStackedWidget, QWidget
 
 from study_app.gui.designer.pane.measure_cards import FactsRow
 from study_app.gui.designer.segments import Segments
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW
 
 FACTS_FROM, FACTS_FROM_OWN, FACTS_LEAST = 740, 560, 110
@@ -62,23 +63,11 @@ class RightPane(QWidget):
         self.tab = ""
         self.tabs = Segments("View of the study")
         self.facts = FactsRow()
-        self._asides, self._below = QHBoxLayout(), QHBoxLayout()
-        self._below.setContentsMargins(SHADOW, 0, SHADOW, 0)
-        self._below.addStretch()
-        bar = QHBoxLayout()
-        bar.setContentsMargins(SHADOW, 0, SHADOW, 0)
-        bar.addWidget(self.tabs)
-        bar.addStretch()
-        bar.addLayout(self._asides)
+        self._asides, self._below = hbox(), hbox(STRETCH, margins=(SHADOW, 0, SHADOW, 0))
+        bar = hbox(self.tabs, STRETCH, self._asides, margins=(SHADOW, 0, SHADOW, 0))
         self._stack = QStackedWidget()
-        self._column = column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(12 - 2 * SHADOW)
-        column.addLayout(bar)
-        column.addLayout(self._below)
-        column.addWidget(self._stack, 1)
-        column.addWidget(self.facts)
-        column.addStretch(0)
+        parts = (bar, self._below, (self._stack, 1), self.facts, STRETCH)
+        self._column = vbox(*parts, spacing=12 - 2 * SHADOW, margins=0, parent=self)
         self.tabs.chosen.connect(lambda name: self.show_tab(str(name)))
 
     def add_page(self, page: PanePage, *, first: bool = False) -> None:

@@ -6,12 +6,13 @@ from typing import Final
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from study_app.gui.designer.participant.live_page import LivePage
 from study_app.gui.designer.segments import Segments
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card
 from study_app.gui.widgets.controls import Cap, Choice, IconButton
 from study_app.gui.widgets.labels import label
@@ -65,12 +66,7 @@ class ParticipantTab(Card):
         self.screens.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.screens.setMinimumContentsLength(9)
         self.aside = QWidget()
-        across = QHBoxLayout(self.aside)
-        across.setContentsMargins(0, 0, 0, 0)
-        across.setSpacing(10)
-        across.addWidget(self.languages)
-        across.addWidget(self.language_key)
-        across.addWidget(self.screens)
+        hbox(self.languages, self.language_key, self.screens, spacing=10, margins=0, parent=self.aside)
         self.before = IconButton("chevron_left", "Previous step", "Previous step", size=36)
         self.after = IconButton("chevron", "Next step", "Next step", size=36)
         for button in (self.before, self.after):
@@ -82,21 +78,9 @@ class ParticipantTab(Card):
         self.moments = Segments("Page of the trial")
         self.zoom = Segments("Size of the page")
         self.zoom.show_values(((True, "Fit"), (False, "100 %")), chosen=True)
-        self._row, self._second = row, second = (QHBoxLayout(), QHBoxLayout())
-        row.setSpacing(8)
-        second.addStretch()
-        row.addWidget(self.before)
-        row.addWidget(self.step, 1)
-        row.addWidget(self.trial)
-        row.addWidget(self.trials)
-        row.addWidget(self.after)
-        row.addWidget(self.moments)
-        row.addWidget(self.zoom)
-        self.column.addWidget(self.note)
-        self.column.addWidget(self.page, 1)
-        self.column.addLayout(row)
-        self.column.addLayout(second)
-        self.column.addStretch(0)
+        parts = (self.before, (self.step, 1), self.trial, self.trials, self.after, self.moments, self.zoom)
+        self._row, self._second = hbox(*parts, spacing=8), hbox(STRETCH)
+        add_parts(self.column, self.note, (self.page, 1), self._row, self._second, STRETCH)
         self._connect()
 
     def _connect(self) -> None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QActionGroup
-from PySide6.QtWidgets import QHBoxLayout, QMenu, QWidget
+from PySide6.QtWidgets import QMenu, QWidget
 
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.viewmodels.designer.keys import keys_of, tip
 from study_app.viewmodels.designer.play import PlayDevices
@@ -29,11 +30,7 @@ class PlayControls(QWidget):
         self.device = IconButton("device", "Device to play with")
         self.menu = QMenu(self)
         self.menu.setFont(font("label"))
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(6)
-        row.addWidget(self.play)
-        row.addWidget(self.device)
+        hbox(self.play, self.device, spacing=6, margins=0, parent=self)
         self.play.clicked.connect(self.asked)
         self.device.clicked.connect(self._show_menu)
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
+from study_app.gui.widgets.boxes import add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card, Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Ink, label
@@ -34,15 +35,9 @@ class PlayStrip(Card):
         self.words = label("", "body", wraps=True)
         self.buttons: dict[str, ActionButton] = {}
         self._lines: list[QWidget] = []
-        self._row = QHBoxLayout()
-        self._row.setSpacing(10)
-        self._row.addWidget(self.icon)
-        self._row.addWidget(self.words, 1)
-        self._listed = QVBoxLayout()
-        self._listed.setContentsMargins(30 + SHADOW, 0, 0, 0)
-        self._listed.setSpacing(2)
-        self.column.addLayout(self._row)
-        self.column.addLayout(self._listed)
+        self._row = hbox(self.icon, (self.words, 1), spacing=10)
+        self._listed = vbox(spacing=2, margins=(30 + SHADOW, 0, 0, 0))
+        add_parts(self.column, self._row, self._listed)
         self.hide()
 
     def show_state(self, state: PlayState | None) -> None:
@@ -66,8 +61,7 @@ class PlayStrip(Card):
         self.setAccessibleDescription(state.words)
         say(self, state.words)
         self._lines = [label(line, "label", "text2", wraps=True) for line in state.listed]
-        for line in self._lines:
-            self._listed.addWidget(line)
+        add_parts(self._listed, *self._lines)
         for action, words in state.actions:
             cap = key_cap("stop") if action == "stop" else ""
             made = ActionButton(ICONS.get(action, ""), words, cap=cap, role=ROLES.get(action, ""), height=36)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QScrollArea, QWidget
 
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed, apply_theme_within, replace_inside
+from study_app.gui.widgets.boxes import hbox, vbox
 from study_app.gui.widgets.cards import Icon, Rule
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import label
@@ -28,16 +29,9 @@ class ChangeLine(QWidget):
         self.revert: ActionButton | None = None
         title = label(row.title, "label", wraps=True)
         title.setFont(font("label", weight=600))
-        words = QVBoxLayout()
-        words.setSpacing(0)
-        words.addWidget(title)
         sentence = label(_breakable(row.change.sentence), "small", "text2", wraps=True)
         sentence.setAccessibleName(row.change.sentence)
-        words.addWidget(sentence)
-        across = QHBoxLayout(self)
-        across.setContentsMargins(INDENT, 3, 0, 3)
-        across.setSpacing(8)
-        across.addLayout(words, 1)
+        across = hbox((vbox(title, sentence, spacing=0), 1), spacing=8, margins=(INDENT, 3, 0, 3), parent=self)
         if can_go and row.element:
             self.go = IconButton("arrow_right", f"Go to {row.title}", size=34, role="plain")
             across.addWidget(self.go)
@@ -83,9 +77,7 @@ class ChangeList(Themed, QScrollArea):
         self._shown = (groups, can_revert)
         scrolled = self.verticalScrollBar().value()
         inside = QWidget()
-        column = QVBoxLayout(inside)
-        column.setContentsMargins(0, 0, 8, 0)
-        column.setSpacing(4)
+        column = vbox(spacing=4, margins=(0, 0, 8, 0), parent=inside)
         self.lines = []
         for at, group in enumerate(groups):
             if at:
@@ -107,14 +99,11 @@ class ChangeList(Themed, QScrollArea):
 
 def _heading(group: ChangeGroup) -> QWidget:
     made = QWidget()
-    row = QHBoxLayout(made)
-    row.setContentsMargins(0, 6, 0, 2)
-    row.setSpacing(8)
-    row.addWidget(Icon(group.icon, group.tone if group.tone in {"ok", "warn", "bad"} else "text2", 18))
+    icon = Icon(group.icon, group.tone if group.tone in {"ok", "warn", "bad"} else "text2", 18)
     title = label(f"{group.title}: {len(group.rows)}", "label", group.tone)  # type: ignore[arg-type]
     title.setFont(font("label", weight=600))
-    row.addWidget(title)
-    row.addWidget(label(group.meaning, "small", "text2", wraps=True), 1)
+    meaning = label(group.meaning, "small", "text2", wraps=True)
+    hbox(icon, title, (meaning, 1), spacing=8, margins=(0, 6, 0, 2), parent=made)
     return made
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QSignalBlocker, Signal
-from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QStackedWidget, QWidget
 
 from study_app.gui.designer.segments import Segments
 from study_app.gui.designer.versions.change_list import ChangeList
 from study_app.gui.designer.versions.side_by_side_view import SideBySideView
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import Choice
 from study_app.gui.widgets.labels import label
@@ -47,19 +48,9 @@ class ChangesCard(Card):
         self.stack.addWidget(self.sides)
         self._of = label("Compare with", "label")
         self.top = QWidget()
-        row = QHBoxLayout(self.top)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(10)
-        row.addWidget(self._of)
-        row.addWidget(self.version, 1)
-        row.addWidget(self.how)
+        hbox(self._of, (self.version, 1), self.how, spacing=10, margins=0, parent=self.top)
         self.nothing = label(NOTHING, "body", "text2", wraps=True)
-        below = QVBoxLayout()
-        below.addWidget(self.note)
-        below.addWidget(self.stack, 1)
-        self.column.addWidget(self.top)
-        self.column.addWidget(self.nothing)
-        self.column.addLayout(below, 1)
+        add_parts(self.column, self.top, self.nothing, (vbox(self.note, (self.stack, 1)), 1))
         self.setFocusProxy(self.version)
         self.version.activated.connect(lambda at: self.version_chosen.emit(str(self.version.itemData(at))))
         self.how.chosen.connect(lambda how: self.show_how(str(how)))

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QScrollArea, QWidget
 
 from study_app.gui.designer.prompts import Prompt
+from study_app.gui.widgets.boxes import vbox
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
 
@@ -36,9 +37,7 @@ class CommentsCard(Prompt):
             title_of(name, comments), "Renaming does not change comments. Correct them in the file where needed."
         )
         inside = QWidget()
-        column = QVBoxLayout(inside)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(2)
+        column = vbox(spacing=2, margins=0, parent=inside)
         self.lines: list[ActionButton] = []
         for line, text in comments:
             made = ActionButton("", f"Line {line}:  {_cut(text)}", role="plain", height=34)

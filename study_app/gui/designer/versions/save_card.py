@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QWidget
+from PySide6.QtWidgets import QLineEdit, QWidget
 
 from study_app.gui.designer.prompts import Prompt
 from study_app.gui.designer.repair_button import NameRefusal
 from study_app.gui.designer.versions.change_list import LEAST, ChangeList
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
 from study_app.gui.widgets.cards import Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
@@ -47,16 +48,9 @@ class SaveCard(Prompt):
         self.save = ActionButton("save", "", role="primary", height=40)
         self._of_version = label("Version", "label")
         self._of_name = label("Short name", "label")
-        line = QHBoxLayout()
-        line.setSpacing(10)
-        for part in (self._of_version, self.version, self._of_name, self.name):
-            line.addWidget(part)
-        line.addWidget(self.refusal, 1)
-        line.addStretch()
-        self.column.addLayout(line)
-        for button in (self.changes, self.another, self.save):
-            self.buttons.addWidget(button)
-        self.column.addLayout(self.buttons)
+        line = hbox(self._of_version, self.version, self._of_name, self.name, (self.refusal, 1), STRETCH, spacing=10)
+        add_parts(self.buttons, self.changes, self.another, self.save)
+        add_parts(self.column, line, self.buttons)
         self.another.setVisible(asked.another)
         self._naming = False
         self._show_name(naming=False)
@@ -115,9 +109,6 @@ def _field(name: str, text: str, width: int) -> QLineEdit:
 
 def _line(icon: str, words: str) -> QWidget:
     made = QWidget()
-    row = QHBoxLayout(made)
-    row.setContentsMargins(0, 0, 0, 0)
-    row.setSpacing(8)
-    row.addWidget(Icon(icon, "warn" if icon == "warning" else "text2", 18))
-    row.addWidget(label(words, "label", wraps=True), 1)
+    parts = (Icon(icon, "warn" if icon == "warning" else "text2", 18), (label(words, "label", wraps=True), 1))
+    hbox(*parts, spacing=8, margins=0, parent=made)
     return made

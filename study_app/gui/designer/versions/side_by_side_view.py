@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QFontDatabase, QPainter, QPaintEvent, QResizeEvent, QTextCursor
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QPlainTextEdit, QTextEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QPlainTextEdit, QTextEdit, QWidget
 
 from study_app.gui.designer.pane.text_lines import visible_lines
 from study_app.gui.theme.theme import Theme
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import hbox, vbox
 from study_app.gui.widgets.cards import Rule
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Elided, figures
@@ -148,21 +149,8 @@ class SideBySideView(QWidget):
         self.next = IconButton("arrow_down", "Next difference", size=34)
         self.revert = ActionButton("undo", "Revert this part", height=34)
         self.revert.setProperty("dense", "true")
-        bar = QHBoxLayout()
-        bar.setSpacing(8)
-        bar.addWidget(self.heading, 1)
-        for part in (self.place, self.previous, self.next, self.revert):
-            bar.addWidget(part)
-        texts = QHBoxLayout()
-        texts.setSpacing(10)
-        texts.addWidget(self.before, 1)
-        texts.addWidget(self.after, 1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(6)
-        column.addLayout(bar)
-        column.addWidget(Rule())
-        column.addLayout(texts, 1)
+        bar = hbox((self.heading, 1), self.place, self.previous, self.next, self.revert, spacing=8)
+        vbox(bar, Rule(), (hbox((self.before, 1), (self.after, 1), spacing=10), 1), spacing=6, margins=0, parent=self)
         for one, other in ((self.before, self.after), (self.after, self.before)):
             one.verticalScrollBar().valueChanged.connect(other.verticalScrollBar().setValue)
             one.horizontalScrollBar().valueChanged.connect(other.horizontalScrollBar().setValue)

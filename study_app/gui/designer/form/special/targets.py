@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Final
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QBoxLayout, QGridLayout, QHBoxLayout
+from PySide6.QtWidgets import QBoxLayout, QGridLayout
 
 from study_app.gui.designer.form.row_fields import Field, add_button
 from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.designer.form.tank_view import TankView
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine
+from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import figures, label
 from study_app.number_text import number_of
@@ -31,14 +32,11 @@ class TargetsField(Field):
         self.chosen = 0
         self.box.setDirection(QBoxLayout.Direction.TopToBottom)
         self.front, self.above = TankView("front"), TankView("above")
-        across = QHBoxLayout()
-        across.setSpacing(8)
         for view in (self.front, self.above):
             view.moved.connect(self._move)
             view.picked.connect(self._pick)
             view.came.connect(self.came)
-            across.addWidget(view)
-        self.box.addLayout(across)
+        self.box.addLayout(hbox(self.front, self.above, spacing=8))
         grid = QGridLayout()
         grid.setSpacing(6)
         for column, axis in enumerate(AXES, start=1):

@@ -6,13 +6,14 @@ from typing import Final
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPainterPath, QPaintEvent, QPen, QResizeEvent
-from PySide6.QtWidgets import QAbstractButton, QBoxLayout, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QAbstractButton, QBoxLayout, QWidget
 
 from study_app.gui.designer.form.row_fields import ChoiceField
 from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import add_parts, hbox
 from study_app.viewmodels.designer.form.form_rows import FormRow
 from study_app.viewmodels.designer.requests import GoTo
 from study_app.viewmodels.designer.special.trial_strip import Phase, TrialStrip
@@ -165,15 +166,10 @@ class DesignField(ChoiceField):
         self.view = StripView()
         super().__init__(row)
         choice = QWidget()
-        across = QHBoxLayout(choice)
-        across.setContentsMargins(0, 0, 0, 0)
-        across.setSpacing(8)
-        for part in (self.segments, self.list, self.arrow):
-            if part is not None:
-                across.addWidget(part, int(part is self.list))
+        parts = ((part, int(part is self.list)) for part in (self.segments, self.list, self.arrow) if part is not None)
+        hbox(*parts, spacing=8, margins=0, parent=choice)
         self.box.setDirection(QBoxLayout.Direction.TopToBottom)
-        for widget in (choice, self.view):
-            self.box.addWidget(widget)
+        add_parts(self.box, choice, self.view)
         self.view.opened.connect(lambda path: self.asked.emit(GoTo(path[:2], path)))
         self.show_value()
 
