@@ -12,7 +12,7 @@ from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
+from study_app.gui.widgets.boxes import hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Elided, label
@@ -64,6 +64,7 @@ class FormHead(QWidget):
         self.title = Elided("card")
         self.kind = Elided("small", "text2")
         self.followed = Elided("small", "text2")
+        self.used = Elided("small", "text2")
         self.id = TypedLine("Id")
         self.id.setMinimumWidth(110)
         self.id.setMaximumWidth(230)
@@ -99,7 +100,7 @@ class FormHead(QWidget):
         self.id_line = QWidget()
         words_of_id = label("Id", "label")
         words_of_id.setFixedWidth(LABEL_PX)
-        parts = (words_of_id, (self.id, 8), self.unlock, self.comments, (STRETCH, 1))
+        parts = (words_of_id, (self.id, 8), self.unlock, self.comments, (self.used, 1))
         hbox(*parts, spacing=8, margins=(0, 4, 0, 0), parent=self.id_line)
         grid.addWidget(self.id_line, 1, 0, 1, 3)
         grid.addWidget(self.refusal, 2, 0, 1, 3)
@@ -119,7 +120,8 @@ class FormHead(QWidget):
         self.tile.update()
         self.title.show_text(form.title)
         at = "" if form.position is None else f"{form.position[0]} of {form.position[1]}"
-        self.kind.show_text("  ·  ".join(filter(None, (form.kind, at, form.used))))
+        self.kind.show_text("  ·  ".join(filter(None, (form.kind, at))))
+        self.used.show_text(form.used)
         self.id_line.setVisible(form.id is not None)
         self._read_only = read_only
         self._apply_lock()
