@@ -62,7 +62,7 @@ class Tasks:
     def template(self) -> None:
         """A study from "Compare liquids" with its own title and a second language, saved."""
         user = self.user
-        user.press("New study …")
+        user.press("New study …*")
         user.write("Title", "Three drinks", accept=False)
         user.press("Language Dutch")
         user.press("Make study")

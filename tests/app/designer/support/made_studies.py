@@ -19,7 +19,7 @@ PLAYED_S = 400.0
 
 def begin(user: User, template: str, title: str) -> None:
     """Begin a study from a template, at the home window."""
-    user.press("New study …")
+    user.press("New study …*")
     user.press(f"Template {template}")
     user.write("Title", title, accept=False)
     user.shortcut("Return", "Make study")
