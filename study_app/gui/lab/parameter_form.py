@@ -110,7 +110,8 @@ class FormPanel(Card):
     def _lay_out(self) -> None:
         head = hbox(self.badge, (self.liquid, 1), self.copy, spacing=8)
         inside = QWidget()
-        self._column = vbox(spacing=0, margins=(0, 0, 6, 0), parent=inside)
+        self._column = vbox(STRETCH, spacing=0, margins=(0, 0, 6, 0), parent=inside)
+        self._rules: list[Rule] = []
         self.area = scrolled(inside)
         whole = QWidget()
         column = vbox(head, Rule(), (self.area, 1), spacing=8, margins=0, parent=whole)
@@ -189,18 +190,18 @@ class FormPanel(Card):
 
     def _stack_up(self) -> None:
         """Place the blocks below one another, a hairline between them."""
-        while self._column.count():
-            rule = self._column.takeAt(0).widget()
-            if isinstance(rule, Rule):
-                rule.hide()
-                rule.deleteLater()
-        for number, block in enumerate(self.blocks.values()):
-            if number:
-                rule = Rule()
-                rule.apply_theme(self.theme)
-                self._column.addWidget(rule)
-            self._column.addWidget(block)
-        self._column.addStretch()
+        for rule in self._rules:
+            self._column.removeWidget(rule)
+            rule.hide()
+            rule.deleteLater()
+        for block in self.blocks.values():
+            self._column.removeWidget(block)
+        self._rules = [Rule() for _ in list(self.blocks)[1:]]
+        for rule in self._rules:
+            rule.apply_theme(self.theme)
+        parts = [part for pair in zip(self.blocks.values(), self._rules, strict=False) for part in pair]
+        for at, part in enumerate([*parts, *list(self.blocks.values())[-1:]]):
+            self._column.insertWidget(at, part)
 
     def _order(self) -> None:
         """Let Tab go from top to bottom."""

@@ -16,6 +16,7 @@ from study_app.gui.display.screens import ScreenShown
 from study_app.gui.settings.display_offset import OffsetForm
 from study_app.gui.settings.measured_number import LEAST_WORDS, Measure
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
+from study_app.gui.theme.themed import remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Rule
 from study_app.gui.widgets.controls import ActionButton, Choice, Radio, Toggle
@@ -44,6 +45,7 @@ class ScreensCard(Card):
         self.identify.clicked.connect(self.identify_asked)
         self.test.clicked.connect(self.test_asked)
         self._rows = vbox(spacing=8)
+        self._lines: list[QWidget] = []
         self._group: QButtonGroup | None = None
         self._shown: tuple[ScreenShown, ...] = ()
         buttons = hbox(self.identify, self.test, STRETCH, spacing=12)
@@ -60,20 +62,17 @@ class ScreensCard(Card):
 
     def _make(self, screens: tuple[ScreenShown, ...]) -> None:
         self._shown = screens
-        while self._rows.count():
-            old = self._rows.takeAt(0).widget()
-            old.hide()
-            old.deleteLater()
+        for old in self._lines:
+            remove_widget(old)
         self._group = QButtonGroup(self)
-        self.radios = []
+        self.radios, self._lines = [], []
         for screen in screens:
             row, radio = _screen_row(screen)
             self.radios.append(radio)
             self._group.addButton(radio)
             radio.clicked.connect(lambda _checked=False, screen=screen: self.chosen.emit(screen))
-            if self._rows.count():
-                self._rows.addWidget(Rule())
-            self._rows.addWidget(row)
+            self._lines += [Rule(), row] if self._lines else [row]
+        add_parts(self._rows, *self._lines)
 
 
 def _screen_row(screen: ScreenShown) -> tuple[QWidget, Radio]:

@@ -29,7 +29,8 @@ class Card(Themed, QWidget):
         self.column = vbox(spacing=gap, margins=(inside, above, inside, above), parent=self)
         if title:
             self.heading = label(title, "card")
-            self.column.addLayout(hbox(self.heading, STRETCH, *([] if aside is None else [aside])))
+            self.title_row = hbox(self.heading, STRETCH, *([] if aside is None else [aside]))
+            self.column.addLayout(self.title_row)
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the surface, its edge and, in light, a shadow of at most 6 % black."""

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QEvent, Signal
 from PySide6.QtGui import QHideEvent
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from study_app.gui.designer.measures.parts import Made, part_of
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
-from study_app.gui.widgets.boxes import hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 
 
 class CardGrid(Themed, QWidget):
@@ -25,7 +25,8 @@ class CardGrid(Themed, QWidget):
         super().__init__()
         self.cards: tuple[object, ...] = ()
         self.parts: list[Made] = []
-        self.grid = vbox(spacing=8, margins=0, parent=self)
+        self.grid = vbox((STRETCH, 1), spacing=8, margins=0, parent=self)
+        self._rows: list[QHBoxLayout] = []
 
     def show_cards(self, cards: tuple[object, ...]) -> None:
         """Show other cards."""
@@ -38,14 +39,17 @@ class CardGrid(Themed, QWidget):
         for at, part in enumerate(self.parts):
             if at not in kept:
                 remove_widget(part)
-        while self.grid.count():
-            self.grid.takeAt(0)
+        for row in self._rows:
+            for part in kept.values():
+                row.removeWidget(part)
+            self.grid.removeItem(row)
+            row.deleteLater()
         self.parts = []
         for at, card in enumerate(cards):
             self.parts.append(kept[at] if at in kept else self._made(card))
-        for some in _rows(self.parts):
-            self.grid.addLayout(hbox(*((part, 1) for part in some), spacing=8))
-        self.grid.addStretch(1)
+        self._rows = [hbox(*((part, 1) for part in some), spacing=8) for some in _rows(self.parts)]
+        for at, row in enumerate(self._rows):
+            self.grid.insertLayout(at, row)
         self.cards = cards
         for part, (height, title) in zip(self.parts, heights, strict=False):
             part.setMinimumHeight(height if title == part.accessibleName() else 0)

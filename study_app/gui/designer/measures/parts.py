@@ -157,15 +157,15 @@ class Made(Card):
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Put what is beside the title below it where it would be cut."""
         super().resizeEvent(event)
-        margins, head = self.column.contentsMargins(), self.column.itemAt(0).layout()
-        needed = self.heading.sizeHint().width() + self.aside.sizeHint().width() + 2 * head.spacing()
+        margins = self.column.contentsMargins()
+        needed = self.heading.sizeHint().width() + self.aside.sizeHint().width() + 2 * self.title_row.spacing()
         beside = needed <= self.width() - margins.left() - margins.right()
         if beside != self._beside:
             self._beside = beside
             side = Qt.AlignmentFlag.AlignRight if beside else Qt.AlignmentFlag.AlignLeft
             self.aside.setAlignment(side | Qt.AlignmentFlag.AlignVCenter)
             if beside:
-                head.addWidget(self.aside)
+                self.title_row.addWidget(self.aside)
             else:
                 self.column.insertWidget(1, self.aside)
 
