@@ -177,6 +177,7 @@ class DesignerController(QObject):
         self.place.close_new()
         self.show()
         self.show_outline()
+        self.place.areas.focus_element()
 
     # steps that ask first
 

@@ -155,6 +155,7 @@ class DesignerPlace(Place):
         self.elements.selected.connect(self._select)
         self.problem_steps.selected.connect(self._select)
         self.problem_steps.repair_asked.connect(self._ask_for_repair)
+        self.problems.close_asked.connect(self.areas.return_keyboard)  # first, else Qt hands it to the page
         self.problems.close_asked.connect(self.problems.hide)
         self.new_page.begin_asked.connect(self.begin_asked)
         self.new_page.given_up.connect(self.close_new)

@@ -103,3 +103,10 @@ def test_the_first_line_is_marked_where_no_study_is_open(qtbot: Any, designer: A
     qtbot.keyClick(box.view(), Qt.Key.Key_Return)
     QApplication.processEvents()
     assert designer.editing.opened.name == "kitchen"
+
+
+def test_another_study_has_the_keyboard_at_its_selected_element(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.place.header.play.setFocus()
+    designer.controller.open("rek2024")
+    assert designer.place.outline.tree.hasFocus(), "not at a button that would start a session"

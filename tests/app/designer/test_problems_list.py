@@ -165,3 +165,14 @@ def test_the_name_of_a_problem_is_in_the_colour_of_text(qtbot: Any, theme: Theme
     picture = line.go.grab().toImage()
     inks = {picture.pixelColor(x, y).name() for x in range(picture.width()) for y in range(picture.height())}
     assert QColor(theme.text).name() in inks
+
+
+def test_closing_the_list_returns_the_keyboard_to_where_it_was(qtbot: Any, designer: Any) -> None:
+    designer.file.write_text(designer.file.read_text().replace("max_s = 30", "max_s = 3"))
+    designer.controller.open("kitchen")
+    designer.select(("tasks", "explore"))
+    field = designer.row("tasks", "explore", "min_s").field.line
+    field.setFocus()
+    designer.place.areas.focus_problems()
+    qtbot.mouseClick(designer.place.problems.close_button, Qt.MouseButton.LeftButton)
+    assert field.hasFocus()
