@@ -79,9 +79,9 @@ class Expected:
     standards : int
         How many standards the group's mean is over.
     half : float
-        Half the 95 % interval of one participant, in u.
+        Half the 95 % interval of one participant, in u; infinite where nothing is measured.
     spread : float
-        Standard deviation of the estimate's error, in u.
+        Standard deviation of the estimate's error, in u; infinite where nothing is measured.
     threshold : float
         About where the thresholds lie, as a level; or the d′, d_a or exponent that is assumed.
     """
@@ -92,6 +92,11 @@ class Expected:
     half: float
     spread: float
     threshold: float
+
+    @property
+    def measured(self) -> bool:
+        """Whether there are estimates: levels are not clipped."""
+        return math.isfinite(self.half)
 
     @property
     def factor(self) -> float | None:

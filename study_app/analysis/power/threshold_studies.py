@@ -51,7 +51,8 @@ class Found:
         Of each study the errors of the participants' thresholds, (people, standards), in natural logarithms; as shares
         of the threshold on linear spacing, of the mean d′, d_a or exponent.
     halves : list of array
-        Of each study half the group's 95 % interval as a share of the mean, (sizes,); NaN below three participants.
+        Of each study half the group's 95 % interval as a share of the mean, (sizes,); NaN below three participants,
+        infinite where limits clip the levels above the mean threshold.
     """
 
     errors: list[Array] = field(default_factory=list)
@@ -59,8 +60,9 @@ class Found:
 
     @property
     def spread(self) -> float:
-        """The standard deviation of one participant's error at one standard."""
-        return float(np.std(np.concatenate([one.ravel() for one in self.errors])))
+        """The standard deviation of one participant's error at one standard; infinite where nothing is measured."""
+        errors = np.concatenate([one.ravel() for one in self.errors])
+        return float(np.std(errors[np.isfinite(errors)])) if np.isfinite(errors).any() else math.inf
 
     def half(self, place: int) -> float:
         """Return the median of half the group's interval at one of the sizes."""
@@ -114,17 +116,22 @@ def study_batch(case: Case, sizes: Sequence[int]) -> Found:
     medians, variances = _estimates(plan, truth, rng)
     errors = (medians - truth) * (math.log(10) if log else 1 / truth)
     found, shape = Found(), (BATCH, people, plan.standards)
-    for one, median, variance in zip(*(it.reshape(shape) for it in (errors, medians, variances)), strict=True):
+    full = plan.measures(means)
+    for one, median, variance, measured in zip(
+        *(it.reshape(shape) for it in (errors, medians, variances)), full.ravel().tolist(), strict=True
+    ):
         of_people, of_variances = median.mean(axis=1), variance.sum(axis=1) / plan.standards**2
         halves = []
         for n in sizes:
             group = group_mean(of_people[:n].tolist(), of_variances[:n].tolist()) if n >= FEWEST else None
             if group is None or group.low is None or group.high is None:
                 halves.append(math.nan)
+            elif not measured:
+                halves.append(math.inf)
             else:
                 half = (group.high - group.low) / 2
                 halves.append(10.0**half - 1 if log else half / abs(group.mean))
-        found.errors.append(one)
+        found.errors.append(one if measured else np.full_like(one, math.inf))
         found.halves.append(np.array(halves))
     return found
 

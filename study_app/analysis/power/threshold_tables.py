@@ -29,11 +29,11 @@ COLUMNS: Final = (
     ),
     Column("participants", "integer", "Participants of each study.", minimum=2),
     Column("studies", "integer", "Simulated studies.", minimum=1),
-    Column(
+    optional(
         "spread",
         "number",
         "Standard deviation of the logarithm of one participant's threshold; of d′, d_a and exponents, as a share of "
-        "them.",
+        "them; empty where limits clip the levels.",
         minimum=0,
     ),
     optional(
@@ -90,8 +90,8 @@ def _rows(all_of_it: Precisions) -> Iterator[dict[str, Any]]:
                 "trials": trials,
                 "participants": size,
                 "studies": all_of_it.studies,
-                "spread": round(found.spread, 4),
-                "half_interval": None if math.isnan(half) else round(half, 4),
+                "spread": round(found.spread, 4) if math.isfinite(found.spread) else None,
+                "half_interval": round(half, 4) if math.isfinite(half) else None,
                 "precision": precision,
                 "within": None if within is None else round(within, 4),
                 "within_low": None if low is None else round(low, 4),
@@ -125,7 +125,8 @@ def threshold_markdown(precisions: Precisions) -> str:
             for place, size in enumerate(precisions.sizes):
                 half = found.half(place)
                 share = "–" if math.isnan(half) else f"{found.within(place, precision or 0.0):.0%}"
-                cells = (str(trials), str(size), f"{found.spread:.0%}", "–" if math.isnan(half) else f"±{half:.0%}")
+                spread = f"{found.spread:.0%}" if math.isfinite(found.spread) else "–"
+                cells = (str(trials), str(size), spread, f"±{half:.0%}" if math.isfinite(half) else "–")
                 lines.append(f"| {' | '.join((*cells, *([share] if wanted else [])))} |")
     return "\n".join(lines) + "\n"
 

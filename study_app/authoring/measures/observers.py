@@ -78,7 +78,7 @@ class Observed:
     one : tuple of Asked
         The trials of the first observer.
     error : float
-        Standard deviation of the estimates as a share of the threshold.
+        Standard deviation of the estimates as a share of the threshold; infinite where limits clip the levels above it.
     trials : int
         Comparisons of each standard, at most.
     """
@@ -156,7 +156,7 @@ def observe(plan: ThresholdPlan, threshold: float, lapses: float, watch: Watch =
         _asked(plan, np.concatenate(presented)),
         course or (),
         tuple(_one(plan, first)),
-        float(np.std(errors)),
+        float(np.std(errors)) if plan.measures(np.array(u)) else math.inf,
         plan.trials,
     )
 

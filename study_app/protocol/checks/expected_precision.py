@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -19,7 +20,9 @@ from study_app.protocol.trials.stimuli import Stimulus
 from study_app.protocol.trials.tracks import design_of, method_of, standards_of, stimulus_of, tracks_of
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.random import Generator
+    from numpy.typing import NDArray
 
     from study_app.psychophysics.families import Floats
     from study_app.psychophysics.precision import Estimates, Expected
@@ -99,6 +102,15 @@ class ThresholdPlan:
         changed = {"trials": each * method.tracks} if method.adaptive else {"repetitions": each}
         catch = round(self.catch * each / max(1, self.trials // least))
         return replace(self, method=method.model_copy(update=changed), catch=catch)
+
+    def measures(self, thresholds: Floats) -> NDArray[np.bool_]:
+        """Return which thresholds [u] are below the highest level that is presented in full; no other is measured."""
+        return thresholds < self.stimulus.coordinate(self.highest)
+
+    @property
+    def highest(self) -> float:
+        """The highest level that is presented in full."""
+        return math.inf if self.clipping is None else self.clipping.highest(self.stimulus)
 
     def presented(self, levels: Floats) -> Floats:
         """Return levels as they are presented, both in u."""
@@ -208,7 +220,11 @@ def threshold_plan(protocol: Protocol, block: Block) -> ThresholdPlan | None:
 
 @lru_cache(maxsize=32)
 def expected(plan: ThresholdPlan) -> Expected | None:
-    """Return how precise thresholds are expected to be; None where the method's tracks are not simulated."""
+    """Return how precise thresholds are expected to be; None where the method's tracks are not simulated.
+
+    Only thresholds below the highest level that is presented in full have estimates; where those are not the larger
+    half of all, none is expected.
+    """
     import numpy as np  # noqa: PLC0415
 
     from study_app.psychophysics.precision import Expected  # noqa: PLC0415
@@ -218,13 +234,15 @@ def expected(plan: ThresholdPlan) -> Expected | None:
     found = simulated.simulate(truth, np.random.default_rng(SEED))
     if found is None:
         return None
-    shrunk = (simulated.trials / plan.trials) ** 0.5
+    shrunk, full = (simulated.trials / plan.trials) ** 0.5, plan.measures(truth)
+    if full.mean() <= 0.5:
+        shrunk, full = math.inf, np.ones(observers, bool)
     return Expected(
         spacing=plan.stimulus.spacing,
         trials=plan.trials,
         standards=plan.standards,
-        half=shrunk * float((found.highs - found.lows).mean()) / 2,
-        spread=shrunk * float((found.medians - truth).std()),
+        half=shrunk * float((found.highs - found.lows)[full].mean()) / 2,
+        spread=shrunk * float((found.medians - truth)[full].std()),
         threshold=plan.stimulus.level_of(float(np.median(truth))),
     )
 
@@ -255,6 +273,9 @@ def precision_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]
     found = None if plan is None else expected_of(plan)
     if plan is None or found is None:
         return
+    if not found.measured:
+        yield "Expected precision", "none: the levels of most thresholds are clipped"
+        return
     unit, words = "", ""
     if not isinstance(plan, ThresholdPlan):
         words = plan.words
@@ -275,6 +296,13 @@ def imprecise(protocol: Protocol, block: Block) -> Iterator[str]:
     """Yield that the planned participants and trials do not reach the planned precision."""
     plan, (people, precision) = precision_plan(protocol, block), _planned(protocol)
     if plan is None or people is None or precision is None or (found := expected_of(plan)) is None:
+        return
+    if isinstance(plan, ThresholdPlan) and not found.measured:
+        what = "the standard is" if plan.highest <= 0 else f"levels above {plan.highest:.3g} are"
+        yield (
+            f"stimuli.{block.stimulus}.levels: ±{100 * precision:g} % cannot be measured at a threshold of "
+            f"{found.threshold:.2g}: {what} clipped"
+        )
         return
     if (reached := found.of_group(people)) <= precision:
         return

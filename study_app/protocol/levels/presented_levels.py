@@ -98,9 +98,9 @@ class Clipping:
     paced: bool
 
     def highest(self, stimulus: Stimulus) -> float:
-        """Return the highest level that is presented in full; infinite where higher levels have less force."""
+        """Return the highest level that is presented in full; infinite where higher ones have less force."""
         if self.standard is not None and stimulus.level_kind != "value" and stimulus.direction == "down":
-            return math.inf
+            return 0.0 if self.standard > self.limit else math.inf
         return stimulus.level_between(self.standard, self.limit)
 
     def presented(self, stimulus: Stimulus, levels: Floats) -> Floats:

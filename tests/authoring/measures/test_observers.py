@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from study_app.analysis.power.threshold_studies import Case, study_batch
 from study_app.app.designer.measures.measures_worker import Measuring
 from study_app.app.designer.measures.wanted import wanted_of
 from study_app.authoring.measures.observers import OBSERVERS, PLANTED, GivenUp, Planted, _longest, measurable, observe
@@ -104,6 +106,23 @@ def test_clipped_levels_make_the_error_larger() -> None:
     assert found[1] is not None
     assert found[0].error > 1.2 * found[1].error
     assert max(found[0].planted) < found[0].at_threshold + 0.05 < max(found[1].planted)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("standard", [52, 60])
+def test_a_threshold_whose_levels_are_clipped_has_no_error_and_no_precision(standard: float) -> None:
+    plan = plan_of(24, Set(("stimuli", "damping", "standards"), [standard]))
+    observed, known = observe(plan, 0.19, 0.02), expected(plan)
+    assert observed is not None
+    assert known is not None
+    assert math.isinf(observed.error)
+    assert not known.measured
+    assert (known.participants_for(0.15), known.trials_for(0.15, 12)) == (None, None)
+    found = study_batch(Case("viscosity", plan, (1,)), (12,))
+    assert found.within(0, 100.0) == 0.0
+    assert math.isinf(found.spread)
+    full = study_batch(Case("viscosity", replace(plan, clipping=None), (1,)), (12,))
+    assert full.within(0, 100.0) == 1.0
 
 
 @pytest.mark.slow

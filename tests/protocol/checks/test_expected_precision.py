@@ -5,9 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from study_app.protocol.checks.expected_precision import ThresholdPlan, expected, imprecise, threshold_plan
+from study_app.protocol.checks.expected_precision import (
+    ThresholdPlan,
+    expected,
+    imprecise,
+    precision_rows,
+    threshold_plan,
+)
 from study_app.protocol.describe import describe
-from study_app.protocol.load import load, parse
+from study_app.protocol.load import examined, load, parse, read_document
 
 TEXT = """
 format = 2
@@ -120,6 +126,21 @@ def test_too_few_trials_for_the_planned_precision_are_a_warning():
     assert sentence in describe(short)
     enough = study('kind = "questplus", trials = 120', PLANNED)
     assert not list(imprecise(enough, enough.blocks["thicker"]))
+
+
+@pytest.mark.slow
+def test_where_limits_clip_the_levels_no_precision_is_expected():
+    for damping, what in ((60, "the standard is"), (52, "levels above 0.0192 are")):
+        text = TEXT.replace("damping_nspm = 8", f"damping_nspm = {damping}").replace("BLOCK", "")
+        text = text.replace("METHOD", 'kind = "questplus", trials = 20').replace("DESIGN", "2ifc") + PLANNED
+        clipped, faults = examined(read_document(text.encode(), "clipped.toml")[0])
+        assert faults
+        assert list(imprecise(clipped, clipped.blocks["thicker"])) == [
+            f"stimuli.damping.levels: ±15 % cannot be measured at a threshold of 0.11: {what} clipped"
+        ]
+        assert dict(precision_rows(clipped, clipped.blocks["thicker"])) == {
+            "Expected precision": "none: the levels of most thresholds are clipped"
+        }
 
 
 @pytest.mark.slow

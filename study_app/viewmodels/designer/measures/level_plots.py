@@ -46,6 +46,7 @@ from study_app.viewmodels.designer.problem_rows import ProblemRow
 from study_app.viewmodels.number_words import duration_figure
 
 MOST_LABELS: Final = 9
+CLIPPED: Final[Verdict] = ("bad", "warning", "levels are clipped")
 AS_ASKED: Final = "Clipped levels are simulated as they are requested"
 
 
@@ -112,6 +113,11 @@ class LevelBlock:
         if self.limits is None or not math.isfinite(level):
             return None
         return self.words.at(level), "norm" if self.limits.force == self.limits.lowest else "slope"
+
+    def measures(self, threshold: float) -> bool:
+        """Return whether a threshold is below the highest level that observers answer to in full."""
+        paced = self.clipping is not None and self.clipping.paced
+        return not paced or self.clipping is None or threshold < self.clipping.highest(self.words.stimulus)
 
     @property
     def as_asked(self) -> str:
@@ -194,6 +200,8 @@ def _one_person(of: LevelBlock, simulated: Simulated) -> NumberCard:
     found = simulated.observed
     if found is None:
         return _unknown("One person", "%", simulated, "observed")
+    if not of.measures(found.threshold):
+        return NumberCard("One person", UNKNOWN, "%", CLIPPED, simulated.progress.get("observed", ""), of.clipped_words)
     note: Verdict = ("neutral", "people", f"at a {of.words.name} of {of.words.words(found.threshold)}")
     return NumberCard(
         "One person", f"± {100 * found.error:.0f}", "%", note, simulated.progress.get("observed", ""), of.as_asked
@@ -206,6 +214,10 @@ def _people(of: LevelBlock, simulated: Simulated, participants: int, *, warned: 
         title = f"{people(participants, simulated.planned)} in ± {100 * simulated.precision:g} %"
         return _unknown(title, "% of studies", simulated, "group")
     title = f"{people(found.participants, simulated.planned)} in ± {100 * found.precision:g} %"
+    if not of.measures(simulated.threshold):
+        return NumberCard(
+            title, UNKNOWN, "% of studies", CLIPPED, simulated.progress.get("group", ""), of.clipped_words
+        )
     enough = found.share >= ENOUGH
     note: Verdict = ("ok", "check", "Enough") if enough else ("warn", "warning", "Not enough")
     many = f"more than {found.most}" if found.enough is None else f"about {found.enough}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from study_app.authoring.edited_study import Study, read
-from study_app.authoring.measures.observers import Measurable
+from study_app.authoring.measures.observers import Measurable, Observed
 from study_app.authoring.measures.planned import Detectable, Finding, GroupPrecision
 from study_app.authoring.new_study import template
 from study_app.authoring.study_facts import facts
@@ -182,6 +182,31 @@ def test_cards_say_which_levels_are_clipped_and_whether_that_is_simulated() -> N
         assert own is not None
         assert own.warning == ""  # it presents no clipped level
         assert people.more == f"80 % are enough; with 107 trials: 100 %{group}"
+
+
+@pytest.mark.parametrize(
+    ("standard", "threshold", "clipped", "which"),
+    [
+        (60, 0.19, True, "The standard is"),
+        (52, 0.19, True, "Levels above 1.92 % are"),
+        (32, 0.19, False, ""),
+        (52, 0.019, False, ""),
+    ],
+)
+def test_a_threshold_whose_levels_are_clipped_has_no_numbers(
+    standard: float, threshold: float, clipped: bool, which: str
+) -> None:
+    study, _ = template("viscosity-jnd").edited(Set(("stimuli", "damping", "standards"), [standard]))
+    observed = Observed(threshold, 0.02, 400, 0.75, (0.1,), (0.7,), ((0.7,),), (), ((1, (0.1,) * 5),), (), 0.03, 80)
+    group = GroupPrecision(12, 60, 0.15, 80, 1.0, 107, 1.0, 60, 12)
+    slow = SlowResults(simulated=Simulated(observed, group=group, threshold=threshold))
+    _, one, people, _ = view(study, ("blocks", "viscosity"), slow).numbers
+    if not clipped:
+        assert (one.number, people.note[2]) == ("± 3", "Enough")
+        return
+    for card in (one, people):
+        assert (card.number, card.note) == (UNKNOWN, ("bad", "warning", "levels are clipped"))
+        assert card.more == f"{which} clipped: observers are simulated with what the limits leave"
 
 
 def test_ticks_are_round_and_few() -> None:
