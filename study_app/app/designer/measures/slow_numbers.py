@@ -138,9 +138,9 @@ class SlowNumbers(QObject):
         """Give up the number that was computed, and order those after it."""
         log.info("slow numbers failed: %s", sentence)
         self._counted = None
-        failed, *others = self._open()
-        self._failed[failed] = sentence
-        if others:
+        if wanted := self._open():  # the process may end after its last answer
+            self._failed[wanted[0]] = sentence
+        if wanted[1:]:
             self.rest.start()
 
     def _keep(self, wanted: Wanted, found: Found) -> None:

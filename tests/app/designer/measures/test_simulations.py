@@ -109,6 +109,19 @@ def test_a_card_says_how_far_its_simulations_are_and_that_one_crashed(
     assert people.note.text() == ANEW  # another study, another try
 
 
+def test_a_process_that_ends_after_its_last_answer_makes_no_number_fail(
+    qtbot: Any, designer: Any, worker: Worker
+) -> None:
+    jnd(designer)
+    qtbot.waitUntil(lambda: bool(worker.orders))
+    worker.answer()
+    worker.given[-1] = (1, Crashed(1))
+    shown(qtbot, designer, 2, "93")
+    slow = designer.controller.measures.slow
+    assert not slow.waits
+    assert not any(slow.failure(one) for one in worker.orders[0].wanted)
+
+
 def test_without_a_process_the_other_numbers_stay(qtbot: Any, designer: Any) -> None:
     designer.controller.measures.slow.rest.setInterval(10)
     jnd(designer)
