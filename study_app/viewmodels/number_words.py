@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 THIN_SPACE = "\u2009"
 
 
@@ -15,10 +17,10 @@ def minutes(seconds: float) -> str:
 
 
 def duration(seconds: float, *, tenths: bool = False) -> str:
-    """Return how long something takes: "45 s", "10 min", "1 h 05 min"; with ``tenths`` "0.6 s" below a minute."""
-    if round(seconds) < 60:
-        return f"{seconds:.3g} s" if tenths else f"{max(0, round(seconds))} s"
-    hours, rest = divmod(round(seconds / 60), 60)
+    """Return about how long something takes: "45 s", "10 min", "1 h 05 min"; with ``tenths`` "0.6 s" below a minute."""
+    if (whole := math.floor(seconds + 0.5)) < 60:
+        return f"{seconds:.3g} s" if tenths else f"{max(0, whole)} s"
+    hours, rest = divmod(math.floor(seconds / 60 + 0.5), 60)
     return f"{hours} h {rest:02d} min" if hours else f"{rest} min"
 
 
@@ -26,6 +28,17 @@ def duration_figure(seconds: float) -> tuple[str, str]:
     """Return a duration as its number and its unit: ("10", "min"), ("1 h 05", "min")."""
     number, unit = duration(seconds).rsplit(" ", 1)
     return number, unit
+
+
+def exact_duration(least_s: float, most_s: float) -> str:
+    """Return durations of the file as they are written there: "20 to 90 s", "2.5 s"; whole minutes as "2 min"."""
+    (least, least_unit), (most, unit) = (
+        (f"{one / 60:g}", "min") if one and one % 60 == most_s % 60 == 0 else (f"{one:.12g}", "s")
+        for one in (least_s, most_s)
+    )
+    if least_s == most_s:
+        return f"{most} {unit}"
+    return f"{least} to {most} {unit}" if least_unit == unit else f"{least} {least_unit} to {most} {unit}"
 
 
 def duration_range(least_s: float, most_s: float) -> str:

@@ -317,7 +317,16 @@ def test_times_and_numbers_read_as_people_write_them():
 
 @pytest.mark.parametrize(
     ("seconds", "words"),
-    [(0.4, "0 s"), (45.2, "45 s"), (59.6, "1 min"), (612, "10 min"), (3599, "1 h 00 min"), (3900, "1 h 05 min")],
+    [
+        (0.4, "0 s"),
+        (2.5, "3 s"),
+        (45.2, "45 s"),
+        (59.6, "1 min"),
+        (150, "3 min"),
+        (612, "10 min"),
+        (3599, "1 h 00 min"),
+        (3900, "1 h 05 min"),
+    ],
 )
 def test_a_duration_is_written_in_one_way(seconds: float, words: str) -> None:
     assert duration(seconds) == words
@@ -332,7 +341,7 @@ def test_a_range_of_durations_names_a_common_unit_once() -> None:
     assert duration_range(900, 1920) == "15 to 32 min"
     assert duration_range(3300, 4200) == "55 min to 1 h 10 min"
     assert duration_range(3700, 7500) == "1 h 02 min to 2 h 05 min"
-    assert duration_range(30, 150) == "30 s to 2 min"
+    assert duration_range(30, 150) == "30 s to 3 min"
     assert grouped(45918) == "45\u2009918"
     assert duration_words(62e-6) == "62 µs"
     assert duration_words(1.4e-3) == "1.4 ms"

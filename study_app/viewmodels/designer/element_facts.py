@@ -12,7 +12,7 @@ from study_app.authoring.names import ITEMS, references_to
 from study_app.authoring.outline import title_of
 from study_app.number_text import counted
 from study_app.protocol.source.document import Path, value_at
-from study_app.viewmodels.number_words import duration_range
+from study_app.viewmodels.number_words import exact_duration
 
 USED: Final = frozenset({"liquids", "conditions", "tasks", "questionnaires", "scales", "stimuli", "designs", "methods"})
 """Sections whose elements other elements use; pages and blocks are steps of the session."""
@@ -57,7 +57,7 @@ def brief(document: Mapping[str, Any], path: Path) -> str:
     numbers = {key: one for key, one in value.items() if isinstance(one, int | float)}
     for least, most in (("min_s", "max_s"), ("duration_s", "duration_s")):
         if least in numbers and most in numbers:
-            return duration_range(numbers[least], numbers[most])
+            return exact_duration(numbers[least], numbers[most])
     return f"{numbers['count']:g} targets" if "count" in numbers else ""
 
 

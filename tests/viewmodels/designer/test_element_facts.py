@@ -20,7 +20,14 @@ REACH = {"kind": "reach", "count": 12}
 @pytest.mark.parametrize(
     ("section", "table", "words"),
     [
-        ("tasks", {"min_s": 30, "max_s": 120.5}, "30 s to 2 min"),
+        ("tasks", {"min_s": 30, "max_s": 120.5}, "30 to 120.5 s"),
+        ("tasks", {"min_s": 20, "max_s": 90}, "20 to 90 s"),
+        ("tasks", {"min_s": 60, "max_s": 120}, "1 to 2 min"),
+        ("tasks", {"min_s": 30, "max_s": 120}, "30 s to 2 min"),
+        ("tasks", {"min_s": 60, "max_s": 90}, "60 to 90 s"),
+        ("tasks", {"duration_s": 2.5}, "2.5 s"),
+        ("tasks", {"duration_s": 0.4}, "0.4 s"),
+        ("tasks", {"duration_s": 90}, "90 s"),
         ("tasks", {"duration_s": 30, "timeout_s": 60}, "30 s"),
         ("tasks", REACH, "12 targets"),
         ("tasks", {"min_s": "soon", "max_s": 60}, ""),

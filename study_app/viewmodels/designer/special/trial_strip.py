@@ -15,7 +15,7 @@ from study_app.protocol.trials.methods.adjustment import Adjustment
 from study_app.protocol.trials.task import AnyTask
 from study_app.protocol.trials.tracks import design_of, method_of
 from study_app.viewmodels.designer.form.row_facts import RowFacts
-from study_app.viewmodels.number_words import duration
+from study_app.viewmodels.number_words import duration, exact_duration
 
 PhaseKind: TypeAlias = Literal["interval", "pause", "question", "feedback"]
 
@@ -53,7 +53,9 @@ class Phase:
     @property
     def duration(self) -> str:
         """The duration in words."""
-        return f"{'about ' if self.about else ''}{duration(self.duration_s, tenths=True)}"
+        exact = not self.about and bool(self.field) and str(self.field[-1]).endswith("_s")
+        found = exact_duration(self.duration_s, self.duration_s) if exact else duration(self.duration_s, tenths=True)
+        return f"{'about ' if self.about else ''}{found}"
 
 
 @dataclass(frozen=True, slots=True)

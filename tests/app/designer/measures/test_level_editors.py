@@ -130,6 +130,16 @@ def test_a_trial_takes_as_long_as_check_says(name: str, block: str) -> None:
     assert None not in rows_of.values()
 
 
+@pytest.mark.parametrize(("between_s", "words"), [(20.25, "20.25 s"), (0.4, "0.4 s")])
+def test_a_pause_of_the_file_is_written_exactly(between_s: float, words: str) -> None:
+    study, _ = template("viscosity-jnd").edited(Set(("designs", "pair", "between_s"), between_s))
+    row = row_at(study.document, ("blocks", "viscosity", "design"))
+    assert row is not None
+    strip = trial_strip(study, row)
+    assert strip is not None
+    assert strip.phases[-1].duration == words
+
+
 @pytest.mark.slow
 def test_each_phase_of_a_trial_leads_to_its_field(qtbot: Any, designer: Any) -> None:
     designer.controller.begin("template:viscosity-jnd", "thicker")
