@@ -112,14 +112,18 @@ def study_batch(case: Case, sizes: Sequence[int]) -> Found:
     apart = math.log(BETWEEN_PEOPLE) * rng.standard_normal((BATCH, people, 1))
     log = plan.stimulus.spacing == "log"
     own = means + apart / math.log(10) if log else means * np.exp(apart)
-    truth = np.broadcast_to(own, (BATCH, people, plan.standards)).reshape(-1)
-    medians, variances = _estimates(plan, truth, rng)
+    shape = (BATCH, people, plan.standards)
+    each, truth = plan.each_standard(), np.broadcast_to(own, shape)
+    parts = [
+        _estimates(one, part.reshape(-1), rng) for one, part in zip(each, np.split(truth, len(each), 2), strict=True)
+    ]
+    medians, variances = (
+        np.concatenate([one.reshape(BATCH, people, -1) for one in it], 2) for it in zip(*parts, strict=True)
+    )
     errors = (medians - truth) * (math.log(10) if log else 1 / truth)
-    found, shape = Found(), (BATCH, people, plan.standards)
+    found = Found()
     full = plan.measures(means)
-    for one, median, variance, measured in zip(
-        *(it.reshape(shape) for it in (errors, medians, variances)), full.ravel().tolist(), strict=True
-    ):
+    for one, median, variance, measured in zip(errors, medians, variances, full.ravel().tolist(), strict=True):
         of_people, of_variances = median.mean(axis=1), variance.sum(axis=1) / plan.standards**2
         halves = []
         for n in sizes:

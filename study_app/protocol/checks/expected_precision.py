@@ -77,7 +77,7 @@ class ThresholdPlan:
     standards : int
         How many standards the block has.
     clipping : Clipping or None
-        How limits clip the levels that observers answer to; None: they are presented in full.
+        How limits clip the levels of the highest standard that observers answer to; None: they are presented in full.
     """
 
     stimulus: Stimulus
@@ -102,6 +102,14 @@ class ThresholdPlan:
         changed = {"trials": each * method.tracks} if method.adaptive else {"repetitions": each}
         catch = round(self.catch * each / max(1, self.trials // least))
         return replace(self, method=method.model_copy(update=changed), catch=catch)
+
+    def each_standard(self) -> tuple[ThresholdPlan, ...]:
+        """Return the plan of each standard, the highest first, as limits clip it; this one where all are alike."""
+        own = self.clipping
+        if own is None or not own.others:
+            return (self,)
+        of_others = (replace(own, standard=one) for one in own.others)
+        return tuple(replace(self, clipping=one) for one in (own, *of_others))
 
     def measures(self, thresholds: Floats) -> NDArray[np.bool_]:
         """Return which thresholds [u] are below the highest level that is presented in full; no other is measured."""
@@ -231,18 +239,21 @@ def expected(plan: ThresholdPlan) -> Expected | None:
 
     simulated, observers = _affordable(plan)
     truth = plan.middle_half(observers)
-    found = simulated.simulate(truth, np.random.default_rng(SEED))
-    if found is None:
-        return None
-    shrunk, full = (simulated.trials / plan.trials) ** 0.5, plan.measures(truth)
-    if full.mean() <= 0.5:
-        shrunk, full = math.inf, np.ones(observers, bool)
+    halves, variances = [], []
+    for one in simulated.each_standard():
+        found = one.simulate(truth, np.random.default_rng(SEED))
+        if found is None:
+            return None
+        full = one.measures(truth)
+        halves.append(float((found.highs - found.lows)[full].mean()) / 2 if full.mean() > 0.5 else math.inf)
+        variances.append(float((found.medians - truth)[full].var()) if full.mean() > 0.5 else math.inf)
+    shrunk = (simulated.trials / plan.trials) ** 0.5
     return Expected(
         spacing=plan.stimulus.spacing,
         trials=plan.trials,
         standards=plan.standards,
-        half=shrunk * float((found.highs - found.lows)[full].mean()) / 2,
-        spread=shrunk * float((found.medians - truth)[full].std()),
+        half=shrunk * sum(halves) / len(halves),
+        spread=shrunk * (sum(variances) / len(variances)) ** 0.5,
         threshold=plan.stimulus.level_of(float(np.median(truth))),
     )
 
@@ -298,7 +309,10 @@ def imprecise(protocol: Protocol, block: Block) -> Iterator[str]:
     if plan is None or people is None or precision is None or (found := expected_of(plan)) is None:
         return
     if isinstance(plan, ThresholdPlan) and not found.measured:
-        what = "the standard is" if plan.highest <= 0 else f"levels above {plan.highest:.3g} are"
+        clips, named = plan.clipping, "" if plan.clipping is None else plan.clipping.named
+        what = f"levels above {plan.highest:.3g}{named and f' of standard{named}'} are"
+        if clips is not None and clips.clips_standard:
+            what = f"the standard{named} is"
         yield (
             f"stimuli.{block.stimulus}.levels: ±{100 * precision:g} % cannot be measured at a threshold of "
             f"{found.threshold:.2g}: {what} clipped"

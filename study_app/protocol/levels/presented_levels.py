@@ -81,7 +81,7 @@ class LevelLimits:
 
 @dataclass(frozen=True, slots=True)
 class Clipping:
-    """How limits clip what a block presents at its highest standard.
+    """How limits clip what a block presents at one standard.
 
     Attributes
     ----------
@@ -91,16 +91,29 @@ class Clipping:
         The value of the varied number that is presented instead of every higher one.
     paced : bool
         Whether the task sets the pace; otherwise levels are clipped in fast motions alone, whose trials are repeated.
+    others : tuple of float
+        The other standards of the block, which are lower.
     """
 
     standard: float | None
     limit: float
     paced: bool
+    others: tuple[float, ...] = ()
+
+    @property
+    def clips_standard(self) -> bool:
+        """Whether the standard itself is clipped."""
+        return self.standard is not None and self.standard > self.limit
+
+    @property
+    def named(self) -> str:
+        """The standard as one of several: " 52"; "" where there is no other."""
+        return f" {self.standard:g}" if self.others else ""
 
     def highest(self, stimulus: Stimulus) -> float:
         """Return the highest level that is presented in full; infinite where higher ones have less force."""
         if self.standard is not None and stimulus.level_kind != "value" and stimulus.direction == "down":
-            return 0.0 if self.standard > self.limit else math.inf
+            return 0.0 if self.clips_standard else math.inf
         return stimulus.level_between(self.standard, self.limit)
 
     def presented(self, stimulus: Stimulus, levels: Floats) -> Floats:
@@ -211,8 +224,8 @@ def clipping(protocol: Protocol, block: Block) -> Clipping | None:
     limits = level_limits(protocol, block)
     if limits is None or not limits.lowest:
         return None
-    standard = max((one for one in standards_of(protocol, block) if one is not None), default=None)
-    return Clipping(standard, limits.lowest, isinstance(protocol.tasks[block.task], Follow))
+    *others, standard = sorted(one for one in standards_of(protocol, block) if one is not None) or (None,)
+    return Clipping(standard, limits.lowest, isinstance(protocol.tasks[block.task], Follow), tuple(others))
 
 
 def hand_mps_of(protocol: Protocol, block: Block) -> float:

@@ -93,6 +93,8 @@ def test_no_clipped_level_is_a_threshold_that_can_be_measured() -> None:
         (wanted,) = [one for one in wanted_of(protocol, focus, Controls()) if isinstance(one, Measuring)]
         assert wanted.most == pytest.approx(most, rel=1e-4)
         assert (wanted.plan.clipping is None) == (changes is unpaced)  # fast motions are repeated, not answered
+    down = Set(("stimuli", "damping", "standards"), [60]), Set(("stimuli", "damping", "direction"), "down")
+    assert not plan_of(4, *down).measures(np.array(-1.0))  # the standard itself is clipped
     found = measurable(plan_of(4, *CLIPPED), 0.02, 0.02, most=0.03)
     assert found is not None
     assert [one.threshold for one in found.planted] == pytest.approx([0.02], rel=0.01)
@@ -123,6 +125,24 @@ def test_a_threshold_whose_levels_are_clipped_has_no_error_and_no_precision(stan
     assert math.isinf(found.spread)
     full = study_batch(Case("viscosity", replace(plan, clipping=None), (1,)), (12,))
     assert full.within(0, 100.0) == 1.0
+
+
+@pytest.mark.slow
+def test_each_standard_is_simulated_as_limits_clip_it() -> None:
+    plan = plan_of(24, Set(("stimuli", "damping", "standards"), [8, 32]), CLIPPED[1])
+    asked = np.log10([0.02, 0.6, 2.0])
+    high, low = (10.0 ** one.presented(asked) for one in plan.each_standard())
+    assert high.tolist() == pytest.approx([0.02, 0.6, FULL], rel=1e-6)
+    assert low.tolist() == pytest.approx([0.02, 0.6, 2.0])
+    assert plan.clipping is not None
+    all_as_the_highest = replace(plan, clipping=replace(plan.clipping, others=()))
+    own, same = expected(plan), expected(all_as_the_highest)
+    assert own is not None
+    assert same is not None
+    assert own.spread < 0.95 * same.spread
+    studies = (study_batch(Case("viscosity", one, (1,)), (20,)) for one in (plan, all_as_the_highest))
+    own_errors, same_errors = (np.concatenate(one.errors) for one in studies)
+    assert own_errors[:, 1].std() < 0.9 * same_errors[:, 1].std()
 
 
 @pytest.mark.slow

@@ -130,8 +130,13 @@ def test_too_few_trials_for_the_planned_precision_are_a_warning():
 
 @pytest.mark.slow
 def test_where_limits_clip_the_levels_no_precision_is_expected():
-    for damping, what in ((60, "the standard is"), (52, "levels above 0.0192 are")):
-        text = TEXT.replace("damping_nspm = 8", f"damping_nspm = {damping}").replace("BLOCK", "")
+    for damping, what in (
+        ("60", "the standard is"),
+        ("52", "levels above 0.0192 are"),
+        ("8, 52", "levels above 0.0192 of standard 52 are"),
+        ("8, 60", "the standard 60 is"),
+    ):
+        text = TEXT.replace("0.6]", f"0.6], standards = [{damping}]").replace("BLOCK", "")
         text = text.replace("METHOD", 'kind = "questplus", trials = 20').replace("DESIGN", "2ifc") + PLANNED
         clipped, faults = examined(read_document(text.encode(), "clipped.toml")[0])
         assert faults

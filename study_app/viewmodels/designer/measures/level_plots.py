@@ -47,6 +47,7 @@ from study_app.viewmodels.number_words import duration_figure
 
 MOST_LABELS: Final = 9
 CLIPPED: Final[Verdict] = ("bad", "warning", "levels are clipped")
+TOO_SMALL: Final = "All levels are below twice the level error of a valid trial"
 AS_ASKED: Final = "Clipped levels are simulated as they are requested"
 
 
@@ -131,7 +132,10 @@ class LevelBlock:
         if self.clipping is None:
             return self.as_asked
         highest = self.clipping.highest(self.words.stimulus)
-        which = "The standard is" if not 0 < highest < math.inf else f"Levels above {self.words.words(highest)} are"
+        named = self.clipping.named and f"{self.clipping.named} {self.words.value_unit}".rstrip()
+        which = f"Levels above {self.words.words(highest)}{named and f' of standard{named}'} are"
+        if self.clipping.clips_standard:
+            which = f"The standard{named} is"
         if self.clipping.paced:
             return f"{which} clipped: observers are simulated with what the limits leave"
         return f"{which} clipped in fast motions, whose trials are repeated. {AS_ASKED}"
@@ -184,7 +188,11 @@ def _range(of: LevelBlock, simulated: Simulated) -> NumberCard:
     anew = simulated.progress.get("measurable", "")
     clipped = of.clipped_words
     if found.ends is None:
-        why = "estimates are biased" if found.planted else "the standard is clipped"
+        if found.planted:
+            return NumberCard(title, "none", "", ("bad", "warning", "estimates are biased"), anew, clipped)
+        if of.clipping is None:
+            return NumberCard(title, "none", "", ("bad", "warning", "levels are too small"), anew, TOO_SMALL)
+        why = "the standard is clipped" if of.clipping.clips_standard else CLIPPED[2]
         return NumberCard(title, "none", "", ("bad", "warning", why), anew, clipped)
     low, high = found.ends
     note: Verdict = ("neutral", "info", f"of {words.number(of.words.stimulus.levels[1])} {words.unit} at most")

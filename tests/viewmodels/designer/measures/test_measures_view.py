@@ -209,6 +209,24 @@ def test_a_threshold_whose_levels_are_clipped_has_no_numbers(
         assert card.more == f"{which} clipped: observers are simulated with what the limits leave"
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "why", "more"),
+    [
+        ("levels", [0.005, 0.03], "levels are too small", "All levels are below twice the level error"),
+        ("standards", [52], "levels are clipped", "Levels above 1.92 % are clipped"),
+        ("standards", [8, 52], "levels are clipped", "Levels above 1.92 % of standard 52 N·s/m are clipped"),
+        ("standards", [60], "the standard is clipped", "The standard is clipped"),
+        ("standards", [8, 60], "the standard is clipped", "The standard 60 N·s/m is clipped"),
+    ],
+)
+def test_where_nothing_is_measured_the_card_says_why(key: str, value: list[float], why: str, more: str) -> None:
+    study, _ = template("viscosity-jnd").edited(Set(("stimuli", "damping", key), value))
+    slow = SlowResults(simulated=Simulated(measurable=Measurable(None, ())))
+    jnds = view(study, ("blocks", "viscosity"), slow).numbers[0]
+    assert (jnds.number, jnds.note) == ("none", ("bad", "warning", why))
+    assert jnds.more.startswith(more)
+
+
 def test_ticks_are_round_and_few() -> None:
     assert log_ticks(2, 60) == (2, 5, 10, 20, 50)
     assert log_ticks(5, 250) == (5, 10, 20, 50, 100, 200)
