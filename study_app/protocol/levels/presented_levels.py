@@ -213,15 +213,18 @@ def _holds(beyond: Callable[[float], bool], value: float) -> bool:
         return False
 
 
-def clipping(protocol: Protocol, block: Block) -> Clipping | None:
-    """Return how limits clip a block's levels; None where they clip none, or no level follows from the limits."""
+def clipping(protocol: Protocol, block: Block, limits: LevelLimits | None = None) -> Clipping | None:
+    """Return how limits clip a block's levels; None where they clip none, or no level follows from the limits.
+
+    ``limits`` are those of `level_limits`, where they are known.
+    """
     if block.stimulus is None:
         return None
     scenes = [scene for *_, scene in ends(protocol, block) if len(scene.liquids) == 1]
     hand_mps = hand_mps_of(protocol, block)
     if all(steady(scene, hand_mps).limit is None for scene in scenes):
         return None
-    limits = level_limits(protocol, block)
+    limits = limits or level_limits(protocol, block)
     if limits is None or not limits.lowest:
         return None
     *others, standard = sorted(one for one in standards_of(protocol, block) if one is not None) or (None,)

@@ -15,6 +15,7 @@ from study_app.authoring.measures.observers import OBSERVERS, PLANTED, GivenUp, 
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
 from study_app.protocol.checks.expected_precision import ThresholdPlan, expected, threshold_plan
+from study_app.protocol.levels.presented_levels import LevelLimits, clipping
 from study_app.viewmodels.designer.measures.measures_view import Controls, focus_of
 
 CLIPPED = Set(("stimuli", "damping", "standards"), [32]), Set(("stimuli", "damping", "levels"), [0.02, 2.0])
@@ -93,6 +94,10 @@ def test_no_clipped_level_is_a_threshold_that_can_be_measured() -> None:
         (wanted,) = [one for one in wanted_of(protocol, focus, Controls()) if isinstance(one, Measuring)]
         assert wanted.most == pytest.approx(most, rel=1e-4)
         assert (wanted.plan.clipping is None) == (changes is unpaced)  # fast motions are repeated, not answered
+    limits = LevelLimits(None, 40.0, 0.1)
+    known = clipping(protocol, protocol.blocks["viscosity"], limits)
+    assert known is not None
+    assert known.limit == 40.0  # limits that are known are not looked for again
     down = Set(("stimuli", "damping", "standards"), [60]), Set(("stimuli", "damping", "direction"), "down")
     assert not plan_of(4, *down).measures(np.array(-1.0))  # the standard itself is clipped
     found = measurable(plan_of(4, *CLIPPED), 0.02, 0.02, most=0.03)

@@ -84,7 +84,7 @@ def least_of(protocol: Protocol, plan: ThresholdPlan) -> float:
 
 def measuring(protocol: Protocol, plan: ThresholdPlan, block: Block, lapses: float) -> Measuring:
     """Return what asks for the thresholds that a block can measure, up to the highest level that is in full."""
-    found = clipping(protocol, block)
+    found = plan.clipping or clipping(protocol, block)
     most = math.inf if found is None else found.highest(plan.stimulus)
     return Measuring(plan, lapses, least_of(protocol, plan), most)
 

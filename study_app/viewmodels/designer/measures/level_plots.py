@@ -147,8 +147,10 @@ def level_block(protocol: Protocol, block: Block, *, forces: bool = True) -> Lev
         return None
     found = levels(protocol, block.id)
     words = LevelWords(stimulus_of(protocol, block), design_of(protocol, block))
-    limits, clips = (level_limits(protocol, block), clipping(protocol, block)) if forces else (None, None)
-    return LevelBlock(protocol, block, words, found, limits, clips, forces)
+    if not forces:
+        return LevelBlock(protocol, block, words, found, None, None, forces)
+    limits = level_limits(protocol, block)
+    return LevelBlock(protocol, block, words, found, limits, clipping(protocol, block, limits), forces)
 
 
 def number_cards(
