@@ -22,7 +22,7 @@ from study_app.app.designer.series_steps import series
 from study_app.authoring.additions import added
 from study_app.authoring.changes.followed_ids import FollowedIds
 from study_app.authoring.changes.initial_values import initial, singular
-from study_app.authoring.changes.languages import following
+from study_app.authoring.changes.languages import TypedCopies
 from study_app.authoring.changes.short_texts import followed
 from study_app.authoring.conversions import left_by, switched
 from study_app.authoring.edited_study import Study
@@ -76,11 +76,13 @@ class Steps:
     def __init__(self, recorded: Recorded = no_answers) -> None:
         self._left: dict[Path, dict[str, Any]] = {}
         self._ids = FollowedIds()
+        self._copies = TypedCopies()
         self._recorded = recorded
 
     def leave(self) -> None:
-        """Forget what switches removed: another element is selected."""
+        """Forget what switches removed, and what was typed in: another element is selected."""
         self._left.clear()
+        self._copies.end()
 
     def step(self, study: Study, asked: Request, selected: Path = ()) -> Step:
         """Return the step that is asked for while an element is selected.
@@ -90,6 +92,9 @@ class Steps:
         Refused
             It makes no sense in this study.
         """
+        if isinstance(asked, SetText):
+            return self._type(study, asked)
+        self._copies.end()
         if isinstance(asked, SwitchKind):
             return self._switch(study, asked)
         if isinstance(asked, SwitchKey):
@@ -97,8 +102,6 @@ class Steps:
         if isinstance(asked, SetValue):
             name = label_of(asked.path[-1])
             return Step(f"Change {name}", (Set(asked.path, asked.value),), None, asked.path if asked.typing else None)
-        if isinstance(asked, SetText):
-            return self._type(study, asked)
         if isinstance(asked, RemoveKey):
             return Step(f"Remove {label_of(asked.path[-1])}", (Unset(asked.path),))
         if isinstance(asked, AddKey):
@@ -128,7 +131,7 @@ class Steps:
         field = (*(self._ids.first(study, element) or element), asked.path[-1], asked.language)
         ids, after = self._ids.followed(study, asked.path, asked.language, asked.text, self._recorded(element))
         edits: tuple[Edit, ...] = ()
-        for code in (asked.language, *following(study, asked.path, asked.language)):
+        for code in (asked.language, *self._copies.following(study, asked.path, asked.language, field)):
             edits += (*_text(study, replace(asked, language=code)), *followed(study, asked.path, code, asked.text))
         return Step(f"Type {label_of(asked.path[-1])}", (*edits, *ids), None if after == element else after, field)
 

@@ -85,6 +85,45 @@ def following(study: Study, path: Path, language: str) -> tuple[str, ...]:
     return tuple(code for code in texts if code != first and texts[code] == old and is_copied(texts, code, first))
 
 
+class TypedCopies:
+    """Which languages follow a text while it is typed: decided where its typing begins, and not again at each key.
+
+    So a translation that equals what is typed for a moment stays, and a copy follows through the empty text.
+    """
+
+    def __init__(self) -> None:
+        self._typing: tuple[object, tuple[str, ...], Mapping[str, Any]] | None = None
+
+    def end(self) -> None:
+        """Let the text that is typed next begin anew."""
+        self._typing = None
+
+    def following(self, study: Study, path: Path, language: str, field: object) -> tuple[str, ...]:
+        """Return the languages that follow; typing goes on in the same field, as long as the others keep their texts.
+
+        Parameters
+        ----------
+        study : Study
+            The study before the text is typed.
+        path : tuple of str or int
+            The text.
+        language : str
+            The language that is typed.
+        field : object
+            What is typed in.
+        """
+        texts = value_at(study.document, path)
+        texts = dict(texts) if isinstance(texts, Mapping) else {}
+        old = texts.pop(language, None)
+        if self._typing is not None:
+            before, codes, others = self._typing
+            if before == field and texts == {**others, **dict.fromkeys(codes, old)}:
+                return codes
+        codes = following(study, path, language)
+        self._typing = field, codes, {code: text for code, text in texts.items() if code not in codes}
+        return codes
+
+
 def texts_of(study: Study) -> Iterator[tuple[Path, Any]]:
     """Yield every text that is in the languages of a study, labels of scales included, with its place."""
     for pattern in TEXTS:

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QApplication
 from study_app.app.designer.edit_steps import Steps
 from study_app.authoring.changes.short_texts import short_of
 from study_app.authoring.edited_study import Study, read
+from study_app.authoring.undo_stack import History
 from study_app.authoring.writer.edits import Set
 from study_app.protocol.source.document import value_at
 from study_app.viewmodels.designer.requests import AddElement, ChangeLanguage, SetText
@@ -53,6 +54,36 @@ def test_copies_in_another_language_follow_a_text_and_its_short_one_until_they_a
         {"en": "Was it cold?", "nl": "Was it cold?", "de": "War es kalt?"},
         {"en": "Was it cold", "nl": "Was it cold", "de": "War es kalt"},
     ]
+
+
+@pytest.mark.parametrize(
+    ("first", "typed", "other", "found"),
+    [
+        ("", ("War", "Warm", "Warmth"), "War", "War"),
+        ("Warmth", ("Warmt", "Warm", "War"), "Warm", "Warm"),
+        ("Warm", ("War", "", "New words"), "Warm", "New words"),
+    ],
+)
+def test_which_languages_follow_is_decided_where_typing_begins(
+    first: str, typed: tuple[str, ...], other: str, found: str
+) -> None:
+    text = (*ITEMS, 0, "text")
+    study = read((PROTOCOLS / "demo.toml").read_bytes(), PROTOCOLS)
+    steps = Steps()
+    study, _ = study.edited(*steps.step(study, ChangeLanguage("add", "nl")).edits)
+    begun = History(study).edited("Begin", Set(text, {"en": first, "nl": other}))
+    for _ in range(2):  # and again after an undo in between
+        history = begun
+        for words in typed:
+            history = history.edited("Type", *steps.step(history.study, SetText(text, "en", words)).edits)
+        assert value_at(history.study.document, text) == {"en": typed[-1], "nl": found}
+    back = history.undo()
+    back = back.edited("Type", *steps.step(back.study, SetText(text, "en", "Hot")).edits)
+    assert value_at(back.study.document, text)["nl"] == ("Hot" if found == typed[-1] else other)
+    steps.step(back.study, SetText(text, "nl", "Heet"))
+    copies = back.edited("Copy", Set(text, {"en": "Hot", "nl": "Hot"})).study
+    edits = steps.step(copies, SetText(text, "en", "Hotter")).edits
+    assert value_at(copies.edited(*edits)[0].document, text)["nl"] == "Hotter"
 
 
 def test_the_short_text_follows_the_text_until_it_is_edited(qtbot: Any, designer: Any) -> None:
