@@ -110,7 +110,11 @@ def judged_series(study: Study, asked: MakeSeries) -> Generator[SeriesPlan | Non
 
     None is shown of a series that can be made. Else the reason comes first, then the ways on.
     """
-    begun = whole = _begun(study, asked)
+    try:
+        begun = whole = _begun(study, asked)
+    except Refused as refusal:
+        yield refused_plan(refusal)
+        return
     place: Path = ()
     try:
         for one in members(study, asked.path, begun.row, asked.values):

@@ -128,3 +128,12 @@ def test_values_that_are_not_permitted_can_be_left_out(study: Study, values: str
 @pytest.mark.parametrize("values", ["900 much", "900 -1", "900"])
 def test_nothing_is_offered_where_too_few_values_stay(study: Study, values: str) -> None:
     assert words_of(judged(study, SYRUP, values, "density_kg_m3")) == []
+
+
+def test_a_series_is_refused_while_the_file_cannot_be_read_or_has_no_such_number(study: Study) -> None:
+    broken, _ = study.typed(f"{study.text}\n[")
+    for now, key, why in ((broken, "delay_ms", "The file cannot be read"), (study, "nosuch", "Choose a number")):
+        plan = judged(now, WATER, "0 60", key)
+        assert plan is not None
+        assert plan.refusal.startswith(why)
+        assert plan.ways == ()
