@@ -54,6 +54,7 @@ from study_app.viewmodels.designer.requests import (
     Several,
     SwitchKey,
     SwitchKind,
+    with_path,
 )
 
 Recorded: TypeAlias = Callable[[Path], frozenset[str]]
@@ -93,7 +94,7 @@ class Steps:
             It makes no sense in this study.
         """
         if isinstance(asked, SetText):
-            return self._type(study, asked)
+            return self._type(study, asked, selected)
         self._copies.end()
         if isinstance(asked, SwitchKind):
             return self._switch(study, asked)
@@ -125,7 +126,7 @@ class Steps:
             self._ids.add(study.trial.edited(*step.edits)[0], step.select)
         return step
 
-    def _type(self, study: Study, asked: SetText) -> Step:
+    def _type(self, study: Study, asked: SetText, selected: Path) -> Step:
         """Return the step of a text, with the copies in other languages, the short text and the id that follow it."""
         element = asked.path[:-1]
         field = (*(self._ids.first(study, element) or element), asked.path[-1], asked.language)
@@ -133,7 +134,8 @@ class Steps:
         edits: tuple[Edit, ...] = ()
         for code in (asked.language, *self._copies.following(study, asked.path, asked.language, field)):
             edits += (*_text(study, replace(asked, language=code)), *followed(study, asked.path, code, asked.text))
-        return Step(f"Type {label_of(asked.path[-1])}", (*edits, *ids), None if after == element else after, field)
+        select = with_path(selected, element, after) if selected[: len(element)] == element else None
+        return Step(f"Type {label_of(asked.path[-1])}", (*edits, *ids), select, field)
 
     def _several(self, study: Study, asked: Several, selected: Path) -> Step:
         edits: tuple[Edit, ...] = ()

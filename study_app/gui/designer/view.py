@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 from PySide6.QtCore import Qt, Signal, SignalInstance
 from PySide6.QtGui import QKeyEvent, QResizeEvent
@@ -36,7 +37,7 @@ from study_app.viewmodels.designer.new_study import TemplateChoice
 from study_app.viewmodels.designer.outline_rows import ElementPath, OutlineRow
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 from study_app.viewmodels.designer.prompts import DeletePrompt
-from study_app.viewmodels.designer.requests import AskSeries, GoTo, MoveTo, RetypeFile
+from study_app.viewmodels.designer.requests import AskSeries, GoTo, MoveTo, RetypeFile, SetText, SetValue, with_path
 
 
 class DesignerPlace(Place):
@@ -276,12 +277,15 @@ class DesignerPlace(Place):
         self.file.editor.flush()
 
     def _select(self, path: ElementPath) -> None:
-        """Select an element; what is being typed may give it, or what it is in, another id before."""
+        """Select an element, after what is being typed."""
+        self.selected.emit(self._after_typing(path))
+
+    def _after_typing(self, asked: Any) -> Any:
+        """Hand on what is being typed; return a path or request with the id that the form's element has then."""
         before = () if self.form.form is None else self.form.form.path
         self.flush()
-        if before and path[: len(before)] == before and self.form.form is not None:
-            path = (*self.form.form.path, *path[len(before) :])
-        self.selected.emit(path)
+        after = () if self.form.form is None else self.form.form.path
+        return asked if before == after else with_path(asked, before, after)
 
     def _ask(self, asked: SignalInstance) -> None:
         self.flush()
@@ -299,7 +303,9 @@ class DesignerPlace(Place):
         self.adding.open(every, button.mapToGlobal(button.rect().topLeft()))
 
     def _take_asked(self, asked: object) -> None:
-        """Hand on a request; those of the place itself are done here."""
+        """Hand on a request, after what is being typed; those of the place itself are done here."""
+        if not (isinstance(asked, SetText) or (isinstance(asked, SetValue) and asked.typing)):
+            asked = self._after_typing(asked)
         if isinstance(asked, AskSeries):
             self.series_asked.emit(asked)
         elif isinstance(asked, GoTo):

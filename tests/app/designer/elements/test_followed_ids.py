@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -11,7 +12,7 @@ from study_app.app.designer.edit_steps import Steps
 from study_app.authoring.edited_study import read
 from study_app.authoring.undo_stack import History
 from study_app.protocol.source.document import Path
-from study_app.viewmodels.designer.requests import AddElement, AddNamed, RenameElement, Request, SetText
+from study_app.viewmodels.designer.requests import AddElement, AddKey, AddNamed, RenameElement, Request, SetText
 from tests.authoring.grown import PROTOCOLS
 
 ITEMS = ("questionnaires", "liquid", "items")
@@ -105,7 +106,11 @@ def test_an_element_that_a_reference_adds_follows_and_its_questions_go_on_follow
     typist.ask(AddElement((*form, "items")))
     question = typist.history.selected
     typist.ask(SetText((*form, "title"), "en", "Afterwards"))
-    assert typist.history.selected == ("questionnaires", "afterwards")
+    assert typist.history.selected == ("questionnaires", "afterwards", *question[2:])
+    typist.history = replace(typist.history, selected=QUESTION)
+    typist.ask(SetText(("questionnaires", "afterwards", "title"), "en", "After"))
+    assert typist.history.selected == QUESTION
+    typist.ask(SetText(("questionnaires", "after", "title"), "en", "Afterwards"))
     assert typist.history.study.document["blocks"]["liquids"]["questionnaire"] == "afterwards"
     typist.ask(SetText(("questionnaires", "afterwards", *question[2:], "text"), "en", "Tired?"))
     items = typist.history.study.document["questionnaires"]["afterwards"]["items"]
@@ -149,3 +154,22 @@ def test_the_keyboard_stays_in_the_title_whose_block_gets_another_id(qtbot: Any,
     qtbot.keyClicks(QApplication.focusWidget(), "Last")
     designer.place.outline.chosen.emit(("blocks", name))  # what is typed is handed on before
     assert designer.editing.selected == ("blocks", "last")
+
+
+@pytest.mark.slow
+def test_a_question_is_added_after_the_title_that_is_being_typed(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.ask(AddElement(("questionnaires",)))
+    form = designer.editing.selected
+    designer.editing.ask(AddKey((*form, "title")))
+    line = title(designer)
+    line.setFocus()
+    line.selectAll()
+    qtbot.keyClicks(line, "Afterwards")
+    designer.row(*form, "items").field.add.click()
+    after = ("questionnaires", "afterwards")
+    assert designer.editing.selected[:3] == (*after, "items")
+    assert QApplication.focusWidget() is designer.row(*designer.editing.selected, "text").field.lines["en"]
+    designer.editing.undo()
+    assert designer.editing.selected == after
+    assert title(designer).text() == "Afterwards"
