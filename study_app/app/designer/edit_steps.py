@@ -116,7 +116,7 @@ class Steps:
             return replace(step, select=None, several=(), fresh=False)
         if isinstance(asked, RenameElement):
             edits = renamed(study.document, asked.path, asked.name)
-            self._ids.forget(study, asked.path, asked.name)
+            self._ids.rename(study, asked.path, asked.name)
             after = asked.path if isinstance(asked.path[-1], int) else (*asked.path[:-1], asked.name)
             return Step(f"Rename to {asked.name}", edits, after)
         if isinstance(asked, Several):
@@ -124,12 +124,18 @@ class Steps:
         step = _of_elements(study, asked, selected)
         if isinstance(asked, AddElement | AddNamed) and step.select is not None:
             self._ids.add(study.trial.edited(*step.edits)[0], step.select)
+        if step.text:
+            self.retyped(study, study.typed(step.text)[0])
         return step
+
+    def retyped(self, before: Study, after: Study) -> None:
+        """Let ids stay that another text of the file brings in."""
+        self._ids.forget_brought(before, after)
 
     def _type(self, study: Study, asked: SetText, selected: Path) -> Step:
         """Return the step of a text, with the copies in other languages, the short text and the id that follow it."""
         element = asked.path[:-1]
-        field = (*(self._ids.first(study, element) or element), asked.path[-1], asked.language)
+        field = (self._ids.element(study, element) or element, asked.path[-1], asked.language)
         ids, after = self._ids.followed(study, asked.path, asked.language, asked.text, self._recorded(element))
         edits: tuple[Edit, ...] = ()
         for code in (asked.language, *self._copies.following(study, asked.path, asked.language, field)):

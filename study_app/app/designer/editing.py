@@ -108,7 +108,7 @@ class Editing(QObject):
                 text = retyped(opened.study.text, asked.text)
                 if text == opened.study.text:
                     return
-                self._take(opened, opened.history.typed("Edit the file", text, joins=self._joins("file")), "file")
+                self._type(opened, "Edit the file", text, "file")
             else:
                 self._make(opened, self._steps.step(opened.study, asked, opened.history.selected))
         except Refused as refusal:
@@ -125,6 +125,11 @@ class Editing(QObject):
         joins = bool(step.text) or self._joins(step.continues)
         self._take(opened, history.edited(step.words, *step.edits, select=step.select, joins=joins), step.continues)
         self._made = step
+
+    def _type(self, opened: OpenStudy, words: str, text: str, key: object = None) -> None:
+        history = opened.history.typed(words, text, joins=self._joins(key))
+        self._steps.retyped(opened.study, history.study)
+        self._take(opened, history, key)
 
     def _joins(self, key: object) -> bool:
         """Return whether an edit continues the last step: of the same key, made here, not long ago."""
@@ -153,7 +158,7 @@ class Editing(QObject):
     def type_text(self, words: str, text: str) -> None:
         """Give the file another text, as a step of its own."""
         if (opened := self.writable) is not None:
-            self._take(opened, opened.history.typed(words, text))
+            self._type(opened, words, text)
             self._note()
 
     def undo(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from study_app.authoring.changes.languages import languages_of
@@ -13,27 +14,44 @@ from study_app.ids import MAX_FROM_TEXT, free_id, id_of
 from study_app.protocol.source.document import Path, value_at
 
 
+@dataclass(frozen=True, eq=False)
+class _New:
+    """A new element, and the id that it began with."""
+
+    began: str | int
+
+
 class FollowedIds:
     """Knows elements by section and id: a place in a list changes as others come before it.
 
-    An id that an element had before is known, too, since a step may be undone.
+    The id that an element began with stays known, since its steps may be undone; those in between do not.
     """
 
     def __init__(self) -> None:
-        self._first: dict[Path, Path] = {}
+        self._known: dict[Path, _New] = {}
 
     def add(self, study: Study, path: Path) -> None:
         """Let the id of a new element follow its text."""
         key = _key(study.document, path)
-        self._first[key] = key
+        self._known[key] = _New(key[-1])
 
-    def forget(self, study: Study, path: Path, name: str) -> None:
-        """Let an id that is given by hand stay."""
-        self._first.pop((*_key(study.document, path)[:-1], name), None)
+    def rename(self, study: Study, path: Path, name: str) -> None:
+        """Let an id that is given by hand stay, and elements below it go on following."""
+        key = _key(study.document, path)
+        new = (*key[:-1], name)
+        below = {one: its for one, its in self._below(key, new).items() if one != new}
+        self._forget(new)
+        self._known |= below
 
-    def first(self, study: Study, path: Path) -> Path | None:
-        """Return section and id that a new element began with; None where its id does not follow its text."""
-        return self._first.get(_key(study.document, path))
+    def forget_brought(self, before: Study, after: Study) -> None:
+        """Let ids that a typed or pasted text brings in stay."""
+        for key in tuple(self._known):
+            if _has(after.document, key) and not _has(before.document, key):
+                self._known.pop(key)
+
+    def element(self, study: Study, path: Path) -> object:
+        """Return what stands for a new element whatever its id is; None where its id does not follow its text."""
+        return self._known.get(_key(study.document, path))
 
     def followed(
         self, study: Study, path: Path, language: str, text: str, recorded: frozenset[str]
@@ -55,17 +73,35 @@ class FollowedIds:
         wanted, key = id_of(text, MAX_FROM_TEXT), _key(document, element)
         own = str(key[-1])
         of_element = path[-1] == ("text" if isinstance(element[-1], int) else "title")
-        if key not in self._first or not of_element or language not in languages_of(study)[:1]:
+        if key not in self._known or not of_element or language not in languages_of(study)[:1]:
             return (), element
         name = free_id(taken_beside(document, element) | recorded, wanted) if wanted else own
         if name == own or own in recorded:
             return (), element
         new = (*key[:-1], name)
-        self._first |= {(*new, *one[len(key) :]): began for one, began in self._first.items() if one[: len(key)] == key}
+        moved = self._below(key, new)
+        for one in [one for one, its in self._known.items() if its is moved[new] and one[-1] != its.began]:
+            self._forget(one)
+        self._known |= moved
         return renamed(document, element, name), element if isinstance(element[-1], int) else new
+
+    def _below(self, key: Path, new: Path) -> dict[Path, _New]:
+        """Return an element and those below it, by what they are once it has another id."""
+        return {(*new, *one[len(key) :]): its for one, its in self._known.items() if one[: len(key)] == key}
+
+    def _forget(self, key: Path) -> None:
+        self._known = {one: its for one, its in self._known.items() if one[: len(key)] != key}
 
 
 def _key(document: Mapping[str, Any], path: Path) -> Path:
     """Return section and id of an element."""
     name = value_at(document, (*path, "id")) if isinstance(path[-1], int) else path[-1]
     return (*path[:-1], str(name))
+
+
+def _has(document: Mapping[str, Any], key: Path) -> bool:
+    """Return whether a section has an element of an id."""
+    inside = value_at(document, key[:-1])
+    if isinstance(inside, tuple):
+        return any(isinstance(one, Mapping) and one.get("id") == key[-1] for one in inside)
+    return isinstance(inside, Mapping) and key[-1] in inside

@@ -3,16 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path as File
 from typing import Any
 
 import pytest
+from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QApplication
 
 from study_app.app.designer.edit_steps import Steps
+from study_app.app.designer.editing import Editing
+from study_app.app.designer.open_study import OpenStudy
 from study_app.authoring.edited_study import read
 from study_app.authoring.undo_stack import History
-from study_app.protocol.source.document import Path
-from study_app.viewmodels.designer.requests import AddElement, AddKey, AddNamed, RenameElement, Request, SetText
+from study_app.protocol.source.document import Path, value_at
+from study_app.viewmodels.designer.requests import (
+    AddElement,
+    AddKey,
+    AddNamed,
+    Paste,
+    RenameElement,
+    Request,
+    RetypeFile,
+    SetText,
+)
 from tests.authoring.grown import PROTOCOLS
 
 ITEMS = ("questionnaires", "liquid", "items")
@@ -115,6 +128,62 @@ def test_an_element_that_a_reference_adds_follows_and_its_questions_go_on_follow
     typist.ask(SetText(("questionnaires", "afterwards", *question[2:], "text"), "en", "Tired?"))
     items = typist.history.study.document["questionnaires"]["afterwards"]["items"]
     assert items[-1]["id"] == "tired"
+
+
+def test_questions_go_on_following_after_their_form_is_renamed_by_hand() -> None:
+    typist = Typist()
+    typist.ask(AddNamed(("blocks", "liquids", "questionnaire"), "questionnaires"))
+    form = typist.history.selected
+    question = typist.ask(AddElement((*form, "items")))
+    typist.ask(RenameElement(form, "exit"))
+    typist.ask(SetText(("questionnaires", "exit", *question[2:], "text"), "en", "Tired?"))
+    assert typist.history.study.document["questionnaires"]["exit"]["items"][-1]["id"] == "tired"
+    typist.ask(SetText(("questionnaires", "exit", "title"), "en", "Afterwards"))
+    assert "exit" in typist.history.study.document["questionnaires"]
+
+
+def test_an_id_that_a_new_question_left_is_that_of_another_one_from_then_on() -> None:
+    typist = Typist()
+    typist.ask(AddElement(ITEMS))
+    for text in ("Hot", "Hot now"):
+        typist.write(text)
+    typist.history = replace(typist.history, selected=QUESTION)
+    old = f'id = "{typist.id}"'
+    typist.history = typist.history.typed("File", typist.history.study.text.replace(old, 'id = "hot"', 1))
+    assert typist.id == "hot"
+    typist.write("Is it hot?")
+    assert typist.id == "hot"
+    typist.history = replace(typist.history, selected=(*ITEMS, 1))
+    typist.ask(AddElement(ITEMS))
+    typist.write("Cold")
+    typist.history = replace(typist.history, selected=(*ITEMS, 1))
+    typist.write("Wet")
+    assert typist.id == "wet"  # also after another one began as it did
+
+
+@pytest.mark.parametrize("how", ["file", "words", "paste"])
+def test_an_id_that_a_text_brings_in_stays(how: str, tmp_path: File) -> None:
+    typist, parent = Typist(), QObject()
+    editing = Editing(tmp_path, parent)
+    editing.open(OpenStudy(tmp_path / "demo.toml", typist.history))
+    editing.ask(AddElement(ITEMS))
+    for text in ("Hot", "Cold"):
+        editing.ask(SetText((*editing.selected, "text"), "en", text))
+    opened = editing.opened
+    assert opened is not None
+    for _ in range(3):
+        editing.undo()
+    question = '[[questionnaires.liquid.items]]\nid = "question"\nkind = "statement"\ntext = "Old"\n'
+    if how == "paste":
+        editing.ask(Paste(QUESTION, question))
+    elif how == "file":
+        editing.ask(RetypeFile(f"{opened.study.text}\n{question}"))
+    else:
+        editing.type_text("Restore", f"{opened.study.text}\n{question}")
+    items = value_at(opened.study.document, ITEMS)
+    at = next(at for at, item in enumerate(items) if item["id"] == "question")
+    editing.ask(SetText((*ITEMS, at, "text"), "en", "Not as old"))
+    assert value_at(opened.study.document, (*ITEMS, at, "id")) == "question"
 
 
 def test_an_id_with_answers_stays_and_is_given_to_no_other_question() -> None:
