@@ -66,8 +66,19 @@ def sections_at(place: Path) -> tuple[str, ...]:
     return next((sections for pattern, sections in CHOICES.items() if _matches(place, pattern)), ())
 
 
-def renamed(document: Document, thing: Path, name: str) -> tuple[Edit, ...]:
+def renamed(document: Document, thing: Path, name: str, recorded: frozenset[str] = frozenset()) -> tuple[Edit, ...]:
     """Return the edits that rename a table or item, and every text that names it.
+
+    Parameters
+    ----------
+    document : mapping
+        The study.
+    thing : tuple of str or int
+        The table or item.
+    name : str
+        Its new name.
+    recorded : frozenset of str
+        Names with recorded answers: where the new one is refused, only its own one of them is proposed.
 
     Raises
     ------
@@ -78,8 +89,9 @@ def renamed(document: Document, thing: Path, name: str) -> tuple[Edit, ...]:
     taken = taken_beside(document, thing)
     title = value_at(document, (*thing, "text" if item is not None else "title"))
     text = next(iter(title.values()), "") if isinstance(title, Mapping) else title
-    wanted = id_of(name) or id_of(str(text or ""), MAX_FROM_TEXT) or id_of(str(item or thing[-1])) or "question"
-    free = free_id(taken, wanted)
+    own = str(item or thing[-1])
+    wanted = id_of(name) or id_of(str(text or ""), MAX_FROM_TEXT) or id_of(own) or "question"
+    free = free_id(taken | (recorded - {own}), wanted)
     check_id(name, free)
     if name in taken:
         where = "" if item is None else " by another item of this questionnaire"

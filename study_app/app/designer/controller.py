@@ -224,7 +224,7 @@ class DesignerController(QObject):
             return
         try:
             if name != str(path[-1]):
-                renamed(opened.study.document, path, name)
+                renamed(opened.study.document, path, name, self.editing.recorded(path))
         except Refused as refusal:
             why, free = f"{refusal}.", refusal.free
         self.place.form.head.refuse(why, free)

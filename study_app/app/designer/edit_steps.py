@@ -115,7 +115,7 @@ class Steps:
             step = duplicate(study, DuplicateElement(asked.entries[0], asked.entries[1:]))
             return replace(step, select=None, several=(), fresh=False)
         if isinstance(asked, RenameElement):
-            edits = renamed(study.document, asked.path, asked.name)
+            edits = renamed(study.document, asked.path, asked.name, self._recorded(asked.path))
             self._ids.rename(study, asked.path, asked.name)
             after = asked.path if isinstance(asked.path[-1], int) else (*asked.path[:-1], asked.name)
             return Step(f"Rename to {asked.name}", edits, after)

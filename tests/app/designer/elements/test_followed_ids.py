@@ -15,6 +15,7 @@ from study_app.app.designer.editing import Editing
 from study_app.app.designer.open_study import OpenStudy
 from study_app.authoring.edited_study import read
 from study_app.authoring.undo_stack import History
+from study_app.authoring.writer.refused import Refused
 from study_app.protocol.source.document import Path, value_at
 from study_app.viewmodels.designer.requests import (
     AddElement,
@@ -195,6 +196,10 @@ def test_an_id_with_answers_stays_and_is_given_to_no_other_question() -> None:
     locked.ask(AddElement(ITEMS))
     locked.write("Cold?")
     assert locked.id == "question"
+    for one, name, free in ((typist, "Cold!", "cold_2"), (locked, "Question!", "question")):
+        with pytest.raises(Refused) as refused:
+            one.ask(RenameElement(one.history.selected, name))
+        assert refused.value.free == free
 
 
 def title(designer: Any) -> Any:

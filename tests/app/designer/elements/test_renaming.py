@@ -73,3 +73,12 @@ def test_a_rename_says_once_how_many_references_followed(
     designer.editing.undo()
     assert head.followed.text() == ""
     assert not said
+
+
+def test_an_id_with_answers_is_not_proposed_while_another_one_is_typed(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    question = ("questionnaires", "liquid", "items", 0)
+    designer.select(question)
+    designer.editing.recorded = lambda _element: frozenset({"cold"})
+    designer.place.id_typed.emit(question, "Cold!")
+    assert '"cold_2" is free' in designer.place.form.head.refusal.text()
