@@ -132,6 +132,10 @@ class Steps:
         """Let ids stay that another text of the file brings in."""
         self._ids.forget_brought(before, after)
 
+    def travelled(self, before: Study, after: Study) -> None:
+        """Let ids follow again that undo or redo brings back."""
+        self._ids.go_on(before, after)
+
     def _type(self, study: Study, asked: SetText, selected: Path) -> Step:
         """Return the step of a text, with the copies in other languages, the short text and the id that follow it."""
         element = asked.path[:-1]

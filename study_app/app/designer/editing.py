@@ -171,7 +171,9 @@ class Editing(QObject):
 
     def _travel(self, to: Callable[[History], History]) -> None:
         if (opened := self.writable) is not None:
-            self._take(opened, to(opened.history))
+            history = to(opened.history)
+            self._steps.travelled(opened.study, history.study)
+            self._take(opened, history)
             self._note()
 
     def _note(self) -> None:

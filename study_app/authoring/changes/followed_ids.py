@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,11 +24,13 @@ class _New:
 class FollowedIds:
     """Knows elements by section and id: a place in a list changes as others come before it.
 
-    The id that an element began with stays known, since its steps may be undone; those in between do not.
+    The id that an element began with stays known, since its steps may be undone; those in between are known again only
+    where undo or redo brings them back.
     """
 
     def __init__(self) -> None:
         self._known: dict[Path, _New] = {}
+        self._left: dict[Path, _New] = {}
 
     def add(self, study: Study, path: Path) -> None:
         """Let the id of a new element follow its text."""
@@ -41,13 +43,19 @@ class FollowedIds:
         new = (*key[:-1], name)
         below = {one: its for one, its in self._below(key, new).items() if one != new}
         self._forget(new)
+        self._left.pop(new, None)
         self._known |= below
 
     def forget_brought(self, before: Study, after: Study) -> None:
         """Let ids that a typed or pasted text brings in stay."""
-        for key in tuple(self._known):
-            if _has(after.document, key) and not _has(before.document, key):
-                self._known.pop(key)
+        for key in _brought({**self._known, **self._left}, before, after):
+            self._known.pop(key, None)
+            self._left.pop(key, None)
+
+    def go_on(self, before: Study, after: Study) -> None:
+        """Let ids that undo or redo brings back follow again."""
+        for key in _brought(self._left, before, after):
+            self._known[key] = self._left.pop(key)
 
     def element(self, study: Study, path: Path) -> object:
         """Return what stands for a new element whatever its id is; None where its id does not follow its text."""
@@ -81,7 +89,7 @@ class FollowedIds:
         new = (*key[:-1], name)
         moved = self._below(key, new)
         for one in [one for one, its in self._known.items() if its is moved[new] and one[-1] != its.began]:
-            self._forget(one)
+            self._left |= self._forget(one)
         self._known |= moved
         return renamed(document, element, name), element if isinstance(element[-1], int) else new
 
@@ -89,14 +97,22 @@ class FollowedIds:
         """Return an element and those below it, by what they are once it has another id."""
         return {(*new, *one[len(key) :]): its for one, its in self._known.items() if one[: len(key)] == key}
 
-    def _forget(self, key: Path) -> None:
-        self._known = {one: its for one, its in self._known.items() if one[: len(key)] != key}
+    def _forget(self, key: Path) -> dict[Path, _New]:
+        """Forget an element and those below it, and return them."""
+        gone = self._below(key, key)
+        self._known = {one: its for one, its in self._known.items() if one not in gone}
+        return gone
 
 
 def _key(document: Mapping[str, Any], path: Path) -> Path:
     """Return section and id of an element."""
     name = value_at(document, (*path, "id")) if isinstance(path[-1], int) else path[-1]
     return (*path[:-1], str(name))
+
+
+def _brought(known: Iterable[Path], before: Study, after: Study) -> list[Path]:
+    """Return the elements that are in a study only afterwards."""
+    return [key for key in known if _has(after.document, key) and not _has(before.document, key)]
 
 
 def _has(document: Mapping[str, Any], key: Path) -> bool:

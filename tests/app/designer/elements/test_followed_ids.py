@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path as File
 from typing import Any
@@ -162,14 +163,31 @@ def test_an_id_that_a_new_question_left_is_that_of_another_one_from_then_on() ->
     assert typist.id == "wet"  # also after another one began as it did
 
 
+@pytest.fixture
+def editing(tmp_path: File, monkeypatch: pytest.MonkeyPatch) -> Iterator[Editing]:
+    """The demo with a new question, whose text was typed in two steps."""
+    monkeypatch.setattr("study_app.app.designer.editing.JOIN_S", 0.0)
+    parent = QObject()
+    made = Editing(tmp_path, parent)
+    made.open(OpenStudy(tmp_path / "demo.toml", Typist().history))
+    made.ask(AddElement(ITEMS))
+    for text in ("Hot", "Hot now"):
+        made.ask(SetText((*made.selected, "text"), "en", text))
+    yield made
+    parent.deleteLater()
+
+
+def test_an_id_that_undo_brings_back_follows_again(editing: Editing) -> None:
+    editing.undo()
+    opened = editing.opened
+    assert opened is not None
+    assert value_at(opened.study.document, (*editing.selected, "id")) == "hot"
+    editing.ask(SetText((*editing.selected, "text"), "en", "Cold"))
+    assert value_at(opened.study.document, (*editing.selected, "id")) == "cold"
+
+
 @pytest.mark.parametrize("how", ["file", "words", "paste"])
-def test_an_id_that_a_text_brings_in_stays(how: str, tmp_path: File) -> None:
-    typist, parent = Typist(), QObject()
-    editing = Editing(tmp_path, parent)
-    editing.open(OpenStudy(tmp_path / "demo.toml", typist.history))
-    editing.ask(AddElement(ITEMS))
-    for text in ("Hot", "Cold"):
-        editing.ask(SetText((*editing.selected, "text"), "en", text))
+def test_an_id_that_a_text_brings_in_stays(how: str, editing: Editing) -> None:
     opened = editing.opened
     assert opened is not None
     for _ in range(3):
