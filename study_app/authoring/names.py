@@ -15,6 +15,8 @@ Document = Mapping[str, Any]
 ITEMS = "items"
 _BESIDE = {"sequence", "groups", "analysis"}
 """Tables that name elements without presenting them."""
+_ONLY = (("blocks", "task", "tasks"), ("stimuli", "condition", "conditions"))
+"""Sections whose tables may leave a key out, which then stands for the only table of another section."""
 
 
 def named_at(document: Document, place: Path) -> Path | None:
@@ -40,7 +42,7 @@ def references_to(document: Document, thing: Path) -> tuple[Path, ...]:
 def blocks_using(document: Document, element: Path) -> tuple[str, ...]:
     """Return the blocks that use an element: themselves, or by a condition, stimulus, questionnaire that names it."""
     naming: dict[Path, list[Path]] = {}
-    for place, named in named_places(document):
+    for place, named in uses(document):
         naming.setdefault(named[:2], []).append(place[:2])
     around = [element[:2]]
     for inner in around:  # grows while it is read
@@ -190,6 +192,22 @@ def named_places(document: Document) -> Iterator[tuple[Path, Path]]:
             for path, item in items:
                 if item["id"] == name and _in_reach(place, path):
                     yield place, path
+
+
+def uses(document: Document) -> Iterator[tuple[Path, Path]]:
+    """Yield what `named_places` does, and each key that is left out with the only task, condition or liquid it means.
+
+    Where a study has no conditions, each liquid is one.
+    """
+    yield from named_places(document)
+    own = "conditions" in document
+    for section, key, among in _ONLY:
+        of = among if own or among != "conditions" else "liquids"
+        if len(only := names(document, of)) == 1:
+            tables = entries(document, f"{section}.*")
+            yield from (((*path, key), (of, only[0])) for path, table in tables if not has(table, key))
+    for pattern in () if own else (pattern for pattern, sections in CHOICES.items() if sections == ("conditions",)):
+        yield from ((place, ("liquids", name)) for place, name in entries(document, pattern))
 
 
 def _items(document: Document) -> Iterator[tuple[Path, Mapping[str, Any]]]:

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.fields import label_of
-from study_app.authoring.names import ITEMS, references_to
+from study_app.authoring.names import ITEMS, uses
 from study_app.authoring.outline import title_of
 from study_app.number_text import counted
 from study_app.protocol.source.document import Path, value_at
@@ -62,10 +62,13 @@ def brief(document: Mapping[str, Any], path: Path) -> str:
 
 
 def used_by(document: Mapping[str, Any], path: Path) -> str:
-    """Return how many elements name an element: "used by 3 conditions", "not used"; "" of steps and settings."""
+    """Return how many elements use an element, by its name or as the only one: "used by 3 conditions", "not used".
+
+    It is "" of steps and settings.
+    """
     if len(path) != 2 or path[0] not in USED:
         return ""
-    users = {_user(place) for place in references_to(document, path)} - {path}
+    users = {_user(place) for place, used in uses(document) if used == path} - {path}
     counts = Counter(
         "step" if user[0] == "sequence" else singular(user[-2] if len(user) > 1 else user[0]) for user in users
     )

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import pathlib
 from typing import Any
 
 import pytest
 
-from study_app.authoring.edited_study import read
-from study_app.authoring.writer.edits import Insert, Set
-from study_app.protocol.source.document import Path
+from study_app.authoring.edited_study import Study, read
+from study_app.authoring.names import blocks_using
+from study_app.authoring.templates import FOLDER
+from study_app.authoring.writer.edits import Insert, Set, Unset
+from study_app.protocol.source.document import Path, entries
 from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.element_facts import brief, used_by
 from study_app.viewmodels.designer.form.form_rows import form
 from study_app.viewmodels.designer.outline_rows import outline_rows
+from tests.authoring.grown import PROTOCOLS
 
 REACH = {"kind": "reach", "count": 12}
+
+
+def study_of(file: pathlib.Path) -> Study:
+    return read(file.read_bytes(), file.parent)
 
 
 @pytest.mark.parametrize(
@@ -56,21 +64,50 @@ def test_an_element_has_one_fact(section: str, table: Any, words: str) -> None:
     ],
 )
 def test_an_element_says_how_many_others_use_it(path: Path, words: str) -> None:
-    study = read(shipped_file("rek2024").read_bytes(), shipped_file("rek2024").parent)
+    study = study_of(shipped_file("rek2024"))
     more = Set(("tasks", "spare"), {"kind": "explore", "min_s": 1, "max_s": 2}), Insert(("sequence", 1), "liquid")
     study, _ = study.edited(*more)
     assert used_by(study.document, path) == form(study, path).used == words
 
 
 def test_questions_that_use_a_scale_are_counted_one_by_one() -> None:
-    study = read(shipped_file("rek2024").read_bytes(), shipped_file("rek2024").parent)
+    study = study_of(shipped_file("rek2024"))
     items = ("questionnaires", "liquid", "items")
     study, _ = study.edited(*(Set((*items, at, "scale"), "agreement") for at in (0, 1)))
     assert used_by(study.document, ("scales", "agreement")) == "used by 2 questions, 2 questionnaires"
 
 
+@pytest.mark.parametrize(
+    ("name", "path", "words", "blocks"),
+    [
+        ("delaydetect", ("conditions", "water"), "used by 1 stimulus", ("training", "delay")),
+        ("delayjnd", ("tasks", "reach"), "used by 1 block", ("delay",)),
+        ("delayjnd", ("liquids", "water"), "used by 1 stimulus", ("delay",)),
+    ],
+)
+def test_what_is_the_only_one_is_used_where_its_name_is_left_out(
+    name: str, path: Path, words: str, blocks: tuple[str, ...]
+) -> None:
+    study = study_of(PROTOCOLS / f"{name}.toml")
+    assert (used_by(study.document, path), blocks_using(study.document, path)) == (words, blocks)
+
+
+def test_liquids_are_used_as_conditions_where_a_study_has_none() -> None:
+    document = {"liquids": {"water": {}, "oil": {}}, "blocks": {"one": {"conditions": ("water",)}}}
+    assert [used_by(document, ("liquids", name)) for name in ("water", "oil")] == ["used by 1 block", "not used"]
+    assert blocks_using(document, ("liquids", "water")) == ("one",)
+
+
+@pytest.mark.parametrize("file", [*PROTOCOLS.glob("*.toml"), *FOLDER.glob("*.toml")], ids=lambda file: file.stem)
+def test_what_is_not_used_can_be_deleted(file: pathlib.Path) -> None:
+    study = study_of(file)
+    elements = (path for path, _ in entries(study.document, "*.*"))
+    for path in [one for one in elements if used_by(study.document, one) == "not used"]:
+        assert study.edited(Unset(path))[0].faults == study.faults, path
+
+
 def test_outline_and_lists_to_choose_from_say_it() -> None:
-    study = read(shipped_file("rek2024").read_bytes(), shipped_file("rek2024").parent)
+    study = study_of(shipped_file("rek2024"))
     task = next(row for row in outline_rows(study, {}) if row.path == ("tasks", "explore") and row.depth == 2)
     assert (task.note, task.name) == ("30 s to 2 min", "Explore, task, 30 s to 2 min")
     row = next(row for row in form(study, ("blocks", "liquids")).rows if row.row.path[-1] == "task")
