@@ -44,6 +44,9 @@ class LanguagesField(Field):
             if down and len(row.languages) > 1:
                 self.box.addWidget(label(language, "small", "text2"))
             self.box.addWidget(made)
+        if len(self.lines) > 1:
+            for line in self.lines.values():
+                line.beside = tuple(self.lines.values())
         self.setFocusProxy(next(iter(self.lines.values())))
         self.show_value()
 

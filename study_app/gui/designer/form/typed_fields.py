@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QEvent, QMimeData, QSize, Qt, QTimer, Signal
@@ -42,6 +43,8 @@ class _Typed(_Base):
     came: Any
     rests = True
     """Whether what is typed is handed on while typing, not only at Enter and on leaving."""
+    beside: Sequence[_Typed] = ()
+    """The fields of all languages of a text in several languages."""
 
     def begin(self) -> None:
         self.pending = False
@@ -81,7 +84,19 @@ class _Typed(_Base):
         raise NotImplementedError
 
     def nothing_to_delete(self) -> bool:
-        """Return whether all of the text is marked, or nothing is and the caret is at its end."""
+        """Return whether all of the text is marked, or nothing is and the caret is at its end.
+
+        Of a text in several languages, each must be empty or marked: no key removes a text that is not.
+        """
+        start, end, length = self.marked()
+        others = (one.marked() for one in self.beside)
+        return end == length and start in {0, end} and all((0, one[2]) == one[:2] for one in others)
+
+    def marked(self) -> tuple[int, int, int]:
+        """Return from where to where the text is marked (twice the caret where it is not), and its length.
+
+        All are in the units of Qt: some letters have two.
+        """
         raise NotImplementedError
 
     def restore(self) -> None:
@@ -172,17 +187,17 @@ class TypedLine(_Typed, QLineEdit):
         """Return the text."""
         return self.text()
 
-    def nothing_to_delete(self) -> bool:
-        """Return whether all of the text is marked, or nothing is and the caret is at its end."""
-        marked = self.selectedText()
-        return marked == self.text() if marked else self.cursorPosition() == len(self.text())
+    def marked(self) -> tuple[int, int, int]:
+        """Return from where to where the text is marked, and its length."""
+        at, length = self.cursorPosition(), len(self.text().encode("utf-16-le", "surrogatepass")) // 2
+        return (self.selectionStart(), self.selectionEnd(), length) if self.hasSelectedText() else (at, at, length)
 
     def show_text(self, text: str) -> None:
         """Show a text, unless something else is being typed."""
         if not self.pending and text != self.text():
             at = self.cursorPosition()
             self.setText(text)
-            self.setCursorPosition(min(at, len(text)) if self.hasFocus() else 0)
+            self.setCursorPosition(at if self.hasFocus() else 0)  # Qt leaves the caret at the end of a shorter text
 
 
 class TypedText(_Typed, QPlainTextEdit):
@@ -213,10 +228,10 @@ class TypedText(_Typed, QPlainTextEdit):
         """Return the text."""
         return self.document().toRawText().replace("\u2029", "\n")
 
-    def nothing_to_delete(self) -> bool:
-        """Return whether all of the text is marked, or nothing is and the caret is at its end."""
+    def marked(self) -> tuple[int, int, int]:
+        """Return from where to where the text is marked, and its length."""
         at = self.textCursor()
-        return at.selectionEnd() - at.selectionStart() == len(self.words()) if at.hasSelection() else at.atEnd()
+        return at.selectionStart(), at.selectionEnd(), self.document().characterCount() - 1  # a separator ends it
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return the room for some lines."""

@@ -9,7 +9,7 @@ from PySide6.QtCore import QEvent, QMimeData, Qt
 from PySide6.QtGui import QFocusEvent
 from PySide6.QtWidgets import QApplication
 
-from study_app.gui.designer.form.typed_fields import HAND_ON_MS, TypedSentence, TypedText
+from study_app.gui.designer.form.typed_fields import HAND_ON_MS, TypedLine, TypedSentence, TypedText
 
 pytestmark = pytest.mark.slow
 
@@ -58,6 +58,27 @@ def test_tab_marks_a_sentence_so_that_what_is_typed_replaces_it(qtbot: Any, reas
     field.show_text("New question")
     QApplication.sendEvent(field, QFocusEvent(QEvent.Type.FocusIn, Qt.FocusReason[reason]))
     assert field.textCursor().selectedText() == marked
+
+
+@pytest.mark.parametrize("kind", [TypedLine, TypedText, TypedSentence])
+def test_a_word_after_letters_of_two_units_is_deleted_before_the_key_is_removed(
+    qtbot: Any, kind: type[TypedLine | TypedText]
+) -> None:
+    field = kind("Text")
+    qtbot.addWidget(field)
+    field.show_text("😀😀 one two")
+    control = Qt.KeyboardModifier.ControlModifier
+    qtbot.keyClick(field, Qt.Key.Key_End)
+    assert field.nothing_to_delete()
+    qtbot.keyClick(field, Qt.Key.Key_Left, control | Qt.KeyboardModifier.ShiftModifier)
+    assert not field.nothing_to_delete()
+    qtbot.keyClick(field, Qt.Key.Key_End)
+    qtbot.keyClick(field, Qt.Key.Key_Left, control)
+    assert not field.nothing_to_delete()
+    qtbot.keyClick(field, Qt.Key.Key_Delete, control)
+    assert field.words() == "😀😀 one "
+    field.selectAll()
+    assert field.nothing_to_delete()
 
 
 def test_numbers_are_counted_by_keys_and_taken_ids_refused_while_typing(qtbot: Any, designer: Any) -> None:

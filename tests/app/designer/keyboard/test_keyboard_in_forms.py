@@ -12,7 +12,7 @@ from study_app.gui.designer.form.languages_field import LanguagesField
 from study_app.gui.designer.form.typed_fields import TypedText
 from study_app.gui.designer.outline.rows import ROW_ROLE
 from study_app.gui.designer.tab_order import stops
-from study_app.viewmodels.designer.requests import SetValue
+from study_app.viewmodels.designer.requests import ChangeLanguage, SetValue
 
 pytestmark = pytest.mark.slow
 
@@ -173,5 +173,26 @@ def test_ctrl_delete_deletes_a_word_where_one_follows_and_no_key_comes_back_with
     assert field.text() == "liquids"
     field.setCursorPosition(len(field.text()))
     qtbot.keyClicks(field, " now")
+    press(qtbot, KEY.Key_Delete, CONTROL)
+    assert "title" not in designer.editing.opened.study.document["blocks"]["liquids"]
+
+
+def test_ctrl_delete_removes_a_text_once_it_is_empty_or_marked_in_each_language(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.ask(ChangeLanguage("add", "nl"))
+    title = ("blocks", "liquids", "title")
+    designer.select(title[:2])
+    english, dutch = designer.row(*title).field.lines.values()
+    english.setFocus()
+    english.setText("Two liquids")
+    dutch.setText("Twee")
+    press(qtbot, KEY.Key_Delete, CONTROL)
+    english.selectAll()
+    press(qtbot, KEY.Key_Delete, CONTROL)
+    press(qtbot, KEY.Key_Delete, CONTROL)
+    assert (english.text(), dutch.text()) == ("", "Twee")
+    assert "title" in designer.editing.opened.study.document["blocks"]["liquids"]
+    dutch.setFocus()
+    dutch.selectAll()
     press(qtbot, KEY.Key_Delete, CONTROL)
     assert "title" not in designer.editing.opened.study.document["blocks"]["liquids"]
