@@ -18,10 +18,12 @@ from study_app.viewmodels.designer.designer_view import Banner
 class BannerCard(Card):
     """Draws a `Banner`; ``asked`` carries the action of a button, "close" of the one that closes it.
 
+    ``keyboard_left`` is emitted before the line is hidden while it has the keyboard.
     Where the study is read-only, it is hidden while another line is shown; any other banner needs an answer.
     """
 
     asked = Signal(str)
+    keyboard_left = Signal()
 
     def __init__(self) -> None:
         super().__init__(padding=10, gap=6)
@@ -39,7 +41,10 @@ class BannerCard(Card):
     def make_room(self, *, other: bool) -> None:
         """Hide what needs no answer while another line is shown (``other``)."""
         self._other = other
-        self.setVisible(self._banner is not None and not (other and self._banner.only_offers_copy))
+        shown = self._banner is not None and not (other and self._banner.only_offers_copy)
+        if not shown and self.isAncestorOf(self.window().focusWidget()):
+            self.keyboard_left.emit()  # else Qt hands the keyboard to the next part
+        self.setVisible(shown)
 
     def close_by_key(self) -> bool:
         """Close a line that can be closed; return whether there was one."""
@@ -60,8 +65,8 @@ class BannerCard(Card):
     def show_banner(self, banner: Banner | None) -> None:
         """Show another banner; None hides it."""
         self._banner = banner
-        self.close_button.setVisible(banner is not None and banner.closes)
         self.make_room(other=self._other)
+        self.close_button.setVisible(banner is not None and banner.closes)
         if banner is None:
             self.words.clear()
             return

@@ -122,6 +122,7 @@ class DesignerPlace(Place):
         self.nothing.study_asked.connect(self.study_asked)
         self.nothing.study_asked.connect(self.areas.focus_form)
         self.banner.asked.connect(self.banner_asked)
+        self.banner.keyboard_left.connect(self.areas.return_keyboard)
         outline.chosen.connect(self._select)
         outline.find_changed.connect(self.find_changed)
         outline.field_asked.connect(self.areas.focus_field)

@@ -196,6 +196,20 @@ def test_the_line_about_a_draft_ends_by_undo_by_saving_and_by_closing_it(designe
         designer.saving.save()
 
 
+@pytest.mark.parametrize("button", ["close", "discard"])
+def test_a_line_that_is_answered_by_a_key_gives_the_keyboard_back(designer: Any, qtbot: Any, button: str) -> None:
+    keep(designer.file, Draft(f"{designer.file.read_text()}# more\n", content_hash(designer.file.read_bytes())))
+    designer.controller.open("kitchen")
+    designer.select(TITLE[:2])
+    banner, field = designer.place.banner, next(iter(designer.row(*TITLE).field.lines.values()))
+    field.setFocus()
+    pressed = banner.close_button if button == "close" else banner.buttons[0]
+    pressed.setFocus(Qt.FocusReason.TabFocusReason)
+    qtbot.keyClick(pressed, Qt.Key.Key_Space)
+    assert not banner.isVisible()
+    assert field.hasFocus()
+
+
 def test_a_read_only_study_shows_one_line_at_a_time_above_the_parts(designer: Any) -> None:
     place = designer.place
     designer.controller.open("demo")
