@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
 from study_app.haptics.model.gate import describe_gate, resolve
 from study_app.haptics.model.scene import Scene
+from study_app.number_text import counted
 from study_app.protocol import liquid_summary
 from study_app.protocol.checks.delay_warnings import delay_warnings
 from study_app.protocol.checks.level_warnings import level_warnings
@@ -62,10 +63,6 @@ def describe_scenes(scenes: Mapping[str, Scene]) -> str:
     return "\n\n".join(("\n".join(head), "Effects in each liquid", *effects))
 
 
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
 def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
     """Yield rows as lines whose columns begin under each other."""
     widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
@@ -110,7 +107,7 @@ def _title(one: Variant) -> str:
     if not one.name:
         return "Session"
     minutes = f"about {expected_duration_s(one.protocol) / 60:.0f} min"
-    return f"{one.name[0].upper()}{one.name[1:]} ({minutes}, {_counted(orders_of(one.protocol).answers, 'answer')})"
+    return f"{one.name[0].upper()}{one.name[1:]} ({minutes}, {counted(orders_of(one.protocol).answers, 'answer')})"
 
 
 def _session(protocol: Protocol, language: str) -> list[tuple[str, str, str]]:
@@ -120,7 +117,7 @@ def _session(protocol: Protocol, language: str) -> list[tuple[str, str, str]]:
             page = protocol.pages[step]
             rows.append((f"{number:>2}", page.kind, protocol.text(page.title, language)))
         elif step in protocol.forms:
-            rows.append((f"{number:>2}", "form", f"{step}: {_counted(len(protocol.forms[step].items), 'question')}"))
+            rows.append((f"{number:>2}", "form", f"{step}: {counted(len(protocol.forms[step].items), 'question')}"))
         else:
             block = protocol.blocks[step]
             title = protocol.text(block.title, language)
@@ -128,7 +125,7 @@ def _session(protocol: Protocol, language: str) -> list[tuple[str, str, str]]:
                 (
                     f"{number:>2}",
                     f"{block.phase} trials",
-                    f"{title}: {_counted(order_of(protocol, block).trials, 'trial')}",
+                    f"{title}: {counted(order_of(protocol, block).trials, 'trial')}",
                 )
             )
     return rows
@@ -161,7 +158,7 @@ def _block(protocol: Protocol, block: Block, language: str, delay_ticks: int) ->
 
 
 def _presentation(protocol: Protocol, block: Block) -> str:
-    words = _counted(order_of(protocol, block).trials, "trial")
+    words = counted(order_of(protocol, block).trials, "trial")
     if block.repetitions > 1:
         words += f", every condition {block.repetitions} times"
     return words if len(block.conditions) < 2 else f"{words}, {_order(block)}"
@@ -198,14 +195,14 @@ def _beside_the_trials(protocol: Protocol, block: Block, language: str) -> Itera
         title = protocol.text(protocol.pages[block.break_page].title, language)
         yield (
             "Breaks",
-            f"{order_of(protocol, block).breaks}, after every {_counted(block.break_every or 0, 'trial')}: {title}",
+            f"{order_of(protocol, block).breaks}, after every {counted(block.break_every or 0, 'trial')}: {title}",
         )
 
 
 def _asked(questionnaire: Questionnaire, name: str) -> str:
     order = "in the order written" if questionnaire.item_order == "fixed" else "in another order each time"
     noun = "statement" if len(questionnaire.statements) == len(questionnaire.items) else "question"
-    return f"{_counted(len(questionnaire.items), noun)} (questionnaire {name}), {order}"
+    return f"{counted(len(questionnaire.items), noun)} (questionnaire {name}), {order}"
 
 
 def _liquids(protocol: Protocol) -> list[tuple[str, ...]]:
