@@ -50,6 +50,6 @@ def exact_text(value: float) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def counted(number: int, noun: str) -> str:
-    """Return "1 part", "2 parts"."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+def counted(number: int, noun: str, plural: str = "") -> str:
+    """Return "1 part", "2 parts"; ``plural`` is of a noun that has another one."""
+    return f"{number} {noun}" if number == 1 else f"{number} {plural or noun + 's'}"

@@ -11,7 +11,7 @@ from textwrap import shorten
 from typing import Final
 
 from study_app.app.designer.element_steps import Step, beside
-from study_app.authoring.changes.initial_values import singular
+from study_app.authoring.changes.initial_values import counted_elements
 from study_app.authoring.changes.series import (
     MOST,
     Member,
@@ -99,7 +99,7 @@ def series(study: Study, asked: MakeSeries) -> Step:
     made = made.listed(asked)
     if words := made.problem[0]:
         raise _would_cause(words)
-    count = counted(len(made.paths), singular(asked.path[0]))
+    count = counted_elements(len(made.paths), asked.path[0])
     said = ", ".join(title_of(made.now.document, one) for one in made.paths)
     words = f"Make {count} of {title_of(study.document, asked.path)}"
     return Step(words, made.edits, made.paths[0], several=made.paths, said=said)

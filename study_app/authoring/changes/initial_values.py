@@ -10,17 +10,25 @@ from study_app.authoring.fields import Row, label_of, row_at
 from study_app.authoring.schema_nodes import Node, node_at, table_of
 from study_app.authoring.writer.refused import Refused
 from study_app.ids import free_id
+from study_app.number_text import counted
 from study_app.protocol.forms.scale import POINTS
 from study_app.protocol.source.document import Path, entries, value_at
 
 SINGULAR: Final = {"items": "question", "stimuli": "stimulus"}
 """What an element of a section is called, where it is not the section without its last letter."""
+_PLURAL: Final = {"items": "questions"}
+"""What several elements of a section are called, where it is not the section."""
 LETTER: Final = "^[A-Z]$"
 
 
 def singular(section: str | int) -> str:
     """Return what an element of a section is called: "liquid" of ``liquids``."""
     return SINGULAR.get(str(section), str(section).removesuffix("s"))
+
+
+def counted_elements(number: int, section: str | int) -> str:
+    """Return "1 stimulus", "2 stimuli" of ``stimuli``."""
+    return counted(number, singular(section), _PLURAL.get(str(section), str(section)))
 
 
 def new_text(section: str | int) -> str:

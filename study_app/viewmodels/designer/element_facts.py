@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any, Final
 
-from study_app.authoring.changes.initial_values import singular
+from study_app.authoring.changes.initial_values import counted_elements, singular
 from study_app.authoring.fields import label_of
 from study_app.authoring.names import ITEMS, uses
 from study_app.authoring.outline import title_of
@@ -69,10 +69,11 @@ def used_by(document: Mapping[str, Any], path: Path) -> str:
     if len(path) != 2 or path[0] not in USED:
         return ""
     users = {_user(place) for place, used in uses(document) if used == path} - {path}
-    counts = Counter(
-        "step" if user[0] == "sequence" else singular(user[-2] if len(user) > 1 else user[0]) for user in users
+    counts = Counter(user[-2] for user in users)
+    words = (
+        counted(count, "step") if section == "sequence" else counted_elements(count, section)
+        for section, count in sorted(counts.items())
     )
-    words = (counted(count, word) for word, count in sorted(counts.items()))
     return f"used by {', '.join(words)}" if counts else "not used"
 
 

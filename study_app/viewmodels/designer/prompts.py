@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from study_app.authoring.changes.initial_values import singular
+from study_app.authoring.changes.initial_values import counted_elements, singular
 from study_app.authoring.changes.series import members, number_row, number_rows
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Row, label_of
 from study_app.authoring.outline import title_of
 from study_app.authoring.writer.refused import Refused
-from study_app.number_text import counted, exact_text
+from study_app.number_text import exact_text
 from study_app.protocol.source.document import Path
 from study_app.viewmodels.designer.requests import AskSeries, MakeSeries
 
@@ -123,7 +123,7 @@ def series_plan(study: Study, path: Path, field: Path, values: str) -> SeriesPla
         f"{first if at == 0 else one.title}: {exact_text(one.value)} {row.unit}".rstrip() + f"  ·  {one.name}"
         for at, one in enumerate(made)
     )
-    return SeriesPlan(tuple(lines), make=f"Make {counted(len(made), singular(path[0]))}")
+    return SeriesPlan(tuple(lines), make=f"Make {counted_elements(len(made), path[0])}")
 
 
 def refused_plan(refusal: Refused) -> SeriesPlan:
