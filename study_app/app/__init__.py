@@ -7,21 +7,19 @@ one by command.
 
 from typing import Any
 
-from study_app.gui.display.display_check import missing_library
+from study_app.gui.display.display_check import qt_imported
 
-try:
+with qt_imported():
     from study_app.app.session.entry import resume, run
     from study_app.app.session.live_session import BUG, CANCELLED, LiveSession
-except ImportError as missing:
-    raise missing_library(missing) from missing
 
 
 def __getattr__(name: str) -> Any:
     """Load the main window where it is asked for: a session by command begins without it."""
     if name != "home":
         raise AttributeError(name)
-    from study_app.app.main_controller import home  # noqa: PLC0415
-
+    with qt_imported():
+        from study_app.app.main_controller import home  # noqa: PLC0415
     return home
 
 

@@ -7,7 +7,8 @@ import ctypes
 import importlib.util
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 from study_app.errors import DisplayError
@@ -54,6 +55,21 @@ def missing_library(error: OSError | ImportError) -> DisplayError:
             f"sudo apt install {PACKAGES} ({NEEDS_NO_DISPLAY})"
         )
     return DisplayError(f"Qt cannot be loaded ({error}): reinstall liquid-study with pip")
+
+
+@contextmanager
+def qt_imported() -> Iterator[None]:
+    """Say which system library is missing where an import within it needs one.
+
+    Raises
+    ------
+    DisplayError
+        Something could not be imported.
+    """
+    try:
+        yield
+    except ImportError as missing:
+        raise missing_library(missing) from missing
 
 
 def platform_is_linux() -> bool:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import sys
+
 import pytest
 
+from study_app import app
 from study_app.errors import DisplayError
 from study_app.gui.display.display_check import check_display, missing_library
 
@@ -45,3 +48,9 @@ def test_a_missing_library_is_named_with_the_packages_that_bring_it():
     assert "libEGL.so.1" in said
     assert "apt install" in said
     assert "\n" not in said
+
+
+def test_a_library_that_is_missing_for_the_main_window_is_named_too(monkeypatch):
+    monkeypatch.setitem(sys.modules, "study_app.app.main_controller", None)
+    with pytest.raises(DisplayError, match="Qt cannot be loaded"):
+        app.home  # noqa: B018 - it is imported where it is asked for
