@@ -92,7 +92,7 @@ class _Scan:
             path = (*path, key)
             if path in self._array_tables:
                 path = (*path, self._array_tables[path] - 1)
-        return (*path, keys[-1])
+        return (*path, *keys[-1:])  # none while a header is typed
 
     def _assignment(self, table: Path, kind: Kind) -> Path:
         """Read a key and its value; return the table that they belong to."""

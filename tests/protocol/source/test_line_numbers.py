@@ -187,3 +187,9 @@ def test_lines_of_any_document(data: st.DataObject):
     places = Places(text)
     for path, line in writer.expected.items():
         assert places.line(path) == line, (path, text)
+
+
+@pytest.mark.parametrize("header", ["[", "[]", "[[", "[[]]", "[ = "])
+def test_a_header_that_is_being_typed_hides_no_lines_before_it(header: str) -> None:
+    places = Places(f"[a]\nb = 1\n{header}")
+    assert places.line(("a", "b")) == 2
