@@ -52,7 +52,7 @@ from study_app.workspace import workspace
 STACKED_BELOW = 1080
 COLUMN_PX = 326
 MARGIN, BAR_PX = 28, 12
-NEXT_ROW_PX = 44
+NEXT_ROW_PX = 30
 """So much of the second row of cards is seen at least, which says that there is one."""
 CARDS_SHARE, BELOW_SHARE = 4, 3
 """How the cards and the sessions share the height."""

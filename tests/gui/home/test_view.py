@@ -172,18 +172,24 @@ def test_the_theme_changes(home, qtbot):
     assert rail.switch.text() == "Light theme"
 
 
+def show_mouse(home):
+    says = "visual only, no force: the ball moves as it would in the liquid"
+    (mouse,) = devices_shown([Backend("mouse", "", NONE, says, "")])
+    home.show_machine(MachineSettings(device="mouse"), mouse)
+
+
 def test_three_studies_and_the_sessions_fit_in_a_small_screen(qtbot, results, monkeypatch):
     monkeypatch.setattr("study_app.viewmodels.home.sources", lambda: ("rek2024", "physical_liquids", "demo"))
     home = open_home(qtbot, results, QSize(1366, 768))
-    (mouse,) = devices_shown([Backend("mouse", "", NONE, "seen: the ball moves as it would in the liquid", "")])
-    home.show_machine(MachineSettings(device="mouse"), mouse)
+    show_mouse(home)
     QApplication.processEvents()
     assert home.area.verticalScrollBar().maximum() == 0
 
 
-@pytest.mark.parametrize("size", [QSize(1366, 768), QSize(1600, 1000)])
+@pytest.mark.parametrize("size", [QSize(1366, 768), QSize(1440, 900), QSize(1600, 1000)])
 def test_the_sessions_stay_in_sight_below_many_studies_whose_titles_are_whole(qtbot, results, size):
     home = open_home(qtbot, results, size)
+    show_mouse(home)
     table = home.sessions.rows.table
     QApplication.processEvents()
     assert len(home.grid.cards) > 6
