@@ -196,6 +196,7 @@ def test_the_sessions_stay_in_sight_below_many_studies_whose_titles_are_whole(qt
     assert home.area.verticalScrollBar().maximum() == 0
     assert home.rect().contains(QRect(table.mapTo(home, table.rect().topLeft()), table.size()))
     assert table.viewport().height() > 3 * table.rowHeight(0)
+    assert home.device.height() >= home.device.heightForWidth(home.device.width())
     first, second = (home.grid.cards[at].mapTo(home.cards_area, QPoint()) for at in (0, 3))
     assert first.y() == 0
     assert home.grid.row_height < second.y() < home.cards_area.height()
