@@ -27,11 +27,7 @@ def bus(*emulators):
 
 
 def by_name(*, usb=None, spacemice=None, d2xx=None, platform="linux"):
-    hardware = [
-        *probe_spacemouse(spacemice or hid()),
-        probe_falcon(usb or bus(), platform),
-        probe_ftdi(d2xx, platform),
-    ]
+    hardware = [*probe_spacemouse(spacemice or hid()), probe_falcon(usb or bus(), platform), probe_ftdi(d2xx, platform)]
     looked_for = {(one.name, one.by.split()[0]): one for one in backends()}
     return looked_for | {(one.name, one.by.split()[0]): one for one in hardware}
 

@@ -15,17 +15,11 @@ from study_app.haptics.runtime.servo import Servo
 
 THESIS = {
     "water": Liquid(
-        id="water",
-        density_kg_m3=1000,
-        effects=("drag", "wake"),
-        wake=Wake(length=1700, scaling=1700, exponent=0.75),
+        id="water", density_kg_m3=1000, effects=("drag", "wake"), wake=Wake(length=1700, scaling=1700, exponent=0.75)
     ),
     "honey": Liquid(id="honey", density_kg_m3=1400),
     "light_oil": Liquid(
-        id="light_oil",
-        density_kg_m3=4500,
-        effects=("drag", "wake"),
-        wake=Wake(length=125, scaling=250, exponent=0.25),
+        id="light_oil", density_kg_m3=4500, effects=("drag", "wake"), wake=Wake(length=125, scaling=250, exponent=0.25)
     ),
 }
 LIQUIDS = sorted(THESIS)

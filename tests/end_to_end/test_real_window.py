@@ -32,13 +32,7 @@ from tests.gui.small import ManualClock, questionnaire
 GIVEN = [7, 1, 4, 6, 2, 3, 5, 7, 1]
 BY_CLICK = {1, 4, 8}
 
-pytestmark = [
-    pytest.mark.slow,
-    needs_servo,
-    pytest.mark.xvfb,
-    pytest.mark.timeout(300),
-    needs_display,
-]
+pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.xvfb, pytest.mark.timeout(300), needs_display]
 
 
 @pytest.fixture

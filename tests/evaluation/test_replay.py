@@ -19,13 +19,7 @@ from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol import formats
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.session.transitions.events import (
-    Begin,
-    Continue,
-    EndAsked,
-    PauseAsked,
-    ResumeAsked,
-)
+from study_app.session.transitions.events import Begin, Continue, EndAsked, PauseAsked, ResumeAsked
 from study_app.store import recording_files
 from study_app.store.sessions.reopen import reopen
 from tests.compiled import needs_servo

@@ -60,10 +60,7 @@ KNOWN = {0.2371, 2.1193, 1.3717 + 1.3717 * 0.2371}
     [
         pytest.param((), KNOWN, id="constant"),
         pytest.param(
-            (STAIRCASE, CATCH),
-            {0.6917, 2.1193, 1.3717 + 1.3717 * 0.6917},
-            id="staircase",
-            marks=pytest.mark.nightly,
+            (STAIRCASE, CATCH), {0.6917, 2.1193, 1.3717 + 1.3717 * 0.6917}, id="staircase", marks=pytest.mark.nightly
         ),
     ],
 )

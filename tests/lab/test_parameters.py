@@ -65,9 +65,7 @@ def test_a_preset_beyond_the_labs_range_widens_it() -> None:
     liquid = scene.liquids[0]
     assert liquid.wake is not None
     wide = scene.model_copy(
-        update={
-            "liquids": (liquid.model_copy(update={"wake": liquid.wake.model_copy(update={"scaling": 1e7})}),),
-        }
+        update={"liquids": (liquid.model_copy(update={"wake": liquid.wake.model_copy(update={"scaling": 1e7})}),)}
     )
     assert parameter(wide, "wake.scaling").most == 1e7
 

@@ -16,14 +16,7 @@ from study_app.outlets.marker import CODES
 from study_app.outlets.session_outlets import open_sink, sink_kinds
 from study_app.outlets.sink import SinkThread
 from study_app.outlets.sinks import parallel_port
-from study_app.outlets.sinks.parallel_port import (
-    PPCLAIM,
-    PPEXCL,
-    PPRELEASE,
-    PPWCONTROL,
-    PPWDATA,
-    ParallelPort,
-)
+from study_app.outlets.sinks.parallel_port import PPCLAIM, PPEXCL, PPRELEASE, PPWCONTROL, PPWDATA, ParallelPort
 from study_app.outlets.trigger_pulse import HIGH_S, LOW_S, TriggerSink
 from tests.outlets.sinks import marker
 

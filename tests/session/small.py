@@ -77,10 +77,7 @@ TABLES: dict[str, Any] = {
             "instruction": "Reach.",
         },
     },
-    "scales": {
-        "judged": {"labels": {"en": SCALE}, "cannot_judge": "Cannot judge"},
-        "plain": {"labels": {"en": SCALE}},
-    },
+    "scales": {"judged": {"labels": {"en": SCALE}, "cannot_judge": "Cannot judge"}, "plain": {"labels": {"en": SCALE}}},
     "questionnaires": {
         "feel": {
             "intro": "How was it?",

@@ -215,11 +215,7 @@ def test_an_exclusion_is_taken_back_and_stays_on_record(folder: Path) -> None:
     assert exclusions(folder) == (kept,)
     (line,) = (folder / "exclusions_reversed.jsonl").read_text(encoding="utf-8").splitlines()
     record = json.loads(line)
-    assert (record["by"], record["reason"], record["at"]) == (
-        "CD",
-        "it did not 🌊",
-        exclusions(folder)[0].excluded_at,
-    )
+    assert (record["by"], record["reason"], record["at"]) == ("CD", "it did not 🌊", exclusions(folder)[0].excluded_at)
     assert record["exclusion"]["reason"] == "the phone rang"
     again = exclude(folder, "P007", 1, trial=2, by="AB", reason="it did", now=NOW)
     assert exclusions(folder) == (kept, again)

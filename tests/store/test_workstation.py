@@ -131,11 +131,7 @@ def test_the_participants_screen_is_found_by_its_name_and_else_the_last(settings
 
 
 @pytest.mark.slow
-@given(
-    distance=st.floats(200, 3000),
-    width=st.floats(80, 5000),
-    pixels=st.integers(1024, 7680),
-)
+@given(distance=st.floats(200, 3000), width=st.floats(80, 5000), pixels=st.integers(1024, 7680))
 def test_an_x_is_seen_under_four_tenths_of_a_degree_or_more(distance, width, pixels):
     settings = MachineSettings(viewing_distance_mm=distance, screen_width_mm=width)
     scale = settings.text_scale(pixels, 0.0)
@@ -157,12 +153,7 @@ def test_words_are_as_designed_until_the_distance_is_known():
 
 def test_the_receipt_gets_the_offset_of_the_screen_it_was_measured_on_alone():
     there, elsewhere = ALL.describe("DP-1", 1920, 500.0), ALL.describe("HDMI-1", 1920, 500.0)
-    assert there["display_offset"] == {
-        "mean_ms": 23.5,
-        "spread_ms": 1.2,
-        "how": "photodiode",
-        "measured": "2026-11-20",
-    }
+    assert there["display_offset"] == {"mean_ms": 23.5, "spread_ms": 1.2, "how": "photodiode", "measured": "2026-11-20"}
     assert elsewhere["display_offset"] is None
     assert (there["viewing_distance_mm"], there["width_mm"], there["width_measured"]) == (620, 527.5, True)
     assert json.loads(json.dumps(there)) == there

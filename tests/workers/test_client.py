@@ -98,9 +98,7 @@ def is_last(answer: Any) -> bool:
 
 
 @pytest.mark.slow
-def test_orders_are_carried_out_one_after_the_other_and_a_refusal_is_a_sentence(
-    start: Callable[..., Tried],
-) -> None:
+def test_orders_are_carried_out_one_after_the_other_and_a_refusal_is_a_sentence(start: Callable[..., Tried]) -> None:
     worker = start()
     first, refused, last = (worker.order(order) for order in ("first", "refuse", "last"))
     found: list[tuple[int, Any]] = []
@@ -165,9 +163,7 @@ def test_a_process_that_does_not_listen_is_killed(start: Callable[..., Tried], m
     assert worker.answers() == []
 
 
-def test_a_process_loads_what_its_task_loads_and_may_have_the_lowest_priority(
-    start: Callable[..., Tried],
-) -> None:
+def test_a_process_loads_what_its_task_loads_and_may_have_the_lowest_priority(start: Callable[..., Tried]) -> None:
     worker = start(background=True)
     assert answers_until(worker, worker.order("loaded"), is_last)[-1] == []
     if sys.platform != "win32":

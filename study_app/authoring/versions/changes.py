@@ -84,10 +84,7 @@ def changes(version: str, study: Study) -> tuple[Change, ...]:
 def changes_from_receipt(protocol: Mapping[str, Any], study: Protocol) -> tuple[Change, ...]:
     """Return how a study differs from the protocol of a receipt, which does not say what blinding hides."""
     found = differences(protocol, json.loads(json.dumps(without_conditions(study))))
-    return (
-        *(Change(sentence, effect_of(sentence)) for sentence in found),
-        Change(UNKNOWN_CONDITIONS, "measured"),
-    )
+    return (*(Change(sentence, effect_of(sentence)) for sentence in found), Change(UNKNOWN_CONDITIONS, "measured"))
 
 
 def effect_of(sentence: str) -> Effect:

@@ -66,7 +66,9 @@ class LabCard(Card):
         super().__init__(padding=20, gap=6)
         self._picture = QSpacerItem(0, PICTURE - INSET, QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Maximum)
         self.column.addSpacerItem(self._picture)
-        about = label("Tune a liquid by feel and save it.", "label", "text2")  # a line that wraps keeps the picture high
+        about = label(
+            "Tune a liquid by feel and save it.", "label", "text2"
+        )  # a line that wraps keeps the picture high
         about.setFont(font("label", weight=400))
         self.open = ActionButton("", "Open", height=38)
         self.open.setAccessibleName("Open the liquid lab")

@@ -225,9 +225,7 @@ class TankWidget(QWidget):
 
     def _made_pane(self) -> QWidget:
         """Return a surface of the graphics card that fills the widget."""
-        from study_app.gui.participant.tank.opengl_pane import (  # noqa: PLC0415 - OpenGL: only where it is drawn with
-            Pane,
-        )
+        from study_app.gui.participant.tank.opengl_pane import Pane  # noqa: PLC0415 - OpenGL: only where it is drawn with
 
         pane = Pane(self, self._paint)
         pane.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)

@@ -2,14 +2,7 @@
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import (
-    QButtonGroup,
-    QFileDialog,
-    QLabel,
-    QLineEdit,
-    QSizePolicy,
-    QWidget,
-)
+from PySide6.QtWidgets import QButtonGroup, QFileDialog, QLabel, QLineEdit, QSizePolicy, QWidget
 
 from study_app.devices.registry import list_devices, title_of
 from study_app.gui.display.screens import ScreenShown

@@ -235,9 +235,7 @@ def _sweep(folder: SessionFolder) -> None:
 
 def _recordings_found(folder: SessionFolder, lines: list[Line]) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the lines about recordings that the ended program did not write: whole after all, or lost."""
-    from study_app.store import (  # noqa: PLC0415 - loads the Parquet library, where there are recordings
-        recording_files as recording,
-    )
+    from study_app.store import recording_files as recording  # noqa: PLC0415 - loads the Parquet library, where there are recordings
 
     events = ("recorded", "recording_lost")
     known = {(line["trial"], line["attempt"], line.get("interval")) for line in lines if line["event"] in events}

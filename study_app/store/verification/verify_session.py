@@ -310,9 +310,7 @@ def _recordings(
 
 
 def _facts(folder: SessionFolder, line: Line, kind: str, name: str, rows: int, found: Gathered) -> None:
-    from study_app.store import (  # noqa: PLC0415 - loads the Parquet library, where there are recordings
-        recording_files as recording,
-    )
+    from study_app.store import recording_files as recording  # noqa: PLC0415 - loads the Parquet library, where there are recordings
 
     path = folder.path / name
     with found.reading(path):

@@ -97,14 +97,7 @@ def test_the_aggregate_counts_all_levels_and_what_is_missing(small: Results, to:
     assert [smooth[f"count_{level}"] for level in range(1, 8)] == ["0", "0", "0", "0", "0", "0", "2"]
     assert {
         name: smooth[name] for name in ("n", "presented", "cannot_judge", "missing", "median", "agree_percent")
-    } == {
-        "n": "2",
-        "presented": "4",
-        "cannot_judge": "2",
-        "missing": "0",
-        "median": "7.0",
-        "agree_percent": "100.0",
-    }
+    } == {"n": "2", "presented": "4", "cannot_judge": "2", "missing": "0", "median": "7.0", "agree_percent": "100.0"}
     assert found[1]["missing"] == "2"
 
 

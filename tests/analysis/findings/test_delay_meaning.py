@@ -39,9 +39,7 @@ def against(differences: Mapping[float, list[int]], expected: Direction | None) 
 
 
 def delays(
-    differences: Mapping[float, list[int]],
-    lowest: tuple[Lowest, ...] = (),
-    expected: Direction | None = "increasing",
+    differences: Mapping[float, list[int]], lowest: tuple[Lowest, ...] = (), expected: Direction | None = "increasing"
 ) -> BlockFound:
     """Return a block of delays in which answers to one statement differ so from those at 0 ms."""
     at = (0.0, *differences)

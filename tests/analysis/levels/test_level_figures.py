@@ -67,8 +67,7 @@ def test_courses_are_in_the_order_of_the_trials_and_end_at_the_threshold() -> No
 
 
 @pytest.mark.parametrize(
-    ("ends", "shown"),
-    [((2.7, 11.3), [3, 5, 7, 10]), ((0.05, 0.9), [0.05, 0.1, 0.2, 0.5]), ((5.5, 9.5), [6, 7, 8, 9])],
+    ("ends", "shown"), [((2.7, 11.3), [3, 5, 7, 10]), ((0.05, 0.9), [0.05, 0.1, 0.2, 0.5]), ((5.5, 9.5), [6, 7, 8, 9])]
 )
 def test_ticks_of_levels_leave_room_for_their_numbers(ends: tuple[float, float], shown: list[float]) -> None:
     axes = Figure().add_subplot()

@@ -58,12 +58,7 @@ def planned(name: str = "rek2024") -> Plan:
 
 
 def swept(
-    study: Plan,
-    studies: int = 30,
-    *,
-    sizes: tuple[int, ...] = SIZES,
-    seed: int = 1,
-    executor: Executor | None = None,
+    study: Plan, studies: int = 30, *, sizes: tuple[int, ...] = SIZES, seed: int = 1, executor: Executor | None = None
 ) -> tuple[int, Counts]:
     with ThreadPoolExecutor(1) as one:
         *_, last = sweep(study, sizes, studies, seed, executor or one)
@@ -116,9 +111,7 @@ def test_the_command_writes_the_same_bytes_with_one_worker_two_and_a_cluster(
     assert all(files == written[0] for files in written)
 
 
-def test_engine_dask_and_its_variable_are_other_words_for_a_cluster(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_engine_dask_and_its_variable_are_other_words_for_a_cluster(monkeypatch: pytest.MonkeyPatch) -> None:
     cluster = "tcp://lab1:8786"
     opened: list[Workers] = []
 

@@ -39,10 +39,7 @@ def matching(hits: list[int]) -> Recognition:
 
 
 def test_the_name_is_the_single_highest_rating() -> None:
-    ratings = [
-        [[7, 1, 2], [3, 3, 4], [1, 6, 5]],
-        [[4, 4, 4], [5, 5, 1], [1, np.nan, 7]],
-    ]
+    ratings = [[[7, 1, 2], [3, 3, 4], [1, 6, 5]], [[4, 4, 4], [5, 5, 1], [1, np.nan, 7]]]
     assert named(ratings).tolist() == [[0, 2, 1], [UNDECIDED, UNDECIDED, UNANSWERED]]
 
 

@@ -57,8 +57,7 @@ def test_published_trends(values: np.ndarray, direction: str, statistic: float, 
 
 
 @pytest.mark.parametrize(
-    ("values", "direction", "p"),
-    [(SIEGEL, "increasing", 0.0010825), (DULLER, "decreasing", 5.26e-10)],
+    ("values", "direction", "p"), [(SIEGEL, "increasing", 0.0010825), (DULLER, "decreasing", 5.26e-10)]
 )
 def test_published_trends_by_the_normal_approximation(
     values: np.ndarray, direction: str, p: float, monkeypatch: pytest.MonkeyPatch

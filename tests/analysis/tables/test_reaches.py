@@ -112,6 +112,6 @@ def test_without_recordings_there_are_measures_of_trials_alone(tmp_path: Path) -
     measured = performance(load_study(folder))
     assert (measured.recorded, measured.unread) == (0, ("84 × no recording was kept",))
     assert {one.measure for one in measured.moved} == {
-        *("duration_s", "path_m", "force_mean_n", "force_peak_n", "at_limit_percent"),
+        *("duration_s", "path_m", "force_mean_n", "force_peak_n", "at_limit_percent")
     }
     assert all(one.median is not None and one.n == 12 for one in measured.moved)

@@ -10,12 +10,7 @@ import pytest
 
 from study_app.authoring.drafts import draft_of
 from study_app.protocol.source.files import shipped, shipped_file
-from study_app.viewmodels.designer.requests import (
-    RenameElement,
-    RetypeFile,
-    SetText,
-    SetValue,
-)
+from study_app.viewmodels.designer.requests import RenameElement, RetypeFile, SetText, SetValue
 
 pytestmark = pytest.mark.slow
 

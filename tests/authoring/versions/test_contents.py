@@ -7,13 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from study_app.authoring.versions.contents import (
-    ChangedOutsideError,
-    content_hash,
-    kept_content,
-    kept_versions,
-    save,
-)
+from study_app.authoring.versions.contents import ChangedOutsideError, content_hash, kept_content, kept_versions, save
 from study_app.user_folder import data_folder
 
 

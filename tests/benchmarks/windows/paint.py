@@ -39,12 +39,7 @@ def page() -> TaskPage:
     """Return a reaching task as in part 2 of the thesis' study."""
     instruction = "Hold the ball in the lit ring until it closes"
     task = Reach(
-        kind="reach",
-        targets_mm=((-30, 0, 0), (30, 0, 0)),
-        radius_mm=6,
-        dwell_s=0.5,
-        count=12,
-        instruction=instruction,
+        kind="reach", targets_mm=((-30, 0, 0), (30, 0, 0)), radius_mm=6, dwell_s=0.5, count=12, instruction=instruction
     )
     return TaskPage(
         trial=6,

@@ -215,10 +215,7 @@ def main() -> None:
         with open_executor(Workers(cluster=address)) as executor:
             began_s = begin_s(executor, study)
             print_parts("Dask, 2 workers on this computer", parts_of(executor, study, scheduler))
-        with (
-            TemporaryDirectory() as folder,
-            KeptCases(open_executor(Workers(cluster=address)), Path(folder)) as kept,
-        ):
+        with TemporaryDirectory() as folder, KeptCases(open_executor(Workers(cluster=address)), Path(folder)) as kept:
             there = parts_of(kept, study, scheduler)
             print_parts("Dask, 2 workers, cases stored", there)
     print(f"  first case of a new worker after {began_s:.1f} s")

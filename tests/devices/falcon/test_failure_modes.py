@@ -72,10 +72,7 @@ class TestModes:
             ({"usb": "access", "platform": "darwin"}, ["mac-driver"]),
             ({"usb": "access", "platform": "win32"}, ["busy"]),
             ({"usb": "not-supported", "platform": "win32"}, ["windows-driver"]),
-            (
-                {"usb": "not-supported", "platform": "win32", "listed": True, "ftdi_sees": False},
-                ["two-drivers"],
-            ),
+            ({"usb": "not-supported", "platform": "win32", "listed": True, "ftdi_sees": False}, ["two-drivers"]),
             ({"usb": "busy", "platform": "win32", "listed": True, "ftdi_sees": False}, ["busy"]),
             ({"usb": "busy", "platform": "linux"}, ["busy"]),
             ({"usb": "no-backend"}, ["no-libusb"]),

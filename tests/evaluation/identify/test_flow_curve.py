@@ -25,11 +25,7 @@ STARTS = {
     "ketchup": {"yield_stress_pa": 5.0, "consistency_pa_sn": 3.0, "flow_index": 0.6},
     "toothpaste": {"yield_stress_pa": 20.0, "consistency_pa_sn": 200.0, "flow_index": 0.9},
     "shampoo": {"zero_shear_viscosity_pa_s": 2.0, "time_constant_s": 0.5, "flow_index": 0.7},
-    "cornstarch": {
-        "zero_shear_viscosity_pa_s": 2.0,
-        "thickened_viscosity_pa_s": 10.0,
-        "onset_shear_rate_per_s": 8.0,
-    },
+    "cornstarch": {"zero_shear_viscosity_pa_s": 2.0, "thickened_viscosity_pa_s": 10.0, "onset_shear_rate_per_s": 8.0},
 }
 
 

@@ -110,15 +110,7 @@ def test_from_a_file_to_a_preset(tmp_path):
     true = override_all(load_scene("rek2024", "honey"), {"drag_coefficient": 0.61})
     path = write_csv(tmp_path / "honey.csv", REACH, noisy(true, REACH, 0.02), comment="# by hand\n")
     told = identify(
-        "--measured",
-        path,
-        "rek2024",
-        "--liquid",
-        "honey",
-        "--fit",
-        "drag_coefficient",
-        "--to",
-        tmp_path / "out",
+        "--measured", path, "rek2024", "--liquid", "honey", "--fit", "drag_coefficient", "--to", tmp_path / "out"
     )
     assert told.exit_code == 0
     assert f"honey: {len(REACH.t_s)} rows over 1.8 s; residual 0.0283 N RMS" in told.output

@@ -80,12 +80,7 @@ def main(folder: str, how: str) -> int:
     application = application_here()
     person = Person(watch)
     code = app.run(
-        str(protocol),
-        participant="P001",
-        device="scripted",
-        windowed=True,
-        seed=3,
-        results=Path(folder) / "results",
+        str(protocol), participant="P001", device="scripted", windowed=True, seed=3, results=Path(folder) / "results"
     )
     person.leave()
     application.quit()

@@ -11,11 +11,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.gui.widgets.escape_key import HOLD_MS, EscapeHold
 from study_app.session.pages import EndPage, Page, PausePage, TroublePage
-from study_app.session.transitions.events import (
-    ForceStopped,
-    ItemShown,
-    PauseAsked,
-)
+from study_app.session.transitions.events import ForceStopped, ItemShown, PauseAsked
 from tests.gui.participant.screens import Opened
 from tests.gui.small import questionnaire, task_page, text_page
 

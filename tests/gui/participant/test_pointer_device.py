@@ -11,9 +11,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QWidget
 
 from study_app.gui.participant.pointer_capture import NOTCHES, SHARE_OF_SCREEN, PointerCapture
 from study_app.session.pages import Page, PausePage
-from study_app.session.transitions.events import (
-    PauseAsked,
-)
+from study_app.session.transitions.events import PauseAsked
 from tests.gui.participant.screens import Opened
 from tests.gui.small import questionnaire, task_page, text_page
 

@@ -17,14 +17,7 @@ from study_app.gui.participant.tank_widget import TankWidget
 from study_app.gui.participant.window import LEAST_SIZE, ParticipantWindow
 from study_app.protocol.wording.languages import LANGUAGES, words
 from study_app.session.pages import EndPage, Page, PausePage, TroublePage
-from study_app.session.transitions.events import (
-    Chosen,
-    Continue,
-    ItemShown,
-    PauseAsked,
-    ResumeAsked,
-    Submitted,
-)
+from study_app.session.transitions.events import Chosen, Continue, ItemShown, PauseAsked, ResumeAsked, Submitted
 from tests.gui.participant.screens import Opened
 from tests.gui.small import explore, questionnaire, task_page, text_page, view
 

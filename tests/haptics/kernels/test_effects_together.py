@@ -9,18 +9,7 @@ from study_app.haptics.model.effects.current import Channel, Uniform, Vortex
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.runtime.offline import simulate
-from tests.haptics.scenes import (
-    COMPILED,
-    EVERYTHING,
-    PLACES,
-    POOL,
-    UNBENT,
-    examples,
-    liquid,
-    moving,
-    scene,
-    vectors,
-)
+from tests.haptics.scenes import COMPILED, EVERYTHING, PLACES, POOL, UNBENT, examples, liquid, moving, scene, vectors
 
 LAWS = ("constant", "schiller-naumann", "haider-levenspiel", "brown-lawler")
 

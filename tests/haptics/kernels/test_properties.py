@@ -29,8 +29,7 @@ any_time = st.one_of(
 
 any_velocity = st.tuples(*[st.floats(-5.0, 5.0)] * 3)
 acts = st.one_of(
-    st.tuples(st.just("turn"), any_place, any_time),
-    st.tuples(st.just("stride"), any_velocity, st.integers(1, 40)),
+    st.tuples(st.just("turn"), any_place, any_time), st.tuples(st.just("stride"), any_velocity, st.integers(1, 40))
 )
 
 

@@ -10,9 +10,7 @@ from numba.core.runtime import _nrt_python, rtsys
 from study_app.devices.scripted import ScriptedDevice
 from study_app.errors import StudyError
 from study_app.haptics.kernels.loop import run
-from study_app.haptics.model.layout import (
-    LIMITER_FADE,
-)
+from study_app.haptics.model.layout import LIMITER_FADE
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo

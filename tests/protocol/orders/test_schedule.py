@@ -307,12 +307,7 @@ def with_breaks(every: int) -> Protocol:
 
 
 @pytest.mark.parametrize(
-    ("every", "expected"),
-    [
-        (1, "1 pause 2 pause 3 pause 4"),
-        (2, "1 2 pause 3 4"),
-        (3, "1 2 3 pause 4"),
-    ],
+    ("every", "expected"), [(1, "1 pause 2 pause 3 pause 4"), (2, "1 2 pause 3 4"), (3, "1 2 3 pause 4")]
 )
 def test_breaks_come_between_trials_and_not_after_the_last(every: int, expected: str):
     protocol = with_breaks(every)

@@ -12,14 +12,7 @@ from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.session.device_buttons import ANSWERS
-from study_app.session.transitions.events import (
-    Chosen,
-    Continue,
-    PauseAsked,
-    ResumeAsked,
-    Submitted,
-    TaskDone,
-)
+from study_app.session.transitions.events import Chosen, Continue, PauseAsked, ResumeAsked, Submitted, TaskDone
 from study_app.session.transitions.state import Phase
 from tests.compiled import needs_servo
 from tests.protocol.trials.level_studies import study

@@ -121,9 +121,7 @@ def test_a_repeated_trial_keeps_both_attempts(practising: World) -> None:
     practising.run(3.2)
     ended = practising.journal.of("trial_ended")
     assert [(line["attempt"], line["outcome"]) for line in ended] == [(1, "interrupted"), (2, "complete")]
-    assert practising.journal.of("repeat") == [
-        {"event": "repeat", "t_s": 0.5, "trial": 1, "reason": "a sneeze"},
-    ]
+    assert practising.journal.of("repeat") == [{"event": "repeat", "t_s": 0.5, "trial": 1, "reason": "a sneeze"}]
 
 
 def test_a_trial_with_a_late_screen_or_a_late_servo_says_so(practising: World) -> None:

@@ -5,10 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any, get_args
 
-from study_app.session.transitions.commands import (
-    ShowPage,
-    Write,
-)
+from study_app.session.transitions.commands import ShowPage, Write
 from study_app.session.transitions.events import (
     Broke,
     Chosen,

@@ -8,15 +8,7 @@ import pytest
 
 from study_app.errors import SessionError
 from study_app.session.pages import EndPage, PausePage, TroublePage
-from study_app.session.transitions.commands import (
-    FadeIn,
-    Finish,
-    Rest,
-    StartTrial,
-    StopForce,
-    StopTrial,
-    Write,
-)
+from study_app.session.transitions.commands import FadeIn, Finish, Rest, StartTrial, StopForce, StopTrial, Write
 from study_app.session.transitions.events import (
     Broke,
     Continue,
@@ -74,11 +66,7 @@ def test_a_force_that_the_operator_stopped_is_the_operators_to_bring_back() -> N
     with pytest.raises(SessionError, match="the operator switched the force off: the operator resumes it"):
         advance(stopped, ResumeAsked(6.0, "participant"))
     resumed, commands = advance(stopped, ResumeAsked(7.0, "operator"))
-    assert commands[:3] == (
-        Write("resumed", {"by": "operator"}),
-        Write("force_restored", {"by": "operator"}),
-        FadeIn(),
-    )
+    assert commands[:3] == (Write("resumed", {"by": "operator"}), Write("force_restored", {"by": "operator"}), FadeIn())
     assert (resumed.phase, resumed.held, resumed.force_off) == (Phase.TASK, None, False)
 
 

@@ -244,8 +244,7 @@ def _arranged(state: SessionState) -> str:
 
 
 @pytest.mark.parametrize(
-    ("design", "page"),
-    [('"estimation"', NumberPage), ('"strength"', QuestionnairePage), ('"yesno"', ChoicePage)],
+    ("design", "page"), [('"estimation"', NumberPage), ('"strength"', QuestionnairePage), ('"yesno"', ChoicePage)]
 )
 def test_each_reply_has_its_page(design: str, page: type) -> None:
     more = '\n[scales.three]\nlabels.en = ["a", "b", "c"]\n[designs.strength]\nkind = "rating"\nscale = "three"\n'

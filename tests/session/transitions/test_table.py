@@ -11,15 +11,7 @@ import pytest
 from study_app.errors import SessionError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.session.pages import (
-    EndPage,
-    PausePage,
-    Progress,
-    QuestionnairePage,
-    TaskPage,
-    TextPage,
-    TroublePage,
-)
+from study_app.session.pages import EndPage, PausePage, Progress, QuestionnairePage, TaskPage, TextPage, TroublePage
 from study_app.session.transitions.commands import (
     LeaveTask,
     Rest,

@@ -92,13 +92,7 @@ def test_a_session_of_an_opened_study_and_other_events_are_written_as_they_are()
 
 @pytest.mark.parametrize(
     "change",
-    [
-        {"sealed": "00" * 500},
-        {"sealed": ""},
-        {"sealed": "no digits"},
-        {"trial": 4},
-        {"attempt": 2},
-    ],
+    [{"sealed": "00" * 500}, {"sealed": ""}, {"sealed": "no digits"}, {"trial": 4}, {"attempt": 2}],
     ids=json.dumps,
 )
 def test_what_was_changed_or_moved_does_not_open(change: dict[str, Any]) -> None:

@@ -135,10 +135,7 @@ def test_the_receipt_holds_what_reproduces_the_session(start: Callable[..., Sess
     ids=["used", "used but for capitals", "a dash", "reserved", "no session", "a rehearsal among real ones"],
 )
 def test_a_refusal_touches_nothing(
-    tmp_path: Path,
-    start: Callable[..., SessionStore],
-    attend: Callable[[SessionStore], None],
-    again: dict[str, Any],
+    tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None], again: dict[str, Any]
 ) -> None:
     store = start()
     attend(store)

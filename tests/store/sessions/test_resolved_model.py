@@ -51,10 +51,7 @@ def mud(protocol: Protocol) -> Any:
 
 
 def test_resume_uses_effects_laws_and_estimator_of_the_receipt(
-    begun: SessionStore,
-    protocol: Protocol,
-    again: Again,
-    monkeypatch: pytest.MonkeyPatch,
+    begun: SessionStore, protocol: Protocol, again: Again, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (chosen,) = resolve(protocol.scene_of("quagmire")).liquids
     assert mud(protocol).effects == "auto"

@@ -154,11 +154,7 @@ def test_what_is_recommended_is_a_warning(folder: Path) -> None:
         (table(b"trial\n1\n", "data/notes.csv"), "FILE_NOT_CHECKED", "data/notes.csv"),
         (table(b"x", "exclusions.txt"), "FILE_NOT_CHECKED", "exclusions.txt"),
         (table(b"", "data/sub-1/empty.txt"), "FILE_EMPTY", "data/sub-1/empty.txt"),
-        (
-            table(b"{}", "data/dataset_description.json"),
-            "WRONG_METADATA_LOCATION",
-            "data/dataset_description.json",
-        ),
+        (table(b"{}", "data/dataset_description.json"), "WRONG_METADATA_LOCATION", "data/dataset_description.json"),
         (
             described(variableMeasured=[{"name": "trial"}, {"name": "response"}]),
             "OBJECT_TYPE_MISSING",

@@ -249,13 +249,7 @@ def test_a_description_of_an_earlier_version_is_a_warning_and_a_column_it_never_
     assert not any(error.place == path.name for error in findings.errors)
     assert "describes the columns as an earlier version of the program did" in warned(findings)
     at = next(index for index, it in enumerate(variables) if "minValue" in it and "unitText" in it)
-    for change in (
-        {"minValue": -5},
-        {"maxValue": 7},
-        {"unitText": "mile"},
-        {"@type": "y"},
-        None,
-    ):
+    for change in ({"minValue": -5}, {"maxValue": 7}, {"unitText": "mile"}, {"@type": "y"}, None):
         changed = variables[1:] if change is None else [*variables[:at], variables[at] | change, *variables[at + 1 :]]
         path.write_text(json.dumps(content | {"variableMeasured": changed}))
         assert "differs from what this version writes" in told(verify(study))

@@ -124,12 +124,7 @@ def test_the_tombstone_proves_which_session_was_erased(study: Path) -> None:
     (line,) = (study / "withdrawals.jsonl").read_text().splitlines()
     held = json.loads(line)
     (erased,) = held.pop("sessions")
-    assert held == {
-        "participant": PERSON,
-        "at": "2026-11-22T09:30:00+00:00",
-        "by": "AK",
-        "reason": "asked by letter",
-    }
+    assert held == {"participant": PERSON, "at": "2026-11-22T09:30:00+00:00", "by": "AK", "reason": "asked by letter"}
     assert erased["checksums"] == sums
     assert erased["begun"] == hashlib.sha256(first).hexdigest()
     assert f"{erased['fingerprint']}  data/sub-{PERSON}/ses-01\n" in listed

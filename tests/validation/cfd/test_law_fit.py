@@ -14,10 +14,7 @@ from study_app.validation.cfd.cases import HELD_OUT, TRAINING
 from study_app.validation.cfd.stored_flows import MOTION, Table
 from tests.haptics.scenes import COMPILED
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not COMPILED, reason="thousands of ticks are for compiled code"),
-]
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not COMPILED, reason="thousands of ticks are for compiled code")]
 PLANTED = Constants(c_m=0.5, c_y=1.4, c_z=5.0, c_s=1.5, beta=2.0, r_0=8.0)
 
 

@@ -33,13 +33,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import Path
 from study_app.viewmodels.designer.measures.level_plots import Simulated
 from study_app.viewmodels.designer.measures.level_words import LevelWords
-from study_app.viewmodels.designer.measures.measures_view import (
-    Controls,
-    Focus,
-    SlowResults,
-    focus_of,
-    measures_view,
-)
+from study_app.viewmodels.designer.measures.measures_view import Controls, Focus, SlowResults, focus_of, measures_view
 from study_app.viewmodels.designer.measures.number_cards import ANEW
 from study_app.viewmodels.designer.problem_rows import ProblemRow, problem_rows
 

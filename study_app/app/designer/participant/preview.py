@@ -41,13 +41,7 @@ from study_app.session.simulated.programmed_ball import ProgrammedBall
 from study_app.session.transitions.events import Chosen, Continue, LanguageChosen, Retracted, Submitted
 from study_app.session.transitions.previewed_pages import Moment, moments, previewed_page, tested_condition
 from study_app.viewmodels.designer.keys import tip
-from study_app.viewmodels.designer.participant_page import (
-    SIZES,
-    ParticipantView,
-    ScreenSize,
-    moment_words,
-    step_words,
-)
+from study_app.viewmodels.designer.participant_page import SIZES, ParticipantView, ScreenSize, moment_words, step_words
 
 NO_ANSWERS: Final[Mapping[str, Value]] = {}
 

@@ -94,10 +94,7 @@ class SocketTransport:
     def calls(self) -> BulkCalls:
         """Return the bridge as compiled code sees it; good until `close` or `reopen`."""
         from study_app.devices.falcon.transport.bulk_calls import BulkCalls  # noqa: PLC0415 - loads the compiler
-        from study_app.devices.falcon.transport.socket_bulk import (  # noqa: PLC0415 - likewise
-            connection_record,
-            transfer,
-        )
+        from study_app.devices.falcon.transport.socket_bulk import connection_record, transfer  # noqa: PLC0415 - likewise
 
         connection = self._open_socket()
         _limit_waiting(connection, _SERVO_S)

@@ -11,14 +11,7 @@ from PySide6.QtWidgets import QBoxLayout
 from study_app.gui.designer.form.entry_row import EntryRow
 from study_app.gui.designer.form.row_fields import Field
 from study_app.viewmodels.designer.form.form_rows import FormRow
-from study_app.viewmodels.designer.requests import (
-    DuplicateEntries,
-    MoveEntries,
-    Paste,
-    RemoveKey,
-    Request,
-    Several,
-)
+from study_app.viewmodels.designer.requests import DuplicateEntries, MoveEntries, Paste, RemoveKey, Request, Several
 
 
 class EntryList(Field):

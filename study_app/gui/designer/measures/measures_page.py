@@ -210,11 +210,7 @@ class MeasuresPage(Themed, QWidget):
             card.show_heading(words, waiting)
 
     def _make_plots(self) -> None:
-        from study_app.gui.designer.measures.block_plots import (  # noqa: PLC0415 - pyqtgraph, once there is a plot
-            ForcesView,
-            FunctionView,
-            TrackView,
-        )
+        from study_app.gui.designer.measures.block_plots import ForcesView, FunctionView, TrackView  # noqa: PLC0415 - pyqtgraph, once there is a plot
 
         self.function, self.track, self.forces = FunctionView(), TrackView(), ForcesView()
         forces = ForcesCard(self.forces)

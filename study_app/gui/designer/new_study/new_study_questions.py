@@ -14,12 +14,7 @@ from study_app.gui.widgets.controls import Check
 from study_app.gui.widgets.labels import label
 from study_app.ids import short_name_of
 from study_app.number_text import number_of, typed_numbers
-from study_app.viewmodels.designer.new_study import (
-    Answers,
-    OwnQuestion,
-    TemplateChoice,
-    languages_offered,
-)
+from study_app.viewmodels.designer.new_study import Answers, OwnQuestion, TemplateChoice, languages_offered
 
 FIELD_PX, WORDS_PX = 36, 112
 NAME_HINT: Final = "small letters and digits"

@@ -23,12 +23,7 @@ ABSOLUTE = Qt.AlignmentFlag.AlignAbsolute
 KNOB = 12.0  # radius
 TRACK = 6.0
 PAGE_STEPS = 10
-STEP_KEYS = {
-    Qt.Key.Key_Left: -1,
-    Qt.Key.Key_Right: 1,
-    Qt.Key.Key_PageDown: -PAGE_STEPS,
-    Qt.Key.Key_PageUp: PAGE_STEPS,
-}
+STEP_KEYS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1, Qt.Key.Key_PageDown: -PAGE_STEPS, Qt.Key.Key_PageUp: PAGE_STEPS}
 
 
 class Line(QSlider):

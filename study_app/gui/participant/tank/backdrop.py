@@ -13,13 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
-from PySide6.QtGui import (
-    QImage,
-    QLinearGradient,
-    QPainter,
-    QPolygonF,
-    QRadialGradient,
-)
+from PySide6.QtGui import QImage, QLinearGradient, QPainter, QPolygonF, QRadialGradient
 
 from study_app.gui.participant.tank import glass
 from study_app.gui.participant.tank.camera import Box, Camera
@@ -87,8 +81,7 @@ def _room(painter: QPainter, area: QRectF, box: Box, camera: Camera) -> None:
     """Paint the dark room, a breath of light around the tank and the tank's mirror image on the table."""
     top, middle, bottom = ROOM
     painter.fillRect(
-        area,
-        glass.shade(QLinearGradient(0, 0, 0, area.height()), (0, top, 255), (0.6, middle, 255), (1, bottom, 255)),
+        area, glass.shade(QLinearGradient(0, 0, 0, area.height()), (0, top, 255), (0.6, middle, 255), (1, bottom, 255))
     )
     centre = glass.at(camera, (0, 0, 0))
     reach = area.width() * 0.52

@@ -75,9 +75,7 @@ def walls(painter: QPainter, box: Box, camera: Camera) -> None:
     fill(painter, back, shade(base, (0, "#284A5E", 255), (0.45, "#25475B", 255), (1, "#1A3548", 255)))
     glow = QRadialGradient(QPointF(frame.center().x(), frame.top() + 0.18 * frame.height()), frame.width() * 0.52)
     fill(
-        painter,
-        back,
-        shade(glow, (0, "#6B95AA", 150), (0.35, "#4A7489", 96), (0.75, "#2F5A70", 24), (1, "#244A60", 0)),
+        painter, back, shade(glow, (0, "#6B95AA", 150), (0.35, "#4A7489", 96), (0.75, "#2F5A70", 24), (1, "#244A60", 0))
     )
     for side in (-1, 1):
         far_edge, near_edge = side * x, side * x
@@ -213,9 +211,7 @@ def surface(painter: QPainter, box: Box, camera: Camera) -> None:
     far, near = skin.at(0).y(), skin.at(2).y()
     down = QLinearGradient(0, far, 0, near)
     fill(
-        painter,
-        skin,
-        shade(down, (0, "#D5E8F1", 118), (0.16, "#A9C8D8", 72), (0.5, "#7FA6BA", 26), (1, "#A4C3D3", 64)),
+        painter, skin, shade(down, (0, "#D5E8F1", 118), (0.16, "#A9C8D8", 72), (0.5, "#7FA6BA", 26), (1, "#A4C3D3", 64))
     )
     sheen = QRadialGradient(at(camera, (0, y, -0.55 * z)), (skin.at(1).x() - skin.at(0).x()) * 0.42)
     fill(painter, skin, shade(sheen, (0, "#E4F4FC", 26), (1, "#E4F4FC", 0)))

@@ -41,13 +41,7 @@ ROUNDING_S = 1e-9  # so that a window of whole ticks holds as many of them, howe
 
 @part
 def basset_force(
-    parameters: Record,
-    liquid: Record,
-    local: Record,
-    state: Record,
-    rows: Any,
-    delay_ticks: int,
-    interval_s: float,
+    parameters: Record, liquid: Record, local: Record, state: Record, rows: Any, delay_ticks: int, interval_s: float
 ) -> None:
     """Add the history force, (3,) [N], to the force; φ is the share of the volume in the liquid.
 

@@ -39,12 +39,7 @@ LAPSES = ((0.0, 0.01, 0.02, 0.03, 0.05, 0.06), (0.3, 0.3, 0.2, 0.15, 0.05, 0.0))
     ],
 )
 def test_threshold_and_interval_are_those_of_psignifit(
-    family: Family,
-    stimulus: Stimulus,
-    design: str,
-    levels: int,
-    each: int,
-    planted: tuple[float, float, float],
+    family: Family, stimulus: Stimulus, design: str, levels: int, each: int, planted: tuple[float, float, float]
 ) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -87,9 +87,7 @@ def test_tab_leaves_a_form_whose_last_rows_were_made_later(qtbot: Any, designer:
     assert keyboard in {met[0], met[-1]}, f"Tab goes round from {keyboard.accessibleName()}"  # not every platform wraps
 
 
-def test_the_help_is_of_the_row_that_has_the_keyboard_after_its_step_made_the_form_anew(
-    designer: Any,
-) -> None:
+def test_the_help_is_of_the_row_that_has_the_keyboard_after_its_step_made_the_form_anew(designer: Any) -> None:
     designer.controller.begin("template:empty", "helped")
     designer.select(("blocks", "liquids"))
     field = designer.row("blocks", "liquids", "order").field

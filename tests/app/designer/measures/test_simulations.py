@@ -18,11 +18,7 @@ from study_app.app.designer.measures.measures_worker import (
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
 from study_app.protocol.checks.expected_precision import threshold_plan
-from study_app.viewmodels.designer.measures.number_cards import (
-    ANEW,
-    FAILED,
-    UNKNOWN,
-)
+from study_app.viewmodels.designer.measures.number_cards import ANEW, FAILED, UNKNOWN
 from study_app.workers.messages import Crashed
 from tests.app.designer.measures.conftest import Worker, jnd, shown
 

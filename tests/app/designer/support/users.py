@@ -8,12 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtCore import QModelIndex
-from PySide6.QtWidgets import (
-    QAbstractButton,
-    QApplication,
-    QComboBox,
-    QWidget,
-)
+from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QWidget
 
 from study_app.gui.designer.form.element_form import FormCard
 from study_app.gui.designer.outline.card import OutlineCard

@@ -130,13 +130,7 @@ def test_a_session_that_stopped_goes_on_where_it_was_to_its_end(stopped, results
     assert met == [PausePage(force_off=False)]
     about_recordings = {"recorded", "recording_lost"}  # the first trial's may have been under way
     after = [line["event"] for line in told[len(before) :] if line["event"] not in about_recordings]
-    assert after[:5] == [
-        "session_resumed",
-        "preflight",
-        "paused",
-        "resumed",
-        "trial_started",
-    ]
+    assert after[:5] == ["session_resumed", "preflight", "paused", "resumed", "trial_started"]
     assert resumed["gap_s"] >= 0
     attempts = [(line["trial"], line["attempt"]) for line in told if line["event"] == "trial_started"]
     assert attempts == [(1, 1), (2, 1), (2, 2), (3, 1), (4, 1)]

@@ -353,10 +353,7 @@ def test_the_command_serves_until_it_is_told_to_end_and_removes_its_socket(path,
 
 @pytest.mark.parametrize(
     ("words", "message"),
-    [
-        (("--fault", "froze"), "fault 'froze' is not known"),
-        (("--geometry", "novint"), "geometry 'novint'"),
-    ],
+    [(("--fault", "froze"), "fault 'froze' is not known"), (("--geometry", "novint"), "geometry 'novint'")],
 )
 def test_the_command_refuses_what_it_does_not_know_in_a_line(path, words, message):
     with command("--socket", path, *words) as served:

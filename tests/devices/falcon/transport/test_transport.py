@@ -145,11 +145,7 @@ def test_what_fails_on_the_way_is_said_by_kind():
     transport = PyUsbTransport(backend)
     gone = usb_error(constants.ERROR_NO_DEVICE, 19)
     backend.fails = dict.fromkeys(("ctrl_transfer", "bulk_write", "bulk_read"), gone)
-    for use in (
-        lambda: transport.control(0, 0),
-        lambda: transport.write(b"a", 1.0),
-        lambda: transport.read(64, 1.0),
-    ):
+    for use in (lambda: transport.control(0, 0), lambda: transport.write(b"a", 1.0), lambda: transport.read(64, 1.0)):
         with pytest.raises(FalconLost, match="plug it in again") as caught:
             use()
         assert isinstance(caught.value, DeviceLost)

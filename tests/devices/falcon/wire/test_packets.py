@@ -106,10 +106,7 @@ def test_a_reply_is_read():
 
 @pytest.mark.slow
 @given(
-    st.tuples(*[st.integers(-(1 << 15), (1 << 15) - 1)] * 3),
-    st.integers(0, 15),
-    st.integers(0, 7),
-    st.integers(0, 255),
+    st.tuples(*[st.integers(-(1 << 15), (1 << 15) - 1)] * 3), st.integers(0, 15), st.integers(0, 7), st.integers(0, 255)
 )
 def test_whatever_a_reply_says_is_read(encoders, buttons, homed, unknown):
     stream = Stream()

@@ -23,11 +23,7 @@ from tests.gui.small import ManualClock
 from tests.protocol.forms.mixed import mixed_file
 
 ENTERED = {"number": "33", "text": "Fine."}
-KEYS = {
-    "choice": (Qt.Key.Key_1,),
-    "rating": (Qt.Key.Key_2,),
-    "slider": (Qt.Key.Key_Home, Qt.Key.Key_Right),
-}
+KEYS = {"choice": (Qt.Key.Key_1,), "rating": (Qt.Key.Key_2,), "slider": (Qt.Key.Key_Home, Qt.Key.Key_Right)}
 
 
 class Session:

@@ -186,10 +186,7 @@ def test_the_page_in_another_language_begins_with_the_keyboard_where_it_begins(w
 
     window.event.connect(answer)
     window.show_page(pages["en"])
-    for keys, language in (
-        ((Qt.Key.Key_Tab, Qt.Key.Key_Right), "nl"),
-        ((Qt.Key.Key_Tab, Qt.Key.Key_Left), "en"),
-    ):
+    for keys, language in (((Qt.Key.Key_Tab, Qt.Key.Key_Right), "nl"), ((Qt.Key.Key_Tab, Qt.Key.Key_Left), "en")):
         for key in keys:
             QTest.keyClick(QApplication.focusWidget() or window, key)
         QApplication.processEvents()

@@ -38,13 +38,7 @@ def literal(felt, motion):
     return local_wakes(h_mps, motion.position_m, interval_s, *numbers)
 
 
-PATHS = {
-    "circle": {},
-    "stop": {},
-    "zigzag": {},
-    "reach": {"distance_m": 0.2},
-    "reverse": {},
-}
+PATHS = {"circle": {}, "stop": {}, "zigzag": {}, "reach": {"distance_m": 0.2}, "reverse": {}}
 
 
 @pytest.mark.nightly

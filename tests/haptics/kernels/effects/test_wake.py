@@ -6,15 +6,7 @@ from hypothesis import strategies as st
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import elements_needed, pack
-from tests.haptics.scenes import (
-    COMPILED,
-    UNBENT,
-    examples,
-    liquid,
-    moving,
-    scene,
-    vectors,
-)
+from tests.haptics.scenes import COMPILED, UNBENT, examples, liquid, moving, scene, vectors
 from tests.haptics.tails import LEGS, LONGEST, PACES, difference, tank, wakes, walk
 
 

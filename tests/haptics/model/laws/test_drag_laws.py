@@ -30,8 +30,7 @@ def coefficient(law, reynolds):
 
 
 @pytest.mark.parametrize(
-    ("law", "reynolds", "expected"),
-    [("haider-levenspiel", 200, 0.795955168), ("haider-levenspiel", 0.002, 12039.1412)],
+    ("law", "reynolds", "expected"), [("haider-levenspiel", 200, 0.795955168), ("haider-levenspiel", 0.002, 12039.1412)]
 )
 def test_published_values(law, reynolds, expected):
     assert coefficient(law, reynolds) == pytest.approx(expected, rel=1e-8)
