@@ -80,6 +80,12 @@ def pytest_runtest_teardown() -> None:
             gc.freeze()
 
 
+def pytest_sessionfinish() -> None:
+    """Wait for what windows left in threads: Python aborts if it ends while one of them loads a module."""
+    if (background := sys.modules.get("study_app.gui.widgets.background")) is not None:
+        background.wait_for_jobs(60)
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Say why a test ran again."""
     for report in terminalreporter.stats.get("rerun", []):

@@ -19,6 +19,7 @@ from pathlib import Path
 from PySide6.QtWidgets import QApplication
 from study_app.app.main_controller import MainController
 from study_app.gui.application import application_here
+from study_app.gui.widgets.background import wait_for_jobs
 
 application = application_here()
 visit = MainController(Path(sys.argv[1]))
@@ -26,6 +27,7 @@ visit.window.show()
 application.processEvents()
 assert visit.window.isVisible()
 print(sorted({name.partition(".")[0] for name in sys.modules}))
+wait_for_jobs(60)
 """
 
 NOTE = """
