@@ -79,7 +79,7 @@ def renamed(document: Document, thing: Path, name: str, recorded: frozenset[str]
         The table or item.
     name : str
         Its new name.
-    recorded : frozenset of str
+    recorded : sequence of str
         Names with recorded answers: where the new one is refused, only its own one of them is proposed.
 
     Raises

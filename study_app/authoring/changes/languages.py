@@ -109,7 +109,7 @@ class TypedCopies:
             The text.
         language : str
             The language that is typed.
-        field : object
+        field : tuple
             What is typed in.
         """
         texts = value_at(study.document, path)
