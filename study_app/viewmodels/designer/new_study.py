@@ -53,6 +53,8 @@ TEMPLATES: Final[Mapping[str, tuple[str, str]]] = {
 
 
 SHIPPED: Final = "shipped study"
+PLANNED: Final = " planned"
+"""Follows a number of participants; a picture of people says the same."""
 STEPS: Final = ("pages", "blocks", "questionnaires")
 """Sections whose tables are steps of a session."""
 
@@ -196,7 +198,7 @@ def _figures(protocol: Protocol) -> Iterator[tuple[str, str]]:
     yield "clock", duration(expected_duration_s(protocol))
     people = None if protocol.analysis is None else protocol.analysis.participants
     if people is not None:
-        yield "people", f"{people} planned"
+        yield "people", f"{people}{PLANNED}"
     yield "layers", counted(trials, "trial")
 
 

@@ -14,7 +14,7 @@ from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CARD, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.labels import clamped
-from study_app.viewmodels.designer.new_study import SHIPPED, TemplateChoice
+from study_app.viewmodels.designer.new_study import PLANNED, SHIPPED, TemplateChoice
 
 PICTURE_PX, WORDS_PX, COPY_PX = 150, 132, 76
 RING = 4
@@ -100,7 +100,8 @@ class TemplateButton(Themed, QAbstractButton):
     def _paint_figures(self, painter: QPainter, top: int) -> None:
         x = 16.0
         painter.setFont(font("small", weight=500))
-        for icon, words in self.choice.figures:
+        for icon, spoken in self.choice.figures:
+            words = spoken.removesuffix(PLANNED)
             draw_icon(painter, icon, QRectF(x, top, 16, 16), self.theme.text2, 1.8)
             painter.setPen(QColor(self.theme.text2))
             painter.drawText(QRectF(x + 22, top - 2, 120, 20), Qt.AlignmentFlag.AlignVCenter, words)
