@@ -75,7 +75,7 @@ class FollowedIds:
         language, text : str
             Its language, and what it will be; of several languages the first one counts.
         recorded : sequence of str
-            Ids beside it under which answers are recorded: none of them changes, or is given to another element.
+            Ids of the same table with recorded answers: none is changed or given to another element.
         """
         element, document = path[:-1], study.document
         wanted, key = id_of(text, MAX_FROM_TEXT), _key(document, element)

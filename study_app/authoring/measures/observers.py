@@ -31,7 +31,7 @@ COVERAGE: Final = 0.93
 """A threshold can be measured if the mean estimate is within the bias and so many 95 % intervals hold it. [choice]"""
 
 Watch: TypeAlias = Callable[[int, int], None]
-"""Is told how many simulations of how many are done; raises `GivenUp` to end them."""
+"""Called with the number of finished simulations and of all; raises `GivenUp` to end them."""
 Values: TypeAlias = tuple[float, ...]
 
 
@@ -175,7 +175,7 @@ def measurable(
     least : float
         No threshold below this level counts: twice the largest error of a valid trial.
     watch : callable
-        Is told how far the simulations are.
+        Called with the number of finished simulations and of all.
     most : float
         No threshold above this level counts: the highest one that is presented in full.
 

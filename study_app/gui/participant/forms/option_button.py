@@ -99,7 +99,7 @@ def picture_of(look: OpenLook, ground: str) -> QImage:
 class OptionLook(Button):
     """How an answer looks: the whole rectangle is clickable; shape, fill and a check mark show that it is chosen.
 
-    ``place`` is its number among the answers of its question, which is told where the pointer comes and goes.
+    ``place`` is its number among the answers of its question, which is notified when the pointer enters and leaves.
     """
 
     place = -1
