@@ -6,10 +6,12 @@ import pytest
 
 from tests.documented import ROOT
 
-READ = re.compile(r"\.(itemAt|takeAt|itemAtPosition)\(")
+READ = re.compile(r"\.(itemAt|takeAt|itemAtPosition|replaceWidget)\(")
 
 
-@pytest.mark.parametrize("text", ["self.grid.takeAt(0)", "self.column.itemAt(0).layout()"])
+@pytest.mark.parametrize(
+    "text", ["self.grid.takeAt(0)", "self.column.itemAt(0).layout()", "row.replaceWidget(old, new)"]
+)
 def test_code_that_reads_an_item_is_found(text: str) -> None:
     assert READ.search(text)
 

@@ -120,7 +120,9 @@ class ChosenCard(Card):
             add_parts(column, head, bar, label(choice.recovery.sentence, "small", "text2", wraps=True), Rule())
         for old, new in zip(before, (self.about, self.details), strict=True):
             apply_theme_within(new, self.theme)
-            self.inside.replaceWidget(old, new)
+            at = self.inside.indexOf(old)
+            self.inside.removeWidget(old)
+            self.inside.insertWidget(at, new)
             remove_widget(old)
         self.questions.show_choice(choice)
 
