@@ -3,8 +3,6 @@
 Nothing here changes what a participant meets. It stands in every receipt, so that it cannot be decided afterwards.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Final, Literal
 

@@ -1,7 +1,5 @@
 """Blocks: trials that share a task and a questionnaire, and the order in which their conditions come."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, ClassVar, Final, Literal, Self, TypeAlias
 
 from pydantic import Field, SerializerFunctionWrapHandler, StringConstraints, model_serializer, model_validator

@@ -1,7 +1,5 @@
 """Who made a study, under which licence its data are shared, and how it is cited: for exports."""
 
-from __future__ import annotations
-
 from pydantic import Field
 
 from study_app.protocol.table import Table

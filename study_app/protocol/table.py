@@ -1,7 +1,5 @@
 """The base of everything that is a table of a protocol file."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar, Final, Self
 
 from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, model_validator
@@ -20,7 +18,7 @@ NOT_WITH: Final = "not with"
 class Table(BaseModel):
     """A table of the file: unknown keys are errors, numbers are finite, values never change."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = ()
     """Pairs of keys of which exactly one is given."""

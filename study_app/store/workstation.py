@@ -43,7 +43,7 @@ How = Literal["photodiode", "high-speed camera", "data sheet"]
 
 
 class _Strict(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, defer_build=True)
 
 
 class DisplayOffset(_Strict):

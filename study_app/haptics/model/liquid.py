@@ -5,10 +5,8 @@ effect's table is the model in its descriptor (``haptics.model.effects``); its e
 file in ``haptics.kernels.effects``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import (
     Discriminator,
@@ -80,7 +78,7 @@ class _Liquid(Frozen):
     )
 
     @model_validator(mode="after")
-    def _effects_have_what_they_need(self) -> _Liquid:
+    def _effects_have_what_they_need(self) -> Self:
         if self.effects == "auto":
             self._has_no_problem(
                 it for it in EFFECTS if it.default is None and getattr(self, it.name, None) is not None

@@ -11,7 +11,7 @@ REASON: Final = "reason"
 class Frozen(BaseModel):
     """A value: never changed once made, no unknown fields, no infinities."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
 
 def within(least: float, most: float, why: str, usual: float | None = None, what: str | None = None) -> Any:

@@ -5,10 +5,8 @@ Frozen, validated values in SI units and the scene frame (x right, y up, z towar
 hand from here, too.
 """
 
-from __future__ import annotations
-
 import math
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Literal, Self, TypeAlias
 
 from pydantic import Field, model_validator
 
@@ -133,7 +131,7 @@ class MotionBox(Frozen):
     )
 
     @model_validator(mode="after")
-    def _least_depth_comes_first(self) -> MotionBox:
+    def _least_depth_comes_first(self) -> Self:
         if self.depth_m is not None and self.depth_m[0] > self.depth_m[1]:
             raise ValueError(f"depth_m is the least depth, then the greatest, not {list(self.depth_m)}")
         return self
@@ -163,14 +161,14 @@ class Scene(Frozen):
     link: ForceLink = PROMPT
 
     @model_validator(mode="after")
-    def _liquids_are_told_apart(self) -> Scene:
+    def _liquids_are_told_apart(self) -> Self:
         names = [liquid.id for liquid in self.liquids]
         if len(set(names)) < len(names):
             raise ValueError(f"two liquids share an id in {names}")
         return self
 
     @model_validator(mode="after")
-    def _link_reaches_back(self) -> Scene:
+    def _link_reaches_back(self) -> Self:
         if not self.link.fits(self.rate_hz):
             raise ValueError(too_long(self.rate_hz))
         return self

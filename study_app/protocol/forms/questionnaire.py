@@ -1,7 +1,5 @@
 """Questionnaires: what is answered after a trial, or as a form on its own."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Final, Literal
 

@@ -1,7 +1,5 @@
 """Rating scales."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import Field

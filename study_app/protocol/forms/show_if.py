@@ -1,7 +1,5 @@
 """When a question is shown: by the answer to an earlier one."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Protocol, Self, TypeAlias
 

@@ -1,7 +1,5 @@
 """The tables ``[groups.NAME]``, and where a protocol file names the steps of its sessions."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Any, Final, Self, TypeAlias
 

@@ -1,7 +1,5 @@
 """Scores: numbers computed from the answers to a standard questionnaire."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 

@@ -4,8 +4,6 @@ It comes from a protocol, or from the protocol without its conditions that a ses
 value, so that an order can be made again without opening the key.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeAlias
@@ -137,7 +135,7 @@ def order_of(protocol: Protocol, block: Block) -> BlockOrder:
 class _Kept(BaseModel):
     """The base of what is read from a receipt, which holds more than is asked for here."""
 
-    model_config = ConfigDict(frozen=True, extra="ignore")
+    model_config = ConfigDict(frozen=True, extra="ignore", defer_build=True)
 
 
 class _KeptBlock(_Kept):

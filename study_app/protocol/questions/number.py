@@ -1,7 +1,5 @@
 """A number that is typed."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import ClassVar, Final, Literal, Self

@@ -4,8 +4,6 @@ A kind is a subclass of `Question` with a field ``kind``, in a module of this fo
 a subclass of `ItemView`. It names its widget, measure and figure by their ids, which are looked up where these are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Final, Literal, TypeAlias

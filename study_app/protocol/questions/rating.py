@@ -1,7 +1,5 @@
 """A rating on a scale of 2 to 11 points."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import ClassVar, Final, Literal

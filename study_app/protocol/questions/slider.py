@@ -1,7 +1,5 @@
 """A slider between two words; it has no handle before it is first touched."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import ClassVar, Final, Literal, Self
 

@@ -1,7 +1,5 @@
 """A statement that is rated on its questionnaire's scale of seven points: the only kind of format 1."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Final
 
 from study_app.protocol.forms.scale import Scale

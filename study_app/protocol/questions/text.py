@@ -1,7 +1,5 @@
 """A text that is typed."""
 
-from __future__ import annotations
-
 import unicodedata
 from dataclasses import dataclass, field
 from typing import ClassVar, Final, Literal

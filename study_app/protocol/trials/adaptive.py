@@ -1,7 +1,5 @@
 """What methods share whose next level depends on the answers: trials, first levels, and the answers that count."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from typing import Annotated

@@ -1,7 +1,5 @@
 """Conditions, and stimuli: the one number of a condition that is varied, and the comparisons of its levels."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What a trial may show at most, and what an interval must deliver, to be valid."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer

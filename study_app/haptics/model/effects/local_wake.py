@@ -1,10 +1,8 @@
 """The local wake: the position tail tied to the places it was left at."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -37,7 +35,7 @@ class LocalWake(Frozen):
     ] = 1e-3
 
     @model_validator(mode="after")
-    def _liquid_never_outruns_the_body(self) -> LocalWake:
+    def _liquid_never_outruns_the_body(self) -> Self:
         return within_scaling(self)
 
 

@@ -1,10 +1,8 @@
 """The position tail: the liquid velocity left by the body's recent path."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Protocol, TypeVar
+from typing import Annotated, Any, Literal, Protocol, Self, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -61,7 +59,7 @@ class Wake(Frozen):
     )
 
     @model_validator(mode="after")
-    def _liquid_never_outruns_the_body(self) -> Wake:
+    def _liquid_never_outruns_the_body(self) -> Self:
         return within_scaling(self)
 
 

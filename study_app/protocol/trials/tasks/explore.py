@@ -1,7 +1,5 @@
 """Free motion in the tank."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Final, Literal, Self
 
 from pydantic import Field, model_validator

@@ -1,7 +1,5 @@
 """A target that swings to and fro and is followed: a motion of known pace."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, ClassVar, Literal
 

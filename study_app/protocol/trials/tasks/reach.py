@@ -1,7 +1,5 @@
 """Targets that light up one after the other."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import Annotated, ClassVar, Final, Literal, Self, TypeAlias
