@@ -1,7 +1,5 @@
 """A file becomes a validated protocol, or one ProtocolError that lists every problem with its line and a hint."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -123,13 +121,14 @@ def examined(document: dict[str, Any], *, delay_ticks: int = BELIEVED_TICKS) -> 
         newer = list(formats.newer_keys(document))
         broken += [fault.path for fault in newer]
         faults += newer
-    faults += _outside(broken, _faults(Protocol, document))
+    protocol, wrong = _validated(Protocol, document)
+    faults += _outside(broken, wrong)
     if not formats.is_later(document):
         unfilled = [path for path in broken if path[0] == "questionnaires"]
-        faults += _outside(unfilled, check(document, [fault.path for fault in faults]))
-    if faults:
+        sound = None if faults else protocol
+        faults += _outside(unfilled, check(document, [fault.path for fault in faults], sound))
+    if protocol is None or faults:
         return None, faults
-    protocol = Protocol.model_validate(document, strict=True)
     if faults := list(dict.fromkeys(designs(protocol))):
         return None, faults
     return protocol, [*paced(protocol, delay_ticks), *returned(protocol)]
@@ -184,7 +183,8 @@ def _sound_scene(document: dict[str, Any], name: str, places: Places) -> dict[st
         document = formats.with_scene_defaults(document)
     elif not formats.is_later(document):
         faults = [fault for fault in formats.newer_keys(document) if fault.path[0] in SceneFile.model_fields]
-    _raise(name, faults + _outside([fault.path for fault in faults], _faults(SceneFile, document)), places)
+    _, wrong = _validated(SceneFile, document)
+    _raise(name, faults + _outside([fault.path for fault in faults], wrong), places)
     return document
 
 
@@ -315,17 +315,17 @@ def _shortened(words: str) -> str:
     return _LONG.sub(lambda found: f"{found[0][:SHOWN]}…", words)
 
 
-def _faults(model: type[M], document: Mapping[str, Any]) -> list[Fault]:
+def _validated(model: type[M], document: Mapping[str, Any]) -> tuple[M | None, list[Fault]]:
+    """Return the value of a document, None where it has none, and the faults that its classes find."""
     if formats.is_later(document):
         known = f"this program reads formats 1 to {formats.LATEST}"
-        return [Fault(("format",), f"is {document['format']}, {known}", "use a newer version of liquid-study")]
+        return None, [Fault(("format",), f"is {document['format']}, {known}", "use a newer version of liquid-study")]
     named = [path for section in ("liquids", "blocks") for path, _ in entries(document, f"{section}.*.id")]
     faults = [Fault(path, "unknown key", "the name of the table is its id") for path in named]
     try:
-        model.model_validate(document, strict=True)
+        return model.model_validate(document, strict=True), faults
     except ValidationError as error:
-        faults += faults_of(error, document, schema(model))
-    return faults
+        return None, faults + faults_of(error, document, schema(model))
 
 
 def located(faults: Iterable[Fault], places: Places) -> tuple[Problem, ...]:

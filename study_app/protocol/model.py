@@ -4,8 +4,6 @@ Each class is one table of the file (blocks, tasks and questionnaires have modul
 can decide by itself is checked by its class; what needs two tables is in ``references`` and ``checks``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Final, Literal, Self, TypeAlias, TypeVar
@@ -210,7 +208,7 @@ class StudyLiquid(Liquid):
     @property
     def alone(self) -> Liquid:
         """The liquid without its ball."""
-        return Liquid.model_validate(self.model_dump(exclude={"body"}))
+        return Liquid.model_validate({name: value for name, value in self if name != "body"})
 
     def body_in(self, scene: SceneDefaults) -> Body:
         """Return the ball in this liquid."""

@@ -4,8 +4,6 @@ The checks work on a :class:`Draft` of every entry that is sound by itself, so t
 is wrong between the others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
@@ -26,6 +24,7 @@ from study_app.protocol.model import (
     Format,
     Named,
     PageText,
+    Protocol,
     Reach,
     SceneDefaults,
     StudyLiquid,
@@ -48,7 +47,7 @@ _TABLES = ("liquids", "conditions", "tasks", "pages", "blocks")
 class Draft(BaseModel):
     """The sound entries of a document; ``whole`` says that no block had to be left out."""
 
-    model_config = ConfigDict(frozen=True, extra="ignore")
+    model_config = ConfigDict(frozen=True, extra="ignore", defer_build=True)
 
     format: Format = 1
     device: DeviceNeeds | None = None
@@ -74,8 +73,11 @@ class Draft(BaseModel):
         return scene_with(self.scene, self.device, liquids, self.format)
 
 
-def draft(document: Mapping[str, Any], broken: Iterable[Path]) -> Draft:
+def draft(document: Mapping[str, Any], broken: Iterable[Path], valid: Protocol | None) -> Draft:
     """Return what of ``document`` is sound; ``broken`` are the paths of the problems already found."""
+    differ = bool(document.keys() & {"groups", "sequences"})
+    if valid is not None:
+        return Draft.model_construct(**dict(valid), sessions_differ=differ)
     sound = {key: dict(value) if isinstance(value, Mapping) else value for key, value in document.items()}
     for path in filter(None, broken):
         section = str(path[0])
@@ -84,16 +86,18 @@ def draft(document: Mapping[str, Any], broken: Iterable[Path]) -> Draft:
         else:
             sound.pop(section, None)
     sound.setdefault("scene", None if "scene" in document else {})
-    whole = len(names(document, "blocks")) == len(names(sound, "blocks"))
-    differ = bool(document.keys() & {"groups", "sequences"})
-    return Draft.model_validate({**sound, "whole": whole, "sessions_differ": differ}, strict=True)
+    all_blocks = len(names(document, "blocks")) == len(names(sound, "blocks"))
+    return Draft.model_validate({**sound, "whole": all_blocks, "sessions_differ": differ}, strict=True)
 
 
-def check(document: Mapping[str, Any], broken: Iterable[Path]) -> Iterator[Fault]:
-    """Yield every problem between the tables of ``document``, whose ``broken`` places are known already."""
+def check(document: Mapping[str, Any], broken: Iterable[Path], valid: Protocol | None) -> Iterator[Fault]:
+    """Yield every problem between the tables of ``document``, whose ``broken`` places are known already.
+
+    ``valid`` is its value where nothing is broken: its tables are not validated again.
+    """
     for of_names in (references, kinds, sequence, groups, repeats, items, alike, languages, questions, decisions):
         yield from of_names(document)
-    parts = draft(document, broken)
+    parts = draft(document, broken, valid)
     for of_tables in (balls, targets, crowded, outside, unfelt, equal_liquids, equal_conditions):
         yield from of_tables(parts)
     for of_tables in (codes, compares, breaks, counted_parts):
