@@ -2,7 +2,6 @@
 
 import math
 import re
-from decimal import Decimal
 from typing import Final
 
 MINUS: Final = "\u2212"
@@ -46,6 +45,8 @@ def typed_numbers(text: str, unit: str = "") -> list[tuple[str, int | float]]:
 
 def exact_text(value: float) -> str:
     """Return a number with every digit that it needs, without an exponent: "1000.0001", "0.00002"."""
+    from decimal import Decimal  # noqa: PLC0415 - every command loads this module, few need it
+
     text = format(Decimal(repr(value + 0)), "f")
     return text.rstrip("0").rstrip(".") if "." in text else text
 

@@ -33,6 +33,9 @@ def commands(context: click.Context) -> None:
     demo); RESULTS is a study folder, or its name in the workspace; SESSION is a ses-NN folder, or a name that the
     command sessions lists.
     """
+    from study_app.store.program_log import keep_log
+
+    keep_log()
     if context.invoked_subcommand is None:
         from study_app import app
 
@@ -72,9 +75,6 @@ def _shortened(message: str) -> str:
 
 def main() -> None:
     """Run a command; turn what the user can fix into one line and exit code 2, and log what else fails."""
-    from study_app.store.program_log import keep_log
-
-    keep_log()
     if isinstance(sys.stdout, io.TextIOWrapper):  # a pipe or an old console may lack a letter of a study's title
         sys.stdout.reconfigure(errors="backslashreplace")
     try:

@@ -1,16 +1,18 @@
 """Where commands compute their cases: ``--workers`` and ``--cluster``, and what an interrupted start has finished."""
 
 from collections.abc import Iterator
-from concurrent.futures import Executor
 from contextlib import contextmanager
 from functools import wraps
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 from click.core import ParameterSource
 
 from study_app.cli.options import Command
 from study_app.workers.executors import Workers, open_executor
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
 
 EXIT_CANCELLED: Final = 130
 
@@ -54,7 +56,7 @@ def _not_zero(_context: click.Context, _option: click.Parameter, value: int) -> 
 
 
 @contextmanager
-def executor_for(workers: Workers) -> Iterator[Executor]:
+def executor_for(workers: Workers) -> "Iterator[Executor]":
     """Open the executor of a command, which keeps finished cases until all are; Ctrl+C says how many are kept.
 
     Yields

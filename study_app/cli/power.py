@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +14,8 @@ from study_app.cli.progress import ShowProgress, progress
 from study_app.workers.executors import Workers
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from study_app.analysis.power.power_curves import Powers
     from study_app.analysis.power.threshold_studies import PrecisionPlans
     from study_app.analysis.power.threshold_tables import Precisions

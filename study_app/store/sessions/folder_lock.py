@@ -16,8 +16,6 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Self
 
-import psutil
-
 from study_app.errors import StoreError
 from study_app.store.atomic import cannot_write, create_folder, is_there, sync_folder, write_file
 from study_app.store.journals.parsing import parse_json
@@ -154,7 +152,7 @@ def _lives(holder: dict[str, Any]) -> bool:
     try:
         began = process_began(holder["pid"])
         return began is not None and abs(began - float(holder["began"])) < SAME_S
-    except (psutil.AccessDenied, KeyError, TypeError, ValueError):  # it runs; whether it is the same is not known
+    except (PermissionError, KeyError, TypeError, ValueError):  # it runs; whether it is the same is not known
         return True
 
 
@@ -174,9 +172,11 @@ def process_began(process: int) -> float | None:
 
     Raises
     ------
-    psutil.AccessDenied
+    PermissionError
         It runs, and belongs to another account, which hides it.
     """
+    import psutil  # noqa: PLC0415 - slow to load: only where a folder is locked
+
     try:
         running = psutil.Process(process)
         if running.status() in (psutil.STATUS_ZOMBIE, psutil.STATUS_DEAD):
@@ -184,3 +184,5 @@ def process_began(process: int) -> float | None:
         return running.create_time() - (psutil.boot_time() if psutil.LINUX else 0.0)
     except psutil.NoSuchProcess:
         return None
+    except psutil.AccessDenied as error:
+        raise PermissionError(process) from error

@@ -11,7 +11,6 @@ import psutil
 import pytest
 
 from study_app.errors import StoreError
-from study_app.store.sessions import folder_lock
 from study_app.store.sessions.folder_lock import is_open, markers, open_alone, process_began
 
 
@@ -115,11 +114,11 @@ def test_a_process_that_runs_began_once_and_one_that_ended_is_none() -> None:
 def test_a_process_of_which_nothing_may_be_known_is_taken_for_a_living_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def denied(_process: int) -> float:
+    def denied(_process: psutil.Process) -> str:
         raise psutil.AccessDenied
 
     other(tmp_path)
-    monkeypatch.setattr(folder_lock, "process_began", denied)
+    monkeypatch.setattr(psutil.Process, "status", denied)
     assert is_open(tmp_path)
 
 
