@@ -5,11 +5,28 @@
 one by command.
 """
 
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from study_app.gui.display.display_check import qt_imported
 
-with qt_imported():
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Import without collections of garbage, which would look through what stays: a tenth of the start-up time."""
+    before = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+        gc.freeze()
+    finally:
+        if before:
+            gc.enable()
+
+
+with qt_imported(), _uncollected():
     from study_app.app.session.entry import resume, run
     from study_app.app.session.live_session import BUG, CANCELLED, LiveSession
 
@@ -18,7 +35,7 @@ def __getattr__(name: str) -> Any:
     """Load the main window where it is asked for: a session by command begins without it."""
     if name != "home":
         raise AttributeError(name)
-    with qt_imported():
+    with qt_imported(), _uncollected():
         from study_app.app.main_controller import home  # noqa: PLC0415
     return home
 

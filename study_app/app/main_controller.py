@@ -15,7 +15,8 @@ from study_app.app.lab_and_designer import LabAndDesigner
 from study_app.app.session.garbage_collection import collecting_here
 from study_app.app.session.live_session import BUG, OPENING_PATIENCE_S, LiveSession
 from study_app.app.session.termination import BY_SIGNAL_S, Patience, ended_from_outside
-from study_app.app.workstation_controller import WorkstationController, screen_number, theme_named
+from study_app.app.workstation_controller import WorkstationController
+from study_app.app.workstation_settings import screen_number, theme_named
 from study_app.errors import StoreError
 from study_app.gui.application import application_here
 from study_app.gui.display.screens import place

@@ -16,7 +16,8 @@ from PySide6.QtWidgets import QApplication, QMainWindow
 from study_app.app.devices_controller import DevicesController
 from study_app.app.main_controller import MainController
 from study_app.app.session.live_session import LiveSession
-from study_app.app.workstation_controller import WorkstationController, described, settings_here, text_scale_on
+from study_app.app.workstation_controller import WorkstationController
+from study_app.app.workstation_settings import described, settings_here, text_scale_on
 from study_app.devices.descriptor import NONE, READY, Backend
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.widgets.dialogs import Notice

@@ -23,7 +23,7 @@ from study_app.app.crash_trace import CrashTrace
 from study_app.app.session.garbage_collection import unfreeze_garbage
 from study_app.app.session.preloading import load_windows
 from study_app.app.session.termination import BY_SIGNAL_S
-from study_app.app.workstation_controller import described, screen_number, settings_here, text_scale_on
+from study_app.app.workstation_settings import described, screen_number, settings_here, text_scale_on
 from study_app.authoring.versions.contents import keep_content
 from study_app.devices.registry import descriptor_of
 from study_app.devices.rig import Rig, open_rig, study_settings

@@ -19,7 +19,7 @@ from study_app.app.designer.participant.shown_step import (
     step_name,
 )
 from study_app.app.designer.participant.sound_part import last_valid, sound_part
-from study_app.app.workstation_controller import screen_number, settings_here, text_scale_on
+from study_app.app.workstation_settings import screen_number, settings_here, text_scale_on
 from study_app.authoring.edited_study import Study
 from study_app.authoring.kept_settings import keep_setting, kept_language
 from study_app.authoring.measures.valid_part import valid_part

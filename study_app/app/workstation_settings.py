@@ -1,0 +1,52 @@
+"""What is set for this computer and what its screens are, as sessions and windows use them."""
+
+from typing import Any
+
+from PySide6.QtGui import QScreen
+
+from study_app.devices.registry import descriptor_of
+from study_app.errors import DeviceError
+from study_app.gui.display.frame_clock import BY_CLOCK, LOCKED
+from study_app.gui.display.opengl import has_card
+from study_app.gui.display.screens import describe_screen, screen_shown, screens_shown
+from study_app.gui.theme.theme import DARK, LIGHT, Theme
+from study_app.store import workstation
+from study_app.store.workstation import DEFAULTS, MachineSettings
+from study_app.user_folder import settings_file
+
+
+def settings_here() -> tuple[MachineSettings, str]:
+    """Return what is set, and in a line why it is the defaults where the file cannot be used ("" where it can)."""
+    settings, trouble = workstation.load_or_default()
+    try:
+        descriptor_of(settings.device)
+    except DeviceError as error:
+        return settings.model_copy(update={"device": DEFAULTS.device}), f"{settings_file()}: {error}"
+    return settings, trouble
+
+
+def theme_named(name: str) -> Theme:
+    """Return the theme of the operator's windows by its name."""
+    return DARK if name == DARK.name else LIGHT
+
+
+def screen_number(settings: MachineSettings) -> int:
+    """Return which screen is the participant's, from 1."""
+    return settings.screen_among([screen.name for screen in screens_shown()])
+
+
+def text_scale_on(settings: MachineSettings, screen: QScreen) -> float:
+    """Return how much larger than designed the participant's words must be on a screen."""
+    shown = screen_shown(screen)
+    return settings.text_scale(shown.width_px, shown.width_mm)
+
+
+def described(settings: MachineSettings, participant: QScreen, operator: QScreen) -> dict[str, Any]:
+    """Return what the receipt says of the screens: what the system tells, and what was measured of the first.
+
+    ``frames`` is what the participant's follow: a screen tells of its swaps where a graphics card draws.
+    """
+    shown = screen_shown(participant)
+    frames = {"frames": LOCKED if has_card() else BY_CLOCK}
+    measured = settings.describe(shown.name, shown.width_px, shown.width_mm)
+    return {"participant": describe_screen(participant) | frames | measured, "operator": describe_screen(operator)}
