@@ -28,7 +28,8 @@ def go_on(parts: Sequence[QWidget], by_qt: Callable[[bool], bool], *, forward: b
     """Let Tab go through parts one after another, then to the beginning of the window, or Shift+Tab back.
 
     Within a part the order is Qt's, ``by_qt``, except where Qt leaves the part before all of it was gone through, and
-    where Qt goes to the focus proxy of an editor past what comes before it, such as the entries of a list.
+    where Qt goes to the focus proxy of an editor past what comes before it and after the keyboard, such as the entries
+    of a list.
     """
     window = parts[0].window()
     shown = [(part, found) for part in parts if (found := _shown(part))]
@@ -45,7 +46,7 @@ def go_on(parts: Sequence[QWidget], by_qt: Callable[[bool], bool], *, forward: b
         moved = by_qt(forward)
         there = window.focusWidget()
         if there is not None and part.isAncestorOf(there):
-            if forward and (first := _first(here, there)) is not there:
+            if forward and (first := _first(here, there)) in rest:
                 first.setFocus(Qt.FocusReason.TabFocusReason)
             return moved
     to = rest[0] if rest else _entry(shown, at, window, forward=forward)

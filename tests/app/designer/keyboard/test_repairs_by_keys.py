@@ -83,6 +83,22 @@ def test_tab_goes_on_from_a_repair_to_the_rest_of_the_form(qtbot: Any, broken: A
     assert broken.place.form.isAncestorOf(press(qtbot, KEY.Key_Tab))
 
 
+def test_tab_goes_on_from_a_repair_that_a_choice_of_words_led_to(qtbot: Any, broken: Any) -> None:
+    """Tab comes to the repair from the first word, and then to the other words: the first one is passed already."""
+    broken.editing.type_text("Break", broken.text.replace('kind = "explore"', 'kind = "explor"', 1))
+    problem = next(one for one in broken.place.view.problems if one.fault.path[-1] == "kind")
+    broken.place.problems.open(problem)
+    row = broken.row(*problem.fault.path)
+    qtbot.waitUntil(lambda: bool(row.repairs))
+    row.repairs[0].setFocus()
+    passed = []
+    while row.isAncestorOf(QApplication.focusWidget()):
+        assert QApplication.focusWidget() not in passed, "the keyboard does not leave the row"
+        passed.append(QApplication.focusWidget())
+        press(qtbot, KEY.Key_Tab)
+    assert broken.place.form.isAncestorOf(QApplication.focusWidget())
+
+
 def test_tab_goes_from_a_line_of_the_list_to_its_repair(qtbot: Any, broken: Any) -> None:
     broken.place.header.problems.click()
     for line in broken.place.problems.lines:
