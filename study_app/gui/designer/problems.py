@@ -75,7 +75,7 @@ class ProblemLine(Themed, QWidget):
     def show_repairs(self, repairs: tuple[str, ...]) -> None:
         """Offer repairs, two at most."""
         for words in repairs[len(self.repairs) : 2]:
-            made = RepairButton(self.row, words, self.row.name)
+            made = RepairButton(self.row, words)
             made.clicked.connect(lambda _checked=False, words=words: self.repair_asked.emit(words))
             apply_theme_within(made, self.theme)
             self._repairs.addWidget(made)

@@ -19,12 +19,12 @@ LONGEST = 20
 class RepairButton(ActionButton):
     """Makes a repair of ``problem``; ``by_keys`` says whether a key led to it, not a click."""
 
-    def __init__(self, problem: ProblemRow, words: str, where: str) -> None:
+    def __init__(self, problem: ProblemRow, words: str) -> None:
         super().__init__("", words, height=32)
         self.problem = problem
         self.setProperty("dense", "true")
         self.setFont(font("label"))
-        self.setAccessibleName(f"{words}: {where}")
+        self.setAccessibleName(f"{words}: {problem.name}")
         self.by_keys = False
 
     def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name

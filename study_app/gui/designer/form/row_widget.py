@@ -175,7 +175,7 @@ class RowWidget(Themed, QWidget):
         asked = [(one, word) for one, words in offered.items() for word in words[: 1 if several else 2]]
         times = Counter(word for _problem, word in asked)
         for problem, word in [(one, word) for one, word in asked if times[word] == 1][:MOST_REPAIRS]:
-            made = RepairButton(problem, word, self.row.row.label)
+            made = RepairButton(problem, word)
             made.clicked.connect(lambda _on=False, one=problem, word=word: self.repair_asked.emit(one, word))
             apply_theme_within(made, self.theme)
             self._buttons.addWidget(made, 0, Qt.AlignmentFlag.AlignRight)

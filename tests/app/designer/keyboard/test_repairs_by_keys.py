@@ -99,6 +99,19 @@ def test_tab_goes_on_from_a_repair_that_a_choice_of_words_led_to(qtbot: Any, bro
     assert broken.place.form.isAncestorOf(QApplication.focusWidget())
 
 
+def test_the_name_of_a_repair_tells_it_from_that_of_another_element(qtbot: Any, broken: Any) -> None:
+    text = broken.text.replace('kind = "explore"', 'kind = "explor"', 1)
+    broken.editing.type_text("Break", text.replace('task = "explore"', 'task = "explor"', 1))
+    spoken = set()
+    for problem in (one for one in broken.place.view.problems if '"explor"' in one.message):
+        broken.select(problem.element)
+        row = broken.row(*problem.fault.path)
+        qtbot.waitUntil(lambda row=row: bool(row.repairs))
+        assert row.repairs[0].text() == 'Use "explore"'
+        spoken.add(row.repairs[0].accessibleName())
+    assert spoken == {'Use "explore": Task Explore, Kind', 'Use "explore": Block Liquids, Task'}
+
+
 def test_tab_goes_from_a_line_of_the_list_to_its_repair(qtbot: Any, broken: Any) -> None:
     broken.place.header.problems.click()
     for line in broken.place.problems.lines:
