@@ -191,8 +191,10 @@ def balance_card(
         return None
     evenness, rows, who = judged.evenness, judged.rows, people(participants, planned)
     if evenness.balanced:
-        rounds = "" if rows is None else f": {participants} are {counted(participants // rows, 'round')} of {rows}"
-        verdict: Verdict = ("ok", "check", f"balanced{rounds}")
+        verdict: Verdict = ("ok", "check", "balanced")
+        if rows is not None:
+            rounds = counted(participants // rows, "round")
+            verdict = ("ok", "check", f"balanced: {participants} participants are {rounds} of {rows}")
     elif rows is not None and participants % rows:
         even = " or ".join(str(one) for one in (judged.last_even, judged.next_even) if one)
         verdict = ("warn", "warning", f"balanced with {even} participants, for a {SQUARE_NAMES[judged.order]}")

@@ -74,7 +74,7 @@ def test_a_block_of_statements_shows_session_balance_power_and_force() -> None:
     assert ("ok", "check", "One page, no scrolling at 1366 × 768") in session.verdicts
     assert sum(share for _, share, *_ in session.segments) == pytest.approx(1.0)
     assert isinstance(balance, BalanceCard)
-    assert balance.verdict == ("ok", "check", "balanced: 12 are 2 rounds of 6")
+    assert balance.verdict == ("ok", "check", "balanced: 12 participants are 2 rounds of 6")
     assert {count for line in balance.positions for count in line} == {4}
     assert isinstance(power, LinesCard)
     assert [line.number for line in power.lines] == ["1.0", UNKNOWN]
