@@ -1,4 +1,7 @@
-"""Actions per task of the study designer: python tests/benchmarks/windows/designer_tasks.py prints a table.
+"""Actions per task of the study designer: python tests/benchmarks/windows/designer_tasks.py [--only N[,N]].
+
+Prints a table. ``--only`` does the tasks of these numbers, after the first one of the table, 1, which opens the
+designer; 8 needs 7.
 
 Each task is done once by keys alone and once by the mouse alone (texts and numbers are typed), with real events in a
 real window of 1366 × 768 on a virtual display of its own. A key, a typed text, a click and a notch of the wheel are an
@@ -7,10 +10,11 @@ action each. The program runs in another process, which is killed in the task th
 
 from __future__ import annotations
 
+import argparse
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
@@ -39,7 +43,6 @@ FAULTS = (
     ('task = "explore"', 'task = "explor"'),
 )
 """What is broken in the demo: each has a repair."""
-LIMIT_S = 900.0
 
 
 class Tasks:
@@ -86,14 +89,14 @@ class Tasks:
         user.write("Title", "Four delays", accept=False)
         user.press("Make study")
         user.select("Water", "Conditions")
-        user.shortcut("ctrl+shift+d", "Series …")
+        user.shortcut("ctrl+shift+d", "Series of Water")
         user.write("Values of the series", "0 60 120 240", accept=False)
         user.shortcut("Return", "Make 4 conditions")
         user.select("Liquids", "Session, in order")
         user.choose("Order", "Williams")
         QTest.qWait(1500)
         words = [label.text() for label in user.window.findChildren(QLabel) if label.isVisible()]
-        assert any("balanced, 3 rounds of 4" in one for one in words), words
+        assert any("12 participants are 3 rounds of 4" in one for one in words), words
 
     def changes(self) -> None:
         """What differs from the version that was saved."""
@@ -127,7 +130,9 @@ class Tasks:
             if self.header().problems.words.startswith("No") or "warning" in self.header().problems.words:
                 break
             offered = lambda: [  # noqa: E731 - looked for anew
-                one for one in card.findChildren(ActionButton) if one.isVisible() and ": " in one.accessibleName()
+                one
+                for one in card.findChildren(ActionButton)
+                if one.isVisible() and one.isEnabled() and ": " in one.accessibleName()
             ]
             wait_until(offered, "a repair", 60_000)
             user.press(name_of(offered()[0]))
@@ -165,14 +170,16 @@ TASKS: tuple[Callable[[Tasks], None], ...] = (
     Tasks.measures,
 )  # fmt: skip
 AFTER_A_KILL = "The program is killed in the middle; continue"
+NUMBERS = range(1, len(TASKS) + 2)
+"""The numbers of the tasks, with the one after a kill."""
 
 
-def act_all(kind: str, folder: Path) -> None:
-    """Do all tasks in one window; print the actions of each."""
+def act_tasks(kind: str, folder: Path, *numbers: str) -> None:
+    """Do tasks in one window; print the actions of each."""
 
     def act(user: User) -> None:
         tasks = Tasks(user, folder)
-        for task in TASKS:
+        for task in (TASKS[int(number) - 1] for number in numbers):
             before = user.actions
             try:
                 task(tasks)
@@ -212,11 +219,13 @@ def act_continued(kind: str, folder: Path) -> None:
     use(kind, act)
 
 
-ACTS = {"all": act_all, "killed": act_killed, "continued": act_continued}
+ACTS: dict[str, Callable[..., None]] = {"tasks": act_tasks, "killed": act_killed, "continued": act_continued}
 
 
-def main() -> None:
+def main(numbers: Sequence[int]) -> None:
     """Print the table."""
+    in_one_window = [str(number) for number in numbers if number <= len(TASKS)]
+    acts = [["tasks", *in_one_window], *([["killed"], ["continued"]] if NUMBERS[-1] in numbers else [])]
     counts: dict[str, dict[str, str]] = {}
     for kind in USERS:
         with tempfile.TemporaryDirectory() as name, virtual_display(size=(1366, 768)) as display:
@@ -229,8 +238,8 @@ def main() -> None:
                 text = text.replace(right, wrong, 1)
             (folder / "protocols" / "faulty.toml").write_text(text, encoding="utf-8")
             here = environment(folder) | {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb", "PYTHONFAULTHANDLER": "1"}
-            for act in ACTS:
-                command = [sys.executable, __file__, act, kind, name]
+            for act, *more in acts:
+                command = [sys.executable, __file__, act, kind, name, *more]
                 with subprocess.Popen(command, env=here, stdout=subprocess.PIPE, text=True) as process:
                     assert process.stdout is not None
                     for line in process.stdout:
@@ -248,7 +257,12 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        ACTS[sys.argv[1]](sys.argv[2], Path(sys.argv[3]))
+    if sys.argv[1:2] and sys.argv[1] in ACTS:
+        ACTS[sys.argv[1]](sys.argv[2], Path(sys.argv[3]), *sys.argv[4:])
     else:
-        main()
+        parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+        parser.add_argument("--only", default=",".join(map(str, NUMBERS)), metavar="N[,N]", help="numbers of tasks")
+        asked = {1, *map(int, parser.parse_args().only.split(","))}
+        if asked - {*NUMBERS}:
+            parser.error(f"the tasks are {NUMBERS[0]} to {NUMBERS[-1]}")
+        main(sorted(asked))
