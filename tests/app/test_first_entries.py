@@ -1,7 +1,7 @@
 """The first entry of places that take long to make: the window answers meanwhile."""
 
-from __future__ import annotations
-
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +9,36 @@ import pytest
 from PySide6.QtWidgets import QLabel
 
 from study_app.app import lab_and_designer
-from study_app.app.lab.initial_settings import prepare_initial_settings
+from study_app.app.lab.initial_settings import InitialSettings, prepare_initial_settings
 from study_app.app.main_controller import MainController
+
+
+class HeldLoading:
+    """The loading of both places, which ends once ``allowed`` is set."""
+
+    def __init__(self) -> None:
+        self.began, self.allowed = threading.Event(), threading.Event()
+
+    def load(self) -> InitialSettings:
+        """Wait, then load as the program does."""
+        self.began.set()
+        self.allowed.wait(30.0)
+        return prepare_initial_settings()
+
+
+@pytest.fixture
+def loading(monkeypatch: pytest.MonkeyPatch) -> Iterator[HeldLoading]:
+    """Hold the loading of both places until the test, or its end, allows it."""
+    held = HeldLoading()
+    monkeypatch.setattr(lab_and_designer, "preload_lab_and_designer", held.load)
+    yield held
+    held.allowed.set()
 
 
 @pytest.mark.parametrize("name", ["lab", "designer"])
 def test_a_place_is_not_made_while_a_thread_loads_what_it_needs(
-    qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+    qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, loading: HeldLoading, name: str
 ) -> None:
-    wanted: list[object] = []
-    monkeypatch.setattr(lab_and_designer.Background, "_begin", lambda _self, job: wanted.append(job))
     made: list[str] = []
     monkeypatch.setattr(lab_and_designer.LabAndDesigner, f"make_{name}", lambda _self: made.append(name))
     visit = MainController(tmp_path / "results")
@@ -27,7 +47,7 @@ def test_a_place_is_not_made_while_a_thread_loads_what_it_needs(
     visit.lab_and_designer.prepare_lab()  # as once the window stands
     visit.window.go(name)
     assert (visit.window.here, made) == (name, [])
-    assert wanted == [lab_and_designer.preload_lab_and_designer]
+    assert loading.began.wait(5.0)
     visit.window.go("home")
     visit.window.close()
     visit.end()
@@ -36,10 +56,8 @@ def test_a_place_is_not_made_while_a_thread_loads_what_it_needs(
 @pytest.mark.slow
 @pytest.mark.parametrize("asked", ["edit", "new"])
 def test_a_study_that_was_asked_for_opens_once_the_designer_is_loaded(
-    qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, asked: str
+    qtbot: Any, tmp_path: Path, loading: HeldLoading, asked: str
 ) -> None:
-    wanted: list[object] = []
-    monkeypatch.setattr(lab_and_designer.Background, "_begin", lambda _self, job: wanted.append(job))
     visit = MainController(tmp_path / "results")
     both = visit.lab_and_designer
     qtbot.addWidget(visit.window)
@@ -49,9 +67,8 @@ def test_a_study_that_was_asked_for_opens_once_the_designer_is_loaded(
     else:
         both.begin_study()
     assert (visit.window.here, both.designer) == ("designer", None)
-    assert wanted == [lab_and_designer.preload_lab_and_designer], "loading begins at once"
-    both._preparing._wanted = None
-    both._loaded(prepare_initial_settings())
+    assert loading.began.wait(5.0), "loading begins at once"
+    loading.allowed.set()
     qtbot.waitUntil(lambda: both.designer is not None and both.designer.place.isVisible())
     assert both.designer is not None
     opened = both.designer.editing.opened
@@ -97,17 +114,16 @@ def test_nothing_waits_for_a_place_that_cannot_be_loaded_and_a_second_entry_trie
 
 @pytest.mark.slow
 def test_a_study_that_was_asked_for_is_forgotten_where_one_goes_elsewhere_before_the_designer_is_loaded(
-    qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    qtbot: Any, tmp_path: Path, loading: HeldLoading
 ) -> None:
-    monkeypatch.setattr(lab_and_designer.Background, "_begin", lambda _self, _job: None)
     visit = MainController(tmp_path / "results")
     both = visit.lab_and_designer
     qtbot.addWidget(visit.window)
     visit.window.show()
     both.open_designer("demo")
     visit.window.go("home")
-    both._preparing._wanted = None
-    both._loaded(prepare_initial_settings())
+    with qtbot.waitSignal(both.prepared):
+        loading.allowed.set()
     visit.window.go("designer")
     qtbot.waitUntil(lambda: both.designer is not None and both.designer.place.isVisible())
     qtbot.wait(100)

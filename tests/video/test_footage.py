@@ -15,6 +15,7 @@ from study_app.errors import VideoError
 pytest.importorskip("av", reason="the optional extra video is not installed")
 
 from study_app.video import decoding
+from study_app.video.decoding import Scaler
 from study_app.video.footage import Footage
 from tests.video.clips import number_in, write_clip
 
@@ -123,10 +124,10 @@ def test_an_error_of_ffmpeg_that_is_no_system_error_stops_it_too(clip: Path, mon
 
     footage = Footage(clip)
 
-    def fail(_frame: Any) -> Any:
+    def fail(_scaler: Any, _frame: Any) -> Any:
         raise ExternalError(1, "generic error in an external library")
 
-    monkeypatch.setattr(footage._scaler, "pixels", fail)
+    monkeypatch.setattr(Scaler, "pixels", fail)
     footage.rewind()
     footage.thread.join(10)
     with pytest.raises(VideoError, match=r"stopped \(generic error in an external library\)"):

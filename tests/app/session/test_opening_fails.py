@@ -48,13 +48,11 @@ def refuse(*_: Any, **__: Any) -> Any:
     raise SessionError("the device sends nothing")
 
 
-@pytest.mark.usefixtures("qapp")
 @pytest.mark.parametrize("fails", ["rig", "videos", "outlets", ""])
 def test_the_force_is_zero_first_and_a_part_that_fails_leaves_no_other_open(
-    monkeypatch: pytest.MonkeyPatch, fails: str
+    qtbot: Any, monkeypatch: pytest.MonkeyPatch, fails: str
 ) -> None:
     closed: list[str] = []
-    made: list[object] = []
     parts = {name: Part(name, closed, fails=name == fails) for name in ("rig", "videos", "outlets")}
     for name, value in {
         "load_windows": lambda: None,
@@ -67,11 +65,10 @@ def test_the_force_is_zero_first_and_a_part_that_fails_leaves_no_other_open(
     }.items():
         monkeypatch.setattr(live_session, name, value)
     session = LiveSession(CHOSEN, LIGHT)
-    session._ready.disconnect()
-    session._ready.connect(made.append)
-    session._make_ready()
+    with qtbot.waitSignal(session.over):
+        session.open()
     assert closed == ["rig", "videos", "outlets"]
-    assert [str(error) for error in made] == ["the device sends nothing"]
+    assert str(session.error) == "the device sends nothing"
 
 
 class Stepped(LiveSession):
@@ -88,6 +85,10 @@ class Stepped(LiveSession):
             self.taken.append(step)
             yield
 
+    def hear(self, made: object) -> None:
+        """Hear what the thread made ready, or what it met."""
+        self._open_windows(made)
+
 
 READY: Any = Ready(SimpleNamespace(), SimpleNamespace())
 
@@ -95,8 +96,8 @@ READY: Any = Ready(SimpleNamespace(), SimpleNamespace())
 def test_other_events_are_handled_while_windows_open_which_are_opened_once(qtbot: Any) -> None:
     session = Stepped()
     QTimer.singleShot(0, lambda: session.taken.append("another event"))
-    session._open_windows(READY)
-    session._open_windows(READY)  # Start was pressed twice
+    session.hear(READY)
+    session.hear(READY)  # Start was pressed twice
     qtbot.waitUntil(lambda: 2 in session.taken)
     qtbot.wait(20)
     assert session.taken == [0, "another event", 1, 2]
@@ -104,7 +105,7 @@ def test_other_events_are_handled_while_windows_open_which_are_opened_once(qtbot
 
 def test_a_session_called_off_between_two_steps_opens_nothing_more(qtbot: Any) -> None:
     session = Stepped()
-    session._open_windows(READY)
+    session.hear(READY)
     session.cancel()
     qtbot.wait(20)
     assert session.taken == [0]
@@ -114,8 +115,8 @@ def test_a_device_that_fails_between_two_steps_ends_the_session(qtbot: Any) -> N
     session = Stepped()
     ended: list[bool] = []
     session.over.connect(lambda: ended.append(True))
-    session._open_windows(READY)
-    session._open_windows(SessionError("the device sends nothing"))
+    session.hear(READY)
+    session.hear(SessionError("the device sends nothing"))
     qtbot.wait(20)
     assert (session.taken, ended, str(session.error)) == ([0], [True], "the device sends nothing")
 
@@ -123,7 +124,7 @@ def test_a_device_that_fails_between_two_steps_ends_the_session(qtbot: Any) -> N
 @pytest.mark.usefixtures("qapp")
 def test_a_session_that_never_began_leaves_no_garbage_frozen() -> None:
     session = Stepped()
-    session._open_windows(READY)
+    session.hear(READY)
     gc.freeze()
     session.cancel()
     assert gc.get_freeze_count() == 0

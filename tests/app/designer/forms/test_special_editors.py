@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.authoring.fields import rows
 from study_app.authoring.new_study import Answers
+from study_app.gui.designer.form.row_widget import RowWidget
 from study_app.gui.designer.form.special import EDITORS
 from study_app.gui.widgets.controls import IconButton
 from study_app.haptics.model.steady_state import steady
@@ -239,11 +240,10 @@ def test_the_form_of_a_questionnaire_without_a_language_fits_its_width(qtbot: An
     """Many problems of one row neither widen the form nor offer repairs that read the same."""
     designer.controller.begin("template:compare-liquids", "mine", Answers(languages=("en", "nl")))
     designer.editing.select(("questionnaires", "liquid"))
-    waiting = designer.controller._repairs
-    qtbot.waitUntil(lambda: not waiting._waiting, timeout=10_000)
     row = designer.row("questionnaires", "liquid", "items")
-    words = [button.text() for button in row.repairs]
-    assert len(words) == len(set(words))
+    problems = [one for one in designer.place.view.problems if one.fault.path[: len(ITEMS)] == ITEMS]
+    qtbot.waitUntil(lambda: bool(designer.place.problems.repairs_of(problems[-1])), timeout=10_000)
+    assert row.repairs == []
     assert row.wrong.sentence.text().count("Is missing") == 1
     assert row.minimumSizeHint().width() <= row.width()
     area = designer.place.form.area
@@ -295,6 +295,6 @@ def test_rows_below_what_is_seen_are_made_when_the_form_is_painted(qtbot: Any, d
     designer.select(("pages", "welcome"))
     designer.editing.select(("blocks", "liquids"))
     form = designer.place.form
-    assert len(form._made) < len(form.form.rows)
-    qtbot.waitUntil(lambda: len(form._made) == len(form.form.rows))
+    assert len(form.inside.findChildren(RowWidget)) < len(form.form.rows)
+    qtbot.waitUntil(lambda: len(form.inside.findChildren(RowWidget)) == len(form.form.rows))
     assert all(row.isVisible() for row in form.rows)

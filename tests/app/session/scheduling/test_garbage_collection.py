@@ -142,17 +142,18 @@ def test_what_made_a_collection_take_long_is_passed_over_until_a_session_has_end
     assert len(freed_in) == 2, "where no windows are open all is looked at"
 
 
-def test_what_is_passed_over_is_bounded_between_sessions_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_passed_over_is_bounded_between_sessions_alone(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(garbage_collection, "PERIOD_MS", 5)
     monkeypatch.setattr(garbage_collection, "LONG_S", -1.0)
     monkeypatch.setattr(garbage_collection, "collect_if_due", lambda: OLDEST)
     unfreeze_garbage()
-    garbage_collection._collect()
-    count = gc.get_freeze_count()
-    assert count > 0
-    monkeypatch.setattr(garbage_collection, "MOST_FROZEN", count // 2)
-    freeze_garbage()
-    garbage_collection._collect()
-    assert gc.get_freeze_count() > count // 2, "no collection of everything while a session runs"
-    unfreeze_garbage()
-    garbage_collection._collect()
-    assert gc.get_freeze_count() == 0
+    with collecting_here():
+        qtbot.waitUntil(lambda: gc.get_freeze_count() > 0)
+        count = gc.get_freeze_count()
+        monkeypatch.setattr(garbage_collection, "MOST_FROZEN", count // 2)
+        freeze_garbage()
+        qtbot.wait(50)
+        assert gc.get_freeze_count() > count // 2, "no collection of everything while a session runs"
+        unfreeze_garbage()
+        qtbot.wait(50)
+        assert gc.get_freeze_count() == 0
