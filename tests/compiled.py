@@ -1,7 +1,5 @@
 """What runs without the compiler (``NUMBA_DISABLE_JIT=1``, for a debugger and coverage), and what does not."""
 
-from __future__ import annotations
-
 import numba
 import pytest
 

@@ -1,7 +1,5 @@
 """Damage to files: single bits, values of another type, deep nesting."""
 
-from __future__ import annotations
-
 import base64
 import json
 import random

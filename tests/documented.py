@@ -1,7 +1,5 @@
 """The pages of the documentation as tests read them: blocks of commands, commands, links and headings."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """What tests need of the operating system."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

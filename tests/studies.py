@@ -1,7 +1,5 @@
 """Studies that several tests read: made once, or small, with journals, receipts and a sealed key but no servo."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress

@@ -1,7 +1,5 @@
 """The pages: commands exist or run, links lead somewhere, sections hold every page, the website has no warnings."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import re

@@ -1,7 +1,5 @@
 """Errors cross processes: each is the same after pickling, with its fields."""
 
-from __future__ import annotations
-
 import pickle
 
 import pytest

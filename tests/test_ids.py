@@ -1,7 +1,5 @@
 """Ids made from texts, and free ones."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.ids import MAX_ID, free_id, free_short_name, id_of, short_name_of

@@ -1,7 +1,5 @@
 """Numbers as people type them, whole where they are written so, and with every digit."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.number_text import exact_text, number_of, typed_numbers

@@ -1,7 +1,5 @@
 """README.md is short; the page of the results folder names every file that a session leaves."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Where the user's settings are: where each system keeps them, or where a variable says."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

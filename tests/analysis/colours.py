@@ -4,8 +4,6 @@ CIEDE2000: Sharma, Wu & Dalal (2005), Color Res. Appl. 30, 21-30. Eyes: Machado,
 Trans. Vis. Comput. Graph. 15, 1291-1298, full severity, applied to linear light.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from math import atan2, cos, degrees, exp, hypot, radians, sin, sqrt
 from typing import TypeAlias

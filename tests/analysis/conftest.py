@@ -1,7 +1,5 @@
 """Results folders with known answers: real key, receipts and columns, rows made up by the test."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable
 from dataclasses import dataclass

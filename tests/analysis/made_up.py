@@ -1,7 +1,5 @@
 """Studies made up in memory: one block with any settings, people, sessions, repetitions and answers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path

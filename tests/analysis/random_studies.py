@@ -1,7 +1,5 @@
 """Random studies of any kind, and the check that their evaluation and texts hold no exception and no NaN."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Whatever a study is like, its evaluation and its texts end without an exception, and hold no NaN."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.analysis.random_studies import check

@@ -1,7 +1,5 @@
 """Which tests apply to which block, what is corrected with what, and what may be said."""
 
-from __future__ import annotations
-
 import json
 import random
 from collections.abc import Callable

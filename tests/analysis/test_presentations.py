@@ -1,7 +1,5 @@
 """What one answer stands for: repetitions, sessions and conditions of one delay are said, and never pooled silently."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The sample that comes with the program: sound, small, simulated, and what the program makes today."""
 
-from __future__ import annotations
-
 import csv
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """What a window asks of a study is told piece by piece, by a process that stops when it is asked to."""
 
-from __future__ import annotations
-
 import multiprocessing
 import re
 import shutil

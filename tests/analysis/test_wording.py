@@ -1,7 +1,5 @@
 """The report's words follow what was decided and what was tested."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

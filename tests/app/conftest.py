@@ -1,7 +1,5 @@
 """What meets in the composition root is tested without a screen, as the windows are."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

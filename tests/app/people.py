@@ -1,7 +1,5 @@
 """People who attend a session by keys and clicks, the windows they look at, and what the session wrote."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

@@ -1,7 +1,5 @@
 """The check of this computer, from the button to the rows."""
 
-from __future__ import annotations
-
 import threading
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Delays as a session keeps them: to the sample in virtual time, and held for real with everything a session has."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent

@@ -1,7 +1,5 @@
 """What a setting costs and how true it is, as the lab says it."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.app.lab_rows import error_rows

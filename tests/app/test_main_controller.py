@@ -1,7 +1,5 @@
 """The main window's stay around a session: what was called off is let go of before the program ends."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable, Iterable

@@ -1,7 +1,5 @@
 """Results with their real place: rehearsed studies read, unblinded, left out of, exported and reported."""
 
-from __future__ import annotations
-
 import multiprocessing
 import shutil
 from collections.abc import Callable, Iterator

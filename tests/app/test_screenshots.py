@@ -1,7 +1,5 @@
 """Pictures of the windows: taken of a real session, whole, and nothing of it stays behind."""
 
-from __future__ import annotations
-
 import threading
 from pathlib import Path
 

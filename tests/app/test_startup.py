@@ -1,7 +1,5 @@
 """What the first windows load: neither the compiler, nor the plots, nor what the designer alone needs."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

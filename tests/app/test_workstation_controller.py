@@ -1,7 +1,5 @@
 """What is set for this machine: kept at once, taken back, told in the receipt; and devices looked for in a thread."""
 
-from __future__ import annotations
-
 import threading
 from dataclasses import replace
 from datetime import date

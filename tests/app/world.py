@@ -1,7 +1,5 @@
 """A servo, a store and a clock that do as they are told."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whose each comment of a text is, found in another way than the writer does."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 

@@ -1,7 +1,5 @@
 """Studies as people write them: every notation of TOML that a protocol can have, with comments everywhere."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Final
 

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import pytest
 
 from study_app.authoring.additions import added, duplicated

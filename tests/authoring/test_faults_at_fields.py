@@ -1,7 +1,5 @@
 """Every fault that check knows is shown at a field of the form of its element."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.authoring.edited_study import Study, read

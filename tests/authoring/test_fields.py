@@ -1,7 +1,5 @@
 """Forms from the models of the file format: every key of every model has a row."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from typing import Any

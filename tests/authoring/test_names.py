@@ -1,7 +1,5 @@
 """Renaming and deleting with everything that names the thing."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

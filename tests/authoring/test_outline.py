@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from study_app.authoring.edited_study import read
 from study_app.authoring.outline import found, outline, title_of
 from tests.authoring.grown import PROTOCOLS

@@ -1,7 +1,5 @@
 """Templates: each is a study that works, and ``liquid-study new`` makes a study of one's own of it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

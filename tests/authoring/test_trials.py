@@ -1,7 +1,5 @@
 """Trials: studies whose edits are tried without writing their text."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

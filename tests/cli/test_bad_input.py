@@ -1,7 +1,5 @@
 """Input that no command can use: one line, exit code 2, and nothing written."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

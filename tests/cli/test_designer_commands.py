@@ -1,7 +1,5 @@
 """``new`` and ``edit`` open the study designer; what cannot be opened is refused before any window."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any

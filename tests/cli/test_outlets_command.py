@@ -1,7 +1,5 @@
 """What this machine sends to other programs is printed and changed by a command."""
 
-from __future__ import annotations
-
 import pytest
 from click.testing import CliRunner
 

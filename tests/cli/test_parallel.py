@@ -1,7 +1,5 @@
 """Cases of a command: Ctrl+C keeps what is finished, and the same command continues with it."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Progress is for terminals: elsewhere a command prints only what its callers read."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

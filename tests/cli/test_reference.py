@@ -1,7 +1,5 @@
 """The page Commands: every command with every option, in tables that render."""
 
-from __future__ import annotations
-
 import click
 
 from study_app.cli import commands

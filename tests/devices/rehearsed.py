@@ -1,7 +1,5 @@
 """The thesis' study rehearsed on the scripted hand and on another device, for tests that compare the two."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Iterator
 from pathlib import Path

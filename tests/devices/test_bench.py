@@ -1,7 +1,5 @@
 """`devices bench`: known numbers are found again, and every way out ends in zero force."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """An examination in a worker process: what it says, and that it can be ended at any time."""
 
-from __future__ import annotations
-
 import multiprocessing
 import time
 

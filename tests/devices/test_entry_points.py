@@ -1,7 +1,5 @@
 """A device of another package: found at its entry point, and used everywhere, without a change of this package."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Device and servo opened together: what is cancelled meanwhile is let go of before a servo runs."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

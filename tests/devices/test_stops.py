@@ -1,7 +1,5 @@
 """No stop is lost under the painting windows of a session: a minute each of ``tests/benchmarks/devices/stops.py``."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.compiled import needs_servo

@@ -1,7 +1,5 @@
 """The published contract: the C header describes the servo's records; the template package runs by entry point."""
 
-from __future__ import annotations
-
 import ctypes
 import importlib.util
 import json

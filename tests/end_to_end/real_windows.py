@@ -1,7 +1,5 @@
 """Real windows on a virtual X display: the display, and the program as a person meets it."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """End to end: every protocol that ships is rehearsed, kept, and found again."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

@@ -1,7 +1,5 @@
 """The whole study of the thesis as one comes to it: from home to home and out, by keys alone and by the mouse alone."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator
 from functools import partial

@@ -1,7 +1,5 @@
 """Sessions run where the extra ``analysis`` is not installed; what needs it says so in one line."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -4,8 +4,6 @@ The session's own transitions, which know no window, say what comes next; the sa
 same size, say where it lies.
 """
 
-from __future__ import annotations
-
 import csv
 import ctypes
 import re

@@ -1,7 +1,5 @@
 """Sessions that replay computes again, and how their recordings are changed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What a scene costs and how true it is, here and in the process that answers a lab."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

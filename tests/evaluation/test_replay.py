@@ -1,7 +1,5 @@
 """Sessions replayed: the forces come out again to the last bit, and what was changed is named."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

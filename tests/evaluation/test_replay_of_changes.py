@@ -1,7 +1,5 @@
 """Sessions that were changed or lack something: replay names what, and where."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Sessions whose force is sent late, with jitter and loss: replayed to the last bit, and delivered as requested."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

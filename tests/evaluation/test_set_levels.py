@@ -1,7 +1,5 @@
 """Levels that a participant set follow from the steps, every force from the recording; whoever changes one is found."""
 
-from __future__ import annotations
-
 import csv
 import io
 import shutil

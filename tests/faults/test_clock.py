@@ -1,7 +1,5 @@
 """The wall clock is set back an hour: within a session nobody notices, and over a gap nothing goes back."""
 
-from __future__ import annotations
-
 from datetime import datetime, timedelta
 from itertools import pairwise
 from pathlib import Path

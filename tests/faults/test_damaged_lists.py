@@ -1,7 +1,5 @@
 """Small files besides the sessions, damaged at random with fixed seeds: whatever reads one says so, or reads values."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

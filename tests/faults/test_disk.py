@@ -1,7 +1,5 @@
 """A disk that takes nothing: before a session it is refused, within one it waits, and nothing is lost or doubled."""
 
-from __future__ import annotations
-
 import csv
 import os
 import sys

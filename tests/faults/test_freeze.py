@@ -1,7 +1,5 @@
 """A program that stands still within a trial: the trial is interrupted, its row says why, and it comes again."""
 
-from __future__ import annotations
-
 import csv
 import os
 import signal

@@ -1,7 +1,5 @@
 """A session killed at any moment: every answer that was acknowledged is there, and the session can be completed."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Commands on results, killed at any moment: no file is half there, and the next run ends as if nothing had been."""
 
-from __future__ import annotations
-
 import signal
 from pathlib import Path
 from typing import Any

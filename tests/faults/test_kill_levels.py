@@ -1,7 +1,5 @@
 """A session with levels killed at random bytes of its journal presents, when it is resumed, what it would have."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A session to its end: nothing that can be read tells a condition, nor, while it is double-blind, can be seen."""
 
-from __future__ import annotations
-
 import logging
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A session of levels to its end: nothing that can be seen, read or logged tells a level, standard or comparison."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Two programs want the same id at the same moment, a hundred times over: one gets it, the other is told."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The real program in a real window, ended from outside in a trial: zero force, unfinished, and it can be resumed."""
 
-from __future__ import annotations
-
 import signal
 from collections.abc import Iterator
 from pathlib import Path

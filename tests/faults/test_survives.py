@@ -1,7 +1,5 @@
 """A session in real windows on one small screen survives its device, a panel and its recorder."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

@@ -1,7 +1,5 @@
 """What people type goes in and comes out as it was, by every reader."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

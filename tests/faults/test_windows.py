@@ -1,7 +1,5 @@
 """Windows that are closed, by whomever: zero force, everything kept, and a last line that says how it ended."""
 
-from __future__ import annotations
-
 import os
 import signal
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Widgets are tested without a screen; where Qt cannot be loaded at all they are skipped, with the reason."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import NoReturn

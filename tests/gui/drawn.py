@@ -1,7 +1,5 @@
 """The words that a page draws, with their places: recorded while it paints itself."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager

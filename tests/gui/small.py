@@ -1,7 +1,5 @@
 """Page values and a clock for tests of the participant's widgets."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is felt, and how late it is seen, can be told from no picture: the same motion looks the same in every trial."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import pairwise

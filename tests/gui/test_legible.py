@@ -1,7 +1,5 @@
 """Contrast, sizes and places of what the participant reads and hits, taken from the real widgets."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, replace

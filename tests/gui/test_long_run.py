@@ -1,7 +1,5 @@
 """Half an hour of servo in virtual time, in every fault there is, while both windows of a session paint."""
 
-from __future__ import annotations
-
 import threading
 
 import pytest

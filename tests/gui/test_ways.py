@@ -1,7 +1,5 @@
 """The questionnaire by mouse alone, by keyboard alone, by touch alone, and as a screen reader finds it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

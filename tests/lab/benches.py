@@ -1,7 +1,5 @@
 """What the lab's tests share: a workbench, and a servo on a clock that only moves when told to."""
 
-from __future__ import annotations
-
 from random import Random
 
 from study_app.devices.rig import Rig

@@ -1,7 +1,5 @@
 """Two settings and their edits: undo, drags, blinding."""
 
-from __future__ import annotations
-
 from random import Random
 
 import pytest

@@ -1,7 +1,5 @@
 """Device and servo of the lab: what is edited is felt at once, and every way out ends in zero force."""
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 import pytest

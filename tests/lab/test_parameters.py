@@ -1,7 +1,5 @@
 """Which parameters a liquid has: every range can be set, every number stands where its name says."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.errors import StudyError

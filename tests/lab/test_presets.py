@@ -1,7 +1,5 @@
 """Liquids at hand, and settings kept as files that read back as they were."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

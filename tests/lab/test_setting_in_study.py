@@ -1,7 +1,5 @@
 """A setting of the lab used in a study: one table at the file's end, and every other byte as it was."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What was felt, recomputed outside the servo: the same bits, and the other liquid on the same motion."""
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 import pytest

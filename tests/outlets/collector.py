@@ -1,7 +1,5 @@
 """Outlets of a session that keep its markers, in place of streams and ports."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any

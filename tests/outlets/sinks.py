@@ -1,7 +1,5 @@
 """Sinks that fail or hang when a test wants it."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Mapping
 from typing import Any

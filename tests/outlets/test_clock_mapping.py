@@ -1,7 +1,5 @@
 """The offset of two clocks lies within the bounds that readings give, and follows a drift."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 

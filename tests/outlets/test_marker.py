@@ -1,7 +1,5 @@
 """Markers carry codes and counts by a list, and nothing else that an event says."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """A sink that fails or hangs gets no more markers, and holds up whoever hands one over for no moment."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 

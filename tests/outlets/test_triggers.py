@@ -1,7 +1,5 @@
 """Trigger codes as another program reads them from a port: a byte per event, then 0."""
 
-from __future__ import annotations
-
 import os
 import select
 import sys

@@ -1,7 +1,5 @@
 """The bundle's own files: its start runs commands and modules, its recipe finds every library, its sizes are sums."""
 
-from __future__ import annotations
-
 import os
 import re
 import runpy

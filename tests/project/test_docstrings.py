@@ -1,7 +1,5 @@
 """Docstrings of the public interface: accepted by numpydoc, and with examples that run."""
 
-from __future__ import annotations
-
 import doctest
 import importlib
 import inspect

@@ -1,7 +1,5 @@
 """The files for people who join or cite the project name what exists, and agree with the package."""
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib

@@ -1,7 +1,5 @@
 """What goes wrong with the small sound protocol: edits of its text and the problems they cause."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from tests.protocol.sound import DECIDED, ORDER, SOUND

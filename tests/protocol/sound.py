@@ -1,7 +1,5 @@
 """A small sound protocol, and variants of it."""
 
-from __future__ import annotations
-
 SOUND = """\
 format = 1
 sequence = ["hello", "warm_up", "feel", "look"]

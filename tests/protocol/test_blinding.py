@@ -1,7 +1,5 @@
 """Who must not know what is felt: said by the protocol, kept by the receipt."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.errors import ProtocolError

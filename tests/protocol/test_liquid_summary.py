@@ -1,7 +1,5 @@
 """What a study's liquids will feel like: effects told, pairs that are too alike, liquids that are clipped."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.haptics.model.effects.drag import resistance_n

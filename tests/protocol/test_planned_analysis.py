@@ -1,7 +1,5 @@
 """What [analysis] plans of a study with levels: participants, precision and published values."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

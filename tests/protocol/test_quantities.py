@@ -1,7 +1,5 @@
 """The table of quantities: words and units of everything that a stimulus can vary."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.haptics.model.overrides import number_names

@@ -1,7 +1,5 @@
 """Scene files follow the formats of studies: a damper belongs to format 2."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

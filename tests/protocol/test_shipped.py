@@ -1,7 +1,5 @@
 """The protocols that ship: the thesis' study exactly, and a demonstration of three minutes."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

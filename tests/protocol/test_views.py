@@ -1,7 +1,5 @@
 """What a condition shows: the drawn tank, a camera, or footage, whose hash is part of the study's."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """With a device that gives no force, no page of a shipped study speaks of feeling; its file and statements stay."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

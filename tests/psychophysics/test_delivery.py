@@ -1,7 +1,5 @@
 """The delivered level: exact for a force that is exact, with the estimator's known biases through the compiled tick."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from typing import Any

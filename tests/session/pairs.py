@@ -1,7 +1,5 @@
 """A study of pairs, with practice to a criterion and feedback, and the steps to walk through it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from study_app.protocol.model import Protocol

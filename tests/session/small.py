@@ -1,7 +1,5 @@
 """A small study with everything a session can meet, and the steps to walk through it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

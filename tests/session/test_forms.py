@@ -1,7 +1,5 @@
 """Forms and other questions in the state machine: what is written, what is hidden, and where a session goes on."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

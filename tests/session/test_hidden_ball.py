@@ -1,7 +1,5 @@
 """A hidden ball is drawn while the target starts, as late as everything else, and not while it is felt."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Liquid files: a study's hash covers them, their values are sealed, and resume and replay use the sealed ones."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

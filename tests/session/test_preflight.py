@@ -1,7 +1,5 @@
 """What the pre-flight says of facts, and that it measures them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Pages to read: in which language, how long a break lasts, and where they say one is."""
 
-from __future__ import annotations
-
 from copy import deepcopy
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A device that failed and was connected again: zero force until the operator resumes, then the next attempt."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any

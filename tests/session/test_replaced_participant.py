@@ -1,7 +1,5 @@
 """Who replaces a participant takes that participant's row of every square: begun, resumed and reproduced so."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from types import SimpleNamespace

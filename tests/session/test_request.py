@@ -1,7 +1,5 @@
 """What is chosen before a session, and what is refused before any window opens for it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Where an interrupted session goes on, for every line its journal may end with, and what it then presents."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

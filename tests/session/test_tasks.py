@@ -1,7 +1,5 @@
 """The tasks in closed form: when a target is entered, left and reached, and what was to be seen at any moment."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A video in a trial: the delay asked for holds for it too; late and lost frames are counted, ages recorded."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

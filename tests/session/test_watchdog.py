@@ -1,7 +1,5 @@
 """What a session makes of a servo that stops itself, and what the hand feels of windows that stand still."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A small study whose conditions can be recognised anywhere, and a session that answers it."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager

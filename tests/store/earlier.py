@@ -1,7 +1,5 @@
 """The header of a trials table written before later columns were added."""
 
-from __future__ import annotations
-
 TRIALS_HEADER = (
     "study,participant,session,simulated,pilot,trial,attempt,block,phase,part,index,of,code,"
     "trial_started_at,trial_started_s,outcome,duration_s,targets_reached,targets,ticks,tick_rate_hz,"

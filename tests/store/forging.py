@@ -1,7 +1,5 @@
 """What a person does who changes results by hand and computes anew whatever a program computed."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import shutil

@@ -1,7 +1,5 @@
 """Results of the program before hash chains (commit 17da715): P001's session ended, P002's was killed."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

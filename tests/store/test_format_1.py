@@ -1,7 +1,5 @@
 """Format 1 is frozen: what rehearsals of the shipped studies wrote when it was recorded, they write now."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import io

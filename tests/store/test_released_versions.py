@@ -1,7 +1,5 @@
 """Results of every released version are read by this one; tests/store/releases/record.py records those of a new one."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """The zip for whoever helps says what failed and where, and nothing of a study."""
 
-from __future__ import annotations
-
 import json
 import logging
 import zipfile

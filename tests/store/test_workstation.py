@@ -1,7 +1,5 @@
 """What this machine is like: kept whole, refused with one line where it makes no sense, and what follows from it."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -5,8 +5,6 @@ the system's monotonic time less ``--age-ms``, as those of a camera whose frames
 ``--relative`` they count from 0. Every ``--lose``-th frame is lost. ``--print`` prints number and time of sending.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import socket

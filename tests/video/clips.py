@@ -1,7 +1,5 @@
 """Synthetic footage: each frame says its number by 16 black or white bars, and moves a grey ramp."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A live camera: a process of its own that sends frames over TCP, with time stamps of known age or none."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

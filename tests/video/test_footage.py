@@ -1,7 +1,5 @@
 """Footage from a file: which frame is shown when, from the beginning of each trial, again and again."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What the first-run check says of a computer."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What the operator of a single-blind study sees of force, wake and limiters."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What frames' times come to: rate, gaps and missed ones, by hand."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.viewmodels.frame_times import KEPT_S, LEAST_S, FrameTimes

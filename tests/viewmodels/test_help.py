@@ -1,7 +1,5 @@
 """The list of pages in Help, its search, and the text of a page for a reader without HTML."""
 
-from __future__ import annotations
-
 import re
 
 from study_app import documentation

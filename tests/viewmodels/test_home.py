@@ -1,7 +1,5 @@
 """What the home window says of protocols and sessions."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from datetime import datetime, timedelta

@@ -1,7 +1,5 @@
 """The operator's view as a value: pure, neutral, and true to the journal."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import pytest

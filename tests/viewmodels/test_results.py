@@ -1,7 +1,5 @@
 """What the results window says in words, and a figure in the colours of a theme."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Figures of the tiles and the points of the plots."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

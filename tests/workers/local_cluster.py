@@ -3,8 +3,6 @@
 It is a program of its own, so that what it logs is not in the log of the tests.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """A worker process answers orders piece by piece, stops when asked to, and a crash is an answer too."""
 
-from __future__ import annotations
-
 import json
 import multiprocessing
 import os

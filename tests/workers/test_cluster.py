@@ -1,7 +1,5 @@
 """A Dask cluster of two worker processes: the same results, killed workers, and one line where there is none."""
 
-from __future__ import annotations
-
 import socket
 import sys
 import threading

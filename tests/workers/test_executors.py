@@ -1,7 +1,5 @@
 """Local processes: independent cases; interrupts, killed workers and a killed program change and leave nothing."""
 
-from __future__ import annotations
-
 import errno
 import os
 import signal

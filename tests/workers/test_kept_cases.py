@@ -1,7 +1,5 @@
 """Finished cases of an interrupted computation: stored, reused, and removed when the computation ends."""
 
-from __future__ import annotations
-
 import logging
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Cases for executors: worker processes import them by name."""
 
-from __future__ import annotations
-
 import os
 import random
 import signal

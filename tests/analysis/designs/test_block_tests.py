@@ -1,7 +1,5 @@
 """What many participants and many statements could show is never cut short by how p was found."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Columns of one name in several tables: the description of the dataset is true of each of them."""
 
-from __future__ import annotations
-
 from study_app.analysis.export.psychds_dataset import variables
 from study_app.store.tables.cells import variable
 from study_app.store.tables.column import Column, optional

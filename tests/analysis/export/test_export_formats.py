@@ -1,7 +1,5 @@
 """Exports for other programs: what is written comes back, with every trap that such formats have."""
 
-from __future__ import annotations
-
 import csv
 import importlib
 import io

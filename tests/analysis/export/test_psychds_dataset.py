@@ -1,7 +1,5 @@
 """The export to share: a Psych-DS folder that holds what is needed to read, check and repeat the study."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import shutil

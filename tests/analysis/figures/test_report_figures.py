@@ -1,7 +1,5 @@
 """Figures of a report: what stands in the recognition matrix, over which delays, and where the step-down mark is."""
 
-from __future__ import annotations
-
 import colorsys
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """What is said of a delay: never more than every delay up to it allows, and equivalent only where all checks agree."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import pytest

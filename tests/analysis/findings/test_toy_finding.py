@@ -1,7 +1,5 @@
 """A finding is one file: a report of a rehearsed study holds one that no file of the package names."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

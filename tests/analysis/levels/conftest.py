@@ -1,7 +1,5 @@
 """A rehearsed study with a block of every reply: choices, a rating, numbers, and conditions that are compared."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Catch trials in the analysis: no reversal, no step of a track, and a mark of their own in figures."""
 
-from __future__ import annotations
-
 import re
 from itertools import pairwise
 from pathlib import Path

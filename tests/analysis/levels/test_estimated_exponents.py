@@ -1,7 +1,5 @@
 """Exponents of magnitude estimation: slopes of mean ln answers on ln levels, in report, table and R."""
 
-from __future__ import annotations
-
 import csv
 import math
 import re

@@ -1,7 +1,5 @@
 """Blocks with designs, read from a receipt."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """How levels were delivered, what was repeated and why, and catch trials, in results and report."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

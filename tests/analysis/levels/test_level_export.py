@@ -1,7 +1,5 @@
 """The tables of intervals and tracks: what is in them before and after the key is opened."""
 
-from __future__ import annotations
-
 import csv
 import importlib
 import json

@@ -1,7 +1,5 @@
 """The figures of tracks and of Weber fractions, and what they are drawn from."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path

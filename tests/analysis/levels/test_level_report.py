@@ -1,7 +1,5 @@
 """The report of blocks of levels: by code until the key is opened, then the answers at each level."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """The report's script in R computes d′, criterion, means of reversals and group means again."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from dataclasses import replace

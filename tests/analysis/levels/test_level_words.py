@@ -1,7 +1,5 @@
 """What the report says of thresholds in words: what they cannot show, and the methods paragraph."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

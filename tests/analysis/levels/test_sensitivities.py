@@ -1,7 +1,5 @@
 """d′, criterion and shares of answers per participant, standard, comparison and level, from rows of tracks."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Levels that participants set: found, reported, drawn and exported."""
 
-from __future__ import annotations
-
 import csv
 import math
 import re

@@ -1,7 +1,5 @@
 """The table of thresholds, the reversals of tracks, and times to answer by level, of a rehearsed study."""
 
-from __future__ import annotations
-
 import csv
 import importlib
 import json

@@ -1,7 +1,5 @@
 """Thresholds of a block of levels, from rows of tracks: planted ones are found at the levels delivered."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Weber exponents: slopes of ln JND on ln standard per participant, and their mean."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

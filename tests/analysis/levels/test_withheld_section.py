@@ -1,7 +1,5 @@
 """Up to which level safety left a late force alone, as the report says it."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

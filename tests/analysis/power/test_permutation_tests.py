@@ -1,7 +1,5 @@
 """The sweep's tests over many studies at once, against the report's one by one."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Power of a study: from simulated people to tables, the same whoever works, and what is told of it."""
 
-from __future__ import annotations
-
 import csv
 import io
 import os

@@ -1,7 +1,5 @@
 """The precision of thresholds over participants and trials: simulated studies, and what the command prints."""
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Where a study left its preregistration."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The preregistration's text: everything from the protocol, the same bytes each time."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

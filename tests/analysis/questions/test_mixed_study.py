@@ -1,7 +1,5 @@
 """A study with every kind of question, from its rehearsal to tables, verification, export, SPSS and report."""
 
-from __future__ import annotations
-
 import csv
 import json
 import shutil

@@ -1,7 +1,5 @@
 """Counts of options: a kind of question says which options an answer counts for."""
 
-from __future__ import annotations
-
 import importlib
 from dataclasses import dataclass
 from pathlib import Path

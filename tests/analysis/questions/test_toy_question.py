@@ -1,7 +1,5 @@
 """A question of a new kind is added from outside the package: asked in a session, shown, and reported."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal

@@ -1,7 +1,5 @@
 """A report of twelve participants, opened."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """A report as its reader sees it."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

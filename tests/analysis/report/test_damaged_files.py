@@ -1,7 +1,5 @@
 """Files that are not as they were recorded: an analysis goes on, and says so wherever it speaks."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

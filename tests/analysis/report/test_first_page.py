@@ -1,7 +1,5 @@
 """The first page: three answers with direction, size and interval, pictures, limits, and how often it is wrong."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

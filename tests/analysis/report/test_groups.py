@@ -1,7 +1,5 @@
 """The report's section on groups: sealed until unblinding, then how many are in each and what they answered."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

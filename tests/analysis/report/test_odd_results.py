@@ -1,7 +1,5 @@
 """The report of few participants, missing answers and odd input: honest, or one clear error."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The report: whole, self-contained, the same each time."""
 
-from __future__ import annotations
-
 import base64
 import io
 import re

@@ -1,7 +1,5 @@
 """The report's page at any width: cells on one line, figures as large as their letters need."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

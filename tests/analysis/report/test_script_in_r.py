@@ -1,7 +1,5 @@
 """The report's script in R: it has the report's numbers and computes them again."""
 
-from __future__ import annotations
-
 import random
 import re
 import shutil

@@ -1,7 +1,5 @@
 """A part of the report that fails is said in its place, in the JSON and in the exit code; the rest is written."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

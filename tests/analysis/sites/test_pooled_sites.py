@@ -1,7 +1,5 @@
 """A merged study in the analysis: participants of all sites, codes that mean the same, and the site as a factor."""
 
-from __future__ import annotations
-
 import csv
 import json
 import shutil

@@ -1,7 +1,5 @@
 """Groups of different participants: the Kruskal–Wallis test against scipy, p against all allocations."""
 
-from __future__ import annotations
-
 from itertools import permutations
 
 import numpy as np

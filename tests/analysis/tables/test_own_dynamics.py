@@ -1,7 +1,5 @@
 """The device's own dynamics, as receipts record what `devices bench` measured."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

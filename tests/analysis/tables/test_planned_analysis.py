@@ -1,7 +1,5 @@
 """What was decided before the first session, read from receipts, and what it makes primary."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Reaches out of samples: against paths whose numbers are known, and against what the session itself decided."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

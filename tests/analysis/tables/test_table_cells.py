@@ -1,7 +1,5 @@
 """The cells of tables: both parsers read the same, and every way a file can be damaged is refused."""
 
-from __future__ import annotations
-
 import csv
 import io
 from pathlib import Path

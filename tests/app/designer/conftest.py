@@ -1,7 +1,5 @@
 """A workspace with one study of its own, and the designer in the main window."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Clicks that follow typing, and clicks in the drawer of a small window."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """The designer's controller: opening, drafts, saving, versions, and what another program does to the file."""
 
-from __future__ import annotations
-
 import json
 import os
 from typing import Any

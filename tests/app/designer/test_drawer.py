@@ -1,7 +1,5 @@
 """The outline of a small window: it opens as it was closed, and leads to the form."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Feel it: from the form to the lab with unsaved values, and back into the study as one step, in the main window."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

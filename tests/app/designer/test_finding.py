@@ -1,7 +1,5 @@
 """Words of the grammar are found in the outline and in the list of what can be added, and lead to their fields."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """What one sees first: no study, a study that is read-only, the study's own form, and what a deletion takes away."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

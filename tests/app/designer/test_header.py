@@ -1,7 +1,5 @@
 """The designer's header: what is at its left edge, with and without its title."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import product
 from typing import Any

@@ -1,7 +1,5 @@
 """The designer in its window: by keys alone, by mouse alone, with names for everything, and killed while typing."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """The list of studies in the designer's header: in the order of titles, with files, whatever was saved last."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

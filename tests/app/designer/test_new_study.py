@@ -1,7 +1,5 @@
 """The page of a new study in the window: templates, their questions, and copies."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """The outline in its window: elements dragged, several at once, by keys and by the menu."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """The list of problems under the pointer, and what is shown of a study whose only problems are missing texts."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

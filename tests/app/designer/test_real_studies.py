@@ -1,7 +1,5 @@
 """Studies made from the empty one in a real window: by keys alone and by mouse alone; then saved, rehearsed and run."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

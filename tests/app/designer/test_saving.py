@@ -1,7 +1,5 @@
 """What goes wrong while drafts and files are written, and what another program does meanwhile."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

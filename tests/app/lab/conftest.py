@@ -1,7 +1,5 @@
 """A lab with its real page, servo and scripted device."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any
 

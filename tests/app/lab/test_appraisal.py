@@ -1,7 +1,5 @@
 """Computation times and errors beside the liquid in hand: asked for once it rests."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

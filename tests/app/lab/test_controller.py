@@ -1,7 +1,5 @@
 """The liquid lab with its real page, servo and device: felt, blinded, and never left with a force on."""
 
-from __future__ import annotations
-
 import sys
 import weakref
 from pathlib import Path

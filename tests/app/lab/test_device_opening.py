@@ -1,7 +1,5 @@
 """Devices opened behind the lab's page: one at a time, cancelled, refused, let go of."""
 
-from __future__ import annotations
-
 import gc
 import threading
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The estimation in the lab with its real page, servo and device: from the choice of a source to the applied value."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

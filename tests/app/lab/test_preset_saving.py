@@ -1,7 +1,5 @@
 """Presets saved from the lab, opened again and used in a study."""
 
-from __future__ import annotations
-
 import threading
 from pathlib import Path
 from typing import Any

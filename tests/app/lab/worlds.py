@@ -1,7 +1,5 @@
 """What the lab is given in tests: an appraiser and devices that answer when told to, and the force it sends."""
 
-from __future__ import annotations
-
 import threading
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A bridge between two windows and a world that is told what to do."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Events in, views out: what the windows say reaches the session, and its news the operator."""
 
-from __future__ import annotations
-
 import threading
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Esc held in any window of the program is zero force at the next tick, with a fake servo and with a real one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Whatever fails ends in zero force, is written down once and told to the operator in words."""
 
-from __future__ import annotations
-
 import pkgutil
 import sys
 import threading

@@ -1,7 +1,5 @@
 """What the operator or the participant does while a session's windows are still being shown."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Both windows on one screen: state and force stop stay in sight, and each window leads to the other."""
 
-from __future__ import annotations
-
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication

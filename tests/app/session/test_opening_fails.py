@@ -1,7 +1,5 @@
 """A session that cannot be opened: zero force first, and everything that was open is closed."""
 
-from __future__ import annotations
-
 import gc
 import sys
 import threading

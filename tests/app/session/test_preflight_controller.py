@@ -1,7 +1,5 @@
 """The question before a session: a servo that stops itself is told, and whoever goes back does not wait."""
 
-from __future__ import annotations
-
 import threading
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A device that failed is connected again beside the windows: told line by line, and refused or done in order."""
 
-from __future__ import annotations
-
 import threading
 
 import pytest

@@ -1,7 +1,5 @@
 """A session that cannot begin is refused before its device is opened."""
 
-from __future__ import annotations
-
 from study_app.app.session import live_session
 from study_app.app.session.live_session import LiveSession
 from study_app.errors import StoreError

@@ -1,7 +1,5 @@
 """A single-blind study shows the operator force and wake; a double-blind one does not even look at them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Stopping the force: at once, whatever the disk does, and back only when the one who stopped it asks."""
 
-from __future__ import annotations
-
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest

@@ -1,7 +1,5 @@
 """How a session ends: by a question, by closing a window, from outside, with a disk that takes nothing."""
 
-from __future__ import annotations
-
 import pytest
 from PySide6.QtCore import Qt
 from shiboken6 import isValid

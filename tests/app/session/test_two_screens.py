@@ -1,7 +1,5 @@
 """A session stands on the screens that are set for the machine, where the command names none."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

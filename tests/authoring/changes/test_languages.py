@@ -1,7 +1,5 @@
 """Texts that are copied into a language: counted until they are edited, and told apart from missing ones."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.authoring.changes.languages import filled_in, following, texts_of, with_language

@@ -1,7 +1,5 @@
 """Entries that move together, and elements that are copied and pasted, in every protocol and in grown files."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

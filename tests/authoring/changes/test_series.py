@@ -1,7 +1,5 @@
 """Series: ids, titles, values that are refused, and the study that they make."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.authoring.changes.series import members, number_row, number_rows

@@ -1,7 +1,5 @@
 """The short text of a question follows its text until it is edited."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

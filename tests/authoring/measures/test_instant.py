@@ -1,7 +1,5 @@
 """Instant measures: where limits begin, how long sessions are, which texts reveal a condition, when orders are even."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.authoring.edited_study import Study, read

@@ -1,7 +1,5 @@
 """Planted observers: what they show is what was planted, with the error that ``check`` expects."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from study_app.authoring.writer.comments import comments_naming
 
 TEXT = '''# "honey" first

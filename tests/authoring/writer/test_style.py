@@ -1,7 +1,5 @@
 """How edits are written: what a person would have typed there."""
 
-from __future__ import annotations
-
 import tomllib
 from typing import Any
 

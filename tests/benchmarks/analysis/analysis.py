@@ -5,8 +5,6 @@ Run it by itself, not on Windows: ``python tests/benchmarks/analysis/analysis.py
 own peak. On a busy machine believe the seconds of the processor.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import tempfile

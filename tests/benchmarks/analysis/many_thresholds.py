@@ -4,8 +4,6 @@ Run it by itself: ``python tests/benchmarks/analysis/many_thresholds.py [PARTICI
 results folder, participants answer first, which takes minutes and is not measured. At most 10 s and 1 GB.
 """
 
-from __future__ import annotations
-
 import resource
 import sys
 import tempfile

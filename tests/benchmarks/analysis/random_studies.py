@@ -4,8 +4,6 @@ Run it by itself, at night: ``python tests/benchmarks/analysis/random_studies.py
 tests do the same with the first few. Prints each study that fails, with its number, and ends with 1 if any does.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 import traceback

@@ -5,8 +5,6 @@ two-interval forced choice with d′ proportional to the level, lapse in 2 % of 
 Exit code 3 if the coverage of a 95 % interval is not within 93 to 99 %, or the mean error is above 5 %.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 import time

@@ -4,8 +4,6 @@ The servo at 1 kHz in honey on the scripted hand, on the emulated device, and on
 compiler is installed), in one run, twice: the computer's load enters all of them.
 """
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

@@ -7,8 +7,6 @@
 3. The ratios that are asked for. Ratios are compared within one run; the computer's load enters both sides.
 """
 
-from __future__ import annotations
-
 import socket
 import sys
 import threading

@@ -9,8 +9,6 @@ is lost where the device has a force later than 50 ms after it, or where a stopp
 of each device is its verdict; exit code 3 where one has failed.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

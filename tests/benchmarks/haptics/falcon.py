@@ -6,8 +6,6 @@ slowest of batches of 1,000 ticks; parts take ticks batch by batch. What the USB
 whole tick through the servo's own C functions, over a bridge that answers from memory.
 """
 
-from __future__ import annotations
-
 import statistics
 import time
 from typing import Any

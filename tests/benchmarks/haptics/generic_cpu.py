@@ -6,8 +6,6 @@ strikes both alike; the forces of a motion are compared bit by bit. Run by itsel
     python tests/benchmarks/haptics/generic_cpu.py
 """
 
-from __future__ import annotations
-
 import json
 import os
 import statistics

@@ -5,8 +5,6 @@ motions; ticks of 0.25 to 4 ms compared with 1 ms. Yield stress at rest: how fas
 half the yield force, read in counts of 38 µm, with 0 and 1 % of the samples off by a count.
 """
 
-from __future__ import annotations
-
 from tests.haptics.materials import creep_mps
 from tests.haptics.unsteady import FLUIDS, highest_gain, rotation_error, tick_error
 

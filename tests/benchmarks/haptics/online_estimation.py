@@ -5,8 +5,6 @@
 the model alone, in the same run.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from pathlib import Path

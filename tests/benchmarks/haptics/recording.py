@@ -3,8 +3,6 @@
 ``python tests/benchmarks/haptics/recording.py [FOLDER on the disk to measure] [SECONDS of the paced run, default 60]``
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 import time

@@ -3,8 +3,6 @@
 Run me: I print tables. ``--seconds N`` sets how long is listened (10), ``--load`` lets Python compute meanwhile.
 """
 
-from __future__ import annotations
-
 import argparse
 import subprocess
 import sys

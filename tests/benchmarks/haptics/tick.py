@@ -6,8 +6,6 @@ does strikes all alike. "Over rest" is what a scene costs more than one without 
 a clock is said to jitter, no two ticks are equally long, as in a servo; elsewhere all take a millisecond.
 """
 
-from __future__ import annotations
-
 import statistics
 import time
 from typing import Any

@@ -3,8 +3,6 @@
 Run it by itself: ``python tests/benchmarks/haptics/unsteady_drag.py``.
 """
 
-from __future__ import annotations
-
 import statistics
 
 from study_app.evaluation.cost import Bench

@@ -6,8 +6,6 @@ long after a reversal at 0.1 m/s the estimate is off by more than 20 %. Publishe
 counts in a closed loop: the damping that a free handle of 0.1 kg bears at 1 kHz with one tick of delay, safety off.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -7,8 +7,6 @@ end, are the counts and the upper bound of the one-sided 95 % interval (Clopper 
 3 / sessions).
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -4,8 +4,6 @@ Run it by itself: ``python tests/benchmarks/sessions/intervals.py [TRIALS]``. Ev
 in a window of 1366 × 768 without a screen; limits are those of 60 frames a second and of a page that seems immediate.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import time

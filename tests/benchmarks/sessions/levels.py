@@ -4,8 +4,6 @@ Run it by itself: ``python tests/benchmarks/sessions/levels.py [TRIALS]``. The s
 QUEST+ chooses its levels. Times are by the clock, in brackets those of this thread on the processor.
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 import time

@@ -6,8 +6,6 @@ page is answered with keys and clicks, and after so long the last one is ended. 
 Sixty times a second the operator's window is drawn anew, on top of what it draws anyway.
 """
 
-from __future__ import annotations
-
 import csv
 import os
 import sys

@@ -3,8 +3,6 @@
 ``python tests/benchmarks/sessions/long_session.py [TRIALS]``, at least 200
 """
 
-from __future__ import annotations
-
 import string
 import sys
 import tempfile

@@ -6,8 +6,6 @@ A few sessions of rek2024 with simulated answers are copied under other particip
 chained anew, and the list of fingerprints names it.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import subprocess

@@ -5,8 +5,6 @@ more than the processor's is waiting, mostly for the disk: every line of the jou
 on.
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 import time

@@ -3,8 +3,6 @@
 ``python tests/benchmarks/sessions/store.py [FOLDER on the disk to measure]``
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 import time

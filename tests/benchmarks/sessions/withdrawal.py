@@ -3,8 +3,6 @@
 It rehearses the answers of SESSIONS participants (default 1000), erases one of them, and prints the seconds.
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 import time

@@ -5,8 +5,6 @@ window paints: CPU time per frame, and how much of the time another Python threa
 of its own sends frames over TCP: the delay from sending a frame to having its pixels. Rounds of both are interleaved.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import subprocess

@@ -6,8 +6,6 @@ lateness of the servo's ticks, ratios of neighbouring segments with their 95 % i
 frames of the video were later than requested, in periods of the video.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

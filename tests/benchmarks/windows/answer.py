@@ -7,8 +7,6 @@ system's temporary one). A plain write and flush on the same disk is timed as we
 time. A page of statements that are shown, and a look at the device with which a target is reached, wait for no flush.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import tempfile

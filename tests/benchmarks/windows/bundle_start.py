@@ -6,8 +6,6 @@ programs only add to them. Run by itself, with an environment that has the extra
     python tests/benchmarks/windows/bundle_start.py [dist/liquid-study]
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import re

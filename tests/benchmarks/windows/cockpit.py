@@ -7,8 +7,6 @@ telemetry: lateness with it is printed as a multiple of lateness without, from a
 the machine does falls on both.
 """
 
-from __future__ import annotations
-
 import os
 import statistics
 import time

@@ -4,8 +4,6 @@ Edits are random, of every kind, over every protocol and the grown studies of th
 (document, values it does not concern, comments, undo), and the first one that is written wrongly ends the run.
 """
 
-from __future__ import annotations
-
 import statistics
 import sys
 from itertools import count

@@ -5,8 +5,6 @@ Times are wall and CPU time. A copy of ``rek2024`` and one with 60 times its que
 painted with it. Values of a series that the large study refuses are typed, and what helps is searched for.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 import re

@@ -8,8 +8,6 @@ real window of 1366 × 768 on a virtual display of its own. A key, a typed text,
 action each. The program runs in another process, which is killed in the task that continues after a kill.
 """
 
-from __future__ import annotations
-
 import argparse
 import subprocess
 import sys

@@ -7,8 +7,6 @@ compiler holds the interpreter's lock, but gives it away every few milliseconds.
     python tests/benchmarks/windows/first_start.py [--busy]
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

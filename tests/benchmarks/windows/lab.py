@@ -5,8 +5,6 @@ both plots, limiters. A change of a parameter also writes the form anew. Times a
 machine does, with Qt's share and without the transport to a screen; the last column is the median over the aim.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import os
 import statistics

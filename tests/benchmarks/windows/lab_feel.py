@@ -6,8 +6,6 @@ three times a second; lateness is printed of both, and their ratio. The time to 
 the first tick that presents the scene, and to the one whose force is whole.
 """
 
-from __future__ import annotations
-
 import statistics
 import time
 

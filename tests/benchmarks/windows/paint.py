@@ -6,8 +6,6 @@ of page many times; the tank's still images are painted ahead while a text is re
 widgets' work including Qt's own share, without the transport to a screen.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import statistics

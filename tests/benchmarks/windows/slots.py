@@ -7,8 +7,6 @@ its first page, in a trial, when it is ended while the trial is recorded, and wh
 slots.
 """
 
-from __future__ import annotations
-
 import os
 import tempfile
 import time

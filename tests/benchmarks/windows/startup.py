@@ -7,8 +7,6 @@ that took longest to load until then, each without what it loads itself. Markdow
     python tests/benchmarks/windows/startup.py [--runs 5]
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import statistics

@@ -4,8 +4,6 @@ Run it by itself: ``python tests/benchmarks/workers/executors.py [ROUNDS]``; abo
 the extra ``cluster`` it starts a Dask cluster of two worker processes here.
 """
 
-from __future__ import annotations
-
 import statistics
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The emulated device: the program's list, the driver's ticks, its faults, and the Falcon through either driver."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

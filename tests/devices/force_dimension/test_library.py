@@ -1,7 +1,5 @@
 """The real driver with a stand-in library of our own, built by the C compiler: opening, ticks, faults, ends."""
 
-from __future__ import annotations
-
 import ctypes
 import math
 import shutil

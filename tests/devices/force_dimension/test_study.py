@@ -1,7 +1,5 @@
 """The thesis' study on the emulated device, through the driver's ticks: the same session as on the scripted hand."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

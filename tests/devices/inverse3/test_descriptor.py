@@ -1,7 +1,5 @@
 """The Inverse3 as the program lists it: loaded without a compiler, rehearsed on where it is emulated."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.devices.descriptor import READY

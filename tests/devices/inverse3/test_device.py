@@ -1,7 +1,5 @@
 """The Inverse3's driver: what it sends and records when it is opened, how it ends, and what it reads."""
 
-from __future__ import annotations
-
 import ctypes
 import json
 import threading

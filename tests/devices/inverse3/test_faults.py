@@ -1,7 +1,5 @@
 """Every fault of the emulated service ends in its own message, in zero force, and in silence: one table."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Frames of a WebSocket client: RFC 6455's own examples (§5.7), frames cut at every byte, and violations."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The scanner of states: it agrees with the standard library on what JSON is, and finds the numbers."""
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any

@@ -1,7 +1,5 @@
 """The driver over a real TCP connection to the emulated service, in real time."""
 
-from __future__ import annotations
-
 import json
 import os
 import socket

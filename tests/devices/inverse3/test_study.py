@@ -1,7 +1,5 @@
 """The thesis' study on an emulated Inverse3, through all of its driver: the same session as on the scripted hand."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

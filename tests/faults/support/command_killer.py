@@ -5,8 +5,6 @@ command and moment it writes a line of JSON: the folder, the code of the killed 
 after it and after the next run, and how that ended. A first line of each command is of a run that was left alone.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import random

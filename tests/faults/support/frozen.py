@@ -6,8 +6,6 @@ started it sends SIGCONT; or right after the first frame the window alone ("wind
 the trial's end. Then the operator resumes what the program paused, and ends the session after that trial.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import signal

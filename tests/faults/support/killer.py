@@ -6,8 +6,6 @@ it had not begun). For every session it writes a line of JSON: the folder, after
 journal held then, and how the going on ended. Or it kills one session again and again, whenever its journal has grown.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import random

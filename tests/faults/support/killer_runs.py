@@ -1,7 +1,5 @@
 """Run a program that kills others at random moments, and return what became of each of them."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

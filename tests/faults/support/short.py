@@ -3,8 +3,6 @@
 So answers depend on person and trial alone, and a trial that is presented again is answered as it was.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -4,8 +4,6 @@ With the emulated Falcon, driven by keys and clicks. It prints one JSON object: 
 step. With a folder for pictures, a picture of the screens is kept at each step.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import threading

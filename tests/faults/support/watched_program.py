@@ -1,7 +1,5 @@
 """Runs the program with its windows, and looks at them every 20 ms."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, TypeVar
 

@@ -1,7 +1,5 @@
 """A session of the small study with a real store and a servo that is all memory, walked through by hand."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The diagnosis of a Falcon: what goes on is told, every mode has a row, and closing it ends the examination."""
 
-from __future__ import annotations
-
 import zipfile
 
 import pytest

@@ -1,7 +1,5 @@
 """The devices' place: each device's row is true, and what is chosen is said, not done."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

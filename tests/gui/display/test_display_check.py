@@ -1,7 +1,5 @@
 """Whether a window can be opened is found out before Qt is asked, and said in one line."""
 
-from __future__ import annotations
-
 import sys
 
 import pytest

@@ -1,7 +1,5 @@
 """Frames come once a refresh: none twice, none never, in step with a surface that tells when it swapped."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from PySide6.QtCore import QTimer

@@ -1,7 +1,5 @@
 """A window stands on its screen with its frame."""
 
-from __future__ import annotations
-
 import pytest
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QGuiApplication

@@ -1,7 +1,5 @@
 """The place Help: pages are chosen, searched, followed by links, and drawn in the colours of the theme."""
 
-from __future__ import annotations
-
 import pytest
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QFontDatabase, QTextDocument, QTextTable

@@ -1,7 +1,5 @@
 """Home in its window, with sessions that were held."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import Qt
 
 from study_app.gui.home.main_window import MainWindow

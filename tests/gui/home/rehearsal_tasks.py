@@ -1,7 +1,5 @@
 """What stands for a rehearsal in the tests of its dialog: tasks of a worker process."""
 
-from __future__ import annotations
-
 import signal
 import sys
 import threading

@@ -1,7 +1,5 @@
 """Home when studies, drafts and files come, change and go."""
 
-from __future__ import annotations
-
 import threading
 
 import pytest

@@ -1,7 +1,5 @@
 """The main window: places are made when one goes there, entered and left; the rail tells where one is."""
 
-from __future__ import annotations
-
 import pytest
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QFontMetrics

@@ -1,7 +1,5 @@
 """The questions before a session: checked as they are answered, and nothing created before Begin."""
 
-from __future__ import annotations
-
 import threading
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The dialog of a rehearsal: its progress, its end, and rehearsals that fail or do not stop."""
 
-from __future__ import annotations
-
 import pytest
 from PySide6.QtCore import Qt
 

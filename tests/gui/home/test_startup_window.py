@@ -1,7 +1,5 @@
 """The note while a session is being made ready."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

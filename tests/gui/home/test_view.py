@@ -1,7 +1,5 @@
 """Home: cards, sessions, and the ways into a session or a rehearsal."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

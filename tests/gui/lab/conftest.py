@@ -1,7 +1,5 @@
 """A lab in which a ball was moved, computed once."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numba

@@ -1,7 +1,5 @@
 """A lab as it would look: a ball moved offline through two liquids, A felt and B on the same motion."""
 
-from __future__ import annotations
-
 import dataclasses
 import random
 from dataclasses import dataclass

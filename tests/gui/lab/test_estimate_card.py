@@ -1,7 +1,5 @@
 """The card of the estimation: what it shows, what it asks for, and nothing of it while the comparison is blind."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The lab draws flow curves and forces over speed where a setting is non-Newtonian."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

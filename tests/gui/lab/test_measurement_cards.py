@@ -1,7 +1,5 @@
 """Plots and the right column: numbers, units, heights that do not jump, and what is said of a limiter."""
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Every parameter with slider and field; what is changed is seen, what is refused is said, nothing typed is lost."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

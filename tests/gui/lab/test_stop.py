@@ -1,7 +1,5 @@
 """The lab's force can be stopped from wherever one is, and nothing that is held goes on after a change of side."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

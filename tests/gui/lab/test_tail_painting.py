@@ -1,7 +1,5 @@
 """The tail on the screen: where the body was, breaks where the wake has them, brighter and thicker the newer."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The lab draws a view and says what is asked for; it can be used by keyboard alone, and blind it tells nothing."""
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A demo session told event by event, as the journal would tell it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import Any
 

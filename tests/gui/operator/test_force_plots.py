@@ -1,7 +1,5 @@
 """Force and wake as they are drawn: a scale that follows, a limit that stands, names that do not touch."""
 
-from __future__ import annotations
-
 import sys
 from itertools import pairwise
 from typing import Any

@@ -1,7 +1,5 @@
 """Nothing is clipped at any size, and the force stop neither moves, shrinks nor scrolls."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any

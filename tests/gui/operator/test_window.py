@@ -1,7 +1,5 @@
 """The operator's window draws a view and says what the operator asks for."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from itertools import pairwise

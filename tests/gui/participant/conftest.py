@@ -1,7 +1,5 @@
 """The participant's window, with and without the pointer as its device."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

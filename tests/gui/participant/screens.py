@@ -1,7 +1,5 @@
 """The participant's window on a screen, and what it emitted."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from PySide6.QtWidgets import QApplication, QWidget

@@ -1,7 +1,5 @@
 """Esc pauses, and held down it stops the force."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """The pointer as the hand, on a virtual display: no motion is lost where it is put back into the middle."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """The pointer as the device: held in the tank alone, and mapped to the workspace."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """The participant's window: pages come whole and go whole."""
 
-from __future__ import annotations
-
 from html import unescape
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The window before a session: every check with its value, warnings accepted by name, failures refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from datetime import datetime
 

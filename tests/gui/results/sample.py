@@ -1,7 +1,5 @@
 """Values that the results window is tested with."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any

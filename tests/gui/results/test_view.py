@@ -1,7 +1,5 @@
 """The results window draws a view and says what is asked for; it knows no file and computes nothing."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A session's page: what it reads of a folder, what it shows, and what leaving out does there."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The display test: the tank's own patch toggles when due, greys and lines are what they say, offsets are typed."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import pytest

@@ -1,7 +1,5 @@
 """The machine's place: it shows what is set, says what is to be changed, and changes nothing itself."""
 
-from __future__ import annotations
-
 import pytest
 from PySide6.QtCore import QPoint, QSize, Qt
 from PySide6.QtGui import QFontMetricsF

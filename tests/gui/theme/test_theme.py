@@ -1,7 +1,5 @@
 """Contrast computed by WCAG 2.2, fonts that really are there, icons that paint."""
 
-from __future__ import annotations
-
 import itertools
 
 import pytest

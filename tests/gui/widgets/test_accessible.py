@@ -1,7 +1,5 @@
 """What a screen reader finds: the participant's window, headings, plots, and the answer that was just chosen."""
 
-from __future__ import annotations
-
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAccessible

@@ -1,7 +1,5 @@
 """Jobs beside the window's thread."""
 
-from __future__ import annotations
-
 import threading
 
 from PySide6.QtCore import QObject

@@ -1,7 +1,5 @@
 """Rows and columns that are built in one call."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from PySide6.QtCore import QMargins

@@ -1,7 +1,5 @@
 """The plots' names stand apart and inside, whatever is drawn."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Numbers as people write them, and a field that loses nothing of what was typed."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Rows of a table: what stands in a cell keeps off the row's outline."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from PySide6.QtCore import QRect, Qt

@@ -1,7 +1,5 @@
 """A slider's numbers, and what mouse, keyboard, wheel and a screen reader do to it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Numbers changed under the hand: what moves goes on, the force never steps, and no more comes back than was put in."""
 
-from __future__ import annotations
-
 from random import Random
 
 import numba

@@ -1,7 +1,5 @@
 """The share of the force model that is compiled is said while it is; nothing where all is stored."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Motions of a hand in the scene frame, and what a sensor in a planted liquid measures along them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Estimates are applied within the slope limit, slowly, and only where the motion identifies them."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

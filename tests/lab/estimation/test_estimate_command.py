@@ -1,7 +1,5 @@
 """The command reads a growing file, prints an estimate per second, and says by its exit code whether it holds."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Planted values are found in measured force, and only where the motion shows them."""
 
-from __future__ import annotations
-
 from concurrent.futures import Executor, Future
 from typing import Any
 

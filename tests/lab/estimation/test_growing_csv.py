@@ -1,7 +1,5 @@
 """A file that another program appends to is read line by line, each once."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

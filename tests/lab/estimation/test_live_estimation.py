@@ -1,7 +1,5 @@
 """The lab's estimation on the servo's own telemetry: found, applied, and left alone where it must be."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """An inlet finds a stream by the labels of its channels, on this computer."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Whatever is written in place of a value, or left out, is a fault with its line and no other error."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

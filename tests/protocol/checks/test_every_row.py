@@ -1,7 +1,5 @@
 """What check reports of trials, questions and groups: every row with its line, its message and its hint."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What check expects of d′, d_a and exponents, against closed forms and simulated answers through the program."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

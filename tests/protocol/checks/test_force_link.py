@@ -1,7 +1,5 @@
 """The force link in a protocol: its keys, what check refuses and warns of, and what an interval presents of it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import pytest

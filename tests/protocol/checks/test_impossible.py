@@ -1,7 +1,5 @@
 """Studies that could be read, but in which nothing would be felt, nothing would differ, or no trial could end."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

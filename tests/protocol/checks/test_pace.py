@@ -1,7 +1,5 @@
 """What check reports of paced motions: each row with its line and hint."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import pytest

@@ -1,7 +1,5 @@
 """A small study of format 2 with a question of every kind, after trials and in forms."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 MIXED = """\

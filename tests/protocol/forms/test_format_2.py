@@ -1,7 +1,5 @@
 """Format 2: what it may leave out, what a file of format 1 may not hold, and what questions need of each other."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

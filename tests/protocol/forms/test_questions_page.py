@@ -1,7 +1,5 @@
 """The page about questions: its example is a study, and its tables name what there is."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

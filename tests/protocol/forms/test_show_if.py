@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from study_app.protocol.forms.show_if import ShowIf, shown
 from study_app.protocol.questions.number import NumberView
 

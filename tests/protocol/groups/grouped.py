@@ -1,7 +1,5 @@
 """A study with two groups, as text, and edits of it."""
 
-from __future__ import annotations
-
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 

@@ -1,7 +1,5 @@
 """Allocation to groups: even at every number of participants, and known to nobody without the secret."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import pytest

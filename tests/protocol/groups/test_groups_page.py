@@ -1,7 +1,5 @@
 """The page about groups: its example belongs to a study whose groups and sessions have the steps that it names."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

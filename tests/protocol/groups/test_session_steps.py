@@ -1,7 +1,5 @@
 """The steps of one session in a study whose groups or sessions differ."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

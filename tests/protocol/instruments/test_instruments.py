@@ -1,7 +1,5 @@
 """Standard questionnaires: sources, licences, texts that may be shipped, and worked scores."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

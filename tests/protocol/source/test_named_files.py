@@ -1,7 +1,5 @@
 """Which files a study names as its liquids, however the key is written."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.protocol.source.liquid_files import bundled, unbundled

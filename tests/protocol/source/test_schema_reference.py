@@ -1,7 +1,5 @@
 """The page of the protocol file: every key of the schema, with links that lead to its tables."""
 
-from __future__ import annotations
-
 import re
 
 from study_app.protocol.source.json_schema import schema

@@ -1,7 +1,5 @@
 """A study with a block of levels, as text: its designs and methods are added by each test."""
 
-from __future__ import annotations
-
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule, draw_key

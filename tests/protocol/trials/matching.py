@@ -1,7 +1,5 @@
 """A study whose participants adjust a damper to a standard, as text."""
 
-from __future__ import annotations
-
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 

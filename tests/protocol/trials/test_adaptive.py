@@ -1,7 +1,5 @@
 """Adaptive methods in a study: the next level is a pure function of the answers, in any order, at presented levels."""
 
-from __future__ import annotations
-
 import math
 import time
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The method of adjustment: where settings start, where steps lead, and what check refuses."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

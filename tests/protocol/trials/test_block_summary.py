@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, parse
 from tests.protocol.trials.level_studies import study

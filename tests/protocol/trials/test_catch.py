@@ -1,7 +1,5 @@
 """Catch trials: the largest level, one in every stretch, never first, and no level follows from their answers."""
 
-from __future__ import annotations
-
 from collections import Counter
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """The target that is followed: where it is, how fast, and how long."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """The page about trials of intervals: its example is a study, and its table names every design."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

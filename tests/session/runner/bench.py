@@ -1,7 +1,5 @@
 """A session on the real servo and a simulated device, on a virtual clock."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The runner in a world of fakes: what it asks of whom, in which order, and what it makes of samples and buttons."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The runner while the disk takes no data: the force is off, nothing is lost, and the session pauses."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.errors import SessionError, StoreError

@@ -1,7 +1,5 @@
 """Trials of intervals on the real servo and simulated devices, on a virtual clock: forces, rests, device buttons."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

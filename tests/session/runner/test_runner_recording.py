@@ -1,7 +1,5 @@
 """What the runner hands to the recorder, and that force and recording begin with the first painted frame."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

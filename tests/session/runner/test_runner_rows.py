@@ -1,7 +1,5 @@
 """The row of a trial that the runner writes: what was measured, and nothing that tells the condition."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.haptics.model.layout import LIMITER_GLITCH

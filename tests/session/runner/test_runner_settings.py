@@ -1,7 +1,5 @@
 """Levels set on the real servo and simulated devices, on a virtual clock: forces, device buttons, the time limit."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The runner on the real servo and a scripted device, on a virtual clock: what the hand feels when things happen."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

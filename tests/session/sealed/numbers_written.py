@@ -1,7 +1,5 @@
 """Every number that the program writes about a trial, and a classifier that names what was presented by them."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, TypeAlias

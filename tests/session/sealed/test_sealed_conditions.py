@@ -1,7 +1,5 @@
 """No number that the program writes tells a liquid or a delay while the key is sealed; after unblinding they do."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Two rehearsals whose keys differ write and show the same, but for what is sealed; numbers tell no level."""
 
-from __future__ import annotations
-
 import csv
 import json
 import shutil

@@ -1,7 +1,5 @@
 """The marker stream of a session tells no condition, liquid, parameter or delay."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Answers without a servo: the files that a held session leaves, and the answers that the model gives."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What check passes at its very limits is delivered as requested, and never clipped, on the paced scripted hand."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

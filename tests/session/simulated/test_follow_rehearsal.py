@@ -1,7 +1,5 @@
 """A study of dampers felt along a paced swing: rehearsed, computed again, evaluated."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A rehearsal of a study with groups that was interrupted goes on in the participant's group."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 from typing import Any

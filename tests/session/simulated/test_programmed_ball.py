@@ -1,7 +1,5 @@
 """The ball of a preview: it does what the task asks for, within the tank, again and again."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Simulated participants: how they move, what they sense, and how they go through a session."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """A session that begins at a later step: exactly there, under the preview's key, with levels that answers led to."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """A study whose strong levels the force limit clips: such trials come again, are not asked about, and are given up."""
 
-from __future__ import annotations
-
 import csv
 import shutil
 from collections import Counter

@@ -1,7 +1,5 @@
 """A session in each of its phases, an event of each kind, and what a transition commands."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any, get_args
 

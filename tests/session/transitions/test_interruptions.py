@@ -1,7 +1,5 @@
 """Pauses, force stops, repeats, early ends and what broke."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

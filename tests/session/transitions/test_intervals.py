@@ -1,7 +1,5 @@
 """Trials of intervals: what is presented, rests, answers, feedback, and trials that are passed over."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

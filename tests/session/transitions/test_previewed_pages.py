@@ -1,7 +1,5 @@
 """The pages of a preview: those that a session of the same seed shows, one after the other."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The transition table driven at random: no answer is lost, every trial is ended."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A level that the participant sets: steps, confirmation, the time limit, and what the journal holds of it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

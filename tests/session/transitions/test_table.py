@@ -1,7 +1,5 @@
 """The transition table, row by row: refused where there is no row."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Trials that were not delivered as requested: presented again, not asked about, given up after so many attempts."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator
 from typing import Any

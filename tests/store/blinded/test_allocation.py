@@ -1,7 +1,5 @@
 """Participants come into groups: one entry each, whoever begins at the same time or is killed, and sealed."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

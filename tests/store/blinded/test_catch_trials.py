@@ -1,7 +1,5 @@
 """Whoever answers too many catch trials incorrectly is excluded when the key is opened, and not before."""
 
-from __future__ import annotations
-
 import csv
 import re
 import shutil

@@ -1,7 +1,5 @@
 """What tells a condition cannot be read in a journal, opens whole with the key, and not when it was changed."""
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any

@@ -1,7 +1,5 @@
 """Before unblinding no table tells a condition; after it every table is what an open study's would have been."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Callable
 from datetime import datetime, timedelta, timezone

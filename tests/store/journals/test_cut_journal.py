@@ -1,7 +1,5 @@
 """A journal that lost lines: what `verify` contradicts is neither resumed nor rebuilt from."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

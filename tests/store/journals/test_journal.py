@@ -1,7 +1,5 @@
 """The journal: whole lines, read again as they were written, damage found."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

@@ -1,7 +1,5 @@
 """The journal and its disk: full, slow, failing, and killed at any moment."""
 
-from __future__ import annotations
-
 import contextlib
 import subprocess
 import sys

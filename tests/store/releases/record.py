@@ -7,8 +7,6 @@ files and ``expected.json``: status and number of answers of each participant.
     python tests/store/releases/record.py
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Sessions that are opened again, and the state of a folder."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 from pathlib import Path

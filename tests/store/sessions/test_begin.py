@@ -1,7 +1,5 @@
 """A session begins: what is on disk before its first trial, and what refuses it."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

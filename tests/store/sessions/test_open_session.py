@@ -1,7 +1,5 @@
 """An open session: journal, tables, recordings, a disk that refuses, and the end."""
 
-from __future__ import annotations
-
 import csv
 import errno
 import hashlib

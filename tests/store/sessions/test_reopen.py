@@ -1,7 +1,5 @@
 """A session goes on: times, receipt, tables, torn lines and recordings without a line."""
 
-from __future__ import annotations
-
 import csv
 import io
 import itertools

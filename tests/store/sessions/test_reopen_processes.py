@@ -1,7 +1,5 @@
 """Programs that resume a session at the same time, or are killed while they write one."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

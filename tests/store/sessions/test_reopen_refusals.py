@@ -1,7 +1,5 @@
 """What keeps a session from going on; a refusal changes no file."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

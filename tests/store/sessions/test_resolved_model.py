@@ -1,7 +1,5 @@
 """The force model as a session resolved it: sealed in its receipt, used where a program would choose otherwise."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """A session's outlets get its events once, before the disk; one that fails is journalled once."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path

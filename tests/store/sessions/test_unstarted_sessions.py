@@ -1,7 +1,5 @@
 """Programs that are killed between claiming a session and its first line: the session can be begun all the same."""
 
-from __future__ import annotations
-
 import os
 import signal
 from collections.abc import Callable

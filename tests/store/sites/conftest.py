@@ -1,7 +1,5 @@
 """Sites of one protocol, and a study merged from them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

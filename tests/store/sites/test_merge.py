@@ -1,7 +1,5 @@
 """Merging sites: folders are copied unchanged, whole or not at all."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import signal

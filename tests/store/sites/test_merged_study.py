@@ -1,7 +1,5 @@
 """What is done with a merged study: unblinding, exclusions, withdrawals, lists."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

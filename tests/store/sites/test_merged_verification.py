@@ -1,7 +1,5 @@
 """Every site of a merged study stays provable."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from datetime import datetime, timedelta

@@ -1,7 +1,5 @@
 """Which limits an interval breaks, by its samples: level, clipping, pace, and the difference of two delays."""
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

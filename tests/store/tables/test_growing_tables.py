@@ -1,7 +1,5 @@
 """Tables of a running session: each page writes the rows that changed, and a kill leaves the beginning of a table."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager

@@ -1,7 +1,5 @@
 """A study of two finished sessions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What verification said, and damage done to files by hand."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

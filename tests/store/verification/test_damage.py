@@ -1,7 +1,5 @@
 """Damaged files of a study: single bits and values of another type, with fixed seeds, in files of every kind."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import random

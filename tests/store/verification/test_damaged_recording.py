@@ -1,7 +1,5 @@
 """Damaged recordings: single bits, with a fixed seed. Whatever reads one says that it is damaged, or reads numbers."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import random

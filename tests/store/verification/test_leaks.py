@@ -1,7 +1,5 @@
 """What the conditions are is written nowhere but in the sealed key: no id, no parameter, no delay."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

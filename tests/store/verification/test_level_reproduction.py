@@ -1,7 +1,5 @@
 """Levels that were presented follow from the answers; whoever changes one is found, and no level is printed."""
 
-from __future__ import annotations
-
 import csv
 import io
 import re

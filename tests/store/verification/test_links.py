@@ -1,7 +1,5 @@
 """Files of a results folder that lead elsewhere, and names in them that are paths."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

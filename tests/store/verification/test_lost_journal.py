@@ -1,7 +1,5 @@
 """A journal that was lost or cut is found by whatever else is left."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Callable
 from pathlib import Path

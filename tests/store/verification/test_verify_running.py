@@ -1,7 +1,5 @@
 """A study folder that programs write to is not called damaged: many looks beside real ones."""
 
-from __future__ import annotations
-
 import multiprocessing
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Sessions that run, stopped or crashed: what is a warning, and what an error all the same."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

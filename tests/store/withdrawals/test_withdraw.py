@@ -1,7 +1,5 @@
 """Withdrawal: nothing of the person remains, the study stays sound, and an interrupted erasure is finished."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

@@ -1,7 +1,5 @@
 """Cases of the fluid solver without it: worker processes import them by name."""
 
-from __future__ import annotations
-
 from study_app.validation.cfd.cases import Case
 from study_app.validation.cfd.flow import Grid
 from study_app.validation.cfd.stored_flows import MOTION, text

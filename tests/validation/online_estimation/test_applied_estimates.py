@@ -1,7 +1,5 @@
 """Loops in which estimates are applied stay stable; one in which values jump does not."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Streams and triggers as other processes receive them: nothing is lost, and times are the servo's."""
 
-from __future__ import annotations
-
 import os
 import threading
 

@@ -1,7 +1,5 @@
 """How often verdicts are wrong: rates and their limits, the simulated truth, and the quick way to the same verdicts."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, replace

@@ -1,7 +1,5 @@
 """Loops whose device measures the velocity: its lag is the one that is stated, and the limits of that lag are kept."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

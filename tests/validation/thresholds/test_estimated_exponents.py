@@ -1,7 +1,5 @@
 """The exponent of magnitude estimation is planted over the varied number and recovered."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.protocol.load import load, parse, source_bytes

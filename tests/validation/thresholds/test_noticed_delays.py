@@ -1,7 +1,5 @@
 """The rated and the detected delay of the same simulated people."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

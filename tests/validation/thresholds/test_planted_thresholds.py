@@ -1,7 +1,5 @@
 """Planted thresholds are recovered, and a method, an interval or an observer that is wrong is found."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial

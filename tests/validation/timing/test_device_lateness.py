@@ -1,7 +1,5 @@
 """Emulated devices compared with the scripted hand: in turn, by ratio and interval, with a verdict and an exit code."""
 
-from __future__ import annotations
-
 import threading
 from contextlib import nullcontext
 from typing import Any

@@ -1,7 +1,5 @@
 """The number that stands next to an element's name."""
 
-from __future__ import annotations
-
 import pathlib
 from typing import Any
 

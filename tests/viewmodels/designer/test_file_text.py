@@ -1,7 +1,5 @@
 """The file in its pane: ends of lines stay as they are in the file, and elements are marked where they are."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

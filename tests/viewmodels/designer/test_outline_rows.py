@@ -1,7 +1,5 @@
 """Outline and problems of a study, as rows."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.authoring.edited_study import Study, read

@@ -1,7 +1,5 @@
 """A value of a wrong type, as it is typed into the file, is a fault in the designer and stops none of its views."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

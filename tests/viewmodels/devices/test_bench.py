@@ -1,7 +1,5 @@
 """The last bench of each device, in words, and where its report is."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What is said of each device: true to what was found, and one device for all ways to it."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.devices.backends import backends

@@ -1,7 +1,5 @@
 """What the operator is told of a session's progress is what its journal holds."""
 
-from __future__ import annotations
-
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.store.broken_limits import within_limits

@@ -1,7 +1,5 @@
 """The operator reads how a track is doing, and nothing that depends on a level or on whether answers were correct."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """A finding made for a test: how often participants gave the highest answer to each statement of a block."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Final
 

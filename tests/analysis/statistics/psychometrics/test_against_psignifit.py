@@ -4,8 +4,6 @@ psignifit's own defaults differ in more than the estimator: it adds overdispersi
 lower end of the interval moves by up to a third of the interval.
 """
 
-from __future__ import annotations
-
 import math
 import warnings
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Deviance, its simulated distribution, and drift over trials."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

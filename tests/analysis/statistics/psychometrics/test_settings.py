@@ -1,7 +1,5 @@
 """Settings worked by hand: mean, standard deviation, interval and hysteresis."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

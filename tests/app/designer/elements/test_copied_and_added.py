@@ -1,7 +1,5 @@
 """What is copied, pasted, filled in or added by its name: elements, questions, languages, questionnaires."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

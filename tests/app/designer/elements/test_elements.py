@@ -1,7 +1,5 @@
 """Elements and keys of a study: added, copied, moved, renamed, switched, removed, deleted and repaired."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

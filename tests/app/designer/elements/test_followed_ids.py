@@ -1,7 +1,5 @@
 """The id of a new element, while its text is typed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path as File

@@ -1,7 +1,5 @@
 """Renames in the window: the comments that mention the old name."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """A series of elements, made in the window: by keys, by the mouse, from the list of what can be added."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """What helps where a study cannot take a series: values that are left out, and lists of blocks."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

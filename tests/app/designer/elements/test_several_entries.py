@@ -1,7 +1,5 @@
 """Several entries of a list in the form: selected by mouse and keys, moved, copied, removed as one step."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

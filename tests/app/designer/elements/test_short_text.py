@@ -1,7 +1,5 @@
 """The short text of a new question, while its text is typed in the form."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Words that would be cut in a window of 1366 × 768: they get room, or go below."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

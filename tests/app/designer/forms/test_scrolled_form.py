@@ -1,7 +1,5 @@
 """The form in a small window: the row with the keyboard is seen, and Tab goes from row to row."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

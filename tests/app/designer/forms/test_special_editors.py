@@ -1,7 +1,5 @@
 """Special editors in the window: what they show, and that they ask for the same steps as the editors they replace."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Fields that are typed in: what is shown is no edit, and what is pasted stays as it is within a line."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

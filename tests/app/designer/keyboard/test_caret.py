@@ -1,7 +1,5 @@
 """A text that is typed while the form changes around it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

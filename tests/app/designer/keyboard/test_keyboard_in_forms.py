@@ -1,7 +1,5 @@
 """The keyboard where a step shows another form, or the same form with other rows: it is never lost."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

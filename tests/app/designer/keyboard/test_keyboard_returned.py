@@ -1,7 +1,5 @@
 """The keyboard after what takes it for a moment: a button of the header that can no longer be pressed, a question."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

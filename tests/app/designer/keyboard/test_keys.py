@@ -1,7 +1,5 @@
 """The keys of the designer: each is a shortcut, is shown at its button and in the card, and in the documentation."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Problems by keys alone: F8 goes to the repair of a problem, Enter makes it and goes to the next repair."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

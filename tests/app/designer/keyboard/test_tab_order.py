@@ -1,7 +1,5 @@
 """Tab through the place: header, outline, form, tabs of the views, what is beside them, the page; then the rail."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The tab Measures with a worker of slow numbers that answers when a test says so."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

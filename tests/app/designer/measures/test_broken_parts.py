@@ -1,7 +1,5 @@
 """The tab Measures while a part of the study is broken: its numbers stay in grey, the others continue."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

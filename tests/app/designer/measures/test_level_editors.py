@@ -1,7 +1,5 @@
 """The level axis and the trial strip of the form: drags and keys are steps, and what is drawn is the block's own."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """The tab Measures in its window: what follows an edit, what is ordered and given up, and the repair of levels."""
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

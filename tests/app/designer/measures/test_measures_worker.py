@@ -1,7 +1,5 @@
 """The worker of slow numbers: it answers what the commands answer, and gives up when asked."""
 
-from __future__ import annotations
-
 from concurrent.futures import Executor, Future
 from typing import Any
 

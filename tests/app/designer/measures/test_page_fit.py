@@ -1,7 +1,5 @@
 """Whether the questions fit on one page: as the window of a session divides them."""
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The bar of the steps of a session."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Numbers of Measures that take simulations: ordered, given up, kept, counted, failed."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

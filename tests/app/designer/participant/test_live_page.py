@@ -1,7 +1,5 @@
 """The tab Participant: which page it shows, and how keys, mouse and edits reach it."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

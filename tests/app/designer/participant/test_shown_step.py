@@ -1,7 +1,5 @@
 """Which step shows an element, in studies whose sessions differ, and for what is in no session."""
 
-from __future__ import annotations
-
 from study_app.app.designer.participant.shown_step import STANDALONE, same_step, showing, step_name
 from tests.protocol.groups.grouped import grouped
 

@@ -1,7 +1,5 @@
 """Which texts the tab Participant shows of a study with faults, and in which language."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

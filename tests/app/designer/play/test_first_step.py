@@ -1,7 +1,5 @@
 """The first step of a session that shows an element, by the preview's own orders."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.app.designer.play.first_step import first_step

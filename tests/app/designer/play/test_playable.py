@@ -1,7 +1,5 @@
 """What is played of a faulty draft: faults before the step and texts of other languages do not prevent it."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.app.designer.participant.shown_step import StepPosition

@@ -1,7 +1,5 @@
 """Play from here in its window: by F5, to the end and stopped, its data kept and deleted, and nothing left over."""
 
-from __future__ import annotations
-
 import json
 import re
 import tempfile

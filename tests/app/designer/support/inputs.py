@@ -1,7 +1,5 @@
 """Keys and clicks of a user, which the X server sends to a real window."""
 
-from __future__ import annotations
-
 import subprocess
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """A user of the designer with keys alone."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from PySide6.QtCore import QModelIndex, QPoint

@@ -1,7 +1,5 @@
 """Studies that a user makes from the empty one, and what follows: saving, and playing as a pilot that is kept."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A user of the designer with the mouse alone, who types texts and numbers."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QModelIndex, QPoint, QRect
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (

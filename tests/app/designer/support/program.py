@@ -4,8 +4,6 @@ Run as a program: ``python -m tests.app.designer.support.program keys|mouse STUD
 empty one, saves it, plays it and keeps the pilot. It prints the number of actions.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable

@@ -3,8 +3,6 @@
 Each key, typed text, click, drag and notch of the wheel is an action. A part that cannot be reached fails.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from PySide6.QtCore import QModelIndex

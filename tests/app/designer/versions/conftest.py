@@ -1,7 +1,5 @@
 """A study that sessions were run with, and what tests of versions click and read."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

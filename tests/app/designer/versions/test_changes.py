@@ -1,7 +1,5 @@
 """The tab Changes: what differs from a version that was run, and single differences taken back."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Versions in the window: the chip, the card that asks before saving, two programs on one study."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """What can wait: done when it is due and there is room, never for ever put off, never more than its share."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 from study_app.app.session.frame_budget import MOST_PERIODS, MOST_SHARE, FrameBudget

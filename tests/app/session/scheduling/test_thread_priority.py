@@ -1,7 +1,5 @@
 """The windows' thread goes before other programs while it is asked to, and is one among others again after that."""
 
-from __future__ import annotations
-
 import os
 import sys
 import threading

@@ -1,7 +1,5 @@
 """Sessions of pairs and of settings in windows without a screen, attended by keys alone."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

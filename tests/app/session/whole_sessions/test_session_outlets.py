@@ -1,7 +1,5 @@
 """A session in its windows sends its events to a port and to the Lab Streaming Layer, and goes on without them."""
 
-from __future__ import annotations
-
 import json
 import os
 import threading

@@ -1,7 +1,5 @@
 """Sessions begun at the home window, and those that stopped and go on."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

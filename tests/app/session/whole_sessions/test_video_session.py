@@ -1,7 +1,5 @@
 """A session in windows whose conditions show footage: what is kept of it, and what does not tell a condition."""
 
-from __future__ import annotations
-
 import hashlib
 import itertools
 import json

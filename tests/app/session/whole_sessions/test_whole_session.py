@@ -1,7 +1,5 @@
 """The command's way into a session, with real windows, servo and store, without a screen."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

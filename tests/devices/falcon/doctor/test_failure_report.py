@@ -1,7 +1,5 @@
 """What an examination shows: every mode in its order, as found, ok or not looked at."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import dataclass
 

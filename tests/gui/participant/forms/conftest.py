@@ -1,7 +1,5 @@
 """Forms that are opened and closed again, and a finger."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """A form in the participant's window, and a hand for it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from PySide6.QtCore import QPoint, Qt

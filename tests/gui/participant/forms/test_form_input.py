@@ -1,7 +1,5 @@
 """Forms are answered by keys, mouse, touch or screen reader alone."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QPoint
 from PySide6.QtGui import QAccessible, QPointingDevice
 from PySide6.QtTest import QTest

@@ -1,7 +1,5 @@
 """Forms: everything fits without scrolling, can be hit, and is mirrored from right to left."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any
 

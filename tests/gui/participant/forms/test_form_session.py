@@ -1,7 +1,5 @@
 """A session with forms in the participant's window, by keys alone: every event is one that the state machine takes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Forms: questions that come and go, entries that are not permitted, pauses, and what is missing."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

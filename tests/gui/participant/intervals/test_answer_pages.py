@@ -1,7 +1,5 @@
 """The pages of a design's one question, feedback, and the tank throughout a trial."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from typing import Any
 

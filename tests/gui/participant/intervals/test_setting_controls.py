@@ -1,7 +1,5 @@
 """Less, more and done: by keys, wheel and buttons, only where a level is set, without a number or end marks."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 from typing import Any

@@ -3,8 +3,6 @@
 The session's own transitions say what comes next; the same widgets, laid out off screen, say where it lies.
 """
 
-from __future__ import annotations
-
 import csv
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """From one page to the next: what is on the screen is the old page, then the new one, and never anything else."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """Pages to read: what they say, which keys go on, and that they fit."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """The questionnaire: what is shown, what keys and clicks tell, and that it fits."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Pages to read: a break that lasts, texts that are longer than the window, languages to choose from."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

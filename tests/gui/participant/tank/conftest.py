@@ -1,7 +1,5 @@
 """A tank with two targets."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """What a tank looks like, as numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 from PySide6.QtGui import QImage
 

@@ -1,7 +1,5 @@
 """The camera and what it places: everything of the tank lies within its rectangle, near things are larger."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

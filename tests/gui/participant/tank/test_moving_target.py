@@ -1,7 +1,5 @@
 """A target that moves and is followed: where it is drawn, and the ball that is hidden or waited for."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The photodiode's square: it toggles when a movement begins."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QPoint
 from PySide6.QtGui import QColor
 

@@ -1,7 +1,5 @@
 """The tank on an OpenGL surface, on a virtual display: the same picture, a swap for every frame, frames in step."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

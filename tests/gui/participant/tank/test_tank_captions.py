@@ -1,7 +1,5 @@
 """The words around the tank: how long a task still lasts, and what stands above it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

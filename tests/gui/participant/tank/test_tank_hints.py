@@ -1,7 +1,5 @@
 """The line below the tank: when the participant may or must go on, and how the ball gets into its target."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

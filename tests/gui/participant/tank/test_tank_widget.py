@@ -1,7 +1,5 @@
 """The tank: what is drawn, what is painted anew, and when a view counts as painted."""
 
-from __future__ import annotations
-
 import sys
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The video in the tank: drawn behind ball and targets or in place of them, and painted anew when it changes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The form of an element: every key of it once, faults at their rows, and where everything is in the file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

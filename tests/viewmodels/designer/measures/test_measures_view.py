@@ -1,7 +1,5 @@
 """What is shown of each element: cards that concern it, from the program's own functions."""
 
-from __future__ import annotations
-
 import pytest
 
 from study_app.authoring.edited_study import Study, read

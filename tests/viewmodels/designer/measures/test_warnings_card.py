@@ -1,7 +1,5 @@
 """The card of warnings."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 
