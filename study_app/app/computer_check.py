@@ -1,7 +1,5 @@
 """The check of this computer: where its window, a servo with the simulated hand and the devices' probes meet."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from random import Random
 

@@ -1,7 +1,5 @@
 """Where a crash of the interpreter or of a library in C leaves its trace: a file in the session's folder."""
 
-from __future__ import annotations
-
 import contextlib
 import faulthandler
 import sys

@@ -4,8 +4,6 @@ Nothing of a session is left out or done twice: trials reach for targets with th
 read from the recordings and tables that a session leaves.
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable
 from contextlib import nullcontext

@@ -1,7 +1,5 @@
 """The devices: where their place, a look at the machine in a thread, and a diagnosis meet."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Sequence
 

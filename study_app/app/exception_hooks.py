@@ -1,7 +1,5 @@
 """Hooks for exceptions that no slot catches: those in Qt's own calls, such as painting, and those that end a thread."""
 
-from __future__ import annotations
-
 import logging
 import sys
 import threading

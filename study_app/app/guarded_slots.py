@@ -1,7 +1,5 @@
 """Decorators for slots: no exception leaves a slot."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from functools import wraps

@@ -1,7 +1,5 @@
 """What a setting costs, how true it is, and what there is to feel it with, as the lab says it."""
 
-from __future__ import annotations
-
 from study_app.devices.registry import list_devices
 from study_app.evaluation.appraisal import Costs, Errors
 from study_app.haptics.model.effects import NAMED

@@ -3,8 +3,6 @@
 The process lives while the place is shown; reports and tables are written by one of their own. Nothing here waits.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What a study's folder tells, as the results window shows it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path

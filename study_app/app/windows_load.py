@@ -1,7 +1,5 @@
 """The windows' thread, lent to those who time or soak the servo: painting as in a session, and a timer of Qt's own."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable

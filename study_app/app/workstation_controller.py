@@ -1,7 +1,5 @@
 """What is set for this machine: where its place, its file and the windows that follow it meet."""
 
-from __future__ import annotations
-
 from datetime import date
 from pathlib import Path
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """New elements: with the keys that check asks for, and valid initial values; only their texts are left to write."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Edits that give a table another kind."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Documents with one value changed: the others are shared, nothing is written to a file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

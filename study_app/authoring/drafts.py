@@ -4,8 +4,6 @@ A draft is one file in the user's data folder, written whole or not at all. Wher
 keeps the other's draft as a version before it writes its own.
 """
 
-from __future__ import annotations
-
 import json
 from contextlib import suppress
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ It is looked at in a language of the preview and with a number of simulated part
 These settings are kept with drafts and versions in the user's data folder; they change no protocol.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 from pathlib import Path

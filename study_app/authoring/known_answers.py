@@ -1,7 +1,5 @@
 """Known answers: what a template with an adaptive method finds of simulated people whose threshold is planted."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What names what in a study, both ways; and the edits that rename, replace or delete a thing with what names it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """New studies: a copy of a template or of another study, with a name of its own."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The outline of a study: its session in order, the parts it is made of, and the study itself."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final

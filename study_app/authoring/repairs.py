@@ -1,7 +1,5 @@
 """Repairs: edits that remove a fault, each with the words of its button; only those are offered that do."""
 
-from __future__ import annotations
-
 import difflib
 import math
 import re

@@ -1,7 +1,5 @@
 """What the JSON Schema of the file format says of a place in a study."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any, TypeAlias
 

@@ -1,7 +1,5 @@
 """Facts of a study that follow every edit: its length, trials, forces, missing texts and warnings."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Final

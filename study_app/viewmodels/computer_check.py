@@ -1,7 +1,5 @@
 """Whether this computer is fit for sessions, apart from every study: the first-run check. No Qt here."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final

@@ -1,7 +1,5 @@
 """What the lab shows of an estimation from measured force, as values."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 

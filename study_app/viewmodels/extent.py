@@ -1,7 +1,5 @@
 """How much a session asks of a participant; where sessions differ, from the least to the most. No Qt here."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

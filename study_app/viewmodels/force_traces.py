@@ -3,8 +3,6 @@
 In a double-blind study nothing of this is made: the bridge then reads no force at all.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """When frames were painted, and what that comes to. No Qt here."""
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import dataclass
 from itertools import pairwise

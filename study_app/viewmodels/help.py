@@ -1,7 +1,5 @@
 """What the window Help shows: the pages by section, as text for a reader that knows Markdown and no HTML."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """What the home window says of protocols and sessions, as values. No Qt here."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable
 from contextlib import suppress

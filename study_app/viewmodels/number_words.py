@@ -1,7 +1,5 @@
 """Numbers and durations in words."""
 
-from __future__ import annotations
-
 import math
 
 THIN_SPACE = "\u2009"

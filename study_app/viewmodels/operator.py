@@ -3,8 +3,6 @@
 Nothing here says a liquid, a parameter or a delay; nor, in a double-blind study, a force or what a limiter did.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal

@@ -4,8 +4,6 @@ Nothing here says a liquid, a parameter or a delay: costs and errors are those o
 accurate scene.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime, timedelta

@@ -1,7 +1,5 @@
 """What the results window shows, as one frozen value: widgets only draw it. No Qt here."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime

@@ -1,7 +1,5 @@
 """Is the session healthy: ticks, lateness, screen frames and the hand's recent path, kept in rings. No Qt here."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Literal
 

@@ -1,7 +1,5 @@
 """What a row says of a session, as values. No Qt here."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

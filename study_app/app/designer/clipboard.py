@@ -1,7 +1,5 @@
 """Copying and pasting elements of a study, as TOML on the clipboard."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QObject
 from PySide6.QtGui import QGuiApplication
 

@@ -3,8 +3,6 @@
 Each edit is shown in the form at once; the outline, the warnings and the repairs follow when the keyboard rests.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Final
 

@@ -1,7 +1,5 @@
 """From what is asked for to the edits of a study: one step each, with its words and what is selected after it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Final, TypeAlias

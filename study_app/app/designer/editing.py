@@ -1,7 +1,5 @@
 """The study that is open in the designer, and the steps that are made in it."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Steps that add, copy, move, paste and delete whole elements, one or several at once."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Feel it: liquids of the draft in the lab, and what was changed there put back as one step."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path as File

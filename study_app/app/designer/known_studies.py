@@ -1,7 +1,5 @@
 """The studies that the designer can open, and how they are described."""
 
-from __future__ import annotations
-
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The repairs of a study's problems: found one after the other, while the window goes on."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from PySide6.QtCore import QObject, QTimer, Signal

@@ -1,7 +1,5 @@
 """Drafts, saving, and the banner of a study that is read-only or was changed by another program."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Final

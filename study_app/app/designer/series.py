@@ -1,7 +1,5 @@
 """Asking for a series: of which element, which number differs, its values, and what they make while they are typed."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import replace

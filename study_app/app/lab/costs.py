@@ -1,7 +1,5 @@
 """What the felt setting costs and how true it is, as far as it was answered."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 

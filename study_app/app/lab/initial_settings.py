@@ -1,7 +1,5 @@
 """The settings and the liquids that the lab begins with."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

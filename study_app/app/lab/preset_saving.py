@@ -1,7 +1,5 @@
 """Presets written in the background: a disk may take its time, and a program that ends waits for it."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from functools import partial

@@ -1,7 +1,5 @@
 """Waits until a window shows what is wanted of it, and keeps a picture of it."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The study designer in both themes and in the sizes of three screens: forms, measures, a broken study, a new one."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, Final
 

@@ -1,7 +1,5 @@
 """What the pictures are taken of: a rehearsed study with one interrupted session, and a protocol of short tasks."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Final

@@ -1,7 +1,5 @@
 """The main window at each of its places, and the windows that open from them, in both themes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, Final
 

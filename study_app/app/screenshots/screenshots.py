@@ -1,7 +1,5 @@
 """All pictures, one after the other."""
 
-from __future__ import annotations
-
 import os
 import sys
 import tempfile

@@ -1,7 +1,5 @@
 """A session held with the scripted hand: what is seen before it, by the participant and by the operator."""
 
-from __future__ import annotations
-
 import signal
 from pathlib import Path
 from typing import Final, Self

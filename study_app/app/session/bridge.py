@@ -6,8 +6,6 @@ Whatever fails in here ends in zero force: the force is stopped first, then the 
 operator. Nothing of it reaches the participant but a calm page.
 """
 
-from __future__ import annotations
-
 import logging
 import traceback
 from dataclasses import replace

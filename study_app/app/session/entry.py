@@ -1,7 +1,5 @@
 """Sessions asked for by command: begun or gone on with, without a dialog."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Callable, Mapping
 from pathlib import Path

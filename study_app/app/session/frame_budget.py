@@ -4,8 +4,6 @@ The operator's plots take as long as a frame of a fast screen. Drawn by timers o
 a frame is of and its painting; drawn here they wait for a frame to be painted and for one after which there is room.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

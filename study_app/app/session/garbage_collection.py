@@ -10,8 +10,6 @@ the next session has ended, or was cancelled. Between sessions, objects that wer
 are bounded: beyond ``MOST_FROZEN`` objects, the next collection looks at everything.
 """
 
-from __future__ import annotations
-
 import gc
 import threading
 import time

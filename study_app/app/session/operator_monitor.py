@@ -1,7 +1,5 @@
 """What the operator is to see of a session under way: telemetry in; views, traces and figures out."""
 
-from __future__ import annotations
-
 from study_app.app.session.parts import Parts
 from study_app.gui.operator.force_plots import ForceCard
 from study_app.gui.operator.window import OperatorWindow

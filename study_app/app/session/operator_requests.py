@@ -1,7 +1,5 @@
 """What the operator asks for during a session, as events for the runner."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from PySide6.QtCore import QObject

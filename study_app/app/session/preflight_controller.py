@@ -1,7 +1,5 @@
 """The question before a session: what was found of device, servo, disk and scenes, and whether to begin."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Iterable
 from dataclasses import replace

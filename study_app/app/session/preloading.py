@@ -1,7 +1,5 @@
 """Modules that are loaded in a thread while the note before a session is shown."""
 
-from __future__ import annotations
-
 
 def load_windows() -> None:
     """Load what a session's windows need while the note is shown: modules, and versions, read from the disk once."""

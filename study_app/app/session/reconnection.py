@@ -1,7 +1,5 @@
 """Connecting a device again in the background: opening and homing it takes as long as a person does."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from typing import Any

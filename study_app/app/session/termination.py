@@ -1,7 +1,5 @@
 """The ways a program is ended from outside: signals, Ctrl+C, and the system's session that is logged off."""
 
-from __future__ import annotations
-
 import signal
 import threading
 import time

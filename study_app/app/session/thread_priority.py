@@ -4,8 +4,6 @@ A frame that is being painted is older by all that another program computes mean
 before this one all the same.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import sys

@@ -1,7 +1,5 @@
 """Ids of elements that were added while a study is open: each follows its element's text until it is edited by hand."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Elements of a study as TOML on their own, with their comments: copied, and pasted into the same or another study."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Mapping, Sequence

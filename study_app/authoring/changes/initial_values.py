@@ -1,7 +1,5 @@
 """Valid initial values for keys that are not in a study."""
 
-from __future__ import annotations
-
 import string
 from collections.abc import Mapping
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """Edits that add a language to every text of a study, fill in what it lacks, and take it away again."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Edits that move entries of one list together: steps of the session, questions, names in a list."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A series of elements: copies of one that differ from it in one number, each with an id and a title that say it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

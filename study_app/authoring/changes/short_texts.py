@@ -1,7 +1,5 @@
 """The short text of a question, which names it in figures and tables: it follows the text until it is edited."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Final
 

@@ -1,7 +1,5 @@
 """Balance of a block's orders over some participants, and with how many it is even."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

@@ -1,7 +1,5 @@
 """The force of each liquid against a hand."""
 
-from __future__ import annotations
-
 from study_app.haptics.model.steady_state import HAND_MPS, Steady, steady
 from study_app.protocol.model import Protocol
 

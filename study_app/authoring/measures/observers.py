@@ -3,8 +3,6 @@
 The observers answer by the block's own method and are estimated as the analysis does, as for ``check`` and ``power``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace

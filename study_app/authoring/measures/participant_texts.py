@@ -1,7 +1,5 @@
 """Texts of a study: how many each language has, and those that a participant reads that reveal a condition."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """What simulated studies of so many participants find: values that the worker of slow numbers answers with."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

@@ -1,7 +1,5 @@
 """What of a study with faults can be measured: without its broken elements, with a text for each that is wrong."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Templates: studies that work as they are, to begin one's own from."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Final
 

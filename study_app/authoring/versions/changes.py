@@ -1,7 +1,5 @@
 """How a study differs from a version of it: in sentences, what each does to the data, and the edits that revert it."""
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib

@@ -1,7 +1,5 @@
 """Saving a study's file: never over another program's content, and every content stays under its hash."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

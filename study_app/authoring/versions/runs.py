@@ -1,7 +1,5 @@
 """Which contents of a study were run, by how many sessions, and what may be saved under which version."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Entries of an array, or of an array of tables: insert, remove, copy and move them, as splices."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from typing import Any, Final

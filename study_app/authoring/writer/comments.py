@@ -1,7 +1,5 @@
 """Comments of a TOML text."""
 
-from __future__ import annotations
-
 import re
 from typing import Final, NamedTuple
 

@@ -4,8 +4,6 @@ An edit is refused with a sentence where it makes no sense. After its splices ar
 compared with what was meant; a difference is a bug of the writer, and nothing is changed.
 """
 
-from __future__ import annotations
-
 import copy
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """Keys and tables of a text: replace, add, remove, copy and rename them, as splices."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """Why an edit is not made."""
 
-from __future__ import annotations
-
 from study_app.errors import StudyError
 
 

@@ -1,7 +1,5 @@
 """Splices: replacements of pieces of a text, applied together and undone backwards."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import NamedTuple, TypeAlias
 

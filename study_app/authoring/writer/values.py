@@ -1,7 +1,5 @@
 """Values and tables as TOML text, in the style of their neighbours; ``tomlkit`` writes what stands on one line."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping
 from typing import Any, Final

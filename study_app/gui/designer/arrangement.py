@@ -1,7 +1,5 @@
 """Where the parts of the designer are: side by side, and in small windows the outline as a drawer, then one column."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QRect, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QApplication, QSizePolicy, QWidget

@@ -1,7 +1,5 @@
 """One line above the parts of the designer: why a study is read-only, a draft that was found, a file that changed."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QRectF, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 

@@ -1,7 +1,5 @@
 """The header of the designer: which study, its problems, its draft, undo, redo and Save."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFocusEvent, QPainter, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QFileDialog, QSizePolicy, QWidget

@@ -1,7 +1,5 @@
 """The parts of the designer that the keyboard goes to: header, outline, form, views and problems."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt

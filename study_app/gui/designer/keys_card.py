@@ -1,7 +1,5 @@
 """The card that lists the keys of the designer, over the place; Esc closes it."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QWidget

@@ -1,7 +1,5 @@
 """From problem to problem, and from each to its repairs."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QWidget
 

@@ -1,7 +1,5 @@
 """The list of problems: where each is, the sentence of ``check``, its line, and its repairs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal

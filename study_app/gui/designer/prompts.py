@@ -1,7 +1,5 @@
 """Questions as cards in the place: what to do with what names a deleted element, and the values of a series."""
 
-from __future__ import annotations
-
 from itertools import zip_longest
 
 from PySide6.QtCore import Qt, Signal

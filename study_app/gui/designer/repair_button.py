@@ -1,7 +1,5 @@
 """Buttons that put something right: a repair, at a field and in the list of problems, and a name that is free."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFocusEvent, QMouseEvent
 from PySide6.QtWidgets import QWidget

@@ -1,7 +1,5 @@
 """A choice between few words, side by side: the chosen one is raised, the one with the keyboard has a ring."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from PySide6.QtCore import QEvent, QRectF, QSize, Qt, Signal

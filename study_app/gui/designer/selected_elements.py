@@ -1,7 +1,5 @@
 """What is asked of the selected elements: to copy, move, delete or join them, or to make a series."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from PySide6.QtCore import QObject, Signal

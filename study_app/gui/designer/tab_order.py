@@ -1,7 +1,5 @@
 """The order in which Tab goes through parts that are made after what follows them: Qt would put them last."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 

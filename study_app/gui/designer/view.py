@@ -1,7 +1,5 @@
 """The study designer's place: header, outline, form, file and problems."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

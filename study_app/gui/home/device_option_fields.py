@@ -1,7 +1,5 @@
 """The fields for a device's options, such as the file of its firmware."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Fields of a form: a text field, a field with a button, and a labelled field in a grid."""
 
-from __future__ import annotations
-
 from PySide6.QtWidgets import QGridLayout, QLabel, QLineEdit, QWidget
 
 from study_app.gui.theme.theme import font

@@ -1,7 +1,5 @@
 """The main window: the rail, and one view at a time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 

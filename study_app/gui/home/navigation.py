@@ -1,7 +1,5 @@
 """The strip at the left of the main window: the places one can go to, and the switch of the theme."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import NamedTuple
 

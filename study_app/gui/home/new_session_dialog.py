@@ -1,7 +1,5 @@
 """The questions before a session. Nothing is created until Begin; Cancel leaves everything as it was."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 

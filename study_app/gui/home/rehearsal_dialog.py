@@ -1,7 +1,5 @@
 """Rehearsing a protocol from the home window, in a worker process, so that nothing here waits."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from PySide6.QtCore import QTimer

@@ -1,7 +1,5 @@
 """Above everything else: a session that was interrupted, what of it is on disk, and the button to go on."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget

@@ -1,7 +1,5 @@
 """The sessions that were held, in all studies, by what they are; the newest of them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from datetime import datetime
 

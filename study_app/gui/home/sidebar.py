@@ -1,7 +1,5 @@
 """The sidebar of the sessions: haptic devices, and the way into the lab."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """What is shown while a session is being made ready: what is going on, and a way back. Never a frozen window."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

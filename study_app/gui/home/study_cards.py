@@ -1,7 +1,5 @@
 """A card for each protocol, with the facts one chooses by and the two ways to go on."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TypeAlias
 

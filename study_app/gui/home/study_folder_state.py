@@ -1,7 +1,5 @@
 """The state of a study's results folder: the used participant ids, or why the folder cannot be used."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Home: choose a protocol and begin, go on where one stopped, or see what was held."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from datetime import datetime
 from functools import partial

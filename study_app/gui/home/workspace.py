@@ -1,7 +1,5 @@
 """The question of the first start: which folder of this machine holds protocols and results."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget

@@ -5,8 +5,6 @@ into the middle of the window whenever it comes near an edge; motion that was un
 twice.
 """
 
-from __future__ import annotations
-
 from PySide6.QtCore import QEvent, QObject, QPoint, Qt, Signal
 from PySide6.QtGui import QCursor, QGuiApplication, QMouseEvent, QWheelEvent
 from PySide6.QtWidgets import QWidget

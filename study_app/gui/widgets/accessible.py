@@ -1,7 +1,5 @@
 """What screen readers receive beyond Qt's own roles: headings, plots, the participant's window."""
 
-from __future__ import annotations
-
 import shiboken6
 from PySide6.QtGui import QAccessible
 from PySide6.QtWidgets import QAccessibleWidget, QLabel, QWidget

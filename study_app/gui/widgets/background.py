@@ -1,7 +1,5 @@
 """Jobs outside the window's thread: neither a slow disk nor a long computation freezes a window."""
 
-from __future__ import annotations
-
 import queue
 import threading
 import time

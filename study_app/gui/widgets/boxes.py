@@ -1,7 +1,5 @@
 """Widgets and layouts next to each other, or one below the other."""
 
-from __future__ import annotations
-
 from typing import Any, Final, TypeAlias, TypeVar
 
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLayout, QVBoxLayout, QWidget

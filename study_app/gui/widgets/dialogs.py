@@ -1,7 +1,5 @@
 """Questions with a way back, and notices: one sentence and one button each."""
 
-from __future__ import annotations
-
 from PySide6.QtWidgets import QDialog, QWidget
 
 from study_app.gui.theme.theme import Theme

@@ -1,7 +1,5 @@
 """Esc as every window hears it: held it stops the force, tapped it is whatever the window makes of it."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QGuiApplication, QKeyEvent, QWindow
 from PySide6.QtWidgets import QWidget

@@ -4,8 +4,6 @@ What holds the session and the force (header, banner, force stop, buttons) is no
 session.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from traceback import clear_frames
 from types import FrameType, TracebackType

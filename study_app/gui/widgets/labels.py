@@ -1,7 +1,5 @@
 """Labels in the type scale and the palette's roles."""
 
-from __future__ import annotations
-
 from typing import Literal, TypeAlias
 
 from PySide6.QtCore import QSize, Qt

@@ -3,8 +3,6 @@
 Horizontal grid only, few ticks, curves named at their ends and distinguished by stroke as well as colour.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

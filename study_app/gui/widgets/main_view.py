@@ -1,7 +1,5 @@
 """What a place of the main window is: a part that fills it, entered and left, with shortcuts of its own."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 from PySide6.QtCore import Qt, Signal

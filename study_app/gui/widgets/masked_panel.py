@@ -1,7 +1,5 @@
 """What stands where something must not be seen: as large as what it hides, so that its shape tells nothing."""
 
-from __future__ import annotations
-
 import math
 
 from PySide6.QtCore import QLineF, QRectF, Qt

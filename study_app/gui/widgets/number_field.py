@@ -1,7 +1,5 @@
 """A field for one number: what is typed stays until it is understood, and one line says what is wrong with it."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QLineEdit

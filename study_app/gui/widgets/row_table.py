@@ -3,8 +3,6 @@
 The model gives each cell's words as its display text, so that screen readers hear what is drawn.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from PySide6.QtCore import QAbstractItemModel, QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt, Signal

@@ -1,7 +1,5 @@
 """A slider for a number in a range, even or by decades, with a tick at the value it began with."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """What can be added to a study where one is."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Everything that the study designer shows at one moment."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 

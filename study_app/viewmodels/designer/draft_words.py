@@ -1,7 +1,5 @@
 """What a draft of a study holds, in words; apart from `home`, which begins without the designer's modules."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Final
 

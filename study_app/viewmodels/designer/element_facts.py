@@ -1,7 +1,5 @@
 """What elements and their places in the file are called, what tells elements apart, and how many others use them."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
 from typing import Any, Final

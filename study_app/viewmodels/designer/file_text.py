@@ -1,7 +1,5 @@
 """The file as the pane shows it: lines that end in line feeds, the lines of the selected element, and faulty lines."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from typing import Final

@@ -1,7 +1,5 @@
 """Fields of a study, found by the words of their labels, of their choices, and of what the choices mean."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """The keys of the study designer: the one table for its shortcuts, its tips, its menu and its card of keys."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

@@ -1,7 +1,5 @@
 """What a new study can begin as: templates and copies, each with its session, and the questions that it begins with."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace

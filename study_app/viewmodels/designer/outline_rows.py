@@ -1,7 +1,5 @@
 """The rows of the outline: the study itself, its session in order, its parts, and its settings."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, TypeAlias

@@ -1,7 +1,5 @@
 """The participant's page in the designer, as a value."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

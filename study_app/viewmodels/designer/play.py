@@ -1,7 +1,5 @@
 """What the designer shows of playing a study: what is under way or asked, and the devices to play with."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 

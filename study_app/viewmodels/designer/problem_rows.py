@@ -1,7 +1,5 @@
 """The problems of a study, as ``check`` prints them, each with the element and the field that it belongs to."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace

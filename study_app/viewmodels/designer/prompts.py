@@ -1,7 +1,5 @@
 """What the study designer asks before some steps."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from study_app.authoring.changes.initial_values import counted_elements, singular

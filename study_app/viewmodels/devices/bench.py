@@ -1,7 +1,5 @@
 """The last bench of each device (`liquid-study devices bench`), as windows show it. No Qt here."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What the columns of a table of sessions are, which chips stand in them, and how sessions are filtered. No Qt here."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from typing import Literal, NamedTuple, TypeAlias
 

@@ -1,7 +1,5 @@
 """What a session's page says: its trials, limits, notes, files and exclusions, read from its folder. No Qt here."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime

@@ -1,7 +1,5 @@
 """The rows of the operator's rail, one for each page or trial of a session, or for a long block. No Qt here."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from study_app.protocol.model import Protocol

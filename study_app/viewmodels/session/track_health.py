@@ -4,8 +4,6 @@ It follows from what the journal holds unsealed, so that it is the same for ever
 never shown.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import groupby

@@ -1,7 +1,5 @@
 """The tab Measures: instant numbers once the window is idle after an edit, slow ones when the keyboard rests."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any, Final
 

@@ -1,7 +1,5 @@
 """Whether the questions of a study fit on one page: looked at when the keyboard rests, a language at a time."""
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from dataclasses import replace
 from typing import Final

@@ -1,7 +1,5 @@
 """Numbers that take simulations: ordered when the keyboard rests, dropped at the next edit, kept by what they need."""
 
-from __future__ import annotations
-
 import logging
 import time
 from collections import OrderedDict

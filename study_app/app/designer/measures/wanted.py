@@ -1,7 +1,5 @@
 """Which simulations a study calls for, and what each of them depends on."""
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any, Final

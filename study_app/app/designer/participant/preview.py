@@ -1,7 +1,5 @@
 """The participant's page of the study that is edited: which page, in which language, with which answers."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping
 from typing import Final

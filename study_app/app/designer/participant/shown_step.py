@@ -1,7 +1,5 @@
 """Which step of which session shows the selected element, and which of its pages."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final, Literal, NamedTuple, TypeAlias

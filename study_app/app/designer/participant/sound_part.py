@@ -1,7 +1,5 @@
 """The part of a faulty study that is sound, so that its pages are shown while something else is being mended."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any, Final

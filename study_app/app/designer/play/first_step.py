@@ -1,7 +1,5 @@
 """Which step of a session shows an element of the study first."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TypeAlias
 

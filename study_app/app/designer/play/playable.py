@@ -4,8 +4,6 @@ Missing texts of languages that are not shown are filled in from those that are 
 begins with the step that shows the element, and what no later step needs is left out of the played bytes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path as Folder

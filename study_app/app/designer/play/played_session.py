@@ -5,8 +5,6 @@ share a screen, closing the participant's window and every failure end the force
 window; the journal has an end unless the disk took none.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator
 from typing import Final

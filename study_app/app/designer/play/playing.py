@@ -1,7 +1,5 @@
 """Play from here: a pilot of the draft from the shown step on, with the simulated hand or a device."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 import time

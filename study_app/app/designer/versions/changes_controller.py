@@ -1,7 +1,5 @@
 """The tab Changes: compares the open study with a version, and reverts single differences."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path

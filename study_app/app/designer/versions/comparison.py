@@ -1,7 +1,5 @@
 """A study compared with a version of it: with its copy where one is kept, else with what a receipt says of it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Final, NamedTuple

@@ -1,7 +1,5 @@
 """Notices that another program changes the file of the open study, while the designer is shown."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from PySide6.QtCore import QFileSystemWatcher, QObject, Qt, QTimer, Signal

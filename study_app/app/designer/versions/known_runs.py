@@ -1,7 +1,5 @@
 """What the open study was run with: read from receipts in the background, and how the study stands to it."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Mapping
 from functools import partial

@@ -1,7 +1,5 @@
 """What a new id does: how many references follow, answers recorded under the old one, comments that mention it."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from PySide6.QtCore import QObject

@@ -1,7 +1,5 @@
 """The form: one element at a time, its rows in sections, with help for the focused field at its foot."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal

@@ -1,7 +1,5 @@
 """A list whose entries are selected by mouse and keys: moved, copied and removed together, as one step."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from PySide6.QtCore import QRectF, Qt, Signal

@@ -1,7 +1,5 @@
 """One entry of a list in the form: selected, dragged by its grip, or moved by keys."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from PySide6.QtCore import QEvent, QRectF, Qt, Signal

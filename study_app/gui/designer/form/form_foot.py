@@ -1,7 +1,5 @@
 """The foot of the form: what the focused field means, where it is in the file, and what is permitted."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget

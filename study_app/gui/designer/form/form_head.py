@@ -1,7 +1,5 @@
 """The head of the form: icon, title and id of the element, and the buttons that move, copy and delete it."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGridLayout, QWidget

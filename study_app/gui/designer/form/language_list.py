@@ -1,7 +1,5 @@
 """The languages of a study: how many texts each lacks, and languages to add."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QBoxLayout
 

@@ -1,7 +1,5 @@
 """A text in each language of the study, side by side or below each other."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 from PySide6.QtCore import Qt

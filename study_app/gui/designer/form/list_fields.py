@@ -1,7 +1,5 @@
 """Editors of lists: entries that are opened, moved, removed and added; and of values that may be of several kinds."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any

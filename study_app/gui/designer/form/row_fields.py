@@ -1,7 +1,5 @@
 """The editors of a form's rows: one for each kind of value."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from PySide6.QtCore import Qt, Signal

@@ -1,7 +1,5 @@
 """A row of the form: its label, its editor, what is wrong with it, and the repairs of that."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
 from functools import cached_property

@@ -1,7 +1,5 @@
 """What a special editor is: an editor of one key of a model, in place of the one that every key of its kind has."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

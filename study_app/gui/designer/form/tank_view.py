@@ -1,7 +1,5 @@
 """Targets in the tank, seen from the front or from above: drag them, or move the chosen one by the arrow keys."""
 
-from __future__ import annotations
-
 from typing import Final, Literal
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal

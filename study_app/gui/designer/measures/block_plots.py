@@ -1,7 +1,5 @@
 """The plots of a block with a method: psychometric function, expected track, force of each level."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The grid of the cards of measures."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from PySide6.QtCore import QEvent, Signal

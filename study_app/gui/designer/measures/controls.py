@@ -1,7 +1,5 @@
 """The controls at the right of the tabs: what is simulated."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QSizePolicy, QWidget
 

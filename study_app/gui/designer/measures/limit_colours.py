@@ -1,7 +1,5 @@
 """The colours of the limits, the same on the axis of the levels and in every plot."""
 
-from __future__ import annotations
-
 from study_app.gui.theme.theme import Theme
 from study_app.viewmodels.designer.measures.number_cards import Limit
 

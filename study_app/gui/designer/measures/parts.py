@@ -1,7 +1,5 @@
 """The cards of the tab Measures that hold words, numbers and bars."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from PySide6.QtCore import QRectF, Qt, Signal

@@ -1,7 +1,5 @@
 """A new study: what it can begin as at the left, the chosen one with its questions at the right."""
 
-from __future__ import annotations
-
 from functools import partial
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """The questions that a new study begins with: title, short name, languages, and those of the template."""
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 from PySide6.QtCore import Signal

@@ -1,7 +1,5 @@
 """Pictures of the templates: what a participant feels or answers, drawn in the tank's colours."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Final

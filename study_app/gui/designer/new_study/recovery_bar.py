@@ -1,7 +1,5 @@
 """The known answer of a template: the planted threshold, and what simulated studies find of it."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QWidget

@@ -1,7 +1,5 @@
 """The outline: what the study is made of, as a tree to choose from, with a field to find."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QEvent, QItemSelectionModel, QModelIndex, QObject, QPoint, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import QLineEdit, QMenu

@@ -1,7 +1,5 @@
 """The tree of the outline: keys that mean steps, and rows that are dragged to another place of their list."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QEvent, QModelIndex, QPoint, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QKeySequence, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QAbstractItemView, QApplication, QFrame, QTreeView

@@ -1,7 +1,5 @@
 """The pane at the right of the designer: a page for each tab, and the facts below."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

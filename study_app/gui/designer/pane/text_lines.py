@@ -1,7 +1,5 @@
 """Which lines of a text are on the screen, and where."""
 
-from __future__ import annotations
-
 from PySide6.QtWidgets import QPlainTextEdit
 
 

@@ -1,7 +1,5 @@
 """The participant's window within the designer: its real widgets at their real size, scaled as a whole."""
 
-from __future__ import annotations
-
 import atexit
 import math
 import time

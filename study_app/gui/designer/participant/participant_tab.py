@@ -1,7 +1,5 @@
 """The tab Participant: the live page, with language, screen, steps and pages."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from PySide6.QtCore import Qt, Signal

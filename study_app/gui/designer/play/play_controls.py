@@ -1,7 +1,5 @@
 """The header's button that plays the study from here, and the list of devices to play with."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QActionGroup
 from PySide6.QtWidgets import QMenu, QWidget

@@ -1,7 +1,5 @@
 """The line below the header that says what is played, and asks before and after."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QWidget

@@ -1,7 +1,5 @@
 """Differences from a version as a list: groups by effect, each difference with its place and its way back."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from PySide6.QtCore import QSize, Qt, Signal

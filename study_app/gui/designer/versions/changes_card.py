@@ -1,7 +1,5 @@
 """The tab Changes: a version to compare with, and how the study differs from it, in sentences or side by side."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import QStackedWidget, QWidget
 

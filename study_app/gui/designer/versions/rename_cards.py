@@ -1,7 +1,5 @@
 """Cards about a new id: what it breaks where answers are recorded, and the comments that mention the old one."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from PySide6.QtCore import Qt, Signal

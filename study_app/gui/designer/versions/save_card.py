@@ -1,7 +1,5 @@
 """The card that asks before a study that was run is saved: what differs, under which version, or as another study."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QLineEdit, QWidget

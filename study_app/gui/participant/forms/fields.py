@@ -1,7 +1,5 @@
 """The widgets of questions by their ids, found by importing the modules of one folder."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from study_app.discovery import modules_of

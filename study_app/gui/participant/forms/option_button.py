@@ -1,7 +1,5 @@
 """An answer that can be chosen: a radio button, or a check box where several can be."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Literal, NamedTuple, TypeAlias
 

@@ -1,7 +1,5 @@
 """A question that is answered by choosing among options: what choices, ratings and statements have in common."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from PySide6.QtCore import Qt, Signal

@@ -1,7 +1,5 @@
 """A form: questions of several kinds on one page, or on as few as hold them, by mouse, keyboard or touch alone."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from study_app.gui.participant.forms.fields import FIELDS

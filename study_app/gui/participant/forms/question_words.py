@@ -1,7 +1,5 @@
 """The words of a question: its number, its text and the small line under it, painted as one."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QRect, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetrics, QFontMetricsF, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QStyle, QWidget

@@ -1,7 +1,5 @@
 """Points in a row, the same way round in every language: what ratings in a form and statements in a grid share."""
 
-from __future__ import annotations
-
 from study_app.gui.participant.forms.option_button import RadioOption
 from study_app.gui.participant.forms.options_field import MOST_DIGITS, OptionsField
 from study_app.protocol.forms.show_if import Value

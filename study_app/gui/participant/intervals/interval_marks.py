@@ -1,7 +1,5 @@
 """Which interval of a trial is presented: "1 of 2" and an outlined square for each, the current one filled."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPen
 

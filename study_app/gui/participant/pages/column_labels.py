@@ -1,7 +1,5 @@
 """The labels over the columns of a questionnaire."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from PySide6.QtCore import QRectF, Qt

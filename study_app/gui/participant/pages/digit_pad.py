@@ -1,7 +1,5 @@
 """Digits on the screen, for mouse and touch: they type into a field."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFont
 from PySide6.QtWidgets import QGridLayout, QLineEdit, QPushButton, QWidget

@@ -1,7 +1,5 @@
 """The study's languages to choose from, each in its own words."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QPaintEvent, QPen
 from PySide6.QtWidgets import QGroupBox, QRadioButton, QWidget

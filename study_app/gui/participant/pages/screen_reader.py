@@ -1,7 +1,5 @@
 """Announcements to a screen reader, beyond the names and states that it asks for."""
 
-from __future__ import annotations
-
 from PySide6.QtGui import QAccessible, QAccessibleAnnouncementEvent, QAccessibleEvent
 from PySide6.QtWidgets import QWidget
 

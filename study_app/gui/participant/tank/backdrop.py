@@ -4,8 +4,6 @@ Two images: the back, opaque, behind everything that moves; the front, the water
 it. They are painted with 16 bits a channel and dithered, so that the dark gradients show no bands.
 """
 
-from __future__ import annotations
-
 import math
 import threading
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ Vertical rays are bent by the slope of the surface and gathered where they land.
 no motion of its own, the same for every liquid.
 """
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

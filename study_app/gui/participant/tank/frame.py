@@ -4,8 +4,6 @@ A frame is a table from the name of a thing to (state, place). Two frames with e
 only the places of things whose state changed are painted anew.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Protocol

@@ -1,7 +1,5 @@
 """How glass, water, light and floor of the tank are painted; used once for each size by ``backdrop``."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ The patch follows what is *shown*, so that a photodiode on it and a sensor on th
 latency from hand to eye.
 """
 
-from __future__ import annotations
-
 import math
 
 MOVING_MPS = 0.020

@@ -1,7 +1,5 @@
 """The tank on the graphics card: the same painter on a surface that tells when it swapped."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from PySide6.QtCore import QRect, Signal

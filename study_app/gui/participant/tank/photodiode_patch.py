@@ -1,7 +1,5 @@
 """The corner that a photodiode looks at: a black square, and in its outer corner a white one, lit or not."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QPainter
 

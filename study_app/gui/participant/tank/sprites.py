@@ -3,8 +3,6 @@
 A sprite is an image and its middle; it is drawn at sub-pixel places, so that slow motion does not step.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import lru_cache

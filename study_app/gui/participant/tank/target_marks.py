@@ -1,7 +1,5 @@
 """The marks of a target on the tank's floor, and the line of dots below it."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 

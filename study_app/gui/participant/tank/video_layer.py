@@ -1,7 +1,5 @@
 """The video behind ball and targets: the newest frame of the view, in the middle of the tank's place."""
 
-from __future__ import annotations
-
 from PySide6.QtCore import QPointF, QRectF, QSizeF
 from PySide6.QtGui import QColor, QImage, QPainter, QRegion
 

@@ -1,7 +1,5 @@
 """What a step changes in the form of an element."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from study_app.protocol.source.document import Path

@@ -1,7 +1,5 @@
 """The form of one element of a study: its rows in sections, with their faults, places and entries."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """What a special editor shows beyond the value of its row."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """What is shown of a block with a method: numbers, psychometric function, expected track, force of each level."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Levels of a stimulus in words, their places along an axis, and its ticks."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Final

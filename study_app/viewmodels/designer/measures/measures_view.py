@@ -1,7 +1,5 @@
 """What the tab Measures shows for the selected element, and the cards below the other tabs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final

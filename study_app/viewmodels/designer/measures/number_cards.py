@@ -1,7 +1,5 @@
 """The cards of the tab Measures: frozen values that windows draw; "–" stands for a number that is not known."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 

@@ -1,7 +1,5 @@
 """Cards about a session: its length, the balance of its orders, what a hand feels, its texts, what people can show."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Final, TypeAlias
 

@@ -1,7 +1,5 @@
 """What special editors show besides the value of their row: one module each, with a `RowFacts` named ``FACTS``."""
 
-from __future__ import annotations
-
 import sys
 from typing import Final
 

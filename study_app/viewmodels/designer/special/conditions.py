@@ -1,7 +1,5 @@
 """The conditions of a block: what each presents, by how much it is late, and its force."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """The levels of a stimulus along an axis: their ends and steps, and where limits take part of the force away."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

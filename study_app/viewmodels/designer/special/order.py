@@ -1,7 +1,5 @@
 """The order of a block's conditions: with how many participants it is balanced."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal

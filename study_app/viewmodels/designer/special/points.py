@@ -1,7 +1,5 @@
 """The points of a scale: their words in each language, lowest first."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final

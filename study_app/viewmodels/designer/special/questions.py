@@ -1,7 +1,5 @@
 """The questions of a questionnaire: kind, text in each language, and when each is shown."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final

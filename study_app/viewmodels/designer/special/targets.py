@@ -1,7 +1,5 @@
 """The targets of a task in the tank."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 

@@ -1,7 +1,5 @@
 """One trial of a block with a design: its intervals, pauses, question and feedback, with their durations."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 

@@ -1,7 +1,5 @@
 """Differences from a version, sorted by what they do to the data."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final

@@ -1,7 +1,5 @@
 """What the tab Changes shows: the versions to compare with, and how the study differs from the chosen one."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Two texts side by side: lines that belong together in one row, with what differs marked."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from typing import Final, Literal, TypeAlias

@@ -1,7 +1,5 @@
 """The version of a study in the header, and what is asked before it is saved."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

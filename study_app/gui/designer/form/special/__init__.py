@@ -1,7 +1,5 @@
 """Special editors: one module each, with a `SpecialEditor` named ``EDITOR``. The form works without any of them."""
 
-from __future__ import annotations
-
 import sys
 from typing import Final
 

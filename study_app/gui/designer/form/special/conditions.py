@@ -1,7 +1,5 @@
 """The conditions of a block, each with its liquid, its delay and its force."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Final
 

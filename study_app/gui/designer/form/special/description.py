@@ -1,7 +1,5 @@
 """The description of the study: a plain text in as many lines as it takes, at most three."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from study_app.gui.designer.form.row_fields import Field

@@ -1,7 +1,5 @@
 """The levels of a stimulus: two numbers, and an axis on which their ends are dragged or moved by keys."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal

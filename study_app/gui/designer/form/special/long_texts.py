@@ -1,7 +1,5 @@
 """Sentences: their languages side by side, in the width of the form, each shown whole."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from study_app.gui.designer.form.languages_field import LanguagesField

@@ -1,7 +1,5 @@
 """The order of a block's conditions, with the numbers of participants that balance it."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from PySide6.QtCore import QSize, Qt

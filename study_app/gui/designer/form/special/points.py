@@ -1,7 +1,5 @@
 """The points of a scale from end to end, with their words in each language."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from PySide6.QtCore import Qt

@@ -1,7 +1,5 @@
 """The kind of a question: all kinds side by side where there is room, else in a list."""
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 from PySide6.QtCore import QSize

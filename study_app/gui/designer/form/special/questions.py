@@ -1,7 +1,5 @@
 """The questions of a questionnaire, with their texts in each language side by side."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from PySide6.QtCore import Qt

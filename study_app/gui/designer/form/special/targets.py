@@ -1,7 +1,5 @@
 """The targets of a reaching task: drawn in the tank, with a row of x, y and z for each below."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from PySide6.QtCore import Qt

@@ -1,7 +1,5 @@
 """The design of a block, with a picture of one trial: intervals, pauses, question and feedback with their durations."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
