@@ -56,6 +56,7 @@ KEYS: Final = (
     Keys("leave page", "Leave that page", ("Escape",), 0, "page"),
     Keys("language", "That page in the next language", ("Ctrl+L",), 0),
     Keys("add", "Add", ("Insert",), 1),
+    Keys("open entry", "Open what an entry names", ("Return",), 1, "lists"),
     Keys("duplicate", "Duplicate", ("Ctrl+D",), 1),
     Keys("series", "Copies that differ in one number", ("Ctrl+Shift+D",), 1),
     Keys("rename", "Rename", ("F2",), 1),

@@ -60,17 +60,13 @@ class EntryRow(Themed, QWidget):
         self.setMinimumHeight(FIELD_PX + 2)
         self.setAccessibleName(words)
 
-    def button(self, icon: str, name: str) -> IconButton:
-        """Add a button at the right."""
+    def button(self, icon: str, name: str, action: str = "") -> IconButton:
+        """Add a button at the right; Tab passes one whose action the row has a key for."""
         made = IconButton(icon, name, size=FIELD_PX - 2, role="plain")
+        if action and self.grip:
+            made.setToolTip(with_key(name, action))
+            made.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.row.addWidget(made)
-        return made
-
-    def remove_button(self, name: str) -> IconButton:
-        """Add a button that removes the entry, as Delete does; Tab passes it."""
-        made = self.button("cross", name)
-        made.setToolTip(with_key(name, "delete"))
-        made.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         return made
 
     def show_chosen(self, chosen: bool, count: int) -> None:

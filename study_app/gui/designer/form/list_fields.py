@@ -28,7 +28,6 @@ from study_app.gui.theme.theme import font
 from study_app.gui.widgets.controls import Choice
 from study_app.number_text import typed_numbers
 from study_app.viewmodels.designer.form.form_rows import STUDY_LANGUAGES, Entry, FormRow, new_words
-from study_app.viewmodels.designer.keys import with_key
 from study_app.viewmodels.designer.requests import AddElement, AddEntry, AddNamed, SetValue, Several
 
 KINDS = {
@@ -50,17 +49,16 @@ class EntriesField(EntryList):
             shown = self.entry_row(entry, words, grip=kind != "tables")
             if kind != "tables":
                 for by, icon, word in ((-1, "arrow_up", "up"), (1, "arrow_down", "down")):
-                    button = shown.button(icon, f"Move {entry.title} {word}")
-                    button.setToolTip(with_key(button.accessibleName(), word))
+                    button = shown.button(icon, f"Move {entry.title} {word}", word)
                     button.setEnabled(0 <= at + by < count)
                     to = at - 1 if by < 0 else at + 2
                     button.clicked.connect(lambda _checked=False, at=at, to=to: self.move_entries((at,), to))
-            opens = shown.button("arrow_right", f"Open {entry.title}")
+            opens = shown.button("arrow_right", f"Open {entry.title}", "open entry")
             opens.setEnabled(bool(entry.target))
             opens.clicked.connect(lambda _checked=False, at=at: self._open(at))
             shown.opened.connect(lambda at=at: self._open(at))
             if kind != "tables":
-                away = shown.remove_button(f"Remove {entry.title} from {row.row.label}")
+                away = shown.button("cross", f"Remove {entry.title} from {row.row.label}", "delete")
                 away.clicked.connect(lambda _checked=False, at=at: self.remove((at,)))
             self.add_row(shown)
         self.add = add_button(f"Add to {row.row.label}", "Add")
@@ -118,7 +116,7 @@ class LinesField(EntryList):
             line.typed.connect(lambda text, at=at: self._take(at, text))
             line.came.connect(self.came)
             shown.row.addWidget(line, 1)
-            away = shown.remove_button(f"Remove {name}")
+            away = shown.button("cross", f"Remove {name}", "delete")
             away.clicked.connect(lambda _checked=False, at=at: self.remove((at,)))
             self.add_row(shown)
             self.lines.append(line)

@@ -7,6 +7,7 @@ from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.gui.designer.form.row_widget import RowWidget
+from study_app.gui.designer.tab_order import stops
 from study_app.viewmodels.designer.requests import AddEntry, ChangeLanguage, DuplicateElement, SetValue
 
 pytestmark = pytest.mark.slow
@@ -121,3 +122,13 @@ def test_the_delay_of_a_condition_is_shown_whole(designer: Any) -> None:
     rows = designer.row(*BLOCK, "conditions").field.rows
     assert [row.note.text() for row in rows] == ["0 ms late", "Water, 240 ms late"]
     assert [row.note.text() for row in rows] == [row.note.text() for row in rows]
+
+
+def test_tab_passes_the_buttons_of_an_entry_whose_actions_have_a_key(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.select(BLOCK)
+    first = designer.row(*BLOCK, "conditions").field.rows[0]
+    assert stops(first) == [first.liquid]
+    first.setFocus()
+    qtbot.keyClick(first, Qt.Key.Key_Return)
+    assert designer.editing.selected[0] == "conditions"
