@@ -2,7 +2,7 @@
 
 from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFocusEvent, QPainter, QPaintEvent, QPen, QResizeEvent
-from PySide6.QtWidgets import QFileDialog, QSizePolicy, QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from study_app.gui.designer.play.play_controls import PlayControls
 from study_app.gui.designer.play.play_strip import PlayStrip
@@ -13,6 +13,7 @@ from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Chip, chip_size, paint_chip
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
+from study_app.gui.widgets.dialogs import choose_protocol
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.designer_view import HeaderState
 from study_app.viewmodels.designer.keys import tip, with_key
@@ -202,6 +203,5 @@ class DesignerHeader(QWidget):
 
     def open_file(self) -> None:
         """Ask for a file and open it."""
-        chosen, _ = QFileDialog.getOpenFileName(self, "Open study", "", "Protocols (*.toml)")
-        if chosen:
+        if chosen := choose_protocol(self, "Open study"):
             self.study_asked.emit(chosen)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QFileDialog, QHBoxLayout, QLayout, QSizePolicy, QWidget
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLayout, QSizePolicy, QWidget
 
 from study_app.devices.registry import descriptor_of
 from study_app.errors import StudyError
@@ -26,6 +26,7 @@ from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, scrolled
 from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.dialogs import choose_protocol
 from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.main_view import Place, make_shortcuts
 from study_app.session.request import resumed
@@ -299,7 +300,7 @@ class HomePlace(Place):
         dialog.open()
 
     def _open_protocol(self) -> None:
-        chosen, _ = QFileDialog.getOpenFileName(self, "Open protocol", str(workspace().protocols), "Protocols (*.toml)")
+        chosen = choose_protocol(self, "Open protocol")
         if not chosen:
             return
         if holds_liquids_alone(chosen):

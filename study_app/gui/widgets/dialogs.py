@@ -1,12 +1,18 @@
-"""Questions with a way back, and notices: one sentence and one button each."""
+"""Questions with a way back, notices of one sentence and one button, and the choice of a protocol's file."""
 
-from PySide6.QtWidgets import QDialog, QWidget
+from PySide6.QtWidgets import QDialog, QFileDialog, QWidget
 
 from study_app.gui.theme.theme import Theme
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
+from study_app.workspace import workspace
+
+
+def choose_protocol(parent: QWidget, title: str) -> str:
+    """Ask for a file in the workspace's folder of protocols; return its path, "" where none is chosen."""
+    return QFileDialog.getOpenFileName(parent, title, str(workspace().protocols), "Protocols (*.toml)")[0]
 
 
 class Question(QDialog):

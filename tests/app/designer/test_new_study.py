@@ -12,6 +12,7 @@ from study_app.gui.designer.new_study.cards import RING
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.protocol.source.files import shipped
 from study_app.viewmodels.designer.requests import SetValue
+from study_app.workspace import workspace
 
 pytestmark = pytest.mark.slow
 
@@ -112,8 +113,15 @@ def test_the_page_fits_its_window(qtbot: Any, designer: Any, size: tuple[int, in
 def test_a_study_begins_as_a_copy_of_a_file(designer: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     designer.controller.ask_for_new()
     page = designer.place.new_page
-    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_words: (str(designer.file), ""))
+    folders: list[str] = []
+
+    def choose(_parent: Any, _title: str, folder: str, _files: str) -> tuple[str, str]:
+        folders.append(folder)
+        return str(designer.file), ""
+
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", choose)
     page.file.click()
+    assert folders == [str(workspace().protocols)]
     chosen = next(one for one in page.buttons if one.isChecked())
     assert chosen.choice.source == str(designer.file)
     assert chosen.choice.note == "kitchen.toml"

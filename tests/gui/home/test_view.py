@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from PySide6.QtCore import QPoint, QRect, QSize, Qt
 from PySide6.QtGui import QAccessible, QFontMetrics
-from PySide6.QtWidgets import QApplication, QPushButton
+from PySide6.QtWidgets import QApplication, QFileDialog, QPushButton
 
 from study_app.devices.descriptor import NONE, Backend
 from study_app.gui.home import view
@@ -156,7 +156,7 @@ def test_a_protocol_opened_from_elsewhere_gets_a_card(home, qtbot, tmp_path, mon
     own.write_bytes(source_bytes("demo").replace(b'name = "demo"', b'name = "own"'))
     chosen = [(str(own), ""), (str(tmp_path / "broken.toml"), "")]
     (tmp_path / "broken.toml").write_text("format = 1\n")
-    monkeypatch.setattr("study_app.gui.home.view.QFileDialog.getOpenFileName", lambda *_arguments: chosen.pop(0))
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_arguments: chosen.pop(0))
     home.open_protocol.click()
     qtbot.waitUntil(lambda: study_cards(home)[0].facts.protocol.study.name == "own")
     home.open_protocol.click()
@@ -222,9 +222,7 @@ def test_a_long_title_is_cut_after_two_lines_and_whole_in_tip_and_name(qtbot, re
 
 def test_keys_begin_a_study_and_open_a_protocol(home, qtbot, monkeypatch):
     asked = []
-    monkeypatch.setattr(
-        "study_app.gui.home.view.QFileDialog.getOpenFileName", lambda *_: asked.append("open") or ("", "")
-    )
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: asked.append("open") or ("", ""))
     home.new_asked.connect(lambda source: asked.append(("new", source)))
     home.main.activateWindow()
     qtbot.waitUntil(home.main.isActiveWindow)

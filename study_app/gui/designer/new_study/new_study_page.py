@@ -7,7 +7,6 @@ from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
-    QFileDialog,
     QGridLayout,
     QHBoxLayout,
     QLayout,
@@ -25,6 +24,7 @@ from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule
 from study_app.gui.widgets.controls import ActionButton, Check, IconButton
+from study_app.gui.widgets.dialogs import choose_protocol
 from study_app.gui.widgets.labels import Elided, figures, label
 from study_app.gui.widgets.main_view import last_focused
 from study_app.viewmodels.designer.designer_view import StudyChoice
@@ -239,8 +239,7 @@ class NewStudyPage(Themed, QWidget):
         self._begin()
 
     def _open_file(self) -> None:
-        chosen, _ = QFileDialog.getOpenFileName(self, "Copy a study", "", "Protocols (*.toml)")
-        if chosen:
+        if chosen := choose_protocol(self, "Copy a study"):
             self.copy_asked.emit(chosen)
 
     def _show_choice(self) -> None:
