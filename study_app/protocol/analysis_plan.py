@@ -4,18 +4,16 @@ Nothing here changes what a participant meets. It stands in every receipt, so th
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import Field
 
 from study_app.haptics.model.ranges import within
 from study_app.protocol.source.document import Path, entries
 from study_app.protocol.source.problems import Fault, did_you_mean
-from study_app.protocol.table import Table
+from study_app.protocol.table import ExtendedTable, Table
 from study_app.protocol.texts import Brief, Id
 
-LATER: Final = frozenset({"participants", "precision", "published"})
-"""Keys that format 1 does not have."""
 Reported = Annotated[float, within(-1e9, 1e9, "no published value is larger")]
 LISTS = ("primary", "names", "rising", "falling")
 
@@ -51,8 +49,10 @@ class Published(Table):
         return f"{self.block}: {self.measure} {self.value:g}{''.join(about)}"
 
 
-class Analysis(Table):
+class Analysis(ExtendedTable):
     """Decisions about the analysis; without this table the report calls all its results exploratory."""
+
+    LATER: ClassVar[frozenset[str]] = frozenset({"participants", "precision", "published"})
 
     alpha: Annotated[float, within(0.0001, 0.2, "no study of people shows less than 0.0001")] = Field(
         default=0.05, description="Largest p that counts as significant."
@@ -83,11 +83,6 @@ class Analysis(Table):
         default=None, description="Half the 95 % interval of the group's mean that is planned, as a share of the mean."
     )
     published: tuple[Published, ...] = Field(default=(), description="Published values to compare with.")
-
-    @model_serializer(mode="wrap")
-    def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Omit the keys of format 2 that are not used: receipts and keys of format 1 keep their bytes."""
-        return {name: value for name, value in plain(self).items() if name not in LATER or value}
 
     def described(self, named_by: Sequence[str]) -> Iterator[tuple[str, str]]:
         """Yield a row in words for each decision; ``named_by`` says which item names each condition."""

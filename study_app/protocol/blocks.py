@@ -1,14 +1,14 @@
 """Blocks: trials that share a task and a questionnaire, and the order in which their conditions come."""
 
-from typing import Annotated, Any, ClassVar, Final, Literal, Self, TypeAlias
+from typing import Annotated, ClassVar, Final, Literal, Self, TypeAlias
 
-from pydantic import Field, SerializerFunctionWrapHandler, StringConstraints, model_serializer, model_validator
+from pydantic import Field, StringConstraints, model_validator
 from pydantic_core import PydanticCustomError
 
 from study_app.haptics.model.ranges import within
 from study_app.ids import MAX_ID
 from study_app.protocol.orders.order_constraint import Constraint
-from study_app.protocol.table import Table
+from study_app.protocol.table import ExtendedTable, Table
 from study_app.protocol.texts import Id, Localised
 
 Phase: TypeAlias = Literal["main", "practice", "baseline"]
@@ -17,8 +17,6 @@ Compared: TypeAlias = Literal["liquids", "delays", "views"]
 Kind: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9_]*$", max_length=MAX_ID)]
 
 
-LATER: Final = frozenset({"standard", "stimulus", "standards", "design", "method", "until", "catch"})
-"""Keys of a block that format 1 does not have."""
 WAYS: Final = ("a stimulus", "conditions", "conditions and no design")
 """What a block presents, in words, for each entry of `Block.NOT_WITH`."""
 ROUNDING: Final = 1e-9
@@ -64,12 +62,16 @@ class Catch(Table):
         return range(max(begin, 1), end + 1)
 
 
-class Block(Table):
+class Block(ExtendedTable):
     """Trials that share a task and a questionnaire.
 
     Tables name a condition of a main block by a code, such as L1 with ``code_prefix`` L; which condition a code stands
     for is drawn at random. Practice and baseline blocks have one condition and are announced as such.
     """
+
+    LATER: ClassVar[frozenset[str]] = frozenset(
+        {"standard", "stimulus", "standards", "design", "method", "until", "catch"}
+    )
 
     ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = (("conditions", "stimulus"),)
     NOT_WITH: ClassVar[tuple[tuple[tuple[str, ...], tuple[str, ...]], ...]] = (
@@ -153,11 +155,6 @@ class Block(Table):
     break_page: Id | None = Field(default=None, description="The page shown in a break, of kind break.")
     task: Id = Field(description="What the participant does.")
     questionnaire: Id | None = Field(default=None, description="The questionnaire after each trial; left out: none.")
-
-    @model_serializer(mode="wrap")
-    def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Omit the keys of format 2 that are not used: receipts and keys of format 1 keep their bytes."""
-        return {name: value for name, value in plain(self).items() if name not in LATER or value}
 
     @model_validator(mode="after")
     def _presents_in_one_way(self) -> Self:

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from study_app.haptics.model.scene import FADE_S, Scene
-from study_app.protocol.analysis_plan import LATER as OF_ANALYSIS
-from study_app.protocol.blocks import LATER
+from study_app.protocol.analysis_plan import Analysis
+from study_app.protocol.blocks import Block
 from study_app.protocol.forms.scale import POINTS
 from study_app.protocol.source.document import entries, names
 from study_app.protocol.source.problems import Fault
@@ -37,8 +37,8 @@ NEW_KEYS: Final = (
     *(f"conditions.*.{key}" for key in OF_LINK),
     *TABLES,
     *(f"limits.{key}" for key in LEVEL_LIMITS),
-    *(f"blocks.*.{key}" for key in sorted(LATER)),
-    *(f"analysis.{key}" for key in sorted(OF_ANALYSIS)),
+    *(f"blocks.*.{key}" for key in sorted(Block.LATER)),
+    *(f"analysis.{key}" for key in sorted(Analysis.LATER)),
 )
 """Keys that belong to format 2, as patterns of places in the file."""
 NEW_VALUES: Final = {

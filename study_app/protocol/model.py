@@ -6,16 +6,9 @@ can decide by itself is checked by its class; what needs two tables is in ``refe
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Final, Literal, Self, TypeAlias, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias, TypeVar
 
-from pydantic import (
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    SerializerFunctionWrapHandler,
-    model_serializer,
-    model_validator,
-)
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from study_app.haptics.model.ranges import DensityKgM3, DiameterM, DragCoefficient, FadeS, Metres, within
@@ -38,7 +31,7 @@ from study_app.protocol.forms.questionnaire import Questionnaire
 from study_app.protocol.forms.scale import Scale
 from study_app.protocol.groups.group import Group, Sequences, Steps
 from study_app.protocol.groups.session_steps import every_step
-from study_app.protocol.table import Table
+from study_app.protocol.table import ExtendedTable, Table
 from study_app.protocol.texts import Body as PageBody
 from study_app.protocol.texts import Description, Id, Language, Localised, text_in
 from study_app.protocol.trials.asked import asked
@@ -69,8 +62,6 @@ __all__ = [
 ]
 
 MAX_FORCE_N = 8.0
-LATER: Final = frozenset({"stimuli", "designs", "methods", "sequences", "groups"})
-"""Tables that format 1 does not have."""
 HandForceN: TypeAlias = Annotated[
     float, within(0.1, MAX_FORCE_N, "below 0.1 N a hand feels little; 8 N is the most that is safe")
 ]
@@ -85,8 +76,10 @@ def _whole(value: Any) -> Any:
 Format: TypeAlias = Annotated[Literal[1, 2], BeforeValidator(_whole)]
 
 
-class StudyHead(Table):
+class StudyHead(ExtendedTable):
     """Name, version and languages of the study."""
+
+    LATER: ClassVar[frozenset[str]] = frozenset({"credits"})
 
     name: str = Field(pattern=r"^[a-z][a-z0-9]*$", max_length=40, description="Short name, used in folders and files.")
     title: Localised = Field(description="Title as people read it.")
@@ -107,11 +100,6 @@ class StudyHead(Table):
         "wake while the session runs, the participant does not know the condition.",
     )
     credits: Credits | None = Field(default=None, description="Authors, licence and citation that exports state.")
-
-    @model_serializer(mode="wrap")
-    def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Omit the keys of format 2 that are not used: receipts and keys of format 1 keep their bytes."""
-        return {name: value for name, value in plain(self).items() if name != "credits" or value}
 
 
 class DeviceNeeds(Table):
@@ -138,8 +126,10 @@ class DeviceNeeds(Table):
         return self
 
 
-class SceneDefaults(Table):
+class SceneDefaults(ExtendedTable):
     """The part of the scene that all conditions share: everything but the liquids."""
+
+    LATER: ClassVar[frozenset[str]] = frozenset({"fade_s"})
 
     scale: SceneScale = Field(default=10, description="Metres in the scene per metre of the hand.")
     origin_m: Metres = Field(default=(0, 0, 0), description="Point in the scene at the zero of the hand frame [m].")
@@ -149,11 +139,6 @@ class SceneDefaults(Table):
     motion: MotionBox = Field(default_factory=MotionBox, description="How the ball is expected to move in the scene.")
     accuracy: Accuracy = Field(default_factory=Accuracy, description='What effects = "auto" may leave out.')
     fade_s: FadeS = Field(default=FADE_S, description="Time over which the force fades in [s].")
-
-    @model_serializer(mode="wrap")
-    def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Omit the usual fade: receipts of format 1 keep their bytes."""
-        return {name: value for name, value in plain(self).items() if name != "fade_s" or value != FADE_S}
 
 
 def compared(conditions: Sequence[Condition]) -> Compared:
@@ -241,8 +226,10 @@ def _named(tables: Any) -> Any:
 Named: TypeAlias = Annotated[dict[Id, T], BeforeValidator(_named)]
 
 
-class Protocol(Table):
+class Protocol(ExtendedTable):
     """The whole file."""
+
+    LATER: ClassVar[frozenset[str]] = frozenset({"stimuli", "designs", "methods", "sequences", "groups"})
 
     format: Format = Field(description="Version of this file format.")
     study: StudyHead
@@ -265,11 +252,6 @@ class Protocol(Table):
     analysis: Analysis | None = Field(
         default=None, description="Decisions about the analysis, made before the first session."
     )
-
-    @model_serializer(mode="wrap")
-    def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Omit empty tables of format 2: receipts and keys of format 1 keep their bytes."""
-        return {name: value for name, value in plain(self).items() if name not in LATER or value}
 
     def text(self, value: str | dict[str, str], language: str) -> str:
         """Return a localised text in one of the study's languages."""

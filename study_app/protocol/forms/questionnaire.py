@@ -1,23 +1,23 @@
 """Questionnaires: what is answered after a trial, or as a form on its own."""
 
 from collections.abc import Mapping
-from typing import Any, Final, Literal
+from typing import ClassVar, Literal
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import Field
 
 from study_app.protocol.forms.kinds import AnyQuestion
 from study_app.protocol.forms.scale import Scale
 from study_app.protocol.instruments.scores import Score
 from study_app.protocol.questions.question import Context, Question
 from study_app.protocol.questions.statement import Statement
-from study_app.protocol.table import Table
+from study_app.protocol.table import ExtendedTable
 from study_app.protocol.texts import Id, Localised
 
-_OF_FORMAT_2: Final[Mapping[str, Any]] = {"instrument": None, "scores": {}}
 
-
-class Questionnaire(Table):
+class Questionnaire(ExtendedTable):
     """Questions that are answered after a trial, or on their own where ``sequence`` names the questionnaire."""
+
+    LATER: ClassVar[frozenset[str]] = frozenset({"instrument", "scores"})
 
     title: Localised | None = Field(default=None, description="Heading; left out: the name of the setting.")
     intro: Localised = Field(description="The question above the statements.")
@@ -32,15 +32,6 @@ class Questionnaire(Table):
         default=None, description="The standard questionnaire whose items and scoring are used."
     )
     scores: dict[Id, Score] = Field(default_factory=dict, description="Numbers computed from the answers.")
-
-    @model_serializer(mode="wrap")
-    def _without_keys_of_format_2(self, serialized: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out what format 1 does not know."""
-        return {
-            name: value
-            for name, value in serialized(self).items()
-            if name not in _OF_FORMAT_2 or value != _OF_FORMAT_2[name]
-        }
 
     @property
     def statements(self) -> tuple[Question, ...]:

@@ -1,14 +1,14 @@
 """The tables ``[groups.NAME]``, and where a protocol file names the steps of its sessions."""
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Final, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, Final, Self, TypeAlias
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from study_app.haptics.model.ranges import within
 from study_app.protocol.source.document import Path, entries
-from study_app.protocol.table import Table
+from study_app.protocol.table import ExtendedTable
 from study_app.protocol.texts import Id
 
 MOST_SHARE: Final = 20
@@ -19,8 +19,10 @@ Steps: TypeAlias = tuple[Id, ...]
 Sequences: TypeAlias = tuple[Annotated[Steps, Field(min_length=1)], ...]
 
 
-class Group(Table):
+class Group(ExtendedTable):
     """A group of participants; a group without a sequence has that of the study."""
+
+    LATER: ClassVar[frozenset[str]] = frozenset({"sequence", "sequences"})
 
     share: Annotated[int, within(1, MOST_SHARE, "a share is a small whole number")] = Field(
         default=1, description="How many participants of each round of allocations come into this group."
@@ -34,10 +36,6 @@ class Group(Table):
             message = "give either sequence or sequences, one of the two"
             raise PydanticCustomError("one_of", message, {"place": "sequences"})
         return self
-
-    @model_serializer(mode="wrap")
-    def _without_what_is_omitted(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {name: value for name, value in plain(self).items() if value}
 
 
 def sequences_in(document: Any) -> Iterator[tuple[Path, tuple[Any, ...]]]:

@@ -6,14 +6,14 @@ a subclass of `ItemView`. It names its widget, measure and figure by their ids, 
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, Final, Literal, TypeAlias
+from typing import Annotated, ClassVar, Final, Literal, TypeAlias
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import Field
 
 from study_app.haptics.model.ranges import within
 from study_app.protocol.forms.scale import Scale
 from study_app.protocol.forms.show_if import ShowIf, Value
-from study_app.protocol.table import Table
+from study_app.protocol.table import ExtendedTable
 from study_app.protocol.texts import Id, Localised, text_in
 
 Draw: TypeAlias = Callable[[], float]
@@ -69,8 +69,10 @@ class Context:
         return text_in(value, self.language)
 
 
-class Question(Table):
+class Question(ExtendedTable):
     """One question."""
+
+    LATER: ClassVar[frozenset[str]] = frozenset({"show_if"})
 
     widget: ClassVar[str]
     measure: ClassVar[str]
@@ -84,11 +86,6 @@ class Question(Table):
     show_if: ShowIf | None = Field(
         default=None, description="The answer to an earlier item that shows this one; left out: always shown."
     )
-
-    @model_serializer(mode="wrap")
-    def _without_show_if(self, serialized: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out what format 1 does not know."""
-        return {name: value for name, value in serialized(self).items() if name != "show_if" or value is not None}
 
     @property
     def kind_id(self) -> str:

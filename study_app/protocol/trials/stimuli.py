@@ -1,18 +1,17 @@
 """Conditions, and stimuli: the one number of a condition that is varied, and the comparisons of its levels."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, Self, TypeAlias, TypeVar
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, model_validator
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError
 
 from study_app.haptics.model import force_link
 from study_app.haptics.model.force_link import ForceLink
 from study_app.haptics.model.ranges import within
-from study_app.protocol.table import Table
+from study_app.protocol.table import ExtendedTable, Table
 from study_app.protocol.texts import Id
 
 if TYPE_CHECKING:
@@ -37,18 +36,10 @@ CONSTANT_LEVELS: Final = 7
 LEVELS_MOST: Final = 201
 
 
-USUAL: Final[Mapping[str, Any]] = {
-    "ball": "shown",
-    **dict.fromkeys(OF_LINK, 0),
-    "view": "tank",
-    "overlay": "shown",
-    "footage_sha256": None,
-}
-"""Keys of format 2 with their defaults."""
-
-
-class Condition(Table):
+class Condition(ExtendedTable):
     """A named combination of a liquid (or several with regions), what the tank shows, and delays."""
+
+    LATER: ClassVar[frozenset[str]] = frozenset({"ball", *OF_LINK, "view", "overlay", "footage_sha256"})
 
     ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = (("liquid", "liquids"),)
 
@@ -84,11 +75,6 @@ class Condition(Table):
     )
     footage_sha256: SkipJsonSchema[str | None] = None
     """That of the video file; ``load`` fills it in."""
-
-    @model_serializer(mode="wrap")
-    def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Omit a ball that is shown, a prompt force and a drawn tank: receipts of format 1 keep their bytes."""
-        return {name: value for name, value in plain(self).items() if name not in USUAL or value != USUAL[name]}
 
     @property
     def liquid_ids(self) -> tuple[str, ...]:

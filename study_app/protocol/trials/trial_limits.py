@@ -1,15 +1,19 @@
 """What a trial may show at most, and what an interval must deliver, to be valid."""
 
-from typing import Annotated, Any
+from typing import Annotated, ClassVar
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import Field
 
 from study_app.haptics.model.ranges import within
-from study_app.protocol.table import Table
+from study_app.protocol.table import ExtendedTable
 
 
-class Limits(Table):
+class Limits(ExtendedTable):
     """Limits within which a trial is valid."""
+
+    LATER: ClassVar[frozenset[str]] = frozenset(
+        {"targets_percent", "level_error_percent", "level_error_ms", "pace_error_percent", "attempts"}
+    )
 
     lateness_ms: Annotated[float, within(0.01, 1000, "no servo is more punctual, and 1 s is a failure")] = Field(
         default=2, description="99th percentile of the lateness of ticks [ms]."
@@ -41,8 +45,3 @@ class Limits(Table):
     attempts: Annotated[int, Field(ge=1, le=100)] | None = Field(
         default=None, description="How often a trial of intervals is presented until it is delivered; default: 3."
     )
-
-    @model_serializer(mode="wrap")
-    def _without_what_is_not_asked(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out what is not asked for: files of earlier versions and of format 1 do not know it."""
-        return {name: value for name, value in plain(self).items() if value is not None}
