@@ -59,8 +59,10 @@ def modules(package: str) -> Iterator[ModuleType]:
 
 
 def is_public(name: str, value: Any) -> bool:
+    if name.startswith("_"):
+        return False  # not looked at: a validator that is not built yet would be built here, in its model's dictionary
     value = getattr(value, "py_func", value)  # what numba compiles
-    return not name.startswith("_") and (
+    return (
         inspect.isfunction(value) or inspect.isclass(value) or isinstance(value, property | classmethod | staticmethod)
     )
 
