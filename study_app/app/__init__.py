@@ -15,7 +15,7 @@ from study_app.gui.display.display_check import qt_imported
 
 @contextmanager
 def _uncollected() -> Iterator[None]:
-    """Import without collections of garbage, which would look through what stays: a tenth of the start-up time."""
+    """Import without garbage collections, which take a tenth of the start-up time and find nothing to free."""
     before = gc.isenabled()
     gc.disable()
     try:

@@ -1,5 +1,6 @@
 """Whether a window can be opened is found out before Qt is asked, and said in one line."""
 
+import gc
 import sys
 
 import pytest
@@ -52,3 +53,13 @@ def test_a_library_that_is_missing_for_the_main_window_is_named_too(monkeypatch)
     monkeypatch.setitem(sys.modules, "study_app.app.main_controller", None)
     with pytest.raises(DisplayError, match="Qt cannot be loaded"):
         app.home  # noqa: B018 - it is imported where it is asked for
+
+
+def test_garbage_is_collected_again_after_an_import_that_failed(monkeypatch):
+    monkeypatch.setitem(sys.modules, "study_app.app.main_controller", None)
+    monkeypatch.setattr(gc, "isenabled", lambda: True)
+    enabled = []
+    monkeypatch.setattr(gc, "enable", lambda: enabled.append(True))
+    with pytest.raises(DisplayError):
+        app.home  # noqa: B018 - it is imported where it is asked for
+    assert enabled
