@@ -5,6 +5,6 @@ docs/architecture.md lists the packages; an import may only point to a lower lay
 
 import os
 
-os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # no plugin is used; finding them reads every package
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # none is used; the search reads every package
 
 __version__ = "0.2.0"

@@ -1,4 +1,4 @@
-"""What is set for this computer and what its screens are, as sessions and windows use them."""
+"""The settings and screens of this computer, for sessions and windows."""
 
 from typing import Any
 
@@ -16,7 +16,7 @@ from study_app.user_folder import settings_file
 
 
 def settings_here() -> tuple[MachineSettings, str]:
-    """Return what is set, and in a line why it is the defaults where the file cannot be used ("" where it can)."""
+    """Return the settings, and why they are the defaults if the file cannot be used ("" if it can)."""
     settings, trouble = workstation.load_or_default()
     try:
         descriptor_of(settings.device)
@@ -31,20 +31,20 @@ def theme_named(name: str) -> Theme:
 
 
 def screen_number(settings: MachineSettings) -> int:
-    """Return which screen is the participant's, from 1."""
+    """Return the number of the participant's screen, from 1."""
     return settings.screen_among([screen.name for screen in screens_shown()])
 
 
 def text_scale_on(settings: MachineSettings, screen: QScreen) -> float:
-    """Return how much larger than designed the participant's words must be on a screen."""
+    """Return the factor by which the participant's text must be enlarged on a screen."""
     shown = screen_shown(screen)
     return settings.text_scale(shown.width_px, shown.width_mm)
 
 
 def described(settings: MachineSettings, participant: QScreen, operator: QScreen) -> dict[str, Any]:
-    """Return what the receipt says of the screens: what the system tells, and what was measured of the first.
+    """Return the receipt's description of both screens, with the measurements of the participant's.
 
-    ``frames`` is what the participant's follow: a screen tells of its swaps where a graphics card draws.
+    ``frames`` says what times the participant's frames: the screen's swaps where a graphics card draws, else a clock.
     """
     shown = screen_shown(participant)
     frames = {"frames": LOCKED if has_card() else BY_CLOCK}

@@ -316,7 +316,7 @@ def _shortened(words: str) -> str:
 
 
 def _validated(model: type[M], document: Mapping[str, Any]) -> tuple[M | None, list[Fault]]:
-    """Return the value of a document, None where it has none, and the faults that its classes find."""
+    """Return the validated document, None if it is invalid, and the faults that its models find."""
     if formats.is_later(document):
         known = f"this program reads formats 1 to {formats.LATEST}"
         return None, [Fault(("format",), f"is {document['format']}, {known}", "use a newer version of liquid-study")]

@@ -25,9 +25,8 @@ def lead_by_tab(first: QWidget, parts: Sequence[QWidget]) -> None:
 def go_on(parts: Sequence[QWidget], by_qt: Callable[[bool], bool], *, forward: bool) -> bool:
     """Let Tab go through parts one after another, then to the beginning of the window, or Shift+Tab back.
 
-    Within a part the order is Qt's, ``by_qt``, except where Qt leaves the part before all of it was gone through, and
-    where Qt goes to the focus proxy of an editor past what comes before it and after the keyboard, such as the entries
-    of a list.
+    Within a part the order is Qt's, ``by_qt``, with two exceptions: Qt leaves the part too early, or goes to the focus
+    proxy of an editor and skips widgets between the focused one and the proxy, such as the entries of a list.
     """
     window = parts[0].window()
     shown = [(part, found) for part in parts if (found := _shown(part))]

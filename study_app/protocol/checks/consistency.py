@@ -74,7 +74,7 @@ class Draft(BaseModel):
 
 
 def draft(document: Mapping[str, Any], broken: Iterable[Path], valid: Protocol | None) -> Draft:
-    """Return what of ``document`` is sound; ``broken`` are the paths of the problems already found."""
+    """Return the sound entries of ``document``; ``broken`` are the paths of the problems already found."""
     differ = bool(document.keys() & {"groups", "sequences"})
     if valid is not None:
         return Draft.model_construct(**dict(valid), sessions_differ=differ)
@@ -93,7 +93,7 @@ def draft(document: Mapping[str, Any], broken: Iterable[Path], valid: Protocol |
 def check(document: Mapping[str, Any], broken: Iterable[Path], valid: Protocol | None) -> Iterator[Fault]:
     """Yield every problem between the tables of ``document``, whose ``broken`` places are known already.
 
-    ``valid`` is its value where nothing is broken: its tables are not validated again.
+    ``valid`` is the validated document if nothing is broken, so that its tables are not validated again.
     """
     for of_names in (references, kinds, sequence, groups, repeats, items, alike, languages, questions, decisions):
         yield from of_names(document)
