@@ -182,11 +182,11 @@ class DesignerHeader(QWidget):
             say(self, state.draft)
 
     def focusInEvent(self, _event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Keep no keyboard."""
+        """Pass the keyboard focus on."""
         self.keyboard_left.emit()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Say fewer words where there is little room."""
+        """Show shorter texts if there is little room."""
         super().resizeEvent(event)
         self.play.show_wide(self.width() >= WIDE_FROM)
         self._make_room()

@@ -23,7 +23,7 @@ class _Segment(Themed, QAbstractButton):
         self.setSizePolicy(QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Fixed)
 
     def show_words(self, words: str) -> None:
-        """Say other words."""
+        """Show another text."""
         if words != self.text():
             self.setText(words)
             self.setAccessibleName(words)

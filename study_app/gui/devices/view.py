@@ -129,7 +129,7 @@ class DevicesPlace(Place):
         self.look_asked.emit()
 
     def leave(self) -> None:
-        """Say so: what examines a device must let go of it."""
+        """Tell that the place is left, so that a running examination releases its device."""
         self.left.emit()
 
     def show_devices(self, shown: tuple[DeviceShown, ...], preferred: str) -> None:

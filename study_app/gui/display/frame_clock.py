@@ -62,7 +62,7 @@ class Frames(QObject):
         self._timer.stop()
 
     def swapped(self) -> None:
-        """Hear that the surface has just swapped: from now on a frame is drawn shortly before each swap to come."""
+        """Note that the surface has just swapped: from now on, a frame is drawn shortly before each swap."""
         self._swapped_ns = self._now_ns()
         aim_ns = self._swapped_ns - min(LEAD_NS, self.period_ns // 2)
         half_ns = self.period_ns // 2

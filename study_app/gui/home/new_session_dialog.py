@@ -219,7 +219,7 @@ class NewSessionDialog(QDialog):
             self.results.setText(self._suggested)
 
     def _choose_pilot(self, pilot: bool) -> None:
-        """Hold a pilot in a window of its own look, under ids that the data never use; without it all is as before."""
+        """Put a pilot in a framed window and suggest its folder; restore both choices if it is no pilot."""
         if pilot:
             self._windowed_without_pilot = self.windowed.isChecked()
         self.windowed.setChecked(pilot or self._windowed_without_pilot)

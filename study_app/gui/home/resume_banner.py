@@ -1,4 +1,4 @@
-"""Above everything else: a session that was interrupted, what of it is on disk, and the button to go on."""
+"""The banner above all cards: an interrupted session, what of it is saved, and the button that resumes it."""
 
 from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent

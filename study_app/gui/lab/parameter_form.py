@@ -55,7 +55,7 @@ class SectionBlock(QWidget):
         return came
 
     def _place(self) -> None:
-        """Stand switches two by two, everything else in lines of its own."""
+        """Place two switches per line, and every other row on a line of its own."""
         line, column = 0, 0
         for row in self.rows.values():
             if isinstance(row, SwitchRow):

@@ -53,13 +53,13 @@ class ParameterRow(QWidget):
         raise NotImplementedError
 
     def show_refused(self, why: str) -> None:
-        """Say in one line why what was asked for cannot be; what was typed stays."""
+        """Show in one line why a value is refused; the typed text stays."""
         self._refused = why
         self.why.setText(why)
         self._below.setVisible(bool(why))
 
     def let_go(self) -> None:
-        """Let go of what is held, and forget what was refused: it was another setting's."""
+        """Release what is held, and hide the refusal, which belongs to another setting."""
         self.show_refused("")
 
     def parts(self) -> tuple[QWidget, ...]:

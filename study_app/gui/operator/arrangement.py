@@ -88,7 +88,7 @@ class Arrangement(QWidget):
         self._arrange(QSize(1600, 900))
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Give way in a small window."""
+        """Rearrange the parts to fit the new size."""
         super().resizeEvent(event)
         self._arrange(event.size())
 

@@ -216,7 +216,7 @@ class OperatorWindow(QMainWindow):
         question.show()
 
     def come_forward(self) -> None:
-        """Stand before every other window of the screen."""
+        """Move the window in front of every other window of its screen."""
         self.raise_()
         self.activateWindow()
 

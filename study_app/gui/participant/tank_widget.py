@@ -237,7 +237,7 @@ class TankWidget(QWidget):
         self._tell()
 
     def _tell(self) -> None:
-        """Say once of every view that it was painted."""
+        """Emit once for every view that it was painted."""
         if self._unpainted and self._drawn_ns is not None:
             self._unpainted = False
             self.painted.emit(self._drawn_ns)

@@ -176,7 +176,7 @@ class ParticipantWindow(QWidget):
         self.activateWindow()
 
     def come_forward(self) -> None:
-        """Stand before every other window of the screen."""
+        """Move the window in front of every other window of its screen."""
         self.raise_()
         self.activateWindow()
 

@@ -1,4 +1,4 @@
-"""The page of the first start: what of this computer is fit for sessions, and what to do where something is not."""
+"""The page of the first start: whether this computer is fit for sessions, and how to mend what is not."""
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QProgressBar, QScrollArea, QWidget

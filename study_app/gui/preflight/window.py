@@ -171,7 +171,7 @@ class PreflightWindow(QWidget):
             super().keyPressEvent(event)
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
-        """Go back, if it was not we who closed it."""
+        """Cancel, unless the program closed the window."""
         super().closeEvent(event)
         if not self._done:
             self._done = True

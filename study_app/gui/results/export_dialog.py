@@ -1,4 +1,4 @@
-"""Handing results on: where to, what of it, how far it is, and then the way to what was written."""
+"""The export of results: folder, contents, progress, and then a link to the written files."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -155,7 +155,7 @@ class WriteDialog(QDialog):
         self.write_asked.emit(Path(self.to.text().strip()).expanduser(), extras)
 
     def _shrink(self) -> None:
-        """Be no higher than what there is to say now."""
+        """Shrink the dialog to the height of its present contents."""
         layout = self.layout()
         if layout is not None:
             layout.activate()

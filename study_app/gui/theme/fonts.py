@@ -75,7 +75,7 @@ def font(role: TypeRole, *, scale: float = 1.0, weight: int | None = None, tabul
 
 @lru_cache(maxsize=256)
 def _made(size_px: int, weight: int, *, tabular: bool) -> QFont:
-    """Return a font; whoever takes it must copy it."""
+    """Return a shared font; copy it before changing it."""
     load_fonts()
     made = QFont(FAMILIES)
     made.setPixelSize(size_px)

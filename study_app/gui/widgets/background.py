@@ -14,7 +14,7 @@ _threads: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
 
 
 def wait_for_jobs(seconds: float) -> None:
-    """Wait for the jobs of every `Background`, so long at most: Python aborts if it ends while one loads a module."""
+    """Wait a limited time for the jobs of every `Background`: Python aborts if it ends while one loads a module."""
     until_s = time.monotonic() + seconds
     for thread in tuple(_threads):
         thread.join(max(until_s - time.monotonic(), 0.0))

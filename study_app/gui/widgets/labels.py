@@ -137,7 +137,7 @@ def clamped(text: str, most: int, font: QFont, width: int) -> list[str]:
 
 
 def set_ink(widget: QLabel, ink: Ink) -> None:
-    """Give a label the colour of another role; the style sheet is asked anew."""
+    """Give a label the colour of another role, and apply the style sheet again."""
     if widget.property("role") != ink:
         widget.setProperty("role", ink)
         widget.style().unpolish(widget)

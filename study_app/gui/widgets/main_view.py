@@ -1,4 +1,4 @@
-"""What a place of the main window is: a part that fills it, entered and left, with shortcuts of its own."""
+"""The interface of a place of the main window: it fills the window, is entered and left, and has its own shortcuts."""
 
 from collections.abc import Callable, Mapping
 
@@ -23,7 +23,7 @@ class Place(Themed, QWidget):
         """Take note that the place is shown from now on: look again at what may have changed."""
 
     def leave(self) -> None:
-        """Take note that the place is no longer shown: let go of whatever acts on the hand, at once."""
+        """React to the place being hidden: release at once every device that acts on the hand."""
 
     def wants_narrow_rail(self) -> bool:
         """Return whether the place needs the width that a wide rail takes."""

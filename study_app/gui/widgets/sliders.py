@@ -99,7 +99,7 @@ class Slider(Themed, QSlider):
         return self._dragged
 
     def show_number(self, span: Range, value: float, tick: float | None = None) -> None:
-        """Stand at ``value`` of ``span``, with a tick at ``tick``; says nothing."""
+        """Show ``value`` within ``span``, with a tick at ``tick``, without a signal."""
         if (span, value, tick) == (self._span, self._value, self._tick):
             return
         self._span, self._value, self._tick = span, value, tick
@@ -214,7 +214,7 @@ class Slider(Themed, QSlider):
         self.slid.emit(value, held)
 
     def _set(self, step: int) -> None:
-        """Go where something else than mouse and keys put the slider, such as a screen reader."""
+        """Follow a change that came neither from mouse nor from keys, such as a screen reader's."""
         self._move(self._span.value(step / self._span.steps), held=False)
 
     def _tell(self) -> None:

@@ -231,7 +231,7 @@ class NewStudyPage(Themed, QWidget):
             self.area.ensureWidgetVisible(button)
 
     def refuse(self, sentence: str, free: str = "") -> None:
-        """Say why a study cannot begin so, and offer a short name that is free."""
+        """Show why the study cannot be created, and offer a short name that is free."""
         self.card.refusal.show_refusal(sentence, free)
 
     def _take_name(self, name: str) -> None:

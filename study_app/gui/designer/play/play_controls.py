@@ -52,7 +52,7 @@ class PlayControls(QWidget):
         self.device.setEnabled(not playing)
 
     def show_wide(self, wide: bool) -> None:
-        """Say all words, or as few as needed."""
+        """Show the full text of the button, or the short one."""
         self.play.show_action("play", PLAY if wide else PLAY_NARROW)
 
     def _show_menu(self) -> None:

@@ -158,7 +158,7 @@ class OptionLook(Button):
         self._tell_pointed(-1)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802
-        """Let a finger that is lifted point at nothing any more."""
+        """End the pointing when a finger is lifted."""
         super().mouseReleaseEvent(event)
         if event.device().type() == QInputDevice.DeviceType.TouchScreen:
             self._tell_pointed(-1)

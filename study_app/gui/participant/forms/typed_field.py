@@ -55,7 +55,7 @@ class TypedField(QuestionField):
     """What is typed is taken when typing pauses, and at the latest when the question is left."""
 
     def type_into(self, entry: QWidget, wait_ms: int, take: Callable[[], object]) -> None:
-        """Give the keyboard to ``entry``; call ``take`` so long after the last key."""
+        """Give the keyboard to ``entry``; call ``take`` this time after the last key."""
         self.setFocusProxy(entry)
         self._timer = QTimer(self)
         self._timer.setSingleShot(True)

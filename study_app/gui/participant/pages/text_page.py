@@ -191,7 +191,7 @@ class TextWidget(ReadingPage):
         self.event_made.emit(LanguageChosen(self._clock(), language))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Go on with Enter, and but for a consent with Space."""
+        """Go on with Enter, and with Space unless the page is a consent."""
         enter = event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter)
         space = event.key() == Qt.Key.Key_Space and not self._consent
         if (enter or space) and not event.isAutoRepeat():
