@@ -171,7 +171,7 @@ class MainController(QObject):
         return made
 
     def _show_machine(self) -> None:
-        """Let home say what is set, and what the preferred device is like."""
+        """Show the settings and the state of the preferred device on the home page."""
         if self._home_place is not None:
             self._home_place.show_machine(self.machine.settings, self.devices.preferred)
 

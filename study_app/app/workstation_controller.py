@@ -66,12 +66,12 @@ class WorkstationController(QObject):
         self._keep(made)
 
     def remember_operator(self, operator: str) -> None:
-        """Offer these initials in the next session; that is no change of the machine that could be taken back."""
+        """Offer these initials in the next session; this is not a setting, so undo ignores it."""
         if operator and operator != self.settings.operator:
             self._keep(self.settings.model_copy(update={"operator": operator}))
 
     def remember_protocol(self, protocol: Path) -> None:
-        """Keep a protocol file among the recent ones; that is no change of the machine that could be taken back."""
+        """Keep a protocol file among the recent ones; this is not a setting, so undo ignores it."""
         made = self.settings.with_recent(protocol)
         if made != self.settings:
             self._keep(made)

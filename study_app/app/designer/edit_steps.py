@@ -131,7 +131,7 @@ class Steps:
         self._ids.forget_brought(before, after)
 
     def travelled(self, before: Study, after: Study) -> None:
-        """Let ids follow again that undo or redo brings back."""
+        """Let ids follow their texts again after undo or redo restored them."""
         self._ids.go_on(before, after)
 
     def _type(self, study: Study, asked: SetText, selected: Path) -> Step:

@@ -379,7 +379,7 @@ class LabController(QObject):
 
     @guarded
     def _could_not_save(self, error: Exception) -> None:
-        """Say why a preset could not be written; the force goes on, unless it is a mistake in here."""
+        """Show why a preset could not be written; the force continues. Any other exception is a bug and is raised."""
         if not isinstance(error, StudyError):
             raise error
         self.trouble = str(error)

@@ -41,7 +41,7 @@ class Camera:
         return it
 
     def wait(self, milliseconds: int) -> None:
-        """Let the program go on for so long."""
+        """Process events for this time."""
         deadline = time.monotonic() + milliseconds / 1000
         while time.monotonic() < deadline:
             self._turn()

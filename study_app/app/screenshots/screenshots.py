@@ -81,6 +81,6 @@ def _environment(name: str, value: str) -> Iterator[None]:
 
 
 def _pass_on(kind: QtMsgType, _context: object, message: str) -> None:
-    """Print what Qt says, but for what it says of having no screen."""
+    """Print Qt's messages, except those about a missing screen."""
     if kind != QtMsgType.QtDebugMsg and not message.startswith("This plugin does not support"):
         sys.stderr.write(f"{message}\n")

@@ -197,7 +197,7 @@ class SessionBridge(QObject):
 
     @guarded_session_slot
     def _tell_of_thread(self, what: str) -> None:
-        """Tell the operator, and note it: what that thread did is missing from here on."""
+        """Tell the operator, and log it: from now on, the work of that thread is missing."""
         self.operator.show_message("A part of the program ended", f"{what}. All answers are kept.")
         self.requests.record_note(f"a thread of the program ended: {what}")
 
@@ -369,5 +369,5 @@ class SessionBridge(QObject):
 
 
 def _trace_of(error: BaseException) -> BaseException | None:
-    """Return what the log says of an error besides its sentence: nothing of one that the user can understand."""
+    """Return the error for the log's traceback; None for an error that its sentence explains to the user."""
     return None if isinstance(error, StudyError) else error

@@ -16,7 +16,7 @@ FORGETS: Final = 0.9  # what a work took at worst is forgotten by so much each t
 
 @dataclass(slots=True)
 class DeferredTask:
-    """Something to be done every so often; ``took_ns`` is what it lately took at worst."""
+    """A recurring task; ``took_ns`` is its longest recent duration."""
 
     do: Callable[[], object]
     period_ns: int

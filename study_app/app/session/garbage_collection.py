@@ -45,9 +45,9 @@ def _collect() -> None:
 
 
 def freeze_garbage() -> None:
-    """Skip all there is until `unfreeze_garbage`, but for what came last and is garbage already.
+    """Skip all present objects until `unfreeze_garbage`, after collecting the youngest garbage.
 
-    A collection of all that a session is made of takes as long as several frames; of what comes later, next to nothing.
+    A collection of all objects of a session takes as long as several frames; one of later objects hardly any time.
     """
     _session_runs.set()
     gc.collect(YOUNG)

@@ -308,7 +308,7 @@ class LiveSession(QObject):
             raise SessionError(f"the session did not start: {reason}")
 
     def _finished(self) -> None:
-        """Hear that the windows are gone; keep what broke, for whoever asked for the session."""
+        """Close the session after its windows; keep the error that ended it for the caller."""
         assert self.bridge is not None  # noqa: S101 - it has just spoken
         self.theme = self.bridge.operator.theme
         if self._progress is not None and (proof := self.bridge.parts.journal.fingerprint):
@@ -324,7 +324,7 @@ class LiveSession(QObject):
         self._close()
 
     def cancel(self) -> None:
-        """Go back before the session is on the disk; from then on it is ended in its windows."""
+        """Cancel the session if it is not on the disk yet; later it is ended in its windows."""
         if self._store is None:
             self.code = CANCELLED
             self._close()

@@ -1,4 +1,4 @@
-"""What a session in windows is made of, but for its windows."""
+"""The parts of a session in windows, except the windows."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """What a session is made of, but for its windows.
+    """The parts of a session, except its windows.
 
     ``session`` is what the operator sees of it throughout; ``key`` is block → code → condition or track
     and ``secret`` the sealed key's nonce, never shown; ``start``

@@ -89,7 +89,7 @@ class Appraisal:
             self._asked = self.appraiser.order(Question(scene, stroke, self.dynamics))
 
     def close(self) -> None:
-        """Let go of who was asked."""
+        """Close the appraiser."""
         self.appraiser.close()
 
 

@@ -214,7 +214,7 @@ def _calibration(device: Device) -> tuple[tuple[str, str], ...]:
 
 
 def _aim(hand: HandOrders | None, servo: Servo) -> Callable[[], tuple[float, float, float]]:
-    """Return what tells where the hand is; of a simulated one where it means to be, for its lag shows the liquid."""
+    """Return a function that tells where the hand is; for a simulated one its aim, since its lag reveals the liquid."""
     if hand is not None:
         return lambda: hand.aim_m
 

@@ -92,7 +92,7 @@ Found: TypeAlias = Observed | Measurable | GroupPrecision | Detectable | tuple[s
 
 @dataclass(frozen=True, slots=True)
 class Counted:
-    """Says how many simulations of how many are done of what is wanted."""
+    """How many of the wanted simulations are done, and how many there are."""
 
     wanted: Wanted
     done: int

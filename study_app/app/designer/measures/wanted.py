@@ -88,7 +88,7 @@ def measuring(protocol: Protocol, plan: ThresholdPlan, block: Block, lapses: flo
 
 
 def _dependencies(protocol: Protocol) -> str:
-    """Return what of a study its simulations depend on: all but pages and texts."""
+    """Return the parts of a study on which its simulations depend: all except pages and texts."""
     whole = protocol.model_dump(mode="json", exclude={"pages"})
     return json.dumps(_without_texts(whole), sort_keys=True)
 
