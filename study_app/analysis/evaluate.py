@@ -50,7 +50,7 @@ def evaluate(study: Study, *, progress: Progress = silent, planning: bool = True
 
 
 def _ending(progress: Progress, what: str, share: float) -> None:
-    """Tell of progress; what that raises ends the evaluation."""
+    """Report progress; an exception from the callback ends the evaluation."""
     try:
         progress(what, share)
     except BaseException as error:

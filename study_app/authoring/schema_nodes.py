@@ -32,7 +32,7 @@ def table_of(nodes: tuple[Node, ...], value: Any) -> Node | None:
 
 
 def tags(nodes: tuple[Node, ...]) -> tuple[str, dict[str | None, Node]]:
-    """Return the key that tells tables apart, and the table of each of its values; of None where it is left out."""
+    """Return the key that distinguishes the tables, and the table for each of its values; None: the key is left out."""
     tables = [node for node in nodes if node.get("type") == "object" and "properties" in node]
     if len(tables) < 2:
         return "", {}
@@ -70,7 +70,7 @@ def _is_of(node: Node, tables: list[Node], value: Mapping[str, Any]) -> bool:
 
 
 def _tells_apart(key: str, tables: list[Node]) -> bool:
-    """Return whether each table fixes a key to values of its own; one of them may do without it."""
+    """Return whether the key has different fixed values in each table; one table may lack the key."""
     values = [_values(node, key) for node in tables]
     every = [value for some in values for value in some]
     return sum(map(bool, values)) >= len(tables) - 1 and len(every) == len(set(every))

@@ -1,4 +1,4 @@
-"""What figures say of themselves: titles, n, and captions that stand on their own."""
+"""Texts of figures: titles, n, and captions that can be read without the report."""
 
 from collections import Counter
 from typing import Final

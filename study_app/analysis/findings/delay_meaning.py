@@ -20,9 +20,9 @@ VERDICTS: Final = ("equivalent", "different", "inconclusive", "out of reach")
 
 
 def tempting_ms(found: BlockFound) -> float | None:
-    """Return the delay of which one would most like to say that it does not matter.
+    """Return the delay for which the report discusses whether it matters.
 
-    It is the longest that nothing here speaks against; without any, the shortest that was added.
+    It is the longest delay without contrary evidence; if every delay has some, the shortest added delay.
     """
     if len(found.delays_ms) < 2:
         return None
@@ -31,10 +31,10 @@ def tempting_ms(found: BlockFound) -> float | None:
 
 
 def speaking_against(found: BlockFound, delay_ms: float) -> tuple[str, ...]:
-    """Return what speaks against "delays up to this one do not matter", a clause for each statement.
+    """Return the evidence against "delays up to this one do not matter", a clause for each statement.
 
-    It is a trend that shows up to this delay or a shorter one, or a difference at one, in the direction stated before
-    the study where one was, with the error rate held over all statements.
+    Evidence is a trend up to this delay or a shorter one, or a difference at one of them, in the direction stated
+    before the study, if any. The error rate is controlled over all statements.
     """
     trends = {
         one.item: f"“{short(found, one.item)}” follows the delay already up to {ms(shown_ms)}{_exploratory(found, one)}"

@@ -52,7 +52,7 @@ def paragraph(words: str, kind: str = "") -> Markup:
 
 
 def not_there(why: str) -> Markup:
-    """Return what stands in the place of a part that could not be computed."""
+    """Return the text that replaces a part that could not be computed."""
     return box([paragraph(f"Not there: {why}.")], "care")
 
 

@@ -131,7 +131,7 @@ class Study:
         return bool(self.settings)
 
     def tell_doubts(self, warn: Callable[[str], object] | None) -> None:
-        """Say a line of every file that is not as it was recorded."""
+        """Warn, in one line per file, of every file that differs from its recorded state."""
         if warn is None:
             return
         for doubt in self.doubts:

@@ -1,4 +1,4 @@
-"""What of a study with faults can be measured: without its broken elements, with a text for each that is wrong."""
+"""The measurable part of a faulty study: without its broken elements, and with a text in place of each faulty one."""
 
 import re
 from collections.abc import Mapping

@@ -102,7 +102,7 @@ def participants_needed(differences: Array, bound: float, alpha: float) -> int |
 
 @lru_cache(maxsize=4096)
 def _needed(place: int, step: float, bound: float, alpha: float) -> int | None:
-    """Return the smallest number with enough power: powers grow with it but for single steps of rounded answers."""
+    """Return the smallest number with enough power, which grows with it except at single steps of rounded answers."""
     sd = math.exp(place * FINENESS)
     normal = _before_rounding(sd, step)
 

@@ -192,7 +192,7 @@ def _maxima(heights: Array) -> Whole:
 
 
 def at_bounds(counts: Counts, curve: Curve, guess: Bounds, lapse: Bounds) -> tuple[str, ...]:
-    """Return what of a fitted curve lies where the fit ends, so that the answers alone do not tell it."""
+    """Return, in words, which parameters of a curve lie at the bounds of the fit: the answers do not determine them."""
     narrow, wide = (counts.span * float(np.exp(end)) for end in _log_widths(counts))
     limits = []
     for what, found, (least, most) in (("guesses", curve.guess, guess), ("lapses", curve.lapse, lapse)):
