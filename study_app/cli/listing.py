@@ -1,4 +1,4 @@
-"""The commands that say what is at hand: the workspace, its studies, their sessions."""
+"""Commands that list the workspace, its studies and their sessions."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -239,7 +239,7 @@ class Recorder:
             raise
 
     def _lose_all(self, reason: str) -> None:
-        """Give up what is under way and what waits; with the lock held."""
+        """Count everything that is being written or waits as lost; the caller holds the lock."""
         lost = [Lost(trial, attempt, reason, interval) for trial, attempt, interval in self._expected]
         self._kept += lost
         self._lost += lost

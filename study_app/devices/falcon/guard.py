@@ -96,7 +96,7 @@ class Guard:
             self._died()
 
     def stand_down(self) -> None:
-        """Tell it that all is well: the torque is zero and the Falcon closed. A second call does nothing."""
+        """Dismiss the guard: the torque is zero and the Falcon closed. A second call does nothing."""
         self._end(WORD)
 
     def release(self) -> None:
@@ -104,9 +104,9 @@ class Guard:
         self._end(b"")
 
     def leave(self) -> None:
-        """Let it send its packets once the Falcon is there again, for as long as its patience lasts; wait for nothing.
+        """Let the guard send its packets once the Falcon is connected again, within a limited time; return at once.
 
-        For a link that was lost: the Falcon may push on, and be back before anybody opens it.
+        For a lost link: the Falcon may still exert force, and may reconnect before any program opens it.
         """
         child, self.child = self.child, None
         allow_suspension(self)

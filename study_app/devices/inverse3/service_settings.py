@@ -65,7 +65,7 @@ def _command(device_id: str, **further: Any) -> dict[str, Any]:
 
 
 def recorded(config: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what of a configuration changes the force, for the receipt."""
+    """Return the settings of a configuration that change the force, for the receipt."""
     return {key: config[key] for key in RECORDED if key in config}
 
 

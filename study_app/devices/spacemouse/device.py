@@ -1,7 +1,7 @@
-"""A 3Dconnexion SpaceMouse: how far its cap is pushed is how fast the pointer of a simulated handle goes.
+"""A 3Dconnexion SpaceMouse: the deflection of its cap sets the speed of the pointer of a simulated handle.
 
-Felt is nothing; seen is what the mouse shows: the handle hangs on its pointer by a spring, and the liquid's force acts
-on the handle. A thread of its own reads the device and says where the pointer is, as a window does for the mouse.
+The participant feels no force and sees what the mouse device shows: a spring connects the handle to the pointer, and
+the liquid's force acts on the handle. A thread reads the device and sets the pointer, as a window does for the mouse.
 """
 
 import threading

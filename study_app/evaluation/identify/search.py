@@ -146,7 +146,7 @@ class Problem:
         return self._to_z(values)
 
     def moved(self, z: Floats, k: int, u: float) -> Floats:
-        """Return z with another length; the scaling stays, but for being no less."""
+        """Return z with another length; the scaling is kept, or raised to the length."""
         u = min(max(u, self.least[k]), self.most[k])
         moved = np.array(z, float)
         if self.scaling is not None:

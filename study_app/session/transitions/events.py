@@ -93,7 +93,7 @@ class PauseAsked(_Timed):
 
 @dataclass(frozen=True, slots=True)
 class ResumeAsked(_Timed):
-    """Go on from the pause; a trial under way starts again. What the operator stopped is the operator's to resume."""
+    """The pause ends; an interrupted trial starts again. Only the operator resumes what the operator stopped."""
 
     by: Literal["participant", "operator"]
 

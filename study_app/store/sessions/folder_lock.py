@@ -109,7 +109,7 @@ def refuse_if_open(folder: Path) -> None:
 
 
 def _pass(marker: Path) -> None:
-    """Take away the marker of a program that is gone; refuse where it lives."""
+    """Remove the marker of a program that has ended; refuse if it still runs."""
     holder = _holder(marker)
     if _lives(holder):
         raise _is_open(marker, holder)

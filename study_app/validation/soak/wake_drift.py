@@ -25,7 +25,7 @@ class Drift:
     _next_tick: int = -1
 
     def expect(self, serial: int, scene: Scene) -> None:
-        """Say which scene telemetry will know by ``serial``."""
+        """Register the scene that telemetry calls ``serial``."""
         if wake_of(scene) is not None:
             self._scenes[serial] = scene
 
