@@ -1,6 +1,6 @@
-"""Two settings side by side, which of them is felt, and every edit so far: one frozen value and its next ones.
+"""Two settings side by side, which of them is felt, and the history of edits, as a frozen value.
 
-Nothing here knows a device or a window: whatever changes is a new `Workbench`, so that undo is to take the one before.
+Nothing here uses a device or a window. Every change makes a new `Workbench`, so undo returns the previous one.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class Workbench:
     def change(self, name: str, value: Value, *, held: bool = False) -> Workbench:
         """Return this with one parameter of the felt setting changed.
 
-        While a slider is ``held`` its values are one step for undo, its last one, let go of, included.
+        While a slider is ``held`` its values are one step for undo, including the value at its release.
 
         Raises
         ------

@@ -237,7 +237,7 @@ class Live:
         self._present(bench, goes_on=False)
 
     def _present(self, bench: Workbench, *, goes_on: bool) -> None:
-        """Let the servo present what is felt, and the shadows follow."""
+        """Present the felt setting with the servo, and let the shadows follow."""
         a, b = (self._presentable(it.scene) for it in (bench.a, bench.b))
         serial = (self.servo.adjust if goes_on else self.servo.load)(a if bench.felt == "A" else b)
         self.felt = bench

@@ -92,7 +92,7 @@ def _quoted(text: str) -> str:
 
 
 def _replaced(study: Path, scene: Scene) -> str:
-    """Return which of the lab's settings the study replaces by its own; nothing where it cannot be read yet."""
+    """Return which of the lab's settings the study replaces by its own; nothing if the study cannot be read."""
     try:
         protocol = load(study)
     except ProtocolError:

@@ -131,7 +131,7 @@ class Shadow:
         return self._sides[side].tail()
 
     def _change_to(self, serial: int) -> None:
-        """Begin what the servo began with this scene: the felt side anew, the other where it is not what it was."""
+        """Follow the servo to this scene: restart the felt side, and the other side if it changed."""
         if serial == self._serial:
             return
         self._serial = serial

@@ -189,12 +189,12 @@ def _sound_scene(document: dict[str, Any], name: str, places: Places) -> dict[st
 
 
 def is_scene_file(name_or_path: str | File) -> bool:
-    """Return whether a file holds liquids and nothing of a study.
+    """Return whether a file holds liquids and no other part of a study.
 
     Raises
     ------
     ProtocolError
-        The file is not there, or no TOML.
+        The file does not exist or is not TOML.
     """
     document, _ = read_document(source_bytes(name_or_path), str(name_or_path))
     return "liquids" in document and not _holds_study(document)

@@ -46,7 +46,7 @@ QUANTITIES: Final = _OF_THE_SCENE | {it.name: it for effect in EFFECTS for it in
 
 
 def quantity(name: str) -> Parameter:
-    """Return what a stimulus varies: ``table.field``, or a field alone, which means the first table that has it.
+    """Return what a stimulus varies: ``table.field``, or a field alone, which is that of the first table that has it.
 
     Raises
     ------

@@ -86,10 +86,10 @@ class Facts:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One thing looked at: what was found, and of what it was found.
+    """One result of the pre-flight: the verdict, the value, and what it is about.
 
-    ``share`` is how much of its limit a measure takes, None where it has none. ``advice`` is what to do, in a sentence;
-    of a failure it is why there can be no session.
+    ``share`` is the measured value as a share of its limit, None without a limit. ``advice`` says in a sentence what to
+    do, or, for a failure, why no session can begin.
     """
 
     name: str

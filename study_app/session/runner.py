@@ -132,7 +132,7 @@ class Runner:
 
     @property
     def stalled(self) -> str | None:
-        """Why the disk takes nothing, for the operator; None while it does."""
+        """Why the disk accepts no data, for the operator; None while it does."""
         return None if self._state.stall is None else self._state.stall.reason
 
     @property

@@ -197,9 +197,9 @@ class RunningTrial:
 
     @property
     def frozen(self) -> bool:
-        """Whether the program or the machine stood still for so long that the trial was not presented as it is.
+        """Whether the program or the machine was suspended for so long that the trial was not presented as specified.
 
-        Telemetry cannot tell: it knows no tick that did not come. The servo does, and the frames say it of the window.
+        Telemetry has no record of missing ticks. The servo knows its longest gap, and the frames show the window's.
         """
         if self._serial is None:
             return False

@@ -68,7 +68,7 @@ class SensitivityPlan:
 
     @property
     def per(self) -> str:
-        """What has so many trials, in words."""
+        """The words for what the number of trials counts for."""
         return f" per {self.of_each}"
 
     def with_trials(self, trials: int) -> SensitivityPlan:

@@ -2,7 +2,7 @@
 
 ``liquid-study design`` prints it.
 
-Counted are codes: which condition a code stands for is drawn once per study, and evenness does not depend on it.
+Codes are counted, not conditions: a study draws once which condition each code means, which changes no evenness.
 """
 
 from __future__ import annotations

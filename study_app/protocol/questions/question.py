@@ -44,7 +44,7 @@ class ItemView:
 
     @property
     def keys(self) -> str:
-        """The keys that answer it, as they stand on their caps."""
+        """The keys that answer the question, as labelled on the keyboard."""
         raise NotImplementedError
 
     def simulated(self, opinion: float, draw: Draw) -> Value:

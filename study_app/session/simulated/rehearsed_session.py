@@ -46,7 +46,7 @@ PAINT_S = (0.002, 0.006)  # from looking at the clock to the frame being on the 
 
 
 def rehearsal_rig(study: Protocol, person: str, seed: int, device: str) -> Rig:
-    """Return a device with a simulated hand, and its servo on a clock that stands still but for the servo."""
+    """Return a device with a simulated hand, and its servo on a virtual clock that only the servo advances."""
     settings = study_settings(study, stream(seed, f"rehearsal/{person}/hand"))
     rig = open_rig(device, settings, clock=VirtualClock())
     if hand_of(rig.device) is None:

@@ -1,4 +1,4 @@
-"""What can happen in a session. The machine takes these; nothing else moves it.
+"""The events of a session. They alone change the state machine.
 
 ``at_s`` is seconds on the session's monotonic clock (0 = the session's clock origin).
 """

@@ -73,7 +73,7 @@ def begin(state: SessionState, event: Begin) -> Result:
 
 
 def read_on(state: SessionState, event: Continue) -> Result:
-    """Leave a page that was read; one that lasts some time stays until then, whoever presses what."""
+    """Leave a page that was read, but not before its least time."""
     if state.stays_until_s is not None and event.at_s < state.stays_until_s:
         return state, ()
     text = state.plan.protocol.pages[state.page_id]

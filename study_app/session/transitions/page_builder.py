@@ -213,9 +213,9 @@ def _progress(state: SessionState, trial: Trial) -> Progress:
 
 
 def _progress_between(state: SessionState) -> Progress | None:
-    """Return where a page to read is: before the first trial of its part, or after so many.
+    """Return the progress shown on a page to read: before the first trial of its part, or after a number of trials.
 
-    None outside the parts, but for a break among trials of intervals, which names the last one.
+    None outside the parts, except for a break among trials of intervals, which names the last trial.
     """
     steps, coming = state.plan.schedule.steps, _coming(state)
     done = next((step for step in reversed(steps[: state.index]) if isinstance(step, Trial)), None)

@@ -144,7 +144,7 @@ class SessionState:
 
     @property
     def over(self) -> bool:
-        """Whether nothing follows but what is still to be written."""
+        """Whether the session has ended, except for pending writes."""
         return (self.phase if self.stall is None else self.stall.before) in FINAL
 
     @property

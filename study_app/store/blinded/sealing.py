@@ -45,7 +45,7 @@ def sealed(start: Mapping[str, Any], event: str, fields: dict[str, Any], key: Ke
 
 
 def seal(whose: Sequence[object], values: Mapping[str, Any], key: Key) -> str:
-    """Return some values as a sealed text; ``whose`` says what they belong to, and opens it again."""
+    """Return values as a sealed text; ``whose`` says what they belong to, and is needed to open it."""
     said = json.dumps(plain(values), allow_nan=False, separators=(",", ":")).encode()
     said = said.ljust(-(-len(said) // _BLOCK_BYTES) * _BLOCK_BYTES)
     tag = _tag(whose, said, key)

@@ -269,7 +269,7 @@ def _sync_above(path: Path) -> None:
 
 
 def _unclaim(place: Place, opening: Opening) -> None:
-    """Take the claimed folder away again in one step, and the participant's if it holds nothing else."""
+    """Remove the claimed folder in one step, and the participant's folder if that is empty then."""
     path = place.folder.path
     away = temporary_path(path)
     with contextlib.suppress(OSError):

@@ -37,7 +37,7 @@ class Opening:
         self.release()
 
     def release(self) -> None:
-        """Let other programs have it; a marker that cannot be taken away means nothing once this program has ended."""
+        """Remove the marker; one that cannot be removed is ignored once this program has ended."""
         with contextlib.suppress(OSError):
             self.marker.unlink(missing_ok=True)
 

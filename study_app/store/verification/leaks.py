@@ -98,7 +98,7 @@ def recorded_numbers(protocol: Protocol, opened: Iterable[Mapping[str, Any]]) ->
 
 
 def certain_telltales(tables: Tables, published: Any, levels: Iterable[float] = ()) -> Telltales:
-    """Return what tells a condition and stands nowhere by chance: no short number, no word of the ``published`` part.
+    """Return the words that reveal a condition and occur nowhere by chance: no short number, no ``published`` word.
 
     ``tables`` are the sealed key's, ``published`` is the receipt's protocol, ``levels`` are `presented_numbers`.
     """

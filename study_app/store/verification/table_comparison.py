@@ -1,6 +1,6 @@
 """Tables compared with what the journals give, and their cells with the column dictionary.
 
-Of a session that has not ended, a table may be an earlier state of what its journal gives: that is a warning alone.
+A table of a session that has not ended may be an earlier state of what its journal gives: this is only a warning.
 """
 
 import csv
@@ -72,7 +72,7 @@ def check_table(
 
 
 def _is_behind(held: bytes, expected: bytes, table: str) -> bool:
-    """Return whether a table ``held`` may be an earlier state of ``expected``: it tells nothing that this does not."""
+    """Return whether a table ``held`` may be an earlier state of ``expected``: it holds nothing that this lacks."""
     try:
         theirs, ours = (
             list(csv.reader(io.StringIO(content.decode("utf-8", "replace"), newline=""), strict=True))

@@ -52,7 +52,7 @@ class Gathered:
 
     @contextlib.contextmanager
     def reading(self, path: Path) -> Iterator[None]:
-        """Make a finding of ``path`` of what cannot be read in this block, and go on after it."""
+        """Turn an error of reading within this block into a finding about ``path``, and continue after the block."""
         try:
             yield
         except StoreError as error:
