@@ -42,7 +42,7 @@ def tags(nodes: tuple[Node, ...]) -> tuple[str, dict[str | None, Node]]:
 
 
 def alternatives(node: Node) -> Iterator[Node]:
-    """Yield what a node may be, without references; each says what the node says of all of them, but null."""
+    """Yield the alternatives of a node except null, with references resolved and the node's common keys added."""
     around = {key: value for key, value in node.items() if key not in {"$ref", "anyOf", "oneOf", "discriminator"}}
     if "$ref" in node:
         found = schema()["$defs"][node["$ref"].rsplit("/", 1)[-1]]

@@ -23,7 +23,7 @@ class Device(Driver, Protocol):
         ...
 
     def close(self) -> None:
-        """Let go of it; a second call does nothing."""
+        """Release the device; a second call does nothing."""
         ...
 
     def describe(self) -> dict[str, Any]:

@@ -144,7 +144,7 @@ class Outlets:
             thread.mark(marker)
 
     def close(self) -> None:
-        """Send what waits, but not for ever, and let go of everything."""
+        """Send what waits, for a limited time, and close all outlets."""
         for thread in self._threads:
             thread.close()
         if self._samples is not None:

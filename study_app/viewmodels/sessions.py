@@ -57,7 +57,7 @@ class SessionFacts:
 
     @property
     def kind(self) -> Kind:
-        """What it is where it is not a participant's: "sample", "simulated", "pilot", else nothing.
+        """The kind "sample", "simulated" or "pilot"; "" for a session of a participant.
 
         Samples are the simulated sessions that ship with the program, in a folder whose name begins with "sample-". A
         pilot stays one where its first steps or its device were simulated.

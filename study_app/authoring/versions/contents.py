@@ -82,7 +82,7 @@ def save(file: Path, text: str, base: str) -> str:
 
 
 def keep_version(file: Path, content: bytes, origin: Origin) -> None:
-    """Keep a content of a study's file by its hash and list it (`kept_versions`); one that is listed stays as it is.
+    """Keep the content of a study's file by its hash and list it (`kept_versions`); a listed content is not changed.
 
     Raises
     ------

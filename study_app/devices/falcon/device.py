@@ -121,10 +121,10 @@ class FalconDevice(Device):
             raise
 
     def close(self) -> None:
-        """Send zero torque several times and let go of it; a second call does nothing.
+        """Send zero torque several times and release the device; a second call does nothing.
 
-        While a servo's loop hangs in its bridge it stays open and guarded, so that the loop ends the force when it
-        returns, and calls nothing that is gone; a call after that closes it.
+        While a servo's loop hangs in a call of the bridge, the device stays open and guarded, so that the loop can end
+        the force when the call returns; a later call of ``close`` closes it.
         """
         if not let_go(self.falcon):
             return
@@ -251,7 +251,7 @@ class FalconDevice(Device):
         self._begin_anew()
 
     def _lose_guard(self) -> None:
-        """Let nothing pass any more; called by the guard's thread."""
+        """Block every force from now on; called by the guard's thread."""
         self._guard_died = True
         self.falcon.unguarded = 1
 

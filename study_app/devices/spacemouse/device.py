@@ -105,7 +105,7 @@ class SpaceMouseDevice(PointedDevice):
         return super().describe() | own
 
     def _read_on(self) -> None:
-        """Read until it is closed, or gone: then the servo hears of it at its next tick."""
+        """Read until the mouse is closed or lost; the servo learns of a loss at its next tick."""
         assert self._model is not None  # noqa: S101 - it is open
         moving = Displacement(0, 0, 0)
         place_m = self.aim_m

@@ -150,7 +150,7 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
 def _of_liquids(
     name: str, names: Callable[[], Iterable[str]], seed: str, choices: Mapping[str, tuple[Any, ...]], count: int | None
 ) -> Iterator[Group]:
-    """Yield liquids that the sweep has not as the sweep has the others, believed another delay, and let go."""
+    """Yield groups for liquids outside the sweep: its own cases, with misjudged delays, and with releases."""
     whole = tuple(_grid(GRIPS, names=names))
     yield Group(name, tuple(_drawn(f"{seed} {name}", some(whole, count), choices)))
     for change in MISJUDGED:

@@ -101,7 +101,7 @@ def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> 
 
 
 def _titles(elements: Sequence[Element]) -> dict[Path, str]:
-    """Return what each element is called; after a title that an earlier one of its section has stands its id."""
+    """Return the name of each element: its title, with its id if an earlier element of the section has this title."""
     first: dict[tuple[Path, str], Path] = {}
     for one in elements:
         first.setdefault((one.path[:-1], one.title), one.path)
