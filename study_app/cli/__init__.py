@@ -7,6 +7,7 @@ Each command imports what it needs when it runs, so that ``--help`` loads neithe
 import errno
 import io
 import logging
+import os
 import re
 import sys
 
@@ -75,6 +76,7 @@ def _shortened(message: str) -> str:
 
 def main() -> None:
     """Run a command; turn what the user can fix into one line and exit code 2, and log what else fails."""
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # none is used; the search reads every package
     if isinstance(sys.stdout, io.TextIOWrapper):  # a pipe or an old console may lack a letter of a study's title
         sys.stdout.reconfigure(errors="backslashreplace")
     try:

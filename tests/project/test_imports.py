@@ -1,6 +1,7 @@
 """Modules import one another without a cycle, those for type annotations included, and no more than they need."""
 
 import ast
+import os
 import pkgutil
 import re
 import subprocess
@@ -45,6 +46,13 @@ def test_no_module_imports_itself_through_others() -> None:
         imports[package] |= graph.find_children(package)
 
     TopologicalSorter(imports).prepare()  # raises CycleError, which names the modules of a cycle
+
+
+def test_reading_a_protocol_leaves_the_environment_as_it_is() -> None:
+    """A program that imports the package may use plugins of pydantic, which the commands switch off."""
+    program = "import os; before = dict(os.environ); import study_app.protocol.load; assert dict(os.environ) == before"
+    plain = {name: value for name, value in os.environ.items() if not name.startswith("PYDANTIC")}
+    subprocess.run([sys.executable, "-c", program], env=plain, check=True)
 
 
 def test_reading_a_protocol_loads_neither_compiler_nor_qt():

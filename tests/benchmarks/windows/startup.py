@@ -36,22 +36,19 @@ class Probe(QObject):
                 QTimer.singleShot(0, lambda: os.kill(os.getpid(), signal.SIGTERM))
         return False
 
-from study_app import app
-if sys.argv[1] == "home":
-    from study_app.app import main_controller as started
-else:
-    from study_app.app.session import entry as started
-made = started.application_here
+kind, wanted, results = sys.argv[1:]
+from study_app.gui import application
+made = application.application_here
 def with_probe():
-    application = made()
-    application.probe = Probe(sys.argv[2].split(","))
-    application.installEventFilter(application.probe)
-    return application
-started.application_here = with_probe
-if sys.argv[1] == "home":
-    app.home()
-else:
-    app.run("demo", participant="P001", windowed=True, results=__import__("pathlib").Path(sys.argv[3]))
+    it = made()
+    it.probe = Probe(wanted.split(","))
+    it.installEventFilter(it.probe)
+    return it
+application.application_here = with_probe
+run = ["run", "demo", "--participant", "P001", "--windowed", "--results", results]
+sys.argv[1:] = [] if kind == "home" else run
+from study_app.cli import main
+main()
 """
 
 
