@@ -53,6 +53,16 @@ def test_enter_goes_to_the_field_whose_label_or_choice_was_found(qtbot: Any, des
     assert "Thin · Delay" in find("delays")
 
 
+def test_a_line_says_that_nothing_was_found_and_for_which_words(designer: Any, find: Any) -> None:
+    nothing = designer.place.outline.nothing
+    for words in ("xyzzy", "xyzzyx"):
+        assert find(words) == []
+        assert nothing.isVisible()
+        assert nothing.whole == f'Nothing called "{words}" in this study'
+    assert find("force limit")
+    assert not nothing.isVisible()
+
+
 def test_down_leads_into_the_tree_and_enter_or_a_click_there_to_the_field(qtbot: Any, designer: Any, find: Any) -> None:
     outline = designer.place.outline
     find("delay")

@@ -6,11 +6,13 @@ from PySide6.QtWidgets import QLineEdit, QMenu
 
 from study_app.gui.designer.outline.rows import ROW_ROLE, Index
 from study_app.gui.designer.outline.tree import Tree
+from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.icons import icon
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.widgets.boxes import add_parts, hbox
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import Elided
 from study_app.viewmodels.designer.keys import key_cap, key_words, keys_of, tip, with_key
 from study_app.viewmodels.designer.outline_rows import ElementPath, OutlineRow
 
@@ -55,6 +57,8 @@ class OutlineCard(Card):
         self._sign = self.words.addAction(
             icon("search", self.theme.text2, 16), QLineEdit.ActionPosition.LeadingPosition
         )
+        self.nothing = Elided("label", "text2")
+        self.nothing.hide()
         self.tree = Tree()
         self.items = QStandardItemModel(self.tree)
         self.tree.setModel(self.items)
@@ -67,7 +71,8 @@ class OutlineCard(Card):
         for button in (self.add, self.duplicate):
             button.setFont(font("label", weight=600))
         self.add.setMaximumWidth(self.add.minimumSizeHint().width())
-        add_parts(self.column, self.words, (self.tree, 1), hbox(self.add, (self.duplicate, 1), spacing=8))
+        foot = hbox(self.add, (self.duplicate, 1), spacing=8)
+        add_parts(self.column, self.words, self.nothing, (self.tree, 1), foot)
         self.words.textChanged.connect(self.find_changed)
         self.words.returnPressed.connect(self._open_first)
         self.words.installEventFilter(self)
@@ -120,7 +125,8 @@ class OutlineCard(Card):
         self.words.clear()
 
     def show_outline(self, rows: tuple[OutlineRow, ...], selected: object) -> None:
-        """Show rows; what was open stays open."""
+        """Show rows; what was open stays open. Where nothing was found, a line says so."""
+        self._say_whether_found(rows)
         if rows != self.rows:
             several, current = self.selected, self.tree.currentIndex()
             before = current.data(ROW_ROLE).path if current.isValid() else None
@@ -152,6 +158,14 @@ class OutlineCard(Card):
             if selected in several and len(several) > 1:
                 self.select_several(several)
         self.mark(selected)
+
+    def _say_whether_found(self, rows: tuple[OutlineRow, ...]) -> None:
+        words = self.words.text().strip()
+        sentence = f'Nothing called "{words}" in this study' if words and not rows else ""
+        if sentence and sentence != self.nothing.whole:
+            say(self.words, sentence)
+        self.nothing.show_text(sentence)
+        self.nothing.setVisible(bool(sentence))
 
     def mark(self, path: object, *, reveals: bool = True) -> None:
         """Mark the row of an element; ``reveals`` opens what it is in, and scrolls to it."""
