@@ -53,6 +53,7 @@ LABELS: Final = {
     "between_s": "Between trials",
     "feedback_s": "Feedback duration",
     "level_error_ms": "Level error of delays",
+    "participants": "Participants planned",
 }
 """Labels of keys that do not read well, or like another one, without their unit."""
 

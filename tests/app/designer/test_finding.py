@@ -63,6 +63,13 @@ def test_a_line_says_that_nothing_was_found_and_for_which_words(designer: Any, f
     assert not nothing.isVisible()
 
 
+def test_the_number_of_participants_is_found_by_what_it_is_a_number_of(qtbot: Any, designer: Any, find: Any) -> None:
+    assert find("planned") == ["Analysis · Participants planned"]
+    assert find("participants") == ["Analysis · Participants planned"]
+    qtbot.keyClick(designer.place.outline.words, Qt.Key.Key_Return)
+    assert QApplication.focusWidget().accessibleName() == "Add Participants planned"
+
+
 def test_down_leads_into_the_tree_and_enter_or_a_click_there_to_the_field(qtbot: Any, designer: Any, find: Any) -> None:
     outline = designer.place.outline
     find("delay")
