@@ -170,6 +170,7 @@ QPushButton[role='stop']:focus {{ border: 3px solid {t.text}; }}
 def _fields(t: Theme) -> str:
     field = "QLineEdit, QComboBox, QSpinBox, QPlainTextEdit"
     focused, disabled = (", ".join(f"{name}:{state}" for name in field.split(", ")) for state in ("focus", "disabled"))
+    refused = ", ".join(f"{name}[state='refused']:focus" for name in ("QLineEdit", "QPlainTextEdit"))
     return f"""
 {field} {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl}; border-radius: {RADIUS_CONTROL}px;
   padding: 7px 12px; min-height: 24px; selection-background-color: {t.accent}; selection-color: {t.on_accent}; }}
@@ -181,6 +182,9 @@ QPlainTextEdit[dense='true']:focus, QPlainTextEdit[dense='true'][state='refused'
 QLineEdit[state='changed'], QComboBox[state='changed'] {{ border: 2px solid {t.accent}; padding: 2px 5px; }}
 QPlainTextEdit[state='refused'] {{ border: 2px solid {t.bad}; }}
 QLineEdit[state='refused'] {{ border: 2px solid {t.bad}; padding: 2px 5px; }}
+{refused} {{ border: 2px solid {t.accent}; border-left: 5px solid {t.bad}; background: {t.bad_bg}; }}
+QLineEdit[state='refused']:focus {{ padding-left: 2px; }}
+QPlainTextEdit[dense='true'][state='refused']:focus {{ padding-left: 4px; }}
 {disabled}, QLineEdit:read-only {{ background: {t.sunk}; color: {t.text2}; border-color: {t.sunk}; }}
 QLineEdit:read-only:focus {{ border-color: {t.accent}; }}
 QComboBox {{ combobox-popup: 0; }}

@@ -1,11 +1,12 @@
 """Contrast computed by WCAG 2.2, fonts that really are there, icons that paint."""
 
 import itertools
+from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QFontInfo, QFontMetricsF
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QVBoxLayout, QWidget
 
 from study_app.gui.theme import icons
 from study_app.gui.theme.theme import DARK, LIGHT, PARTICIPANT, TANK, TYPE, Theme, font, load_fonts, stylesheet
@@ -100,6 +101,32 @@ def test_stylesheet_is_understood_by_qt(qtbot: object, theme: Theme) -> None:
     widget.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
     widget.setStyleSheet(stylesheet(theme))
     assert widget.grab().toImage().pixelColor(5, 5) == QColor(theme.window)
+
+
+@pytest.mark.parametrize("theme", THEMES, ids=lambda theme: theme.name)
+@pytest.mark.parametrize("kind", [QLineEdit, QPlainTextEdit])
+def test_a_refused_field_with_the_keyboard_shows_both(
+    qtbot: Any, theme: Theme, kind: type[QLineEdit | QPlainTextEdit]
+) -> None:
+    window = QWidget()
+    qtbot.addWidget(window)
+    column = QVBoxLayout(window)
+    fields = [kind(), kind()]
+    for field in fields:
+        field.setProperty("dense", "true")
+        field.setProperty("state", "refused")
+        column.addWidget(field)
+    window.setStyleSheet(stylesheet(theme))
+    window.show()
+    window.activateWindow()
+    fields[0].setFocus()
+    qtbot.waitUntil(fields[0].hasFocus)
+    colours = []
+    for field in fields:
+        image = field.grab().toImage()
+        row = {image.pixelColor(x, image.height() // 2).name().upper() for x in range(image.width())}
+        colours.append(row & {theme.accent, theme.bad})
+    assert colours == [{theme.accent, theme.bad}, {theme.bad}]
 
 
 @pytest.mark.parametrize("name", sorted(icons.PATHS))
