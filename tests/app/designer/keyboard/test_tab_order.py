@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.gui.designer.tab_order import stops
 from study_app.gui.theme.theme import DARK, LIGHT
-from study_app.viewmodels.designer.requests import ChangeLanguage
+from study_app.viewmodels.designer.requests import ChangeLanguage, SetValue
 
 pytestmark = pytest.mark.slow
 
@@ -169,3 +169,20 @@ def test_a_ring_shows_the_tab_with_the_keyboard_and_its_surface_the_chosen_one(d
             at = [image.pixelColor(middle, top + y).name().upper() for y in (-2, 4)]
             assert (at[0] == theme.accent.upper()) == (one is focused)
             assert (at[1] == theme.surface.upper()) == (one is chosen)
+
+
+def test_tab_goes_to_what_the_line_above_the_parts_offers_and_then_to_what_closes_it(qtbot: Any, designer: Any) -> None:
+    designer.file.write_text(designer.file.read_text().replace("force_limit_n = 6", "force_limit_n = 60"))
+    designer.controller.open("kitchen")
+    designer.editing.ask(SetValue(("study", "title"), "Another title"))
+    designer.place.header.save.click()
+    banner = designer.place.banner
+    offered = [*banner.buttons, banner.close_button]
+    assert [one.text() for one in banner.buttons] == ["Show the list"]
+    QApplication.processEvents()
+    assert all(one.isVisible() for one in offered)
+    designer.place.areas.focus_header()
+    seen = passed(qtbot, designer.place.outline.isAncestorOf)
+    assert [one for one in seen if banner.isAncestorOf(one)] == offered
+    back = [press(qtbot, KEY.Key_Backtab, Qt.KeyboardModifier.ShiftModifier) for _ in offered]
+    assert back == offered[::-1]
