@@ -182,6 +182,30 @@ def test_tab_goes_to_the_chosen_card_and_arrows_to_others_which_are_scrolled_to(
     assert len(seen) > 2
 
 
+@pytest.mark.parametrize("width", [1600, 1024])
+def test_arrows_skip_no_card_and_no_row(qtbot: Any, designer: Any, width: int) -> None:
+    designer.window.resize(width, 1000)
+    designer.controller.ask_for_new()
+    page = designer.place.new_page
+    qtbot.waitUntil(lambda: page.buttons[-1].y() > 0)
+    rows = sorted({one.y() for one in page.buttons})
+
+    def press(key: Qt.Key, one: Any) -> Any:
+        one.setChecked(True)
+        one.setFocus()
+        qtbot.keyClick(one, key)
+        there = QApplication.focusWidget()
+        assert there.isChecked()
+        return there
+
+    for at, one in enumerate(page.buttons):
+        row = rows.index(one.y())
+        assert press(Qt.Key.Key_Right, one) is page.buttons[min(at + 1, len(page.buttons) - 1)]
+        assert press(Qt.Key.Key_Left, one) is page.buttons[max(at - 1, 0)]
+        for key, by in ((Qt.Key.Key_Down, 1), (Qt.Key.Key_Up, -1)):
+            assert rows.index(press(key, one).y()) == min(max(row + by, 0), len(rows) - 1)
+
+
 def test_the_keyboard_stays_in_the_questions_where_a_card_is_clicked(qtbot: Any, designer: Any) -> None:
     designer.controller.ask_for_new()
     page = designer.place.new_page

@@ -4,7 +4,7 @@ The chosen card has an accent edge, the one with the keyboard a ring around it.
 """
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFocusEvent, QFontMetricsF, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFocusEvent, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QAbstractButton, QSizePolicy
 
 from study_app.gui.designer.new_study.pictures import PICTURES, paint_picture
@@ -22,10 +22,12 @@ RING = 4
 class TemplateButton(Themed, QAbstractButton):
     """One thing to begin from: its picture or icon, title, description and figures.
 
-    ``came`` is emitted when it gets the keyboard; it says whether by a click.
+    ``came`` is emitted when it gets the keyboard; it says whether by a click. ``passed`` asks for the card after it or,
+    by -1, before it.
     """
 
     came = Signal(bool)
+    passed = Signal(int)
 
     def __init__(self, choice: TemplateChoice) -> None:
         super().__init__()
@@ -57,6 +59,13 @@ class TemplateButton(Themed, QAbstractButton):
         """Say what led here."""
         super().focusInEvent(event)
         self.came.emit(event.reason() == Qt.FocusReason.MouseFocusReason)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Go to the card before or after this one: from the end of a row Qt goes to any row."""
+        if event.key() in {Qt.Key.Key_Left, Qt.Key.Key_Right}:
+            self.passed.emit(1 if event.key() == Qt.Key.Key_Right else -1)
+        else:
+            super().keyPressEvent(event)
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the card."""

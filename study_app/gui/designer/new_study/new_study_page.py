@@ -205,6 +205,7 @@ class NewStudyPage(Themed, QWidget):
             for at, choice in enumerate(one for one in choices if one.copy == copies):
                 made = TemplateButton(choice)
                 made.came.connect(partial(self._come, made))
+                made.passed.connect(partial(self._pass, made))
                 self._group.addButton(made)
                 grid.addWidget(made, at // columns, at % columns)
                 self.buttons.append(made)
@@ -229,6 +230,13 @@ class NewStudyPage(Themed, QWidget):
             (last_focused(self.card) or self.card.questions.title).setFocus()
         else:
             self.area.ensureWidgetVisible(button)
+
+    def _pass(self, button: TemplateButton, by: int) -> None:
+        """Choose the card after another one, or before it."""
+        to = self.buttons.index(button) + by
+        if 0 <= to < len(self.buttons):
+            self.buttons[to].setChecked(True)
+            self.buttons[to].setFocus(Qt.FocusReason.OtherFocusReason)
 
     def refuse(self, sentence: str, free: str = "") -> None:
         """Show why the study cannot be created, and offer a short name that is free."""
