@@ -13,8 +13,8 @@ Document = Mapping[str, Any]
 ITEMS = "items"
 _BESIDE = {"sequence", "groups", "analysis"}
 """Tables that name elements without presenting them."""
-_ONLY = (("blocks", "task", "tasks"), ("stimuli", "condition", "conditions"))
-"""Sections whose tables may leave a key out, which then stands for the only table of another section."""
+_MAY_LEAVE_OUT = (("blocks", "task"), ("stimuli", "condition"))
+"""Sections whose tables may leave a key out, which then stands for the only table that it may name."""
 
 
 def named_at(document: Document, place: Path) -> Path | None:
@@ -22,11 +22,11 @@ def named_at(document: Document, place: Path) -> Path | None:
     name = value_at(document, place)
     if not isinstance(name, str):
         return None
-    for pattern, sections in CHOICES.items():
+    for pattern in CHOICES:
         if _matches(place, pattern):
-            found = next((section for section in sections if has(document.get(section), name)), None)
-            if found is not None:
-                return found, name
+            for section in _sections(document, pattern):
+                if has(document.get(section), name):
+                    return section, name
     if any(_matches(place, pattern) for pattern in ITEM_REFERENCES):
         return next((path for path, item in _items(document) if item["id"] == name and _in_reach(place, path)), None)
     return None
@@ -52,9 +52,9 @@ def blocks_using(document: Document, element: Path) -> tuple[str, ...]:
 
 def choices_at(document: Document, place: Path) -> tuple[str, ...] | None:
     """Return the names that a text at ``place`` may have; None where it is not a reference."""
-    for pattern, sections in CHOICES.items():
+    for pattern in CHOICES:
         if _matches(place, pattern):
-            return tuple(name for section in sections for name in names(document, section))
+            return tuple(name for section in _sections(document, pattern) for name in names(document, section))
     if any(_matches(place, pattern) for pattern in ITEM_REFERENCES):
         found = (item for path, item in _items(document) if _in_reach(place, path))
         return tuple(dict.fromkeys(str(item["id"]) for item in found))
@@ -179,9 +179,9 @@ def _covered(path: Path, outer: Iterable[Path]) -> bool:
 
 def named_places(document: Document) -> Iterator[tuple[Path, Path]]:
     """Yield every place of a text that names something, with what it names."""
-    for pattern, sections in CHOICES.items():
+    for pattern in CHOICES:
         for place, name in entries(document, pattern):
-            for section in sections:
+            for section in _sections(document, pattern):
                 if isinstance(name, str) and has(document.get(section), name):
                     yield place, (section, name)
     items = list(_items(document))
@@ -193,19 +193,19 @@ def named_places(document: Document) -> Iterator[tuple[Path, Path]]:
 
 
 def uses(document: Document) -> Iterator[tuple[Path, Path]]:
-    """Yield what `named_places` does, and each key that is left out with the only task, condition or liquid it means.
-
-    Where a study has no conditions, each liquid is one.
-    """
+    """Yield what `named_places` does, and each key that is left out with the only table that it may name."""
     yield from named_places(document)
-    own = "conditions" in document
-    for section, key, among in _ONLY:
-        of = among if own or among != "conditions" else "liquids"
+    for section, key in _MAY_LEAVE_OUT:
+        (of,) = _sections(document, f"{section}.*.{key}")
         if len(only := names(document, of)) == 1:
             tables = entries(document, f"{section}.*")
             yield from (((*path, key), (of, only[0])) for path, table in tables if not has(table, key))
-    for pattern in () if own else (pattern for pattern, sections in CHOICES.items() if sections == ("conditions",)):
-        yield from ((place, ("liquids", name)) for place, name in entries(document, pattern))
+
+
+def _sections(document: Document, pattern: str) -> tuple[str, ...]:
+    """Return the sections whose tables places may name; where a study has no conditions, each liquid is one."""
+    sections = CHOICES[pattern]
+    return ("liquids",) if sections == ("conditions",) and "conditions" not in document else sections
 
 
 def _items(document: Document) -> Iterator[tuple[Path, Mapping[str, Any]]]:

@@ -1,5 +1,6 @@
 """Renaming and deleting with everything that names the thing."""
 
+import re
 from typing import Any
 
 import pytest
@@ -111,6 +112,22 @@ def test_names_lead_both_ways() -> None:
         "welcome", "reaching", "thanks", "liquids", "delays", "liquid", "delay",
     )  # fmt: skip
     assert choices_at(document, ("study", "title")) is None
+
+
+def test_liquids_are_named_as_conditions_where_a_study_has_none() -> None:
+    text = re.sub(r"\[conditions\.\w+\]\n(?:\w+ = .*\n)+", "", (FOLDER / "compare-liquids.toml").read_text())
+    study = read(text.replace('conditions = ["practice"]', 'conditions = ["syrup"]').encode(), FOLDER)
+    assert not study.problems
+    place = ("blocks", "liquids", "conditions", 1)
+    assert named_at(study.document, place) == ("liquids", "oil")
+    assert references_to(study.document, ("liquids", "oil")) == (place,)
+    assert choices_at(study.document, place) == ("water", "oil", "honey", "syrup")
+    for edits in (
+        renamed(study.document, ("liquids", "oil"), "butter"),
+        deletions(with_references(study.document, ("liquids", "oil"), study.needs)),
+    ):
+        changed, _ = study.edited(*edits)
+        assert not changed.problems
 
 
 @pytest.mark.parametrize("name", ["", "Water", "2nd", "with blank", "é", "a" * (MAX_ID + 1)])
