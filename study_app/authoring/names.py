@@ -127,7 +127,7 @@ def with_references(document: Document, thing: Path, needs: Callable[[Path], boo
         does one whose list would be empty.
     """
     named: dict[Path, list[Path]] = {}
-    for place, target in named_places(document):
+    for place, target in _uses_in_turn(document):
         named.setdefault(place, []).append(target)
     gone = [thing]
     for inner in gone:  # grows while it is read
@@ -137,7 +137,7 @@ def with_references(document: Document, thing: Path, needs: Callable[[Path], boo
                 continue
             array = place[:-1]
             if not isinstance(place[-1], int):
-                gone.append(place[:2] if needs(place) else place)
+                gone.append(place if value_at(document, place) is not None and not needs(place) else place[:2])
                 continue
             gone.append(place)
             empty = all(_covered((*array, at), gone) for at in range(len(value_at(document, array))))
@@ -197,9 +197,30 @@ def uses(document: Document) -> Iterator[tuple[Path, Path]]:
     yield from named_places(document)
     for section, key in _MAY_LEAVE_OUT:
         (of,) = _sections(document, f"{section}.*.{key}")
-        if len(only := names(document, of)) == 1:
-            tables = entries(document, f"{section}.*")
-            yield from (((*path, key), (of, only[0])) for path, table in tables if not has(table, key))
+        yield from _left_out(document, section, key, of)
+
+
+def left_without(document: Document, things: Iterable[Path]) -> tuple[Path, ...]:
+    """Return the keys that are left out and mean nothing any more once all of these tables are gone."""
+    gone = set(things)
+    meant: dict[Path, set[Path]] = {}
+    for place, named in _uses_in_turn(document):
+        if value_at(document, place) is None:
+            meant.setdefault(place, set()).add(named)
+    return tuple(place for place, named in meant.items() if named <= gone)
+
+
+def _uses_in_turn(document: Document) -> Iterator[tuple[Path, Path]]:
+    """Yield what `uses` does, and what a key that is left out means once a study has no conditions any more."""
+    yield from uses(document)
+    if "conditions" in document:
+        yield from _left_out(document, "stimuli", "condition", "liquids")
+
+
+def _left_out(document: Document, section: str, key: str, of: str) -> Iterator[tuple[Path, Path]]:
+    if len(only := names(document, of)) == 1:
+        tables = entries(document, f"{section}.*")
+        yield from (((*path, key), (of, only[0])) for path, table in tables if not has(table, key))
 
 
 def _sections(document: Document, pattern: str) -> tuple[str, ...]:

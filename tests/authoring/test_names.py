@@ -10,6 +10,7 @@ from study_app.authoring.names import (
     check_id,
     choices_at,
     deletions,
+    left_without,
     named_at,
     references_to,
     renamed,
@@ -85,6 +86,27 @@ def test_with_references_lists_what_goes_with_a_liquid() -> None:
         ("conditions", "thick"),
         ("liquids", "thick"),
     )
+
+
+@pytest.mark.parametrize(
+    ("thing", "place"), [(("tasks", "reach"), ("blocks", "delay", "task")),
+                         (("liquids", "water"), ("stimuli", "delay", "condition"))],
+)  # fmt: skip
+def test_what_leaves_the_name_of_the_only_one_out_goes_with_it(thing: Path, place: Path) -> None:
+    study = study_of("delayjnd")
+    assert left_without(study.document, [thing]) == (place,)
+    assert place[:2] in with_references(study.document, thing, study.needs)
+
+
+def test_the_only_condition_leaves_its_liquid_to_what_leaves_its_name_out() -> None:
+    study = study_of("delaydetect")
+    condition, liquid = ("conditions", "water"), ("liquids", "water")
+    assert left_without(study.document, [condition]) == ()
+    assert with_references(study.document, condition, study.needs) == (condition,)
+    changed, _ = study.edited(*deletions([condition]))
+    assert not changed.faults
+    assert left_without(study.document, [condition, liquid]) == (("stimuli", "delay", "condition"),)
+    assert {condition, ("stimuli", "delay")} <= {*with_references(study.document, liquid, study.needs)}
 
 
 def test_with_references_leaves_no_list_empty() -> None:

@@ -11,7 +11,7 @@ from study_app.authoring.changes.languages import filled_in, languages_of, with_
 from study_app.authoring.changes.moves import moved
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, row_at
-from study_app.authoring.names import deletions, named_at, references_to, replaced, with_references
+from study_app.authoring.names import deletions, left_without, named_at, references_to, replaced, with_references
 from study_app.authoring.outline import title_of
 from study_app.authoring.writer.edits import Edit, Insert, Move, Set
 from study_app.authoring.writer.refused import Refused
@@ -222,7 +222,8 @@ def delete(study: Study, asked: DeleteElement) -> Step:
 def delete_prompt(study: Study, paths: Sequence[Path]) -> DeletePrompt:
     """Return what names elements that are to be deleted, and what could be named in the place of a single one."""
     document, path = study.document, paths[0]
-    places = [place for one in paths for place in references_to(document, one)]
+    named = (place for one in paths for place in references_to(document, one))
+    places = (*named, *left_without(document, paths))
     outside = [place for place in places if not any(place[: len(one)] == one for one in paths)]
     references = (f"{kind_and_title(document, element_of(study, place))}: {_field(study, place)}" for place in outside)
     gone = {one: None for each in paths for one in with_references(document, each, study.needs)}
@@ -235,8 +236,10 @@ def delete_prompt(study: Study, paths: Sequence[Path]) -> DeletePrompt:
 
 
 def _field(study: Study, place: Path) -> str:
-    inside = [label_of(step) for step in place[len(element_of(study, place)) :]]
-    return ", ".join(inside) or f"entry {_index(place) + 1}"
+    inside = ", ".join(label_of(step) for step in place[len(element_of(study, place)) :])
+    if value_at(study.document, place) is None:
+        return f"{inside} (the only one)"
+    return inside or f"entry {_index(place) + 1}"
 
 
 def _titles(study: Study, paths: Sequence[Path]) -> str:

@@ -12,7 +12,7 @@ from study_app.number_text import counted
 from study_app.protocol.forms.scale import POINTS
 from study_app.protocol.source.document import Path, entries, value_at
 
-SINGULAR: Final = {"items": "question", "stimuli": "stimulus"}
+SINGULAR: Final = {"items": "question", "stimuli": "stimulus", "analysis": "analysis"}
 """What an element of a section is called, where it is not the section without its last letter."""
 _PLURAL: Final = {"items": "questions"}
 """What several elements of a section are called, where it is not the section."""

@@ -4,7 +4,9 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel
 
+from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.addable import addable
 from study_app.viewmodels.designer.form.form_rows import position_of
 from study_app.viewmodels.designer.requests import (
@@ -48,6 +50,18 @@ def test_elements_are_added_copied_moved_renamed_and_deleted(designer: Any) -> N
     while controller.editing.opened.history.done:
         controller.editing.undo()
     assert designer.text == first
+
+
+def test_deleting_the_only_task_asks_what_becomes_of_the_blocks_that_leave_its_name_out(designer: Any) -> None:
+    study = shipped_file("delayjnd").read_text().replace('name = "delayjnd"', 'name = "kitchen"')
+    designer.file.write_text(study)
+    designer.controller.open("kitchen")
+    designer.controller.ask_to_delete(("tasks", "reach"))
+    words = [one.text() for one in designer.place.prompt.findChildren(QLabel)]
+    assert "Block Delay: Task (the only one)" in words
+    assert "Also deletes: Analysis Published, Block Delay." in words
+    designer.place.prompt.all.click()
+    assert "[blocks.delay]" not in designer.text
 
 
 @pytest.mark.parametrize("path", [("questionnaires", "liquid", "items", 0), ("pages", "thanks"), ("pages", "welcome")])
