@@ -19,7 +19,7 @@ from study_app.viewmodels.designer.keys import key_cap, tip
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 
 HIGHEST, NARROW_BELOW = 290, 1000
-HEAD_PX, ROW_PX, NAME_PX, NARROW_NAME_PX, REPAIR_PX, NARROW_REPAIR_PX = 92, 46, 300, 240, 190, 110
+HEAD_PX, ROW_PX, NAME_PX, NARROW_NAME_PX, REPAIR_PX, NARROW_REPAIR_PX = 92, 47, 300, 240, 190, 110
 
 
 class ProblemLine(Themed, QWidget):
@@ -55,7 +55,6 @@ class ProblemLine(Themed, QWidget):
         parts = (*signs, _column(self.go, self._place), (words, 1), buttons)
         hbox(*parts, spacing=10, margins=(10, 2, 6, 2), parent=self)
         self.repairs: list[RepairButton] = []
-        self.setMinimumHeight(ROW_PX)
         self.show_repairs(repairs)
         self.follow(row)
 

@@ -1,16 +1,17 @@
 """The list of problems under the pointer, and what is shown of a study whose only problems are missing texts."""
 
+from itertools import combinations
 from typing import Any
 
 import pytest
 from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QColor, QEnterEvent
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
 from study_app.authoring.measures.participant_texts import texts_by_language
 from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.edits import Set
-from study_app.gui.designer.problems import ProblemLine
+from study_app.gui.designer.problems import ProblemLine, ProblemsCard
 from study_app.gui.theme.theme import DARK, LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme
 from study_app.protocol.source.files import shipped_file
@@ -73,6 +74,26 @@ def test_no_line_moves_while_the_pointer_is_over_the_list(qtbot: Any, designer: 
     leave(problems)
     qtbot.waitUntil(lambda: [line.row for line in problems.lines] == list(designer.place.view.problems))
     assert problems.lines[0].row.fault.path == ("study", "version")
+
+
+def test_no_text_of_a_list_that_scrolls_is_over_another_one(qtbot: Any) -> None:
+    words = "a sentence that is long enough for a second line of the list in a window 1366 wide, with all its words"
+    rows = tuple(
+        ProblemRow(Fault(("tasks", f"t{at}"), words), ("tasks", f"t{at}"), f"Task {at}", "route", words, "a hint", at)
+        for at in range(10)
+    )
+    card = ProblemsCard()
+    qtbot.addWidget(card)
+    card.resize(900, 290)
+    apply_theme(card, LIGHT)
+    card.show_problems(rows, None, {})
+    card.show()
+    qtbot.waitUntil(lambda: card.area.verticalScrollBar().maximum() > 0)
+    for line in card.lines:
+        shown = [one.geometry() for one in line.findChildren(QLabel) if one.text()]
+        assert any(one.height() > 30 for one in shown)
+        assert not [pair for pair in combinations(shown, 2) if pair[0].intersects(pair[1])]
+        assert all(line.rect().contains(one) for one in shown)
 
 
 def test_the_chip_of_warnings_opens_a_list_of_them(qtbot: Any, designer: Any) -> None:
