@@ -16,7 +16,7 @@ from study_app.gui.widgets.cards import Card, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
 from study_app.gui.widgets.labels import Clamped, Elided, Ink, label
 from study_app.viewmodels.designer.keys import key_cap, tip
-from study_app.viewmodels.designer.problem_rows import ProblemRow
+from study_app.viewmodels.designer.problem_rows import ProblemRow, followed
 
 HIGHEST, NARROW_BELOW = 290, 1000
 HEAD_PX, ROW_PX, NAME_PX, NARROW_NAME_PX, REPAIR_PX, NARROW_REPAIR_PX = 92, 47, 300, 240, 190, 110
@@ -36,23 +36,18 @@ class ProblemLine(Themed, QWidget):
         self.go.setProperty("role", "plain")
         self.go.setProperty("dense", "true")
         self.go.setFont(font("label"))
-        self.go.setAccessibleName(f"{row.name}: {row.message}")
         self.go.clicked.connect(self.opened)
         self.go.setFixedSize(NARROW_NAME_PX if narrow else NAME_PX, 24)
-        self.go.setText(self.go.fontMetrics().elidedText(row.name, Qt.TextElideMode.ElideRight, self.go.width() - 4))
         self._place = Elided("small", "text2")
         self._place.setFixedWidth(self.go.width())
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.mark = Icon("warning", "warn" if row.warning else "bad", 18)
         signs = self.mark, Icon(row.icon, "text2", 18)
-        said, hint = Clamped(row.message, 2, "label", steady=False), Elided("small", "text2")
-        hint.show_text(row.hint)
-        self.setToolTip("\n".join(filter(None, (row.name, row.message, row.hint))))
-        words = _column(said, *([hint] if row.hint else []))
+        self.said, self._hint = Clamped(row.message, 2, "label", steady=False), Elided("small", "text2")
         buttons = QWidget()
         buttons.setMinimumWidth(NARROW_REPAIR_PX if narrow else REPAIR_PX)
         self._repairs = hbox(STRETCH, spacing=6, margins=0, parent=buttons)
-        parts = (*signs, _column(self.go, self._place), (words, 1), buttons)
+        parts = (*signs, _column(self.go, self._place), (_column(self.said, self._hint), 1), buttons)
         hbox(*parts, spacing=10, margins=(10, 2, 6, 2), parent=self)
         self.repairs: list[RepairButton] = []
         self.show_repairs(repairs)
@@ -62,18 +57,27 @@ class ProblemLine(Themed, QWidget):
         """Stand for the same problem of the study as it is now; None: it is solved."""
         if row is not None:
             self.row = row
+            self.go.setAccessibleName(f"{row.name}: {row.message}")
+            elided = self.go.fontMetrics().elidedText(row.name, Qt.TextElideMode.ElideRight, self.go.width() - 4)
+            self.go.setText(elided)
             self._place.show_text(row.place)
+            self.said.show_text(row.message)
+            self._hint.show_text(row.hint)
+            self._hint.setVisible(bool(row.hint))
+            self.setToolTip("\n".join(filter(None, (row.name, row.message, row.hint))))
             for button in self.repairs:
-                button.problem = row
+                button.offer(row, button.text())
         self.setEnabled(row is not None)
         ink: Ink = "ok" if row is None else "warn" if row.warning else "bad"
         self.mark.show_icon("check" if row is None else "warning", ink)
 
     def show_repairs(self, repairs: tuple[str, ...]) -> None:
         """Offer repairs, two at most."""
+        for button, words in zip(self.repairs, repairs, strict=False):
+            button.offer(self.row, words)
         for words in repairs[len(self.repairs) : 2]:
             made = RepairButton(self.row, words)
-            made.clicked.connect(lambda _checked=False, words=words: self.repair_asked.emit(words))
+            made.clicked.connect(lambda _checked=False, made=made: self.repair_asked.emit(made.text()))
             apply_theme_within(made, self.theme)
             self._repairs.addWidget(made)
             made.show()  # at once: Tab passes what a layout is still to show
@@ -157,6 +161,8 @@ class ProblemsCard(Card):
 
     def _show(self) -> None:
         rows = self.rows
+        if self.at is not None:
+            self.at = followed([self.at], rows)[0] or self.at
         counts = ((len(self._problems), "problem"), (len(self._warnings), "warning"))
         counted = [f"{count} {word}{'s' * (count != 1)}" for count, word in counts if count]
         self.heading.setText(", ".join(counted) or "No problems")
@@ -196,15 +202,12 @@ class ProblemsCard(Card):
     def _keep_places(self, listed: tuple[ProblemRow, ...]) -> None:
         """Leave every line where it is while someone points at one: solved ones are marked, others come last."""
         self._moved = True
-        rest = list(listed)
-        for line in self.lines:
-            before = line.row.fault
-            now = next((one for one in rest if one.fault[:2] == before[:2]), None)
+        known = followed([line.row for line in self.lines], listed)
+        for line, now in zip(self.lines, known, strict=True):
             line.follow(now)
-            if now is not None:
-                rest.remove(now)
-        for row in rest:
-            self._add_line(row)
+        for row in listed:
+            if row not in known:
+                self._add_line(row)
         inside = self.area.widget()  # at once: a layout that lacks room makes every line lower
         inside.resize(inside.width(), max(inside.height(), self._column.minimumSize().height()))
 

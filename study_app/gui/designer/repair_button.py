@@ -19,11 +19,16 @@ class RepairButton(ActionButton):
 
     def __init__(self, problem: ProblemRow, words: str) -> None:
         super().__init__("", words, height=32)
-        self.problem = problem
         self.setProperty("dense", "true")
         self.setFont(font("label"))
-        self.setAccessibleName(f"{words}: {problem.name}")
         self.by_keys = False
+        self.offer(problem, words)
+
+    def offer(self, problem: ProblemRow, words: str) -> None:
+        """Offer a repair of a problem from now on."""
+        self.problem = problem
+        self.show_action("", words)
+        self.setAccessibleName(f"{words}: {problem.name}")
 
     def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
         """Note what led here."""

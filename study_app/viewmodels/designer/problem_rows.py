@@ -1,7 +1,7 @@
 """The problems of a study, as ``check`` prints them, each with the element and the field that it belongs to."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
@@ -16,6 +16,7 @@ from study_app.viewmodels.designer.outline_rows import FIRST, icon_of
 
 _PLACE: Final = re.compile(r"([a-z]\w*(?:\.\w+)+): (.+)", re.DOTALL)
 """The place in the file that a warning begins with."""
+_NUMBERS: Final = re.compile(r"[-\u2212]?\d+(?:[.,\u2009]\d+)*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +52,23 @@ class ProblemRow:
     def place(self) -> str:
         """Its place in the file, such as ``blocks.liquids.order · line 385``."""
         return place_words(self.fault.path, self.line)
+
+    @property
+    def kind(self) -> tuple[bool, Path, str]:
+        """What stays the same while the numbers in its sentence change, and what helps."""
+        return self.warning, self.fault.path, _NUMBERS.sub("", self.message.split(": ")[0])
+
+
+def followed(before: Sequence[ProblemRow], now: Iterable[ProblemRow]) -> list[ProblemRow | None]:
+    """Return what each problem is now: of the same words, else the same but for its numbers; None: it is solved."""
+    rest, found = list(now), dict[int, ProblemRow]()
+    for exact in (True, False):
+        for at, row in enumerate(before):
+            same = (one for one in rest if one.kind == row.kind and (one.message == row.message or not exact))
+            if at not in found and (match := next(same, None)) is not None:
+                found[at] = match
+                rest.remove(match)
+    return [found.get(at) for at in range(len(before))]
 
 
 @lru_cache(maxsize=2)
