@@ -27,12 +27,18 @@ class ProblemSteps(QObject):
         super().__init__(card)
         self._card, self._form, self._file, self._areas = card, form, file, areas
         self._problems: tuple[ProblemRow, ...] = ()
+        self._of_other_study: tuple[ProblemRow, ...] = ()
         self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
         self._opened_at: QWidget | None = None
         card.opened.connect(self._open)
         card.next.clicked.connect(self.open_next)
         for part in (card, form):
             part.repair_asked.connect(self._repair)
+
+    def begin(self) -> None:
+        """Begin with another study, whose problems and then warnings are shown next: without any the list closes."""
+        self._of_other_study, self._problems = self._card.rows, ()
+        self._card.begin()
 
     def show_problems(self, problems: tuple[ProblemRow, ...], element: object) -> None:
         """Show problems; ``element`` is the selected one. The list closes when the last problem is solved."""
@@ -45,7 +51,7 @@ class ProblemSteps(QObject):
 
     def show_warnings(self, warnings: tuple[ProblemRow, ...]) -> None:
         """Show other warnings; the list closes when the last one is solved."""
-        before = self._card.rows
+        before, self._of_other_study = self._of_other_study or self._card.rows, ()
         self._card.show_warnings(warnings)
         if before and not self._card.rows and not self._card.under_pointer:
             self._card.hide()

@@ -142,6 +142,13 @@ class ProblemsCard(Card):
         add_parts(self.column, top, (self.area, 1))
         self.close_button.clicked.connect(self.close_asked)
 
+    def begin(self) -> None:
+        """Begin with the next problems as if there had been none: in their order, from the first one on."""
+        self._problems = self._warnings = ()
+        self.lines, self._listed, self._moved = [], None, False
+        self.at, self._number = None, 0
+        self.area.verticalScrollBar().setValue(0)
+
     def show_problems(
         self, rows: tuple[ProblemRow, ...], element: object, repairs: Mapping[ProblemRow, tuple[str, ...]]
     ) -> None:

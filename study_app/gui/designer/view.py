@@ -207,8 +207,8 @@ class DesignerPlace(Place):
         """Show the next view at the top: it is of another study."""
         self.view, self.form.form = DesignerView(), None
         self.outline.begin()
-        for area in (self.measures.area, self.problems.area):
-            area.verticalScrollBar().setValue(0)
+        self.problem_steps.begin()
+        self.measures.area.verticalScrollBar().setValue(0)
 
     def show_header(self, state: HeaderState) -> None:
         """Show the header's state."""

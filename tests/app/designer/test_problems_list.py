@@ -232,3 +232,27 @@ def test_closing_the_list_returns_the_keyboard_to_where_it_was(qtbot: Any, desig
     designer.place.areas.focus_problems()
     qtbot.mouseClick(designer.place.problems.close_button, Qt.MouseButton.LeftButton)
     assert field.hasFocus()
+
+
+def test_the_list_begins_anew_with_another_study(qtbot: Any, designer: Any) -> None:
+    text = designer.file.read_text().replace("force_limit_n = 6", "force_limit_n = 60")
+    other = designer.file.with_name("garden.toml")
+    other.write_text(text.replace('name = "kitchen"', 'name = "garden"').replace("max_s = 30", "max_s = 3"))
+    designer.file.write_text(text.replace('liquid = "thick"', 'liquid = "thik"', 1))
+    designer.controller.open("kitchen")
+    designer.place.header.problems.click()
+    problems = designer.place.problems
+    enter(problems)
+    problems.lines[1].go.click()
+    problems.lines[0].go.click()
+    designer.controller.open(str(other))
+    assert [line.row for line in problems.lines] == list(designer.place.view.problems)
+    assert len(problems.lines) > 1
+    assert all(line.isEnabled() for line in problems.lines)
+    assert not any(line.here for line in problems.lines)
+    problems.next.click()
+    assert problems.at == problems.rows[0]
+    leave(problems)
+    assert problems.isVisible()
+    designer.controller.open("demo")
+    assert not problems.isVisible()
