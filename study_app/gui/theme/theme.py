@@ -158,6 +158,7 @@ QPushButton[role='primary']:focus {{ border: 2px solid {t.text}; padding: 7px 15
 QPushButton[role='primary']:disabled {{ background: {t.border}; color: {t.text2}; border-color: {t.border}; }}
 QPushButton[role='danger'] {{ color: {t.bad}; border-color: {t.bad}; }}
 QPushButton[role='danger']:hover {{ background: {t.bad_bg}; }}
+QPushButton[role='danger']:focus {{ border-color: {t.accent}; }}
 QPushButton[role='plain'] {{ background: transparent; border-color: transparent; color: {t.text2}; }}
 QPushButton[role='plain']:hover {{ background: {t.hover}; }}
 QPushButton[role='plain']:focus {{ border: 2px solid {t.accent}; }}

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QFontInfo, QFontMetricsF
-from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QPushButton, QVBoxLayout, QWidget
 
 from study_app.gui.theme import icons
 from study_app.gui.theme.theme import DARK, LIGHT, PARTICIPANT, TANK, TYPE, Theme, font, load_fonts, stylesheet
@@ -127,6 +127,21 @@ def test_a_refused_field_with_the_keyboard_shows_both(
         row = {image.pixelColor(x, image.height() // 2).name().upper() for x in range(image.width())}
         colours.append(row & {theme.accent, theme.bad})
     assert colours == [{theme.accent, theme.bad}, {theme.bad}]
+
+
+@pytest.mark.parametrize("theme", THEMES, ids=lambda theme: theme.name)
+def test_a_button_that_deletes_shows_that_it_has_the_keyboard(qtbot: Any, theme: Theme) -> None:
+    button = QPushButton("Delete")
+    qtbot.addWidget(button)
+    button.setProperty("role", "danger")
+    button.setStyleSheet(stylesheet(theme))
+    button.show()
+    button.activateWindow()
+    button.setFocus()
+    qtbot.waitUntil(button.hasFocus)
+    image = button.grab().toImage()
+    row = {image.pixelColor(x, image.height() // 2).name().upper() for x in range(image.width())}
+    assert theme.accent in row
 
 
 @pytest.mark.parametrize("name", sorted(icons.PATHS))
