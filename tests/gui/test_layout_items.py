@@ -1,22 +1,50 @@
-"""No window reads the items of its layouts."""
+"""No window keeps Python's wrapper of a layout's item: PySide does not notice when Qt deletes the item.
+
+An event at the same address would get that wrapper, and the class of the item.
+"""
 
 import re
 
 import pytest
+import shiboken6
+from PySide6.QtWidgets import QLabel, QLayoutItem, QVBoxLayout, QWidget
 
+from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox, insert_layout, vbox
 from tests.documented import ROOT
 
-READ = re.compile(r"\.(itemAt|takeAt|itemAtPosition|replaceWidget)\(")
+READ = re.compile(r"\.(itemAt|takeAt|itemAtPosition|replaceWidget|addLayout|insertLayout)\(")
+
+
+def wrapped() -> list[QLayoutItem]:
+    """Return the wrappers of items; those of layouts live as long as these."""
+    return [one for one in shiboken6.getAllValidWrappers() if type(one).__name__ in {"QWidgetItem", "QSpacerItem"}]
 
 
 @pytest.mark.parametrize(
-    "text", ["self.grid.takeAt(0)", "self.column.itemAt(0).layout()", "row.replaceWidget(old, new)"]
+    "text",
+    ["self.grid.takeAt(0)", "self.column.itemAt(0).layout()", "row.replaceWidget(old, new)", "column.addLayout(row)"],
 )
-def test_code_that_reads_an_item_is_found(text: str) -> None:
+def test_code_that_makes_a_wrapper_of_an_item_is_found(text: str) -> None:
     assert READ.search(text)
 
 
-def test_no_window_reads_the_items_of_its_layouts() -> None:
-    """PySide keeps the wrapper of an item that Qt has deleted; an event at the same address would get its class."""
-    found = [path for path in (ROOT / "study_app" / "gui").rglob("*.py") if READ.search(path.read_text("utf-8"))]
-    assert found == []
+def test_only_the_functions_of_boxes_make_wrappers_of_items() -> None:
+    found = {path.name for path in (ROOT / "study_app" / "gui").rglob("*.py") if READ.search(path.read_text("utf-8"))}
+    assert found == {"boxes.py"}
+
+
+@pytest.mark.usefixtures("qapp")
+def test_a_layout_that_is_added_to_that_of_a_widget_leaves_no_wrapper_of_its_items() -> None:
+    before = len(wrapped())
+    outer, inside = QVBoxLayout(), QWidget()
+    inside.setLayout(outer)
+    outer.addLayout(inner := hbox(QLabel("a"), STRETCH))
+    assert len(wrapped()) == before + 2, "PySide makes none any more: add_layout need not release them"
+    shiboken6.delete(inside)
+    del inner
+    between, other = len(wrapped()), QWidget()
+    column = vbox(hbox(QLabel("b"), 8, vbox(QLabel("c"))), parent=other)
+    add_layout(column, hbox(QLabel("d"), STRETCH))
+    insert_layout(column, 0, hbox(QLabel("e")))
+    assert len(wrapped()) == between
+    assert [label.text() for label in other.findChildren(QLabel)] == ["b", "c", "d", "e"]

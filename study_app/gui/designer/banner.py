@@ -6,7 +6,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import RADIUS_CARD
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
-from study_app.gui.widgets.boxes import hbox
+from study_app.gui.widgets.boxes import add_layout, hbox
 from study_app.gui.widgets.cards import SHADOW, Card, Icon
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import label
@@ -33,7 +33,7 @@ class BannerCard(Card):
         self._banner: Banner | None = None
         self._other = False
         self._row = hbox(self.sign, (self.words, 1), self.close_button, spacing=10)
-        self.column.addLayout(self._row)
+        add_layout(self.column, self._row)
         self.hide()
 
     def make_room(self, *, other: bool) -> None:

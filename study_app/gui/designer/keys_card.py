@@ -5,7 +5,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QWidget
 from shiboken6 import isValid
 
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Rule, scrolled
 from study_app.gui.widgets.controls import Cap, IconButton
 from study_app.gui.widgets.labels import label
@@ -35,10 +35,10 @@ class KeysCard(Card):
             for group in groups:
                 column.addWidget(label(GROUPS[group], "strong"))
                 for one in (one for one in KEYS if one.group == group):
-                    column.addLayout(self._row(one))
+                    add_layout(column, self._row(one))
                 column.addSpacing(10)
             column.addStretch()
-            across.addLayout(column, 1)
+            add_layout(across, column, 1)
         self.area = scrolled(across)
         add_parts(self.column, top, Rule(), (self.area, 1))
         self.hide()

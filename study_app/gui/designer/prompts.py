@@ -7,7 +7,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QLineEdit, QScrollArea, QWidget
 
 from study_app.gui.theme.theme import font
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import label
@@ -79,7 +79,7 @@ class DeleteCard(Prompt):
             lambda at: self.answered.emit(DeleteElement(asked.path, "other", self.other.itemData(at)))
         )
         add_parts(self.buttons, self.gaps, self.other, self.all)
-        self.column.addLayout(self.buttons)
+        add_layout(self.column, self.buttons)
         self.other.setVisible(bool(asked.others))
         self.first: QWidget = self.all
 
@@ -121,7 +121,7 @@ class SeriesCard(Prompt):
         self.values.setFont(font("body"))
         self.values.setAccessibleName("Values of the series")
         self.values.setPlaceholderText("Values, such as 0 60 120 240")
-        self.column.addLayout(hbox(self.elements, self.number, (self.values, 1), spacing=10))
+        add_layout(self.column, hbox(self.elements, self.number, (self.values, 1), spacing=10))
         self.refusal = label("", "label", "bad", wraps=True)
         self.lines = label("", "label")
         said = QWidget()
@@ -146,7 +146,7 @@ class SeriesCard(Prompt):
         self.make = ActionButton("bars", "", role="primary", height=40)
         self.make.clicked.connect(self._make)
         self.buttons.addWidget(self.make)
-        self.column.addLayout(self.buttons)
+        add_layout(self.column, self.buttons)
         self.values.textEdited.connect(lambda _text: self._type())
         self.values.returnPressed.connect(self._make)
         self.number.activated.connect(lambda _at: self._type())

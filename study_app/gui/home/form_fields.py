@@ -3,7 +3,7 @@
 from PySide6.QtWidgets import QGridLayout, QLabel, QLineEdit, QWidget
 
 from study_app.gui.theme.theme import font
-from study_app.gui.widgets.boxes import STRETCH, hbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox
 from study_app.gui.widgets.labels import label
 
 
@@ -31,5 +31,5 @@ def add_field(
     if hint:
         head.addWidget(label(hint, "small", "text3") if isinstance(hint, str) else hint)
     named.setBuddy(field)
-    grid.addLayout(head, row, place, 1, across)
+    add_layout(grid, head, row, place, 1, across)
     grid.addWidget(field, row + 1, place, 1, across)

@@ -16,7 +16,7 @@ from study_app.gui.home.study_folder_state import StudyFolderState, read_study_f
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.background import Background
-from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox, vbox
 from study_app.gui.widgets.cards import Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, Number
 from study_app.gui.widgets.labels import label, set_ink
@@ -158,13 +158,13 @@ class NewSessionDialog(QDialog):
         change.clicked.connect(self._choose_folder)
         add_field(grid, 0, 0, "Participant", self.participant, hint="letters and digits, no name")
         add_field(grid, 0, 1, "Session", self.session)
-        grid.addLayout(self._judge(), 2, 0, 1, 2)
+        add_layout(grid, self._judge(), 2, 0, 1, 2)
         add_field(grid, 4, 0, "Seed", field_with_button(self.seed, another), hint="determines every order; recorded")
         add_field(grid, 4, 1, "Operator", self.operator)
         add_field(grid, 6, 0, "Language of the participant's pages", self.language)
         add_field(grid, 6, 1, "Device", self.device)
         add_field(grid, 8, 0, "Participant's screen", self.screen_choice)
-        grid.addLayout(vbox(self.windowed, self.pilot, spacing=2), 8, 1, 2, 1, Qt.AlignmentFlag.AlignBottom)
+        add_layout(grid, vbox(self.windowed, self.pilot, spacing=2), 8, 1, 2, 1, Qt.AlignmentFlag.AlignBottom)
         folder = field_with_button(self.results, change)
         add_field(grid, 10, 0, "Results folder of this study", folder, hint=self.where, across=2)
         if self.facts.protocol.assigns_rows:

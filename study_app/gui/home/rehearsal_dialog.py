@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QDialog, QProgressBar, QWidget
 
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme
-from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox, vbox
 from study_app.gui.widgets.controls import ActionButton, Number
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.session.simulated.rehearsal_worker import TASK, RehearsalClient, RehearsalOrder
@@ -74,7 +74,7 @@ class RehearsalDialog(QDialog):
         row = hbox(spacing=16)
         for name, field in (("Simulated participants", self.participants), ("Seed", self.seed)):
             field.setAccessibleName(name)
-            row.addLayout(vbox(label(name, "label", "text2"), field, spacing=6), 1)
+            add_layout(row, vbox(label(name, "label", "text2"), field, spacing=6), 1)
         title, foot = label(f"Rehearse {self._facts.title}", "title_dense"), hbox(self.cancel, STRETCH, self.start)
         vbox(title, self.said, row, self.progress, 6, foot, spacing=12, margins=(28, 24, 28, 24), parent=self)
 

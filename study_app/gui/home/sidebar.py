@@ -8,7 +8,7 @@ from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPainterPath, QPain
 from PySide6.QtWidgets import QSizePolicy, QSpacerItem
 
 from study_app.gui.theme.theme import RADIUS_CARD, TANK, font
-from study_app.gui.widgets.boxes import add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
@@ -29,7 +29,7 @@ class DeviceCard(Card):
         self.icon = Icon("device", "text2", 22)
         self.name = label("", "card")
         self.state = Chip(small=True)
-        self.column.addLayout(hbox(self.icon, (self.name, 1), self.state, spacing=10))
+        add_layout(self.column, hbox(self.icon, (self.name, 1), self.state, spacing=10))
         self.about, self.why, self.screens = (label("", "label", "text2", wraps=True) for _ in range(3))
         for line in (self.about, self.why, self.screens):
             line.setFont(font("label", weight=400, tabular=True))
@@ -71,7 +71,7 @@ class LabCard(Card):
         self.open = ActionButton("", "Open", height=38)
         self.open.setAccessibleName("Open the liquid lab")
         self.open.clicked.connect(self.lab_asked)
-        self.column.addLayout(hbox((vbox(label("Liquid lab", "card"), about, spacing=4), 1), self.open))
+        add_layout(self.column, hbox((vbox(label("Liquid lab", "card"), about, spacing=4), 1), self.open))
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the card, and into its upper part the water, the wake and the ball."""

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import remove_widget
-from study_app.gui.widgets.boxes import hbox, vbox
+from study_app.gui.widgets.boxes import add_layout, hbox, vbox
 from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Clamped, Elided, label
@@ -51,7 +51,7 @@ class FileCard(Card):
         self.origin = Elided("small", "text2")
         self.origin.show_text(f"{facts.origin}  ·  {Path(facts.source).stem}.toml")
         top = hbox((vbox(head, self.origin, spacing=2), 1))
-        self.column.addLayout(top)
+        add_layout(self.column, top)
         self.draft = label("" if facts.draft is None else f"{facts.draft.words}.", "small", "warn", wraps=True)
         self.pen: ActionButton | IconButton
         if facts.draft is None:
@@ -63,7 +63,7 @@ class FileCard(Card):
             self.pen = ActionButton("pen", "Continue", role="primary" if first else "", height=38)
             self.pen.setAccessibleName(f"Continue {title}, {Path(facts.source).stem}")
             row = hbox((self.draft, 1, Qt.AlignmentFlag.AlignTop), (self.pen, 0, Qt.AlignmentFlag.AlignTop), spacing=12)
-            self.column.addLayout(row)
+            add_layout(self.column, row)
         self.pen.clicked.connect(lambda: self.edit.emit(facts))
 
 
@@ -86,7 +86,7 @@ class StudyCard(FileCard):
         self.column.addStretch()
         time = f"{facts.duration}  ·  {facts.languages}"
         for icon, words in (("layers", facts.extent), ("clock", time), ("device", facts.needs)):
-            self.column.addLayout(hbox(Icon(icon, "text2", 18), (label(words, "body"), 1), spacing=10))
+            add_layout(self.column, hbox(Icon(icon, "text2", 18), (label(words, "body"), 1), spacing=10))
         self.held = label("", "label", "text2")
         self.column.addWidget(self.held)
         self.new = ActionButton("plus", "New session", role="primary" if first and facts.draft is None else "")
@@ -95,7 +95,7 @@ class StudyCard(FileCard):
         self.rehearse.setAccessibleName(f"Rehearse {facts.title}, {facts.file_name}")
         self.new.clicked.connect(lambda: self.new_session.emit(facts))
         self.rehearse.clicked.connect(lambda: self.rehearsal.emit(facts))
-        self.column.addLayout(hbox((self.new, 1), (self.rehearse, 1), spacing=12))
+        add_layout(self.column, hbox((self.new, 1), (self.rehearse, 1), spacing=12))
 
 
 class BrokenCard(FileCard):

@@ -23,7 +23,7 @@ from study_app.gui.home.study_cards import BrokenCard, CardGrid, Facts, StudyCar
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.background import Background
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.dialogs import choose_protocol
@@ -148,7 +148,7 @@ class HomePlace(Place):
         self._beside = QBoxLayout(QBoxLayout.Direction.TopToBottom)
         self._beside.setSpacing(18)
         add_parts(self._beside, self.device, self.lab, STRETCH)
-        self._below.addLayout(self._beside)
+        add_layout(self._below, self._beside)
         self.below = QWidget()
         self.below.setLayout(self._below)
         self.cards_area = scrolled(self.grid)

@@ -5,7 +5,7 @@ from pathlib import Path
 from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget
 
 from study_app.gui.theme.theme import Theme, font
-from study_app.gui.widgets.boxes import hbox
+from study_app.gui.widgets.boxes import add_layout, hbox
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.dialogs import Question
 from study_app.gui.widgets.labels import label
@@ -30,7 +30,7 @@ class WorkspaceDialog(Question):
         self.choose = ActionButton("", "Choose …", height=40)
         self.choose.setAutoDefault(False)
         self.choose.clicked.connect(self._choose)
-        self.column.addLayout(hbox((self.path, 1), self.choose, spacing=8))
+        add_layout(self.column, hbox((self.path, 1), self.choose, spacing=8))
         holds = label("It will contain the folders protocols and results.", "label", "text2")
         self.column.addWidget(holds)
         self.add_buttons("Not now", ActionButton("check", "Use this folder", role="primary"))

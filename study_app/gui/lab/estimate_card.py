@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from study_app.gui.lab.measurement_cards import LINE, ReadingCard
 from study_app.gui.theme.theme import font
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox
 from study_app.gui.widgets.controls import ActionButton, Choice, Toggle
 from study_app.gui.widgets.labels import Clamped, Elided, figures, label, set_ink
 from study_app.viewmodels.estimation import OFF, PARAMETERS, Choices, EstimateRow
@@ -51,9 +51,9 @@ class EstimateCard(ReadingCard):
         inner.setContentsMargins(0, 0, 0, 0)
         inner.setVerticalSpacing(6)
         inner.addWidget(self.parameters, 0, 0)
-        inner.addLayout(self._grid, 1, 0)
+        add_layout(inner, self._grid, 1, 0)
         inner.addWidget(self.message, 2, 0)
-        inner.addLayout(buttons, 3, 0)
+        add_layout(inner, buttons, 3, 0)
         add_parts(self.content, self.source, self._inside, STRETCH)
         self.source.activated.connect(lambda index: self.source_chosen.emit(self.source.itemData(index)))
         self.parameters.activated.connect(lambda index: self.parameters_chosen.emit(self.parameters.itemData(index)))

@@ -8,7 +8,7 @@ from study_app.gui.lab.side_switch import SideSwitch
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.boxes import add_parts, hbox
+from study_app.gui.widgets.boxes import add_layout, add_parts, hbox
 from study_app.gui.widgets.controls import ActionButton, Choice, CompactStop, IconButton, Toggle
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.lab import Choices, LabView
@@ -109,13 +109,13 @@ class LabHeader(Themed, QWidget):
         for row in (self._left, self._middle, self._right):
             self._grid.removeItem(row)
         if narrow:
-            self._grid.addLayout(self._left, 0, 0)
-            self._grid.addLayout(self._right, 0, 3)
-            self._grid.addLayout(self._middle, 1, 0, 1, 4, Qt.AlignmentFlag.AlignLeft)
+            add_layout(self._grid, self._left, 0, 0)
+            add_layout(self._grid, self._right, 0, 3)
+            add_layout(self._grid, self._middle, 1, 0, 1, 4, Qt.AlignmentFlag.AlignLeft)
         else:
-            self._grid.addLayout(self._left, 0, 0)
-            self._grid.addLayout(self._middle, 0, 1)
-            self._grid.addLayout(self._right, 0, 3)
+            add_layout(self._grid, self._left, 0, 0)
+            add_layout(self._grid, self._middle, 0, 1)
+            add_layout(self._grid, self._right, 0, 3)
 
     def _connect(self) -> None:
         self.sides.switched.connect(self.switched)

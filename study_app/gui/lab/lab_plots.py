@@ -13,7 +13,7 @@ from study_app.gui.lab.parameter_form import HIDDEN
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.accessible import describe_plot
-from study_app.gui.widgets.boxes import vbox
+from study_app.gui.widgets.boxes import add_layout, vbox
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.live_plots import MINUS, Plot, draw_quickly, number, pen
@@ -176,7 +176,7 @@ class PlotCard(Card):
         self.stack = QStackedLayout()
         self.stack.addWidget(shown)
         self.stack.addWidget(MaskedPanel(HIDDEN, "A trace would reveal which is which."))
-        self.column.addLayout(self.stack, 1)
+        add_layout(self.column, self.stack, 1)
         self.setMinimumHeight(226)
 
     def show_blind(self, blind: bool) -> None:

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QStackedLayout, QVBoxLayout, 
 from study_app.gui.lab.parameter_form import HIDDEN
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed, apply_theme_within
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Bar, Card, Icon, Rule
 from study_app.gui.widgets.labels import Elided, figures, label, set_ink
 from study_app.gui.widgets.masked_panel import MaskedPanel
@@ -36,7 +36,7 @@ class ReadingCard(Card):
         self.stack = QStackedLayout()
         self.stack.addWidget(self._shown)
         self.stack.addWidget(MaskedPanel(HIDDEN, why))
-        self.column.addLayout(self.stack, 1)
+        add_layout(self.column, self.stack, 1)
 
     def show_blind(self, blind: bool) -> bool:
         """Show the content, or that it is hidden; return which.

@@ -7,7 +7,7 @@ from study_app.gui.lab.parameter_rows import ParameterRow, SwitchRow, row_for
 from study_app.gui.lab.side_switch import Badge
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import Clamped, label
@@ -123,7 +123,7 @@ class FormPanel(Card):
         self._stack = QStackedLayout()
         self._stack.addWidget(whole)
         self._stack.addWidget(self.hidden)
-        self.column.addLayout(self._stack, 1)
+        add_layout(self.column, self._stack, 1)
 
     def show_view(self, view: LabView) -> None:
         """Show the felt side's liquid and parameters."""

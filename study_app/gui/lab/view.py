@@ -19,7 +19,7 @@ from study_app.gui.lab.parameter_form import FormPanel
 from study_app.gui.lab.side_switch import KEY
 from study_app.gui.lab.tank_note import TankNote
 from study_app.gui.theme.theme import SPACE
-from study_app.gui.widgets.boxes import vbox
+from study_app.gui.widgets.boxes import add_layout, vbox
 from study_app.gui.widgets.cards import SHADOW, scrolled
 from study_app.gui.widgets.escape_key import EscapeAnywhere
 from study_app.gui.widgets.main_view import Place
@@ -106,11 +106,11 @@ class LabPlace(Place):
         self._middle.setColumnStretch(0, 1)
         self._middle.setColumnStretch(1, 1)
         framed = vbox(self.tank, margins=(SHADOW, SHADOW - 1, SHADOW, SHADOW))  # as the neighbouring cards
-        self._middle.addLayout(framed, 0, 0, 1, 2)
+        add_layout(self._middle, framed, 0, 0, 1, 2)
         self._middle.addWidget(self.force, 1, 0)
         self._middle.addWidget(self.speed, 1, 1)
         self._middle.addWidget(self.curves, 2, 0, 1, 2)
-        self._middle.addLayout(self._side, 3, 0, 1, 2)
+        add_layout(self._middle, self._side, 3, 0, 1, 2)
         self._middle.setRowStretch(0, 61)
         self._middle.setRowStretch(1, PLOTS_STRETCH)
         self.area = scrolled(self._middle)

@@ -20,7 +20,7 @@ from study_app.gui.operator.notes import NotesCard
 from study_app.gui.operator.session_header import Header
 from study_app.gui.operator.steps_card import NARROW, SLIM, WIDTH, Rail
 from study_app.gui.operator.stop_panel import StopPanel
-from study_app.gui.widgets.boxes import vbox
+from study_app.gui.widgets.boxes import add_layout, vbox
 from study_app.gui.widgets.cards import Card, scrolled
 from study_app.viewmodels.operator import NOTES_SHOWN
 
@@ -81,7 +81,7 @@ class Arrangement(QWidget):
         right = vbox((self.side_area, 1), p.stop, spacing=GAP)
         self._body = QGridLayout()
         self._body.setVerticalSpacing(GAP)
-        self._body.addLayout(right, 0, 2, 2, 1)
+        add_layout(self._body, right, 0, 2, 2, 1)
         self._body.setColumnStretch(1, 1)
         self._body.setRowStretch(0, 1)
         vbox(p.header, (self._body, 1), spacing=0, margins=0, parent=self)

@@ -4,7 +4,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QLabel
 
 from study_app.gui.theme.theme import font
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox
 from study_app.gui.widgets.cards import Card, Chip, Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
@@ -29,7 +29,7 @@ class DeviceCard(Card):
         self._most = ALL_ROWS
         self._view: DeviceView | None = None
         row = hbox(self.icon, self.name, STRETCH, self.chip, spacing=10)
-        self.column.addLayout(row)
+        add_layout(self.column, row)
         self._grid = QGridLayout()
         self._grid.setVerticalSpacing(8)
         self._grid.setHorizontalSpacing(12)

@@ -2,7 +2,7 @@
 
 from PySide6.QtWidgets import QGridLayout, QWidget
 
-from study_app.gui.widgets.boxes import STRETCH, hbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox
 from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.labels import Elided, Ink, figures, label
 from study_app.viewmodels.operator import OperatorView
@@ -27,9 +27,9 @@ class TileCard(Card):
         self.line = Elided("small", "text2")
         self.column.addWidget(self.title)
         row = hbox(self.value, self.unit, STRETCH, spacing=6)
-        self.column.addLayout(row)
+        add_layout(self.column, row)
         below = hbox(self.sign, (self.line, 1), spacing=8)
-        self.column.addLayout(below)
+        add_layout(self.column, below)
 
     def show_tile(self, tile: Tile) -> None:
         """Show a number, its unit, verdict and comparison."""

@@ -8,7 +8,7 @@ from study_app.gui.preflight.check_rows import CheckRow
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.theme.themed import apply_theme, apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import describe_plot, give_role
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice, Number
 from study_app.gui.widgets.labels import figures, label
@@ -88,7 +88,7 @@ class PreflightWindow(QWidget):
         self._grid = QGridLayout()
         self._grid.setVerticalSpacing(9)
         self._grid.setColumnStretch(1, 1)
-        self.runs.column.addLayout(self._grid)
+        add_layout(self.runs.column, self._grid)
         if self.masking is not None:
             self.runs.column.addWidget(self.masking)
         side = QWidget()

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QSizePolicy, QWidget
 from study_app.gui.results.figure_view import FigureView
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Bar, Card
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
@@ -101,7 +101,7 @@ class WorkLine(Card):
         self.stop.clicked.connect(self.stop_asked)
         self.again.clicked.connect(self.again_asked)
         row = hbox((self.words, 1), (self.bar, 1), self.stop, self.again, spacing=16)
-        self.column.addLayout(row)
+        add_layout(self.column, row)
 
     def show_going(self, going: Going | None, *, untested: bool) -> None:
         """Say how far it is; ``untested``: that it was stopped, and what is missing."""

@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QLineEdit, QWidget
 
 from study_app.gui.theme.theme import Theme, font
-from study_app.gui.widgets.boxes import hbox
+from study_app.gui.widgets.boxes import add_layout, hbox, insert_layout
 from study_app.gui.widgets.cards import Icon
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.dialogs import Question
@@ -27,7 +27,7 @@ class Decision(Question):
         self.form.setHorizontalSpacing(16)
         self.form.setVerticalSpacing(10)
         self.form.setColumnStretch(1, 1)
-        self.column.addLayout(self.form)
+        add_layout(self.column, self.form)
         self.by = _line("Your name or initials, such as AK")
         self.reason = _line("")
         self.missing = label("", "label", "bad", wraps=True)
@@ -81,7 +81,7 @@ class UnblindDialog(Decision):
                 wraps=True,
             )
             row.addWidget(warns, 1)
-            self.column.insertLayout(2, row)
+            insert_layout(self.column, 2, row)
         self.reason.setPlaceholderText("For example: collection closed")
         self.finish("Name", "Reason", ActionButton("eye", "Unblind", role="danger"))
         self.by.setFocus()

@@ -14,7 +14,7 @@ from study_app.gui.settings.screen_numbers import ScreenNumber, identify
 from study_app.gui.settings.setting_cards import OffsetCard, ScreensCard, SeenCard, SessionsCard, WindowsCard
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within
-from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
@@ -59,7 +59,7 @@ class MachinePlace(Place):
         self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._body.setSpacing(18)
         for cards in ((self.screens, self.seen, self.outlets), (self.offset, self.sessions, self.windows)):
-            self._body.addLayout(vbox(*cards, STRETCH, spacing=18), 1)
+            add_layout(self._body, vbox(*cards, STRETCH, spacing=18), 1)
         foot = hbox(self.kept_in, margins=(SHADOW, 0, SHADOW, 0))
         inside = QWidget()
         vbox(head, (self._body, 1), foot, spacing=20, margins=(30, 30, 30, 22), parent=inside)

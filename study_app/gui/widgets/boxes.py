@@ -2,7 +2,8 @@
 
 from typing import Any, Final, TypeAlias, TypeVar
 
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLayout, QVBoxLayout, QWidget
+import shiboken6
+from PySide6.QtWidgets import QBoxLayout, QGridLayout, QHBoxLayout, QLayout, QVBoxLayout, QWidget
 
 STRETCH: Final = "stretch"
 """A gap that takes the room that is left; in a tuple with its stretch."""
@@ -44,10 +45,35 @@ def add_parts(box: QBoxLayout, *parts: Part) -> None:
     for part in parts:
         added, *how = part if isinstance(part, tuple) else (part,)
         if isinstance(added, QLayout):
-            box.addLayout(added, *how)
+            add_layout(box, added, *how)
         elif isinstance(added, QWidget):
             box.addWidget(added, *how)
         elif isinstance(added, int):
             box.addSpacing(added)
         else:
             box.addStretch(*how)
+
+
+def add_layout(outer: QBoxLayout | QGridLayout, inner: QLayout, *place: Any) -> None:
+    """Add a layout to another one: at the end with its stretch, or at a place of a grid."""
+    outer.addLayout(inner, *place)
+    _release_items(inner)
+
+
+def insert_layout(outer: QBoxLayout, at: int, inner: QLayout) -> None:
+    """Insert a layout into a row or column."""
+    outer.insertLayout(at, inner)
+    _release_items(inner)
+
+
+def _release_items(layout: QLayout) -> None:
+    """Release the wrappers that PySide makes of the items of a layout when it adds that to another one.
+
+    PySide does not notice when Qt deletes an item; an event at its address would get the wrapper, and its class.
+    """
+    for at in range(layout.count()):
+        item = layout.itemAt(at)
+        if isinstance(item, QLayout):
+            _release_items(item)
+        elif item is not None:
+            shiboken6.invalidate(item)

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QLayout, QScrollArea, QSizePolicy, QWidget
 from study_app.gui.theme.icons import draw_icon, draw_logo
 from study_app.gui.theme.theme import RADIUS_CARD, RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox, vbox
 from study_app.gui.widgets.labels import Ink, label
 from study_app.viewmodels.tones import Tone
 
@@ -28,7 +28,7 @@ class Card(Themed, QWidget):
         if title:
             self.heading = label(title, "card")
             self.title_row = hbox(self.heading, STRETCH, *([] if aside is None else [aside]))
-            self.column.addLayout(self.title_row)
+            add_layout(self.column, self.title_row)
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the surface, its edge and, in light, a shadow of at most 6 % black."""

@@ -18,7 +18,7 @@ from study_app.gui.designer.form.row_widget import RowWidget, is_wide, language_
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
 from study_app.gui.designer.repair_button import RepairButton
 from study_app.gui.theme.themed import apply_theme_within
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Rule, scrolled
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import label
@@ -167,19 +167,19 @@ class FormCard(Card):
             if number:
                 sections.addWidget(Rule())
             if section.title:
-                sections.addLayout(self._heading(section, removable=section.path != form.path))
+                add_layout(sections, self._heading(section, removable=section.path != form.path))
             if section.faults:
                 sections.addWidget(label("\n".join(section.faults), "label", "bad", wraps=True))
             heads: tuple[tuple[str, str], ...] = ()
             for row in section.rows:
                 beside = () if stacked(row) or is_wide(row) else row.languages
                 if len(beside) > 1 and beside != heads:
-                    sections.addLayout(language_heads(beside, (LABEL_PX + 8, FIELD_PX + 8)))
+                    add_layout(sections, language_heads(beside, (LABEL_PX + 8, FIELD_PX + 8)))
                 heads = beside
                 sections.addWidget(self._row(row))
                 yield ROW_PX * (1 + len(row.entries))
             if section.absent and not self.read_only:
-                sections.addLayout(self._adds(section))
+                add_layout(sections, self._adds(section))
                 yield ROW_PX
         if lines:
             whole.addWidget(self._others(lines[at + 1 :], ()))

@@ -10,7 +10,7 @@ from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.boxes import hbox, vbox
+from study_app.gui.widgets.boxes import add_layout, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Elided, label
@@ -93,8 +93,8 @@ class FormHead(QWidget):
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(8)
         grid.addWidget(self.tile, 0, 0)
-        grid.addLayout(words, 0, 1)
-        grid.addLayout(hbox(self.feel, self.series, self.up, self.down, self.copy, self.delete, spacing=8), 0, 2)
+        add_layout(grid, words, 0, 1)
+        add_layout(grid, hbox(self.feel, self.series, self.up, self.down, self.copy, self.delete, spacing=8), 0, 2)
         self.id_line = QWidget()
         words_of_id = label("Id", "label")
         words_of_id.setFixedWidth(LABEL_PX)

@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLabel, QVBoxLayout
 
 from study_app.gui.designer.form.row_fields import Field
 from study_app.gui.designer.form.typed_fields import TypedLine, TypedText
+from study_app.gui.widgets.boxes import add_layout
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.form.form_rows import FormRow, is_right_to_left
 from study_app.viewmodels.designer.requests import SetText
@@ -26,7 +27,7 @@ class LanguagesField(Field):
         self.outer = self.box
         self.box = QVBoxLayout() if down else QHBoxLayout()
         self.box.setSpacing(8)
-        self.outer.addLayout(self.box)
+        add_layout(self.outer, self.box)
         self.lines: dict[str, TypedLine | TypedText] = {}
         for code, language in row.languages:
             name = row.row.label if len(row.languages) == 1 else f"{row.row.label}, {language}"

@@ -18,7 +18,7 @@ from study_app.gui.designer.repair_button import RepairButton
 from study_app.gui.designer.segments import Segments
 from study_app.gui.designer.tab_order import lead_by_tab, stops
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
-from study_app.gui.widgets.boxes import hbox, vbox
+from study_app.gui.widgets.boxes import add_layout, hbox, insert_layout, vbox
 from study_app.gui.widgets.cards import Icon
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import label
@@ -87,7 +87,7 @@ class RowWidget(Themed, QWidget):
         heads = wide and len(row.languages) > 1 and not stacked(row)
         labelled = not bare and (row.removable or not heads)
         if labelled or bare:
-            column.addLayout(across)
+            add_layout(column, across)
         if not labelled:  # the names of the languages, or the editor, say what it is
             self.words.setParent(self)
             self.words.hide()
@@ -95,13 +95,13 @@ class RowWidget(Themed, QWidget):
             self.keys.show_values(row.instead, row.row.path[-1])
             self.keys.chosen.connect(self._switch)
             above = hbox((self.keys, 0, Qt.AlignmentFlag.AlignLeft), margins=(0 if wide else LABEL_PX + 8, 0, 0, 0))
-            column.insertLayout(0, above)
+            insert_layout(column, 0, above)
         if heads:
             of = "" if labelled else f"{row.row.label}, "
-            column.addLayout(language_heads(tuple((code, f"{of}{language}") for code, language in row.languages)))
+            add_layout(column, language_heads(tuple((code, f"{of}{language}") for code, language in row.languages)))
         if wide and not bare:
             column.addWidget(self.field)
-        column.addLayout(self._buttons)
+        add_layout(column, self._buttons)
         self.show_row(row)
 
     @cached_property

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from study_app.gui.designer.measures.parts import Made, part_of
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
-from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, hbox, insert_layout, vbox
 
 
 class CardGrid(Themed, QWidget):
@@ -47,7 +47,7 @@ class CardGrid(Themed, QWidget):
             self.parts.append(kept[at] if at in kept else self._made(card))
         self._rows = [hbox(*((part, 1) for part in some), spacing=8) for some in _rows(self.parts)]
         for at, row in enumerate(self._rows):
-            self.grid.insertLayout(at, row)
+            insert_layout(self.grid, at, row)
         self.cards = cards
         for part, (height, title) in zip(self.parts, heights, strict=False):
             part.setMinimumHeight(height if title == part.accessibleName() else 0)

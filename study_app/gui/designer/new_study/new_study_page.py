@@ -21,7 +21,7 @@ from study_app.gui.designer.new_study.new_study_questions import Questions
 from study_app.gui.designer.new_study.recovery_bar import RecoveryBar
 from study_app.gui.designer.repair_button import NameRefusal
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget, replace_inside
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule
 from study_app.gui.widgets.controls import ActionButton, Check, IconButton
 from study_app.gui.widgets.dialogs import choose_protocol
@@ -105,7 +105,7 @@ class ChosenCard(Card):
         if choice.session:
             column.addWidget(label("The session", "strong"))
         for icon, title, time in choice.session:
-            column.addLayout(_step(icon, title, time))
+            add_layout(column, _step(icon, title, time))
         if choice.session:
             column.addWidget(Rule())
         if choice.recovery is not None:
@@ -198,7 +198,7 @@ class NewStudyPage(Themed, QWidget):
             ("Or a copy of a study", "with its comments; the original stays as it is", True, COPIES_ACROSS),
         ):
             words = label(heading, "card"), label(aside, "small", "text2")
-            column.addLayout(hbox(*words, STRETCH, spacing=10, margins=(RING, 0, 0, 0)))
+            add_layout(column, hbox(*words, STRETCH, spacing=10, margins=(RING, 0, 0, 0)))
             grid = QGridLayout()
             grid.setSpacing(14 - 2 * RING)
             columns = across if self.width() >= NARROW_BELOW else 2
@@ -211,7 +211,7 @@ class NewStudyPage(Themed, QWidget):
                 self.buttons.append(made)
             for one in range(columns):
                 grid.setColumnStretch(one, 1)
-            column.addLayout(grid)
+            add_layout(column, grid)
         column.addStretch()
         apply_theme_within(inside, self.theme)
         replace_inside(self.area, inside)

@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QScrollArea, QWidget
 
 from study_app.gui.designer.prompts import Prompt
-from study_app.gui.widgets.boxes import vbox
+from study_app.gui.widgets.boxes import add_layout, vbox
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
 
@@ -21,7 +21,7 @@ class UnlockCard(Prompt):
         self.go_on = ActionButton("", "Change the id", role="danger", height=40)
         self.go_on.clicked.connect(lambda: self.answered.emit(name))
         self.buttons.addWidget(self.go_on)
-        self.column.addLayout(self.buttons)
+        add_layout(self.column, self.buttons)
         self.first: QWidget = self.cancel
 
 
@@ -53,7 +53,7 @@ class CommentsCard(Prompt):
         area.setMinimumHeight(min(160, 38 * len(comments) + 6))
         self.column.addWidget(area, 1)
         self.cancel.setText("Close")
-        self.column.addLayout(self.buttons)
+        add_layout(self.column, self.buttons)
         self.first: QWidget = self.cancel
 
 

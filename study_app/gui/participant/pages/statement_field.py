@@ -14,6 +14,7 @@ from study_app.gui.participant.forms.option_button import NO_WORDS
 from study_app.gui.participant.forms.scale_field import ScaleField
 from study_app.gui.participant.pages.questionnaire_grid import AFTER_STATEMENT, CELL_GAP, Grid
 from study_app.gui.theme.theme import PARTICIPANT, font
+from study_app.gui.widgets.boxes import add_layout
 from study_app.protocol.questions.question import ItemView
 
 if TYPE_CHECKING:
@@ -48,10 +49,10 @@ class StatementField(ScaleField):
             self.cells.addWidget(point)
             if mirrored:
                 point.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
-        self.row.addLayout(self.cells)
+        add_layout(self.row, self.cells)
         if self.judge is not None:
             self.row.addWidget(self.judge)
-        self.grid.addLayout(self.row, 0, self.ANSWER, Qt.AlignmentFlag.AlignVCenter)
+        add_layout(self.grid, self.row, 0, self.ANSWER, Qt.AlignmentFlag.AlignVCenter)
         self.grid.setColumnStretch(self.ANSWER, 0)
 
     @property

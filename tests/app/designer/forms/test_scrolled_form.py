@@ -3,8 +3,9 @@
 from typing import Any
 
 import pytest
+import shiboken6
 from PySide6.QtCore import QPoint, QRect, Qt
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QWidget, QWidgetItem
 
 from study_app.gui.designer.form.row_widget import RowWidget
 from study_app.gui.designer.tab_order import stops
@@ -132,3 +133,13 @@ def test_tab_passes_the_buttons_of_an_entry_whose_actions_have_a_key(qtbot: Any,
     first.setFocus()
     qtbot.keyClick(first, Qt.Key.Key_Return)
     assert designer.editing.selected[0] == "conditions"
+
+
+def test_forms_leave_no_wrapper_of_an_item_of_their_layouts(qtbot: Any, designer: Any) -> None:
+    """An event at the address of an item that Qt has deleted would get the wrapper, and a key would fail."""
+    designer.controller.begin("template:viscosity-jnd", "thicker")
+    for row in [("study",), *((name, id) for name, ids in designer.editing.opened.study.document.items()
+                              if isinstance(ids, dict) for id in ids if isinstance(ids[id], dict))]:  # fmt: skip
+        designer.select(row)
+    qtbot.wait(50)
+    assert [one for one in shiboken6.getAllValidWrappers() if type(one) is QWidgetItem] == []

@@ -9,7 +9,7 @@ from study_app.gui.designer.form.entry_row import EntryRow
 from study_app.gui.designer.form.list_fields import EntriesField
 from study_app.gui.designer.form.row_fields import add_button
 from study_app.gui.designer.form.special_editor import SpecialEditor
-from study_app.gui.widgets.boxes import STRETCH, hbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox
 from study_app.gui.widgets.labels import Elided, figures
 from study_app.viewmodels.designer.form.form_rows import Entry, FormRow
 from study_app.viewmodels.designer.keys import tip
@@ -51,7 +51,7 @@ class ConditionsField(EntriesField):
         self.series.setEnabled(bool(row.entries))
         self.series.clicked.connect(self._ask_for_series)
         self.box.removeWidget(self.names)
-        self.box.addLayout(hbox(self.names, self.series, STRETCH))
+        add_layout(self.box, hbox(self.names, self.series, STRETCH))
 
     def _ask_for_series(self) -> None:
         """Ask for a series of the selected condition; where none or several are, which one is asked, too."""

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QBoxLayout, QGridLayout
 from study_app.gui.designer.form.row_fields import Field, add_button
 from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine
+from study_app.gui.widgets.boxes import add_layout
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import figures, label
 from study_app.viewmodels.designer.form.form_rows import FormRow
@@ -28,7 +29,7 @@ class PointsField(Field):
         count = len(row.facts.points)
         for at in range(count):
             self._add_line(grid, at, {0: "lowest", count - 1: "highest"}.get(at, ""))
-        self.box.addLayout(grid)
+        add_layout(self.box, grid)
         self.add = add_button("Add a point", "Point")
         self.add.clicked.connect(self._ask_to_add)
         self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)

@@ -9,7 +9,7 @@ from study_app.gui.designer.form.row_fields import Field, add_button
 from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.designer.form.tank_view import TankView
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine
-from study_app.gui.widgets.boxes import hbox
+from study_app.gui.widgets.boxes import add_layout, hbox
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import figures, label
 from study_app.number_text import number_of
@@ -34,7 +34,7 @@ class TargetsField(Field):
             view.moved.connect(self._move)
             view.picked.connect(self._pick)
             view.came.connect(self.came)
-        self.box.addLayout(hbox(self.front, self.above, spacing=8))
+        add_layout(self.box, hbox(self.front, self.above, spacing=8))
         grid = QGridLayout()
         grid.setSpacing(6)
         for column, axis in enumerate(AXES, start=1):
@@ -42,7 +42,7 @@ class TargetsField(Field):
         self.lines: list[list[TypedLine]] = []
         for number in range(len(row.facts.points)):
             self._add_line(grid, number)
-        self.box.addLayout(grid)
+        add_layout(self.box, grid)
         self.add = add_button(f"Add to {row.row.label}", "Target")
         self.add.clicked.connect(lambda: self.asked.emit(AddEntry(self.row.row.path)))
         self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)
