@@ -111,8 +111,8 @@ class FormCard(Card):
         inside_form = keyboard is not None and self.inside.isAncestorOf(keyboard)
         held = next((row for row in self._made if keyboard is not None and row.isAncestorOf(keyboard)), None)
         added = added_row(form, before) if inside_form and held is None and before is not None else None
-        if held is None and added is None and self.isAncestorOf(self.focusWidget()):
-            held = self._focused
+        if held is None and added is None and self.isAncestorOf(self.window().focusWidget()):
+            held = self._focused  # a list that drops down, or another window, has the keyboard for a while
         focused = added
         if held is not None and before is not None:
             focused = (*form.path, *held.row.row.path[len(before.path) :])

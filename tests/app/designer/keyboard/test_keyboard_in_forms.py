@@ -194,3 +194,31 @@ def test_ctrl_delete_removes_a_text_once_it_is_empty_or_marked_in_each_language(
     dutch.selectAll()
     press(qtbot, KEY.Key_Delete, CONTROL)
     assert "title" not in designer.editing.opened.study.document["blocks"]["liquids"]
+
+
+@pytest.mark.parametrize("shown", ["the form gets another row", "the file can be read again"])
+def test_what_is_typed_into_the_file_stays_there_where_the_form_is_made_anew(
+    qtbot: Any, designer: Any, shown: str
+) -> None:
+    again = shown == "the file can be read again"
+    if again:
+        designer.controller.open("rek2024")
+        designer.file.write_text(designer.file.read_text().replace("[study]", "[study", 1))
+    designer.controller.open("kitchen")
+    designer.select(("study",))
+    designer.place.form.focus_first()
+    editor = designer.place.file.editor
+    designer.place.show_tab("file")
+    editor.setFocus()
+    line = designer.text.split("\n").index("[study" if again else "[study]")
+    cursor = editor.textCursor()
+    cursor.setPosition(editor.document().findBlockByNumber(line).position())
+    cursor.movePosition(cursor.MoveOperation.EndOfBlock)
+    editor.setTextCursor(cursor)
+    typed = "] # and more" if again else '\rcredits = "abc" # and more'
+    for letter in typed:
+        qtbot.keyClicks(QApplication.focusWidget(), letter)
+        qtbot.wait(30)
+    qtbot.wait(300)
+    assert editor.hasFocus()
+    assert typed.strip() in designer.text
