@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from study_app.authoring.changes.languages import languages_of, with_language, without_language
+from study_app.authoring.changes.languages import filled_in, languages_of, with_language, without_language
 from study_app.authoring.drafts import unsaved_files
 from study_app.authoring.edited_study import Study, read
 from study_app.authoring.templates import FOLDER, templates
@@ -29,7 +29,8 @@ class Answers:
     title : str
         Its title, "" for that of the template.
     languages : tuple of str
-        Its languages; the texts of those that the template lacks are missing.
+        Its languages; the texts of those that the template lacks are missing. Where it lacks all, the first one has
+        the texts of the template's first language.
     values : tuple of (tuple of str, object)
         Answers to the template's own questions: key and value.
     """
@@ -90,6 +91,8 @@ def answered(study: Study, answers: Answers) -> Study:
     for code in answers.languages:
         if code not in there:
             study, _ = study.edited(*with_language(study, code))
+    if answers.languages and set(there).isdisjoint(answers.languages):  # no text would be left
+        study, _ = study.edited(*filled_in(study, answers.languages[0]))
     for code in there:
         if answers.languages and code not in answers.languages:
             study, _ = study.edited(*without_language(study, code))

@@ -150,3 +150,17 @@ def test_copy_of_a_shipped_study_keeps_its_comments() -> None:
     assert copied.protocol.liquids == original.liquids
     lines = [pair for pair in zip(text.splitlines(), copied.text.splitlines(), strict=True) if pair[0] != pair[1]]
     assert [new.split("#")[0].strip() for _, new in lines] == ['name = "ours"', 'version = "0.1"']
+
+
+@pytest.mark.parametrize("name", templates())
+def test_a_study_in_another_language_begins_with_the_texts_of_the_template(name: str) -> None:
+    study = answered(template(name), Answers("Wie zäh?", ("de",)))
+    assert study.faults == ()
+    assert study.protocol is not None
+    assert study.document["study"]["title"] == {"de": "Wie zäh?"}
+    assert study.protocol.study.languages == ("de",)
+    english = template(name).protocol
+    assert english is not None
+    assert [page.title["de"] for page in study.protocol.pages.values()] == [
+        english.text(page.title, "en") for page in english.pages.values()
+    ]

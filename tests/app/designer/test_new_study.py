@@ -49,7 +49,14 @@ def test_a_study_begins_with_the_answers_and_nothing_is_on_disk(qtbot: Any, desi
     qtbot.keyClicks(page.name, "thicker")
     references = own(page, "References")
     references.setText("4, 8")
-    page.card.questions.languages["nl"].click()
+    chosen, first_texts = page.card.questions.languages, page.card.questions.first_texts
+    chosen["en"].click()
+    assert not first_texts.isVisible()
+    chosen["nl"].click()
+    assert first_texts.isVisible()
+    assert first_texts.text() == "The texts begin in English: translate them."
+    chosen["en"].click()
+    assert not first_texts.isVisible()
     qtbot.keyClick(references, Qt.Key.Key_Return)
     document = designer.editing.opened.study.document
     assert document["study"]["name"] == "thicker"
