@@ -20,6 +20,7 @@ from study_app.gui.designer.form.row_fields import (
     SwitchField,
     UnknownField,
     add_button,
+    kept,
     written,
 )
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine
@@ -155,7 +156,7 @@ class LinesField(EntryList):
         try:
             value = self._value(text)
         except ValueError as unclear:
-            self.refusal = f"{unclear}. The study keeps the last value."
+            self.refusal = f"{unclear}. {kept(self.row.row.value[at])}"
         self.lines[at].show_refused(bool(self.refusal))
         self.came.emit()
         if not self.refusal:

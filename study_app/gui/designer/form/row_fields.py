@@ -120,12 +120,12 @@ class LineField(Field):
             value = number_of(text)
             if value is None or (row.kind == "whole number" and isinstance(value, float)):
                 wanted = "a whole number" if row.kind == "whole number" else "a number"
-                self.refusal = f"“{text}” is not {wanted}: the study keeps the last value."
+                self.refusal = f"“{text}” is not {wanted}. {kept(row.value)}"
         elif row.kind in {"numbers", "vector"}:
             try:
                 value = [number for _, number in typed_numbers(text)]
             except ValueError as unclear:
-                self.refusal = f"{unclear}. The study keeps the last value."
+                self.refusal = f"{unclear}. {kept(row.value)}"
         self.line.show_refused(bool(self.refusal))
         if self.refusal or before:
             self.came.emit()  # the form shows what is wrong with it, or no longer
@@ -287,6 +287,13 @@ def add_button(name: str, words: str = "") -> ActionButton:
     made.setFont(font("label"))
     made.setAccessibleName(name)
     return made
+
+
+def kept(value: Any) -> str:
+    """Return which value a study keeps while what was typed is refused."""
+    if value is None:
+        return "The study does not use it; Esc clears the field."
+    return f"The study keeps {written(value)}; Esc restores it."
 
 
 def written(value: Any) -> str:

@@ -143,9 +143,10 @@ class _Typed(_Base):
             super().keyPressEvent(event)
 
     def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Remember what is there."""
+        """Remember what is there, unless it is refused: Esc still restores what was there before."""
         super().focusInEvent(event)
-        self._before = self.words()
+        if self.property("state") != "refused":
+            self._before = self.words()
         self.came.emit()
 
     def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name

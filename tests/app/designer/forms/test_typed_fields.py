@@ -119,3 +119,18 @@ def test_a_comma_that_may_separate_numbers_is_refused_in_a_list_of_them(qtbot: A
     assert size_after("100, 60, 60") == (100, 60, 60)
     assert size_after("90,5") == (100, 60, 60)
     assert field.refusal.startswith("“90,5” may be one number or several: separate numbers by spaces or semicolons.")
+
+
+def test_esc_restores_the_value_of_a_field_that_was_left_with_a_refused_text(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.select(("blocks", "liquids"))
+    row = designer.row("blocks", "liquids", "repetitions")
+    line = row.field.line
+    line.setFocus()
+    line.selectAll()
+    qtbot.keyClicks(line, "2x\t")
+    value = designer.editing.opened.study.document["blocks"]["liquids"]["repetitions"]
+    assert row.wrong.sentence.text() == f"“2x” is not a whole number. The study keeps {value}; Esc restores it."
+    line.setFocus()
+    qtbot.keyClick(line, Qt.Key.Key_Escape)
+    assert (line.text(), row.wrong.isVisible()) == (str(value), False)

@@ -5,7 +5,7 @@ from typing import Final
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QBoxLayout, QGridLayout
 
-from study_app.gui.designer.form.row_fields import Field, add_button
+from study_app.gui.designer.form.row_fields import Field, add_button, kept
 from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.designer.form.tank_view import TankView
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine
@@ -90,11 +90,11 @@ class TargetsField(Field):
 
     def _take(self, number: int, axis: int, text: str) -> None:
         value = number_of(text)
-        self.refusal = "" if value is not None else f"“{text}” is not a number: the study keeps the last value."
+        point = self.row.facts.points[number] or (0.0, 0.0, 0.0)
+        self.refusal = "" if value is not None else f"“{text}” is not a number. {kept(point[axis])}"
         self.lines[number][axis].show_refused(value is None)
         self.came.emit()
         if value is not None:
-            point = self.row.facts.points[number] or (0.0, 0.0, 0.0)
             before = [int(at) if at.is_integer() else at for at in point]
             before[axis] = value
             self.asked.emit(SetValue((*self.row.row.path, number), before, typing=True))
