@@ -67,18 +67,18 @@ def test_the_number_of_participants_is_kept_for_each_study(qtbot: Any, designer:
     def shows(number: str, planned: str) -> None:
         qtbot.waitUntil(lambda: (control.field.text(), control.unit.text()) == (number, planned))
 
-    shows("20", "planned")
+    shows("24", "planned")
     simulate("8")
-    shows("8", "(20 planned)")
+    shows("8", "(24 planned)")
     file = designer.editing.opened.file
     designer.controller.open("kitchen")
     shows("12", "(none planned)")
     designer.controller.open(str(file))
-    shows("8", "(20 planned)")
+    shows("8", "(24 planned)")
     assert kept_participants(file) == 8
-    assert b"participants = 20" in designer.editing.opened.source()
-    simulate("20")
-    shows("20", "planned")
+    assert b"participants = 24" in designer.editing.opened.source()
+    simulate("24")
+    shows("24", "planned")
     assert kept_participants(file) is None  # from now on it follows the file
 
 
@@ -90,7 +90,7 @@ def test_a_new_study_has_no_number_of_participants_of_one_that_was_discarded(
     designer.controller.open("kitchen")
     discard(next(file for file in drafted_files() if file.stem == "thicker"))
     jnd(designer)
-    qtbot.waitUntil(lambda: designer.place.measures.controls.participants.field.text() == "20")
+    qtbot.waitUntil(lambda: designer.place.measures.controls.participants.field.text() == "24")
 
 
 def test_a_verdict_says_whether_the_participants_are_enough(qtbot: Any, designer: Any, worker: Worker) -> None:
@@ -98,7 +98,7 @@ def test_a_verdict_says_whether_the_participants_are_enough(qtbot: Any, designer
     people = designer.place.measures.numbers.parts[2]
     enough, few = ("ok", "check", "Enough"), ("warn", "warning", "Not enough")
     for participants, who, number, verdict, words in (
-        (20, "20 planned", "93", enough, "80 % are enough; with 107 trials: 98 %"),
+        (24, "24 planned", "93", enough, "80 % are enough; with 107 trials: 98 %"),
         (12, "12 simulated", "13", few, "Needed: about 22 participants for 80 %; with 107 trials: 22 %"),
         (8, "8 simulated", "13", few, "Needed: more than 60 participants for 80 %; with 107 trials: 22 %"),
     ):
