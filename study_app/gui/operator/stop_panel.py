@@ -46,9 +46,7 @@ class StopButton(Themed, QPushButton):
         centred = Qt.AlignmentFlag.AlignCenter
         painter.drawText(QRectF(0, middle, width, 38), centred, "STOP FORCE")
         painter.setFont(font("label", weight=600))
-        painter.drawText(
-            QRectF(8, middle + 42, width - 16, 22), centred, ("Hold Esc in any window, or press device button 4")
-        )
+        painter.drawText(QRectF(8, middle + 42, width - 16, 22), centred, "Hold Esc in any window, or device button 4")
 
 
 class StopPanel(Card):
