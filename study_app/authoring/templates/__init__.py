@@ -8,7 +8,7 @@ FOLDER: Final = Path(__file__).parent
 QUESTIONS: Final[dict[str, tuple[tuple[str, tuple[str, ...]], ...]]] = {
     "compare-liquids": (("Each liquid comes", ("blocks", "liquids", "repetitions")),),
     "viscosity-jnd": (
-        ("References", ("stimuli", "damping", "standards")),
+        ("Standards", ("stimuli", "damping", "standards")),
         ("Trials for each", ("methods", "adaptive", "trials")),
     ),
     "delay-detection": (

@@ -47,8 +47,8 @@ def test_a_study_begins_with_the_answers_and_nothing_is_on_disk(qtbot: Any, desi
     assert page.name.hasFocus() or page.name.isVisible()
     qtbot.keyClicks(page.card.questions.title, "Which liquid is thicker?")
     qtbot.keyClicks(page.name, "thicker")
-    references = own(page, "References")
-    references.setText("4, 8")
+    standards = own(page, "Standards")
+    standards.setText("4, 8")
     chosen, first_texts = page.card.questions.languages, page.card.questions.first_texts
     chosen["en"].click()
     assert not first_texts.isVisible()
@@ -57,7 +57,7 @@ def test_a_study_begins_with_the_answers_and_nothing_is_on_disk(qtbot: Any, desi
     assert first_texts.text() == "The texts begin in English: translate them."
     chosen["en"].click()
     assert not first_texts.isVisible()
-    qtbot.keyClick(references, Qt.Key.Key_Return)
+    qtbot.keyClick(standards, Qt.Key.Key_Return)
     document = designer.editing.opened.study.document
     assert document["study"]["name"] == "thicker"
     assert document["study"]["title"] == {"en": "Which liquid is thicker?"}
@@ -72,8 +72,8 @@ def test_a_study_begins_with_the_answers_and_nothing_is_on_disk(qtbot: Any, desi
 @pytest.mark.parametrize(
     ("field", "text", "words"),
     [
-        ("References", "thick", "“thick” is not a number."),
-        ("References", "0,5", "“0,5” may be one number or several: separate numbers by spaces or semicolons."),
+        ("Standards", "thick", "“thick” is not a number."),
+        ("Standards", "0,5", "“0,5” may be one number or several: separate numbers by spaces or semicolons."),
         ("Trials for each", "0", "at least"),
         ("Trials for each", "1 2", "is not"),
     ],
