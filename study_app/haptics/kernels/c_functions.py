@@ -1,8 +1,8 @@
-"""The C functions the servo calls: signatures, how to compile one, and how an address becomes records.
+"""The C functions that the servo calls: their signatures, their compilation, and access to records by address.
 
-A device and a clock are each a few C functions and the address of their own memory (``context``). The compiled loop
-gets addresses as plain numbers, so that one specialisation serves all of them. Simulated ones are ``numba.cfunc``; a
-driver in C offers its functions as anything that has an ``address``.
+A device and a clock each consist of a few C functions and the address of their memory (``context``). The compiled loop
+gets addresses as integers, so that one specialisation serves all of them. Simulated ones are ``numba.cfunc``; a driver
+in C offers its functions as objects with an ``address``.
 
 ==========  ======================================================================================================
 ``READ``    ``int32 (intp context, int64 now_ns, intp reading)``: fill the ``layout.READING`` record at the address
@@ -26,7 +26,7 @@ from numba import from_dtype, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from study_app.haptics.kernels.compiled import CACHE  # decided before the first is made
+from study_app.haptics.kernels.compiled import CACHE  # chosen before the first function is compiled
 from study_app.haptics.model.device_dynamics import Dynamics
 
 READ = types.int32(types.intp, types.int64, types.intp)
@@ -40,11 +40,11 @@ READ_LOST = -1
 
 
 class Driver(Protocol):
-    """What the servo needs of a device, and no more (``devices.base.Device`` is the whole).
+    """The part of a device that the servo uses (``devices.base.Device`` is the full interface).
 
-    ``name`` is the word that ``open_device`` takes, ``read`` and ``write`` are C functions (whatever has an
-    ``address``), ``context`` is the address of the device's own memory, handed to both, ``force_limit_n`` the
-    greatest force it may be asked for [N], and ``dynamics`` what it measured of itself when it was opened.
+    ``name`` is the word that ``open_device`` takes, ``read`` and ``write`` are C functions (objects with an
+    ``address``), ``context`` is the address of the device's memory, passed to both, ``force_limit_n`` the greatest
+    force that may be commanded [N], and ``dynamics`` the mass, friction and delay measured when the device was opened.
     """
 
     name: str
@@ -55,12 +55,12 @@ class Driver(Protocol):
 
     @property
     def dynamics(self) -> Dynamics:
-        """What it measured of itself when it was opened."""
+        """The dynamics that the device measured when it was opened."""
         ...
 
     @property
     def failure(self) -> str | None:
-        """Symptom, cause and cure of what ended the device itself, in a sentence; None: it knows of nothing."""
+        """Symptom, cause and remedy of a failure of the device, in a sentence; None: the device reports none."""
         return None
 
 
@@ -95,7 +95,7 @@ def call_at(signature: Any) -> Any:
 
 
 def record_at(dtype: np.dtype[Any]) -> Any:
-    """Return a function for compiled code: an address (intp) -> the record of ``dtype`` that lives there."""
+    """Return a function for compiled code: an address (intp) -> the record of ``dtype`` at it."""
     record: Any = from_dtype(dtype)
 
     def cast(_typing_context: Any, _address: Any) -> Any:
@@ -129,7 +129,7 @@ def _order_memory(_typing_context: Any) -> Any:
 
 
 fence: Any = intrinsic(_order_memory)
-"""For compiled code: other threads see what was written before it before what is written after it."""
+"""Release and acquire fence for compiled code: other threads see earlier writes before later ones."""
 
 
 def _order_all_memory(_typing_context: Any) -> Any:
@@ -141,4 +141,4 @@ def _order_all_memory(_typing_context: Any) -> Any:
 
 
 full_fence: Any = intrinsic(_order_all_memory)
-"""For compiled code: other threads see what was written before it before anything after it is read."""
+"""Full fence for compiled code: other threads see earlier writes before any later read is made."""

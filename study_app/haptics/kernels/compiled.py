@@ -1,9 +1,9 @@
-"""How this package compiles: one decorator, and one cache that no edit can leave stale.
+"""How this package compiles: one decorator, and one cache that is never stale after an edit.
 
-numba keys its on-disk cache on the file of the outermost function alone, so a change in a function it calls would go
-unseen. The cache therefore lives in a folder named after a digest of every source file that may hold kernels; those of
-other sources go when they are old. Within it a function is found by its place in the package, so that the package's
-folder may move. A program that ships with a filled cache (see docs/install.md) begins with a copy of it.
+numba keys its on-disk cache on the file of the outermost function alone, so it would miss a change in a function that
+it calls. The cache is therefore a folder named after a digest of every source file that may contain kernels; old
+folders of other sources are removed. Within the folder a function is found by its path relative to the package, so that
+the package may be moved. A program that ships with a filled cache (see docs/install.md) starts with a copy of it.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ _KERNEL_FOLDERS = ("haptics", "devices", "evaluation", "validation")
 SHIPPED_CACHE = _PACKAGE / "compiled"
 """Caches that came with the program; only the bundle has them."""
 
-KEPT_FOLDERS = 8  # of caches so many stay however old they are
-UNUSED_S = 86_400.0  # no program that runs since less than a day loses its cache
-SWEPT_AT_ONCE = 8  # what removing may take of a start
+KEPT_FOLDERS = 8  # caches kept at any age
+UNUSED_S = 86_400.0  # a program that started less than a day ago keeps its cache
+SWEPT_AT_ONCE = 8  # removals per start, which they delay
 _DIGEST = re.compile(r"[0-9a-f]{16}")
 _HALF_REMOVED = re.compile(r"\.[0-9a-f]{16}\.[0-9a-f]{8}\.gone")
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
-# numba's own name for it, which its stubs do not know; without it ticks are slower, and just as right.
+# numba's private name, which its stubs lack; without the option ticks are slower and equally correct.
 _NO_MEMORY: dict[str, Any] = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -55,7 +55,7 @@ def _digest_of_sources() -> str:
 
 
 def _use_own_cache() -> Path | None:
-    """Use the first folder that can be written, and say which if it is not the first; without one, none."""
+    """Use the first writable folder, and log it if it is not the first choice; return None without one."""
     wanted = [
         *map(Path, filter(None, [os.environ.get("NUMBA_CACHE_DIR")])),
         user_cache_path("liquid-study", appauthor=False, opinion=False),
@@ -71,17 +71,17 @@ def _use_own_cache() -> Path | None:
             return place / digest
     places = " and ".join(map(str, wanted))
     log.warning(
-        "%s cannot be written: every start compiles again, for up to a minute; name a folder in NUMBA_CACHE_DIR", places
+        "%s cannot be written: every start compiles again, for up to a minute; set NUMBA_CACHE_DIR to a folder", places
     )
     return None
 
 
 def copy_shipped(own: Path) -> None:
-    """Begin an own cache that is not there yet with the one of the same sources that came with the program, if any."""
+    """Copy the shipped cache of the same sources, if there is one, to ``own`` unless that exists."""
     shipped = SHIPPED_CACHE / own.name
     if own.exists() or not shipped.is_dir():
         return
-    making = own.with_name(f".{own.name}.{secrets.token_hex(4)}.gone")  # swept should the program be killed here
+    making = own.with_name(f".{own.name}.{secrets.token_hex(4)}.gone")  # swept later if the program is killed here
     with contextlib.suppress(OSError):
         try:
             shutil.copytree(shipped, making, copy_function=shutil.copyfile)
@@ -91,7 +91,7 @@ def copy_shipped(own: Path) -> None:
 
 
 def _writable(folder: Path) -> bool:
-    """Make a folder and say that it is used now; return whether it can be written."""
+    """Create a folder and set its modification time to now; return whether it is writable."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         os.utime(folder)
@@ -103,9 +103,9 @@ def _writable(folder: Path) -> bool:
 def sweep_caches(own: Path) -> None:
     """Remove the caches next to ``own`` that no program used for a day, except the newest.
 
-    A cache says by its time of change when a program last began with it. It is renamed before it is removed, so that of
-    two programs that sweep at once each removes what it renamed. A program that begins with it meanwhile gets it back,
-    and numba makes anew what is missing. What cannot be removed stays.
+    The modification time of a cache is the last start of a program that uses it. A cache is renamed before it is
+    removed, so that two programs that sweep at the same time remove different ones. If a program starts with the cache
+    meanwhile, the cache is renamed back, and numba compiles what is missing. What cannot be removed stays.
     """
     with contextlib.suppress(OSError):
         others = [path for path in own.parent.iterdir() if path != own and path.is_dir()]
@@ -118,7 +118,7 @@ def sweep_caches(own: Path) -> None:
 
 
 def remove_cache(path: Path, used_at: float) -> None:
-    """Remove a cache, unless a program has begun with it since ``used_at`` [s since 1970]."""
+    """Remove a cache, unless a program has started with it since ``used_at`` [s since 1970]."""
     gone = path.with_name(f".{path.name}.{secrets.token_hex(4)}.gone")
     with contextlib.suppress(OSError):
         path.rename(gone)
@@ -129,12 +129,12 @@ def remove_cache(path: Path, used_at: float) -> None:
 
 
 CACHE: Path | None = _use_own_cache()
-"""Where what is compiled is kept; None where nothing can be."""
+"""The folder of compiled code; None if no folder is writable."""
 _OPTIONS["cache"] = CACHE is not None
 
 
 class PackageCacheLocator(UserProvidedCacheLocator):
-    """Finds compiled functions of this package by the sources' digest and their place in the package.
+    """Finds compiled functions of this package by the sources' digest and their path in the package.
 
     numba would look under the absolute path of their file, and in a frozen program under the bytes of its executable.
     """
@@ -157,7 +157,7 @@ class PackageCacheLocator(UserProvidedCacheLocator):
         return cast("PackageCacheLocator | None", found)
 
 
-if CACHE is not None:  # numba of before 0.61.1 ignores it, and compiles again where the package's folder has moved
+if CACHE is not None:  # numba before 0.61.1 ignores it, and compiles again after the package is moved
     _LOCATORS = (f"{__name__}.{PackageCacheLocator.__name__}", "UserProvidedCacheLocator", "IPythonCacheLocator")
     vars(numba.config)["CACHE_LOCATOR_CLASSES"] = ",".join(_LOCATORS)
 
@@ -165,28 +165,28 @@ if CACHE is not None:  # numba of before 0.61.1 ignores it, and compiles again w
 def kernel(function: F) -> F:
     """Compile ``function`` for the servo: no interpreter lock, IEEE arithmetic, division by zero gives infinity.
 
-    numba's memory management is off: code that would allocate does not compile, and arrays that are handed on are not
-    counted, which took two thirds of a tick. They live as long as whoever called from Python holds them.
+    numba's memory management is off: code that would allocate does not compile, and arrays passed on are not
+    reference-counted, which took two thirds of a tick. The Python caller keeps the arrays alive.
     """
     return cast(F, numba.njit(**_OPTIONS, **_NO_MEMORY)(function))
 
 
 def part(function: F) -> F:
-    """Compile ``function`` into each kernel that calls it: for the steps of a tick, which hand on whole models."""
+    """Compile ``function`` inline into each kernel that calls it: for the steps of a tick, which pass whole models."""
     return cast(F, numba.njit(**_OPTIONS, **_NO_MEMORY, forceinline=True)(function))
 
 
 def workings(function: F) -> F:
-    """Compile ``function`` for evaluation, not for the servo: like `kernel`, but it may make arrays."""
+    """Compile ``function`` for evaluation, not for the servo: like `kernel`, but it may allocate arrays."""
     return cast(F, numba.njit(**_OPTIONS)(function))
 
 
 def entry_of(function: F, *arguments: Any) -> F:
-    """Return what runs a compiled function for arguments of these types, whose types no call looks up again.
+    """Return the specialisation of a compiled function for these types, which calls do not look up again.
 
-    The lookup takes 30 µs where arguments are records, as long as ten ticks. To call it with other types is undefined.
+    The lookup takes 30 µs for records, as long as ten ticks. Calls with other types are undefined.
     """
     dispatcher: Any = function
-    if not hasattr(dispatcher, "overloads"):  # it is not compiled: NUMBA_DISABLE_JIT
+    if not hasattr(dispatcher, "overloads"):  # not compiled: NUMBA_DISABLE_JIT
         return function
     return cast(F, dispatcher.compile(tuple(map(dispatcher.typeof_pyval, arguments))))

@@ -1,12 +1,12 @@
-"""The force link: the force of the effects is sent late, unevenly, or not at all, as a study asks.
+"""The force link: it delays, jitters or drops the force of the effects, as a study specifies.
 
-It stands between the slope limits and the rest of the safety layer, which acts on the force that is really sent: the
-passivity observer enters the work of the delayed force, and a stop needs no buffer. Jitter and loss are a hash of the
-link's seed and the tick, so that a recording is recomputed exactly.
+It lies between the slope limits and the rest of the safety layer, which acts on the force actually sent: the passivity
+observer uses the work of the delayed force, and a stop is not delayed. Jitter and loss are a hash of the link's seed
+and the tick, so that a recording is recomputed exactly.
 
-Buoyancy and weight, which the passivity observer leaves out because they only lend energy, are those of the present
-tick: they return what they were lent only where they belong to the place of the hand. What a delayed buoyancy differs
-from that counts like any other force.
+The passivity observer excludes buoyancy and weight because they are conservative; it uses those of the present tick,
+since they are conservative only at the present place of the hand. The difference of a delayed buoyancy from the present
+one counts like any other force.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ _PER_STEP = 2.0**-32
 
 @kernel
 def delay_force(link: Record, state: Record, forces_n: Any, force_n: Any) -> bool:
-    """Put the force that arrives in this tick in the place of ``force_n`` (3,) [N]; return whether one has arrived yet.
+    """Replace ``force_n`` (3,) [N] by the force that arrives in this tick; return whether one has arrived so far.
 
-    The force of tick n is due at n + delay + jitter; one that is older than the force sent before is passed over. Where
-    a force is lost, the last one is held. Until the first one arrives there is none. ``forces_n`` (n, 3) keeps the
-    newest forces.
+    The force of tick n is due at n + delay + jitter; a force older than the last one sent is skipped. If a force is
+    lost, the last one is held. Before the first one arrives the force is 0. ``forces_n`` (n, 3) stores the newest
+    forces.
     """
     tick = state.ticks
     copy(force_n, forces_n[tick % forces_n.shape[0]])
@@ -45,7 +45,7 @@ def delay_force(link: Record, state: Record, forces_n: Any, force_n: Any) -> boo
 
 @part
 def uniform(seed: int, number: int) -> float:
-    """Return a number in [0, 1) that a seed and a number determine; both count modulo 2³²."""
+    """Return a number in [0, 1) determined by a seed and a number; both are taken modulo 2³²."""
     return _mixed(_mixed(number & _MASK) ^ (seed & _MASK)) * _PER_STEP
 
 

@@ -1,14 +1,15 @@
 """The incremental passivity observer: whether the fast part of a force drives the fast part of the hand's motion.
 
-A loop may swing on top of a slow motion and never owe energy: the motion pays more than the swing takes. So what is
-fast is balanced by itself. Force and velocity pass the same two high-pass filters of 20 Hz, above what a hand does and
-below what a loop swings at, and from one sample to the next the hand does the work -f·v Δt in what is left of them::
+A loop may oscillate during a slow motion without an energy debt: the slow motion supplies more energy than the
+oscillation takes. So the fast part has a balance of its own. Force and velocity pass the same two high-pass filters of
+20 Hz, above the frequencies of a hand and below those of an oscillating loop. The filtered signals give the work -f·v
+Δt of the hand from one sample to the next::
 
     B ← min(B - f·v Δt, 0)
 
-The force is that of a tick more than the loop is believed to be late, as in the last balance of `energy`: a loop that
-is mistaken about its delay by one tick is observed as it is. A wake that breaks and a hand that turns back take some
-mJ, once: B may fall to -2 mJ, and 5 mW of it are forgiven. Beyond that `energy.weaken` lowers the gain.
+The force is taken one tick later than the assumed loop delay, as in the last balance of `passivity`: the observer stays
+correct if the delay is one tick longer than assumed. A breaking wake and a reversal of the hand take some mJ, once: B
+may fall to -2 mJ, and recovers at 5 mW. Beyond that `passivity.reduce_gain` lowers the gain.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ FORGIVEN_W = 5e-3
 
 @part
 def begin_incremental(fast: Record) -> None:
-    """Begin at 0, at rest and without force."""
+    """Reset the balance to 0, at rest and without force."""
     for axis in range(3):
         fast.force_n[axis] = fast.force_once_n[axis] = fast.force_twice_n[axis] = 0.0
     clear(fast.velocity_mps)
@@ -37,7 +38,7 @@ def begin_incremental(fast: Record) -> None:
 
 @part
 def observe_incremental(fast: Record, axis: int, force_n: float, velocity_mps: float, interval_s: float) -> None:
-    """Enter the work along one axis: the mean force and velocity since the last sample."""
+    """Add the work along one axis, from the mean force and velocity since the last sample."""
     x = CORNER_RADPS * interval_s
     kept = 1.0 / (1.0 + x * (1.0 + 0.5 * x))
     once_n = kept * (fast.force_once_n[axis] + force_n - fast.force_n[axis])
@@ -55,5 +56,5 @@ def observe_incremental(fast: Record, axis: int, force_n: float, velocity_mps: f
 
 @part
 def close_incremental(fast: Record, interval_s: float) -> None:
-    """Forgive a part of the debt; more than nothing is never kept."""
+    """Forgive a part of the debt; the balance is at most 0."""
     fast.balance_j = min(fast.balance_j + FORGIVEN_W * interval_s, 0.0)

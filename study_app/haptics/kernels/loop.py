@@ -1,7 +1,7 @@
-"""The servo's loop, compiled: read the device, take a tick, write the force, publish the sample, sleep.
+"""The servo's compiled loop: read the device, compute a tick, write the force, publish the sample, sleep.
 
-It meets Python only where it begins and ends. It never allocates, logs, locks or raises; what the host wants it finds
-in a control record, what it did it leaves in the telemetry ring. Whatever ends it, it ends with zero force.
+Python runs only before and after it. It never allocates, logs, locks or raises; it reads the host's requests from a
+control record and writes its samples into the telemetry ring. It always ends with zero force.
 """
 
 from __future__ import annotations
@@ -30,36 +30,36 @@ from study_app.haptics.model.layout import (
 _read, _write, _now, _sleep = call_at(READ), call_at(WRITE), call_at(NOW), call_at(SLEEP)
 
 SLOWER_SAMPLES = 3
-"""A longer delay is taken over after so many samples in a row that show it."""
+"""Consecutive samples with a longer delay before the loop adopts it."""
 FASTER_SAMPLES = 1000
-"""A shorter one likewise: what was slow once may be so again."""
+"""Consecutive samples with a shorter delay before the loop adopts it, since delays recur."""
 
 CONTROL = np.dtype(
     [
         # written by the host
         ("run", np.int64),  # 1 while the loop may go on
-        ("stop", np.int64),  # 1 for no force; the loop sets it too, when the device's stop button is down
+        ("stop", np.int64),  # 1 for no force; the loop also sets it when the device's stop button is down
         ("request", np.int64),  # counts the scenes handed over; the newest is in slot request % 2
-        ("numbers", np.int64),  # counts the times that the scene in force was given the numbers of the spare slot
-        ("serial", np.int64, (2,)),  # what telemetry calls the scene of each slot; 0 is rest
+        ("numbers", np.int64),  # counts the updates of the active scene with the constants of the spare slot
+        ("serial", np.int64, (2,)),  # telemetry's number of the scene in each slot; 0 is rest
         ("period_ns", np.int64),
         # written by the loop
-        ("taken", np.int64),  # the request in force
+        ("taken", np.int64),  # the request that is active
         ("numbers_taken", np.int64),  # likewise
         ("deadline_ns", np.int64),  # when the next tick is due
-        ("ticks", np.int64),  # how many were taken
+        ("ticks", np.int64),  # ticks completed
         ("overruns", np.int64),  # deadlines passed over because a tick did not fit
         ("began_ns", np.int64),  # when the last tick began
-        ("hung", np.int64),  # 1 where the last tick took 50 ms or more
-        ("worst_gap_ns", np.int64),  # the longest time between two ticks since the scene in force was handed over
-        ("status", np.int64),  # STATUS_* of the last tick; any but STATUS_OK ended the loop
+        ("hung", np.int64),  # 1 if the last tick took 50 ms or more
+        ("worst_gap_ns", np.int64),  # the longest time between two ticks since the active scene was requested
+        ("status", np.int64),  # STATUS_* of the last tick; any other than STATUS_OK ends the loop
     ],
     align=True,
 )
 
 
 class DeviceCalls(NamedTuple):
-    """A device as the loop sees it: addresses."""
+    """Addresses of a device's memory and functions."""
 
     context: int
     read: int
@@ -67,7 +67,7 @@ class DeviceCalls(NamedTuple):
 
 
 class ClockCalls(NamedTuple):
-    """A clock as the loop sees it: addresses."""
+    """Addresses of a clock's memory and functions."""
 
     context: int
     now: int
@@ -75,7 +75,7 @@ class ClockCalls(NamedTuple):
 
 
 class Records(NamedTuple):
-    """What loop and device exchange: (1,) arrays of ``layout.READING`` and ``layout.COMMAND``."""
+    """Records that loop and device exchange: (1,) arrays of ``layout.READING`` and ``layout.COMMAND``."""
 
     reading: Any
     command: Any
@@ -90,14 +90,14 @@ class Output(NamedTuple):
 
 @kernel
 def run(control: Any, slots: Any, safety: Any, exchanged: Any, output: Any, device: Any, clock: Any, ticks: int) -> int:
-    """Run until the host or a fault ends it, or ``ticks`` are done (below 0: without end); return how many were taken.
+    """Run until the host or a fault ends it, or ``ticks`` are done (below 0: without end); return their number.
 
     Parameters
     ----------
     control : (1,) array
         One row of ``CONTROL``.
     slots : tuple of Model
-        The two models a scene may be in.
+        The models of the two slots of scenes.
     safety : (1,) array
         One row of ``layout.SAFETY``.
     exchanged : Records
@@ -109,13 +109,13 @@ def run(control: Any, slots: Any, safety: Any, exchanged: Any, output: Any, devi
     clock : ClockCalls
         The function that sleeps, with its context.
     ticks : int
-        How many ticks; below 0 without end.
+        Number of ticks; below 0: unlimited.
 
     Notes
     -----
-    A tick that takes 50 ms or more, in the device or because its thread did not run, sends zero force after its own,
-    and the next one sends zero: then the force fades in as at a start.
-    After ``ticks`` it only pauses, and the device goes on holding the last force; all other ways out write zero.
+    A tick that takes 50 ms or more, in the device or because its thread did not run, sends zero force after its own
+    force, and the next tick sends zero, too: then the force fades in as at a start. After ``ticks`` the loop only
+    pauses, and the device holds the last force; every other exit writes zero.
     """
     first, second = slots
     ring, written = output.ring, output.written
@@ -129,14 +129,14 @@ def run(control: Any, slots: Any, safety: Any, exchanged: Any, output: Any, devi
         sample.tick = host.ticks
         sample.time_ns = began_ns
         sample.lateness_ns = began_ns - host.deadline_ns
-        _sense(sample, safety[0], exchanged.reading, device)
+        _read_device(sample, safety[0], exchanged.reading, device)
         if sample.buttons & BUTTON_STOP:
             host.stop = 1
         _take_scene(host, slots, safety[0], sample)
         host.worst_gap_ns = max(host.worst_gap_ns, began_ns - host.began_ns)
         host.began_ns = began_ns
         if sample.status == STATUS_OK:
-            safety[0].stop = 1 if host.hung != 0 else host.stop  # the sample says so: a replay repeats it
+            safety[0].stop = 1 if host.hung != 0 else host.stop  # recorded in the sample, so that a replay repeats it
             if host.taken % 2 == 0:
                 tick(first, safety[0], sample)
             else:
@@ -151,13 +151,13 @@ def run(control: Any, slots: Any, safety: Any, exchanged: Any, output: Any, devi
         host.ticks += 1
         done += 1
         _set_deadline(host, ended_ns)
-    let_go(exchanged.command, device)
+    send_zero_force(exchanged.command, device)
     return done
 
 
 @kernel
-def _sense(sample: Any, safety: Any, reading: Any, device: Any) -> None:
-    """Read the device into ``sample``; a lost one leaves its status, no velocity and no force."""
+def _read_device(sample: Any, safety: Any, reading: Any, device: Any) -> None:
+    """Read the device into ``sample``; if it is lost, set the status, zero velocity and zero force."""
     reading[0].delay_ticks = -1
     reading[0].measured = 0
     answer = _read(device.read, device.context, sample.time_ns, np.intp(reading.ctypes.data))
@@ -180,7 +180,7 @@ def _sense(sample: Any, safety: Any, reading: Any, device: Any) -> None:
 
 @kernel
 def take_measurements(sample: Any, reading: Any) -> None:
-    """Take what the device measured besides position and buttons; what it did not measure is 0."""
+    """Copy the device's measurements other than position and buttons; set those it lacks to 0."""
     measured = reading.measured
     sample.measured = measured
     for axis in range(3):
@@ -193,9 +193,9 @@ def take_measurements(sample: Any, reading: Any) -> None:
 
 @kernel
 def follow_delay(safety: Any, sample: Any, measured: int) -> None:
-    """Take over a delay that the device measures while it runs: a longer one soon, a shorter one by and by.
+    """Adopt a delay that the device measures while it runs: a longer one soon, a shorter one gradually.
 
-    A sample that is later than any loop is stable with does not count as new.
+    A sample later than any delay with which the loop is stable does not count as new.
     """
     if measured < 0 or sample.fresh == 0:
         return
@@ -213,14 +213,14 @@ def follow_delay(safety: Any, sample: Any, measured: int) -> None:
 
 @kernel
 def _send(sample: Any, safety: Any, command: Any, device: Any, clock: Any, began_ns: int) -> int:
-    """Command the device to send the force, zero after a tick that hung; log what it sent instead, if it did."""
+    """Command the force, then zero if the tick hung; log the force that the device sent instead, if any."""
     row = command[0]
     for axis in range(3):
         row.force_n[axis] = row.sent_n[axis] = sample.device_force_n[axis]
     answer = _write(device.write, device.context, np.intp(command.ctypes.data))
     sample.busy_ns = _now(clock.now, clock.context) - began_ns
     if sample.busy_ns >= FAULT_NS:
-        let_go(command, device)
+        send_zero_force(command, device)
     for axis in range(3):
         if row.sent_n[axis] != sample.device_force_n[axis]:
             log_delivery(safety, sample, row.sent_n)
@@ -230,10 +230,10 @@ def _send(sample: Any, safety: Any, command: Any, device: Any, clock: Any, began
 
 @kernel
 def _take_scene(host: Any, slots: Any, safety: Any, sample: Any) -> None:
-    """Take the scene that was handed over last, if it is another one; or its numbers, with which it goes on."""
+    """Switch to a newly requested scene, and copy newly requested constants into the active one."""
     request, numbers = host.request, host.numbers
     if request != host.taken:
-        host.worst_gap_ns = 0  # before the host sees that the scene was taken
+        host.worst_gap_ns = 0  # before the host sees the new ``taken``
         fence()
         host.taken = request
         begin_scene(safety)
@@ -241,16 +241,16 @@ def _take_scene(host: Any, slots: Any, safety: Any, sample: Any) -> None:
         fence()
         first, second = slots
         if host.taken % 2 == 0:
-            _take_numbers(host, first, second, 0)
+            _copy_constants(host, first, second, 0)
         else:
-            _take_numbers(host, second, first, 1)
+            _copy_constants(host, second, first, 1)
         host.numbers_taken = numbers
     sample.scene = host.serial[host.taken % 2]
 
 
 @kernel
-def _take_numbers(host: Any, model: Any, spare: Any, slot: int) -> None:
-    """Give a model the constants of the spare one, and its serial; what moves in it stays."""
+def _copy_constants(host: Any, model: Any, spare: Any, slot: int) -> None:
+    """Copy the constants and the serial of the spare model into a model; its state stays."""
     model.parameters[0] = spare.parameters[0]
     for i in range(model.liquids.shape[0]):
         model.liquids[i] = spare.liquids[i]
@@ -259,7 +259,7 @@ def _take_numbers(host: Any, model: Any, spare: Any, slot: int) -> None:
 
 @kernel
 def _set_deadline(host: Any, ended_ns: int) -> None:
-    """Set the next deadline and pass over those that are gone: a gap is never made up for by a burst of ticks."""
+    """Set the next deadline and skip those that have passed: a gap is never followed by a burst of ticks."""
     host.deadline_ns += host.period_ns
     if ended_ns > host.deadline_ns:
         missed = (ended_ns - host.deadline_ns) // host.period_ns
@@ -269,7 +269,7 @@ def _set_deadline(host: Any, ended_ns: int) -> None:
 
 @kernel
 def offer_scene(control: Any, slot: int, serial: int) -> None:
-    """Make the scene in ``slot``, already packed, the one that the next tick takes; numbers not taken yet are void."""
+    """Request the scene in ``slot``, already packed, for the next tick; discard constants not yet taken."""
     control[0].numbers = control[0].numbers_taken
     control[0].serial[slot] = serial
     fence()
@@ -278,14 +278,14 @@ def offer_scene(control: Any, slot: int, serial: int) -> None:
 
 @kernel
 def offer_numbers(control: Any, slot: int, serial: int) -> None:
-    """Give the scene in force the numbers of that in ``slot``, the spare one, from the next tick on."""
+    """Request the constants in ``slot``, the spare one, for the active scene from the next tick on."""
     control[0].serial[slot] = serial
     fence()
     control[0].numbers += 1
 
 
 @kernel
-def let_go(command: Any, device: Any) -> None:
+def send_zero_force(command: Any, device: Any) -> None:
     """Command zero force."""
     for axis in range(3):
         command[0].force_n[axis] = command[0].sent_n[axis] = 0.0

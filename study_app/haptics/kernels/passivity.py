@@ -1,39 +1,39 @@
-"""The passivity controller: a liquid gives back to the hand no more than the hand put into it.
+"""The passivity controller: a liquid returns no more energy to the hand than the hand supplied.
 
 Passivity observer and controller (Hannaford & Ryu 2002) in their exact form for a held force: from one sample to the
-next the hand does the work -f·Δp on the liquid, whatever happened in between. Here f is the force really sent, without
-buoyancy and weight, which only lend energy, and Δp the step of the hand in the frame of the current.
+next the hand does the work -f·Δp on the liquid on any path. Here f is the force actually sent, without buoyancy and
+weight, which are conservative, and Δp the step of the hand in the frame of the current.
 
-The energy E begins at 0 with a scene and holds at most what the liquid can return::
+The energy E is 0 at the start of a scene and is limited to what the liquid can return::
 
     E ← min(E - f·Δp, reserve),    reserve = (4/27) c |v_wake|³ N T / scale + m |v - v_current|² / (2 scale) + K τ P
 
 The first terms are what the effects can return, summed by them (``state.returnable_j``): a wake of speed u gives a
 body of speed v the power c (u - v)² v, at most that at v = u/3, and it lasts for N ticks of T; m is the mass of
-inertial effects, as far as it is sent (`pack`). τ is the lag of the velocity estimator and P = max(-f·v̂, 0) the
-power that it takes: a filtered damper stores up to K τ P (`stored_energy`). Without these the lag of each quick
+inertial effects in the share that is sent (`pack`). τ is the lag of the velocity estimator and P = max(-f·v̂, 0) the
+power that it absorbs: a filtered damper stores up to K τ P (`stored_energy`). Without these the lag of each quick
 reversal would count as a debt.
 
-A loop that is late and a force held for too long show as E < 0. E is kept three times: for a force that acts at once,
-for one that acts as late as the loop is believed to be, a tick at least, and for one that acts a tick later still; the
-lowest counts. A force that is under way belongs to an earlier velocity: a late balance may hold what was stored then.
-The liquid may owe 1 mJ; with D = -1 mJ - E, its debt beyond that:
+A delayed loop and a force held for too long cause E < 0. Three balances of E are kept: for a force that acts at once,
+for one that acts after the assumed loop delay, at least one tick, and for one that acts another tick later; the lowest
+counts. A delayed force belongs to an earlier velocity: a delayed balance may include the energy stored then. A debt of
+1 mJ is allowed; with D = -1 mJ - E, the debt beyond that:
 
-- `reduce_gain`: a debt of 0.125 mJ halves the force, one of 0.375 mJ halves it again, and it comes back at 50 % a
+- `reduce_gain`: a debt of 0.125 mJ halves the force, one of 0.375 mJ halves it again, and the gain recovers at 50 % per
   second: the gain of an oscillating loop falls until it no longer oscillates. A debt of the fast part of force and
-  motion alone counts likewise (`incremental_passivity`);
-- `apply_controller`: what pushes the hand along its way may not spend in 20 ms more than is left; in debt it is let go,
-  and damping added until the next step would pay the debt, up to half the maximum stable damping, weakened likewise.
-  The way is taken from the last 2 ms; what is slower than 40 mm/s may be a count of the encoder, and is no way yet;
-- the whole force is kept within F - D / R, F and R being the strongest force and the longest step so far. So E ≥ -1 mJ
-  - F R on any path of the hand: even the worst next step leaves D at F R.
+  motion counts likewise (`incremental_passivity`);
+- `apply_controller`: the force along the motion may spend in 20 ms no more than the energy left; in debt it is removed,
+  and damping is added so that the next step would repay the debt, up to half the maximum stable damping times the gain.
+  The direction of motion is that of the last 2 ms; below 40 mm/s it may be encoder noise and is not used;
+- the whole force is limited to F - D / R, F and R being the greatest force and the longest step so far. So on any path
+  of the hand E ≥ -1 mJ - F R: even the worst next step leaves D at F R.
 
-Letting go and damping come at once, past the slew limit. A debt is forgiven at 1 mW, less than a hand's own damping
-takes at 15 mm/s: without any force none could be paid.
+Removal of force and damping bypass the slew limit. A debt is forgiven at 1 mW, less than a hand's own damping absorbs
+at 15 mm/s: without any force no debt could be repaid.
 
-Where a force link acts, no debt is forgiven, the gain does not come back before the next scene, and it falls further
-as long as there is a debt: a late force lets a handle go on swinging at the power that is forgiven, or at the gain at
-which it neither gives nor takes energy.
+With a force link, no debt is forgiven, the gain does not recover before the next scene, and it falls further as long as
+there is a debt: with a delayed force a handle would continue to oscillate at the forgiven power, or at the gain at
+which it neither supplies nor absorbs energy.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ DELIVERY_STEPS_PER_N = 2.0**14
 
 @kernel
 def reset_observer(passivity: Record) -> None:
-    """Begin at 0, with nothing sent: what came before was another liquid's."""
+    """Reset to 0, with no force sent: earlier forces belong to another liquid."""
     passivity.balance_j = 0.0
     passivity.late_balance_j = 0.0
     passivity.later_balance_j = 0.0
@@ -91,9 +91,9 @@ def reset_observer(passivity: Record) -> None:
 
 @part
 def update_observer(model: Any, safety: Record, interval_s: float) -> None:
-    """Enter the work of the last step into the balances; ``interval_s`` is 0 where there is no new sample.
+    """Add the work of the last step to the balances; ``interval_s`` is 0 without a new sample.
 
-    Where several forces were sent between two samples, their mean over time counts.
+    Several forces sent between two samples count by their mean over time.
     """
     parameters, state, passivity = model.parameters[0], model.state[0], safety.passivity
     delay_ticks = max(safety.delay_ticks, 1)
@@ -155,14 +155,14 @@ def update_observer(model: Any, safety: Record, interval_s: float) -> None:
 
 @part
 def _row_before(passivity: Record, ticks: int) -> int:
-    """Return the row of the force that was sent so many ticks before the last one."""
+    """Return the row of the force that was sent ``ticks`` before the last one."""
     row: int = passivity.row - ticks
     return row if row >= 0 else row + MOST_DELAY + 2
 
 
 @part
 def _left_j(passivity: Record) -> float:
-    """Return how far the lowest balance is above what may be owed [J]; below 0 it is a debt."""
+    """Return the distance of the lowest balance from the allowed debt [J]; below 0 it is a debt."""
     return float(ALLOWANCE_J + min(passivity.balance_j, passivity.late_balance_j, passivity.later_balance_j))
 
 
@@ -173,7 +173,7 @@ def _forgive(balance_j: float, forgiven_j: float) -> float:
 
 @part
 def reduce_gain(parameters: Record, passivity: Record, sample: Record) -> None:
-    """Send a share of the force, halved by every halving debt, and all of it again only seconds after the last."""
+    """Multiply the force by a gain, which a debt reduces at once and which recovers within seconds."""
     left_j = min(_left_j(passivity), INCREMENTAL_ALLOWANCE_J + passivity.fast.balance_j)
     if parameters.link.acts == 0:
         passivity.gain = min(passivity.gain * (1.0 + RECOVERY_PER_S * parameters.period_s), 1.0)
@@ -190,22 +190,22 @@ def reduce_gain(parameters: Record, passivity: Record, sample: Record) -> None:
 
 @part
 def apply_controller(parameters: Record, safety: Record, sample: Record) -> None:
-    """Change the force about to be sent so that a debt is paid back, and cannot grow beyond one step's work."""
+    """Change the force to be sent so that a debt is repaid, and cannot grow by more than one step's work."""
     passivity = safety.passivity
     left_j = _left_j(passivity)
-    given = _give_way(parameters, safety, left_j, sample.device_force_n)
-    kept = left_j < 0.0 and _keep_within(
+    given = _limit_power(parameters, safety, left_j, sample.device_force_n)
+    kept = left_j < 0.0 and _limit_norm(
         max(passivity.strongest_n + left_j / passivity.longest_m, 0.0), passivity, sample.device_force_n
     )
     changed = given or kept
-    if changed or passivity.settling:  # the tick after, too: the force comes back
+    if changed or passivity.settling:  # also the tick after, in which the force returns
         sample.limiters |= LIMITER_ENERGY
     passivity.settling = changed
 
 
 @part
-def _keep_within(most_n: float, passivity: Record, force_n: Any) -> bool:
-    """Shorten the force, buoyancy aside, to ``most_n``; return whether it was longer."""
+def _limit_norm(most_n: float, passivity: Record, force_n: Any) -> bool:
+    """Shorten the force, without buoyancy, to ``most_n``; return whether it was longer."""
     lift_n = passivity.lift_n
     size_n = distance(force_n, lift_n)
     if size_n <= most_n:
@@ -216,8 +216,8 @@ def _keep_within(most_n: float, passivity: Record, force_n: Any) -> bool:
 
 
 @part
-def _give_way(parameters: Record, safety: Record, left_j: float, force_n: Any) -> bool:
-    """Let go of what pushes the hand along its way faster than what is left may be spent; in debt, add damping.
+def _limit_power(parameters: Record, safety: Record, left_j: float, force_n: Any) -> bool:
+    """Reduce the force along the motion to the power that the energy left allows; in debt, add damping.
 
     Return whether the force was changed.
     """
@@ -249,7 +249,7 @@ def _give_way(parameters: Record, safety: Record, left_j: float, force_n: Any) -
 
 @part
 def log_command(passivity: Record, force_n: Any) -> None:
-    """Log the force that the device is asked for, as the one that it sends."""
+    """Log the commanded force as the one that the device sends."""
     stored_j = passivity.stored_j[passivity.row]
     passivity.row = passivity.row + 1 if passivity.row <= MOST_DELAY else 0
     passivity.stored_j[passivity.row] = stored_j  # until the next sample
@@ -258,10 +258,10 @@ def log_command(passivity: Record, force_n: Any) -> None:
 
 @kernel
 def log_delivery(safety: Record, sample: Record, sent_n: Any) -> None:
-    """Log what the device sent in place of the last command: ``sent_n`` (3,) [N on the hand].
+    """Log the force that the device sent instead of the last command: ``sent_n`` (3,) [N on the hand].
 
-    Both are rounded to what a recording keeps, so that the tick can be recomputed from the recording. Where they are
-    the same then, or the device reports a force that is not finite, the command counts.
+    Both are rounded to the resolution of a recording, so that the tick can be recomputed from it. If they are equal
+    then, or the device reports a force that is not finite, the command counts.
     """
     if not is_finite(sent_n):
         return
@@ -279,7 +279,7 @@ def log_delivery(safety: Record, sample: Record, sent_n: Any) -> None:
 
 @part
 def _log(passivity: Record, force_n: Any) -> None:
-    """Keep the force of this tick, buoyancy aside."""
+    """Store the force of this tick, without buoyancy."""
     sent_n = passivity.sent_n[passivity.row]
     for axis in range(3):
         sent_n[axis] = force_n[axis] - passivity.lift_n[axis]
@@ -290,7 +290,7 @@ def _log(passivity: Record, force_n: Any) -> None:
 
 @part
 def log_acted(passivity: Record, force_n: Any) -> None:
-    """Log what moved the hand in this tick, where it was not the force that the observer counted."""
+    """Log the force that acted on the hand in this tick, if the observer counted another one."""
     acted_n = passivity.acted_n[passivity.row]
     for axis in range(3):
         acted_n[axis] = force_n[axis] - passivity.lift_n[axis]

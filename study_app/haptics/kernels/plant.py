@@ -1,18 +1,18 @@
-"""The one handle model: a mass with friction, end stops, an encoder and slow, coarse motors, drawn along by a hand.
+"""The handle model: a mass with friction, end stops, encoder and delayed, quantised motors, moved by a hand.
 
 ::
 
     (m + m_hand) dv/dt = F + K (r - x) + B (dr/dt - v) - b v - f_c v/|v|
 
-F is the force of the servo, held between its writes, after the device's own delay, limit and steps (`push`); r is
-where the hand wants the handle, K and B how stiffly and how well damped it insists, m_hand what of it moves along; b
-and f_c are the device's viscous and Coulomb friction. A handle let go knows no hand. Mouse, scripted hand, the cases of
-``validation.stability`` and every emulated device are this model with other numbers.
+F is the force of the servo, held between its writes, after the device's own delay, limit and steps (`push`); r is the
+hand's target position, K and B its stiffness and damping, m_hand its moving mass; b and f_c are the device's viscous
+and Coulomb friction. A released handle has no hand terms. Mouse, scripted hand, the cases of ``validation.stability``
+and every emulated device are this model with other parameters.
 
-It is integrated in sub-steps of at most 50 us, each implicit in every force but F: with dv/dt and dx/dt = v taken at
+It is integrated in sub-steps of at most 50 us, each implicit in every force except F: with dv/dt and dx/dt = v taken at
 the end of the step the velocity follows from one division, and Coulomb friction, the proximal step of |v|, shortens it
-by at most its whole length. So no stiffness, damping or friction can make it unstable, and a handle at rest under less
-than f_c stays exactly at rest.
+to 0 at most. So no stiffness, damping or friction can make it unstable, and a handle at rest under less than f_c stays
+exactly at rest.
 """
 
 from __future__ import annotations
@@ -30,22 +30,22 @@ from study_app.haptics.model.layout import records
 HANDLE = np.dtype(
     [
         ("mass_kg", np.float64),  # m, of the device
-        ("held", np.int64),  # 1 in a hand, 0 let go
+        ("held", np.int64),  # 1 in a hand, 0 released
         ("hand_kg", np.float64),  # m_hand
         ("viscous_nspm", np.float64),  # b, of the device [N s/m]
         ("coulomb_n", np.float64),  # f_c, of the device
         ("stiffness_npm", np.float64),  # K, of the hand [N/m]
         ("damping_nspm", np.float64),  # B, of the hand [N s/m]
         ("quantum_m", np.float64),  # one encoder count; 0: none
-        ("motor_limit_n", np.float64),  # the most each axis gives
-        ("motor_step_n", np.float64),  # it gives whole multiples of; 0: any force
-        ("delay", np.int64),  # a force takes effect so many writes later, at most MOST_DELAY
-        ("written", np.int64),  # how many were written
-        ("waiting_n", np.float64, (MOST_DELAY + 1, 3)),  # the last of them
+        ("motor_limit_n", np.float64),  # greatest force per axis
+        ("motor_step_n", np.float64),  # resolution of the force; 0: continuous
+        ("delay", np.int64),  # writes until a force acts, at most MOST_DELAY
+        ("written", np.int64),  # number of writes
+        ("waiting_n", np.float64, (MOST_DELAY + 1, 3)),  # the last forces written
         ("stop_m", np.float64, (3,)),  # half extents of the end stops
         ("position_m", np.float64, (3,)),
         ("velocity_mps", np.float64, (3,)),
-        ("force_n", np.float64, (3,)),  # F, as it acts now
+        ("force_n", np.float64, (3,)),  # F that acts now
     ],
     align=True,
 )
@@ -88,7 +88,7 @@ def new_handle(
 
 @kernel
 def move(handle: Any, from_m: Any, to_m: Any, duration_s: float) -> None:
-    """Let ``duration_s`` pass while the hand goes straight ``from_m`` to ``to_m`` (each (3,) [m])."""
+    """Integrate over ``duration_s`` while the hand moves straight from ``from_m`` to ``to_m`` (each (3,) [m])."""
     if duration_s <= 0.0:
         return
     steps = math.ceil(duration_s / SUB_STEP_S)
@@ -125,7 +125,7 @@ def _sub_step(handle: Any, from_m: Any, to_m: Any, duration_s: float, share: flo
 
 @kernel
 def push(handle: Any, x_n: float, y_n: float, z_n: float) -> None:
-    """Take the force that the servo writes [N]; the one written ``delay`` writes ago acts from now on."""
+    """Store the force that the servo writes [N]; the one written ``delay`` writes ago acts from now on."""
     row = handle.written % (MOST_DELAY + 1)
     handle.waiting_n[row, 0] = _given(handle, x_n)
     handle.waiting_n[row, 1] = _given(handle, y_n)
@@ -138,7 +138,7 @@ def push(handle: Any, x_n: float, y_n: float, z_n: float) -> None:
 
 @kernel
 def _given(handle: Any, force_n: float) -> float:
-    """Return what a motor makes of a force: within its limit, in whole steps."""
+    """Return the force that a motor exerts: within its limit, in whole steps."""
     given_n: float = min(max(force_n, -handle.motor_limit_n), handle.motor_limit_n)
     if handle.motor_step_n > 0.0:
         given_n = math.floor(given_n / handle.motor_step_n + 0.5) * handle.motor_step_n
@@ -147,7 +147,7 @@ def _given(handle: Any, force_n: float) -> float:
 
 @kernel
 def let_go(handle: Any) -> None:
-    """Take the force off, that which is still on its way, too."""
+    """Set the force to zero, including forces not yet acting."""
     for i in range(3):
         handle.force_n[i] = 0.0
         for row in range(MOST_DELAY + 1):
@@ -156,7 +156,7 @@ def let_go(handle: Any) -> None:
 
 @kernel
 def measure(handle: Any, position_m: Any) -> None:
-    """Write into ``position_m`` (3,) [m] what the encoders say: the nearest whole count."""
+    """Write the encoder readings into ``position_m`` (3,) [m]: the nearest whole count."""
     for i in range(3):
         position_m[i] = handle.position_m[i]
         if handle.quantum_m > 0.0:

@@ -1,4 +1,4 @@
-"""Where each liquid is: which one the body is in, and how much of it each one gets."""
+"""The regions of the liquids: which one the body is in, and the share of the body in each."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ FADE_S = 20e-3
 
 @part
 def update_volume_fractions(model: Any, interval_s: float) -> None:
-    """Say how much of the body every liquid has: its share φ of the volume, and of the frontal area to begin with.
+    """Set the share φ of the body's volume in every liquid, which is also the first value for the frontal area.
 
-    Where liquids overlap, the last listed counts, as far as the body is under its surface. At a border φ takes 20 ms
-    from 0 to 1, but starts at its end when a scene begins; a surface needs no time, there φ is the part below it.
+    If liquids overlap, the last listed counts, for the part of the body under its surface. At a border φ changes from 0
+    to 1 in 20 ms, but starts at its final value in a new scene; at a surface φ is the submerged part, without delay.
     """
     parameters, state = model.parameters[0], model.state[0]
     free = 1.0
@@ -43,9 +43,9 @@ def update_volume_fractions(model: Any, interval_s: float) -> None:
 
 @part
 def _contains(region: Record, place_m: Any, inside: int, surfaced: int) -> int:
-    """Return 1 where ``place_m`` is in the region; a body that was inside leaves it 1 mm beyond the border.
+    """Return 1 where ``place_m`` is in the region; a body inside leaves it 1 mm beyond the border.
 
-    With a surface, the top face is no border, and the region reaches up from it without end.
+    With a surface, the top face is not a border, and the region extends upward without limit.
     """
     if region.kind == REGION_EVERYWHERE:
         return 1

@@ -1,10 +1,11 @@
-"""What is sent to the hand: always the last step of a tick, in the hand frame [N].
+"""The safety layer, the last step of a tick: it computes the force sent to the hand, in the hand frame [N].
 
-Order: slope limits on drag and inertia, force link, finite, norm, fade, gain of the passivity controller, slew, its
-settling, norm; a force stop or a fault goes past all of them to zero. The slew limit counts from the force of the tick
-before as it was without the settling: a brake that it remembered would go on acting after its time, and drive what it
-should damp.
-``lift_n``, what of the force is buoyancy and weight, is shortened along with it: the passivity controller needs it.
+Order: slope limits on drag and inertia, force link, finite check, norm, fade, gain of the passivity controller, slew
+limit, passivity controller, norm; a force stop or a fault bypasses all and sends zero. The slew limit starts from the
+force of the last tick before the passivity controller: otherwise the controller's damping would act for too long, and
+drive the motion.
+
+``lift_n``, buoyancy and weight within the force, is shortened with it for the passivity controller.
 """
 
 from __future__ import annotations
@@ -41,13 +42,13 @@ from study_app.haptics.model.layout import (
 START_FADE_S = 0.5
 FADE_OUT_S = 0.045
 LEAST_SLEW = 1.0 / 3.0
-"""Share of the slew limit that a fade gets, and a loop that has shown a great debt."""
+"""Share of the slew limit during a fade, and least share after a great energy debt."""
 
 
 def new_safety(device_limit_n: float = math.inf, delay_ticks: int = BELIEVED_TICKS) -> Any:
-    """Return one SAFETY record, shape (1,), for a servo that is about to start: no force yet, 500 ms to full force.
+    """Return one SAFETY record, shape (1,), for a servo about to start: zero force, 500 ms to full force.
 
-    ``delay_ticks`` is how many writes late a force is believed to act.
+    ``delay_ticks`` is the assumed delay of a force, in writes.
     """
     safety = records(SAFETY, 1)
     safety[0].fade_s = START_FADE_S
@@ -59,9 +60,9 @@ def new_safety(device_limit_n: float = math.inf, delay_ticks: int = BELIEVED_TIC
 
 @kernel
 def begin_scene(safety: Record) -> None:
-    """Let the force of another scene fade in, its energy at 0; a start fade that is not over begins again.
+    """Fade in the force of another scene with its energy at 0; restart a start fade that has not ended.
 
-    A brake that was sent for the scene before is let go on the next tick, which says so.
+    Damping sent for the last scene is removed in the next tick, which reports it.
     """
     settling = safety.passivity.settling
     safety.fade = 0.0
@@ -73,7 +74,7 @@ def begin_scene(safety: Record) -> None:
 def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None:
     """Convert the force of the effects into the force to be sent, ``sample.device_force_n``.
 
-    ``interval_s`` is the time since the last accepted sample, 0 where this tick brought none.
+    ``interval_s`` is the time since the last accepted sample, 0 if this tick has none.
     """
     parameters, state = model.parameters[0], model.state[0]
     passivity = safety.passivity
@@ -103,7 +104,7 @@ def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None
     apply_controller(parameters, safety, sample)
     _limit_norm(force_n, lift_n, limit_n, sample)
     if safety.stop != 0 or safety.fault != 0:
-        _let_go(force_n, safety, sample)
+        _zero_force(force_n, safety, sample)
         clear(lift_n)
         clear(safety.slewed_n)
         clear(safety.permitted_n)
@@ -118,10 +119,9 @@ def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None
 def limit_slope(model: Any, safety: Record, sample: Record) -> None:
     """Shorten each liquid's damping to F·min(1, B|w|/|F|): the secant of the maximum stable damping.
 
-    Drag that builds up late gets what is left of B, at the greater speed that it belongs to: in fast strokes it follows
-    so soon that freed handles of 50 g and less swung at scales of 10 and more.
-    What a force that grows more steeply than B exceeds it by, ``excess_n``, is removed whole.
-    Where the body passes between liquids they share the limit B, so that their sum keeps it.
+    Delayed drag is limited by the rest of B at its own, greater speed: in fast strokes it follows so soon that released
+    handles of 50 g and less oscillated at scales of 10 and more. The excess ``excess_n`` of a force that is steeper
+    than B is removed entirely. A body between liquids shares B among them, so that their sum keeps the limit.
     """
     parameters = model.parameters[0]
     shares = 0.0
@@ -151,7 +151,7 @@ def limit_slope(model: Any, safety: Record, sample: Record) -> None:
 
 @part
 def limit_inertia(model: Any, safety: Record, sample: Record) -> None:
-    """Reduce inertial forces to their stable share (`pack`): fast motion meets them as dampers, too."""
+    """Reduce inertial forces to their stable share (`pack`): they also damp fast motion."""
     for i in range(model.parameters[0].liquids):
         local = model.liquid_states[i]
         excess = 1.0 - model.liquids[i].inertia_share[safety.delay_ticks]
@@ -179,9 +179,9 @@ def _scale(force_n: Any, lift_n: Any, factor: float) -> None:
 
 @part
 def _fade(force_n: Any, lift_n: Any, parameters: Record, safety: Record, sample: Record) -> None:
-    """Weaken the force while it fades in or out (no usable sample, or a late tick).
+    """Scale the force while it fades in or out (no usable sample, or a late tick).
 
-    It fades in as slowly as the scene asks for, and after a start in 500 ms at least.
+    The scene sets the fade-in time; after a start it is at least 500 ms.
     """
     if safety.withheld or safety.late_s > 0.0:
         sample.limiters |= safety.withheld if safety.withheld else LIMITER_STALE
@@ -202,9 +202,8 @@ def _fade(force_n: Any, lift_n: Any, parameters: Record, safety: Record, sample:
 def _limit_slew(force_n: Any, parameters: Record, state: Record, safety: Record, sample: Record) -> None:
     """Limit the change of the force from tick to tick (`slope_limits.slew_limit_n`), without pushing the hand on.
 
-    A loop that has shown an energy debt gets less, by the controller's gain; a fade the least. A force that is late to
-    let go at a reversal would do work on the hand: what of it lies along the motion, and is not wanted there, is
-    dropped at once.
+    After an energy debt the limit is reduced by the controller's gain; it is least during a fade. A force that falls
+    too slowly at a reversal would do work on the hand: its unwanted part along the motion is dropped at once.
     """
     most_n = parameters.slew_n * (LEAST_SLEW if safety.fade < 1.0 else max(safety.passivity.gain, LEAST_SLEW))
     if square_distance(force_n, safety.slewed_n) <= most_n * most_n:
@@ -227,8 +226,8 @@ def _limit_slew(force_n: Any, parameters: Record, state: Record, safety: Record,
 
 
 @part
-def _let_go(force_n: Any, safety: Record, sample: Record) -> None:
-    """Zero force now; when let on again, the force fades in as at the start."""
+def _zero_force(force_n: Any, safety: Record, sample: Record) -> None:
+    """Set zero force now; afterwards the force fades in as at the start."""
     if safety.stop != 0:
         sample.limiters |= LIMITER_STOP
     if safety.fault != 0:

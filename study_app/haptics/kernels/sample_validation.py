@@ -1,4 +1,4 @@
-"""Which samples enter the model, and how much time has passed: nothing doubtful gets further than here."""
+"""Validation of samples and of the time between them: implausible ones do not reach the model."""
 
 from __future__ import annotations
 
@@ -27,20 +27,19 @@ FAULT_NS = 50_000_000
 
 @part
 def clamp(interval_s: float) -> float:
-    """Return a time between samples as the model takes it [s], whatever the clock did."""
+    """Return the time between two samples, limited to the range of the model [s]."""
     return min(max(interval_s, SHORTEST_S), LONGEST_S)
 
 
 @part
 def accept_sample(parameters: Record, state: Record, safety: Record, sample: Record) -> float:
-    """Take the sample's position into the scene and return Δt [s], or 0 where there is nothing to take.
+    """Take the sample's position into the scene and return Δt [s], or 0 if no sample is accepted.
 
     Δt is the time since the last accepted sample, so that the next one covers any gap; the first takes the nominal
-    period. A position is refused where it is not finite, lies more than 10 m off the device's middle along an axis, or
-    is out of reach of a hand of 10 m/s within Δt; so is one without the velocity, of 10 m/s at most along an axis,
-    where the device is to measure that. After five refusals in a row estimator and wakes have lost the body, and the
-    next position that a hand can have is a new beginning. A position that the device only repeats after it was refused
-    is marked as refused too.
+    period. A position is rejected if it is not finite, lies more than 10 m from the device's middle along an axis, or
+    cannot be reached at 10 m/s within Δt; if the device measures velocity, also without one of at most 10 m/s along
+    each axis. After five rejections in a row tracking is lost: the next plausible position resets estimator and wakes.
+    A rejected position that the device repeats is marked as rejected, too.
     """
     if sample.fresh == 0:
         if state.rejected > 0:
@@ -70,7 +69,7 @@ def accept_sample(parameters: Record, state: Record, safety: Record, sample: Rec
 
 @part
 def place(state: Record, x_m: float, y_m: float, z_m: float) -> None:
-    """Put the body at a place of the scene; at a beginning it has always been there."""
+    """Move the body to a place of the scene; without tracking, the previous place is the same."""
     copy(state.position_m, state.previous_m)
     state.position_m[0] = x_m
     state.position_m[1] = y_m
@@ -87,7 +86,7 @@ def _in_scene(parameters: Record, hand_m: Any) -> tuple[float, float, float]:
 
 @part
 def _plausible(parameters: Record, state: Record, sample: Record, interval_s: float) -> bool:
-    """Return whether the position is one that a hand can have, and within reach of the last accepted one."""
+    """Return whether the position is plausible for a hand, and within reach of the last accepted one."""
     hand_m = sample.position_m
     for axis in range(3):
         if not abs(hand_m[axis]) <= FARTHEST_HAND_M:  # NaN neither
@@ -99,14 +98,14 @@ def _plausible(parameters: Record, state: Record, sample: Record, interval_s: fl
 
 @part
 def can_have_moved(from_m: Any, to_m: Any, interval_s: float) -> bool:
-    """Return whether a hand of 10 m/s can have moved so far within a time [s]; not where a position is not finite."""
+    """Return whether a hand can have moved so far within a time [s]; False if a position is not finite."""
     farthest_m = FASTEST_HAND_MPS * interval_s
     return bool(square_distance(to_m, from_m) <= farthest_m * farthest_m)
 
 
 @part
 def _has_velocity(sample: Record) -> bool:
-    """Return whether the device measured the velocity, and it is one that a hand can have."""
+    """Return whether the device measured a velocity that is plausible for a hand."""
     for axis in range(3):
         if not abs(sample.device_velocity_mps[axis]) <= FASTEST_HAND_MPS:  # NaN neither
             return False
@@ -115,10 +114,10 @@ def _has_velocity(sample: Record) -> bool:
 
 @part
 def watchdog(parameters: Record, safety: Record, sample: Record) -> None:
-    """Say how long the tick is, and let the force go when no usable sample came: 5 ms fade, 50 ms zero and fault.
+    """Set the tick's duration, and start a fade after 5 ms without a usable sample; after 50 ms, zero and fault.
 
-    A tick that comes late itself is no better, however fresh its sample: the device held an old force meanwhile. It
-    finds the fade where ticks in time would have taken it: after 50 ms at zero, to return as slowly as at a start.
+    A late tick counts alike, even with a new sample, since the device held an old force meanwhile: its fade is where
+    ticks on time would have taken it, after 50 ms at zero, and the force returns as slowly as at a start.
     """
     if safety.started == 0:
         safety.started = 1

@@ -1,4 +1,4 @@
-"""The energy that the velocity estimator stores, and so may give back to the hand."""
+"""The energy that the velocity estimator stores and may therefore return to the hand."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ def filter_storage(model: Any, passivity: Record) -> float:
     """Return the energy [J at the hand] that the velocity estimator stores because it lags behind.
 
     With v̂' = (v − v̂)/τ a damper F(v̂) takes ∫F v dt = ∫F v̂ dt + τ∫F dv̂ from the hand: the second term is a storage,
-    K τ F v̂ with K = 1/3 for a force that grows as v̂², 1/2 for one that grows as v̂. Where only the share s of F is left
-    at the force limit, K = 1 - 2/3 √s and 1 - s/2; of a force that grows less than v̂, K is at most 1. A loop that has
-    shown a debt is believed less of it, by the controller's gain: a swinging loop would live on its storage.
+    K τ F v̂ with K = 1/3 for a force that grows as v̂², 1/2 for one that grows as v̂. If the force limit leaves only
+    the share s of F, K = 1 - 2/3 √s and 1 - s/2; for a force that grows less than v̂, K is at most 1. After a debt the
+    storage is multiplied by the controller's gain: otherwise it would sustain an oscillating loop.
     """
     parameters, state = model.parameters[0], model.state[0]
     lag_s = parameters.fallback_lag_s if state.kalman.distrusted else parameters.filter_lag_s

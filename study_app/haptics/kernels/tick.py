@@ -1,7 +1,7 @@
 """One tick of the servo, read from top to bottom.
 
-The lines of `step_model` are the pipeline; the bits of a liquid's ``effects`` say which of them run. Nothing here
-allocates, raises or waits; the servo, a rehearsal and `offline.simulate` run the same code.
+The lines of `step_model` are the pipeline; the bits of a liquid's ``effects`` select which of them run. The code never
+allocates, raises or waits; the servo, a rehearsal and `offline.simulate` run it alike.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ from study_app.haptics.model.layout import GROWS_AS_SQUARE, LIMITER_ESTIMATOR, S
 
 @kernel
 def tick(model: Any, safety: Record, sample: Record) -> None:
-    """Take one reading and say what force to send.
+    """Process one reading and compute the force to send.
 
     The caller fills ``sample.time_ns``, ``position_m`` (hand frame) and ``fresh``; velocity, wake, forces, limiters and
-    status are filled here. Without a new usable sample the model rests as it is; safety goes on.
+    status are filled here. Without a new usable sample the model is unchanged; the safety layer still runs.
     """
     sample.limiters = 0
     sample.status = STATUS_OK
@@ -60,10 +60,10 @@ def tick(model: Any, safety: Record, sample: Record) -> None:
 
 @part
 def step_model(model: Any, interval_s: float, delay_ticks: int) -> None:
-    """Let the liquids respond to the place the body has reached, Δt after the one before.
+    """Compute the force of the liquids at the body's new place, Δt after the last one.
 
-    Every effect is evaluated before the wake takes this tick in: the first tick of a motion meets a liquid at rest.
-    ``delay_ticks`` is how many writes late a force is believed to act.
+    Every effect is evaluated before the wake is updated: the first tick of a motion meets a liquid at rest.
+    ``delay_ticks`` is the assumed delay of a force, in writes.
     """
     parameters, state = model.parameters[0], model.state[0]
     if state.tracking == 0:
@@ -88,9 +88,9 @@ def step_model(model: Any, interval_s: float, delay_ticks: int) -> None:
 
 @part
 def apply_effects(model: Any, i: int, interval_s: float, delay_ticks: int) -> None:
-    """Let one liquid, in which the body is, act on it by the effects it asks for: in this order, no others.
+    """Apply the effects of one liquid, which contains the body, in this order.
 
-    A damper meets the velocity as it is estimated; the knee is for liquids.
+    A damper uses the estimated velocity without the speed limiter (knee), which is for liquids.
     """
     parameters, state = model.parameters[0], model.state[0]
     liquid, local, rows = model.liquids[i], model.liquid_states[i], model.rows
@@ -129,7 +129,7 @@ def apply_effects(model: Any, i: int, interval_s: float, delay_ticks: int) -> No
 
 @kernel
 def reset_tracking(model: Any) -> None:
-    """Forget the motion so far: all that is known of the body is where it is."""
+    """Reset the motion so far: only the body's place is known."""
     reset_estimator(model.parameters[0], model.state[0])
     for i in range(model.parameters[0].liquids):
         model.liquid_states[i].ticks = 0
@@ -138,7 +138,7 @@ def reset_tracking(model: Any) -> None:
 
 @part
 def write_sample(state: Record, sample: Record) -> None:
-    """Write what the liquids did into the sample."""
+    """Write the results of the liquids into the sample."""
     copy(state.velocity_mps, sample.velocity_mps)
     copy(state.wake_mps, sample.wake_mps)
     copy(state.force_n, sample.force_n)

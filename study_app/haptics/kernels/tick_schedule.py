@@ -1,4 +1,4 @@
-"""When the ticks of a simulated servo come: late by some jitter, or not at all, as on a busy computer."""
+"""The times of a simulated servo's ticks: with jitter and missed ticks, as on a busy computer."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from study_app.haptics.model.layout import records
 PACE = np.dtype(
     [
         ("period_s", np.float64),
-        ("jitter_s", np.float64),  # a tick is late by anything up to this
-        ("missed", np.float64),  # share of the ticks that do not come
-        ("late_s", np.float64),  # how late the last one was
+        ("jitter_s", np.float64),  # greatest lateness of a tick
+        ("missed", np.float64),  # share of missed ticks
+        ("late_s", np.float64),  # lateness of the last tick
         ("random", np.uint64),
     ],
     align=True,
@@ -22,7 +22,7 @@ PACE = np.dtype(
 
 
 def new_schedule(period_s: float, *, jitter_s: float = 0.0, missed: float = 0.0, seed: int = 1) -> Any:
-    """Return the record of a servo's pace; ``jitter_s`` must stay below the period, ``missed`` below 1."""
+    """Return the record of a servo's schedule; ``jitter_s`` must be below the period, ``missed`` below 1."""
     pace = records(PACE, 1)
     pace.period_s = period_s
     pace.jitter_s = jitter_s
@@ -33,7 +33,7 @@ def new_schedule(period_s: float, *, jitter_s: float = 0.0, missed: float = 0.0,
 
 @kernel
 def next_tick(pace: Any) -> float:
-    """Return the time until the servo's next tick [s]: its deadlines stay regular, it is late or misses some."""
+    """Return the time until the servo's next tick [s]: deadlines are regular, ticks are late or missed."""
     ticks = 1.0
     while pace.missed > 0.0 and random(pace) < pace.missed:
         ticks += 1.0
@@ -45,7 +45,7 @@ def next_tick(pace: Any) -> float:
 
 @kernel
 def random(pace: Any) -> float:
-    """Return the next of a row of numbers spread evenly over [0, 1) (xorshift64, Marsaglia 2003)."""
+    """Return the next number of a uniform sequence in [0, 1) (xorshift64, Marsaglia 2003)."""
     x = pace.random
     x ^= x << np.uint64(13)
     x ^= x >> np.uint64(7)

@@ -19,7 +19,7 @@ def clear(vector: Any) -> None:
 @part
 def copy(source: Any, to: Any) -> None:
     """Set ``to`` to ``source``."""
-    x, y, z = source[0], source[1], source[2]  # all read before one is written: they travel together
+    x, y, z = source[0], source[1], source[2]  # all loads before the stores, so that they are vectorised
     to[0], to[1], to[2] = x, y, z
 
 
@@ -38,7 +38,7 @@ def norm(vector: Any) -> float:
 
 @part
 def square(vector: Any) -> float:
-    """Return its length squared: enough to compare lengths, and no root."""
+    """Return its length squared, which compares lengths without a root."""
     return float(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
 
 

@@ -1,10 +1,10 @@
 """The elements of a wake in a ring, their segments in another, and sums that stay exact.
 
-Elements and segments are numbered from 0 as they come; number q lives in ring row ``wake.row + q % wake.length``.
-Speeds and sums are stored divided by ``tracks.scale``, the decay common to all of them. A sum is kept with its rounding
-error (`add`), so that what a fast burst leaves behind when it falls off the list is nothing. Segments between the
-oldest, which loses elements, and the newest, which gains them, stand still: their contribution is one vector,
-``interior``. Each segment holds at least one element, so N rows suffice; segment ``last`` may be empty at rest.
+Elements and segments are numbered from 0 in order; number q is in ring row ``wake.row + q % wake.length``. Speeds and
+sums are stored divided by ``tracks.scale``, the decay common to all of them. A sum is stored with its rounding error
+(`add`), so that a fast burst that has left the list leaves no residue. Segments between the oldest, which loses
+elements, and the newest, which gains them, do not change: their contribution is one vector, ``interior``. Each segment
+holds at least one element, so N rows suffice; segment ``last`` may be empty at rest.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ COSINE_TOLERANCE = 1e-12
 
 @part
 def add(total: float, carry: float, term: float) -> tuple[float, float]:
-    """Return total + term and the rounding errors so far (Neumaier 1974): their sum is right to twice the digits."""
+    """Return total + term and the rounding errors so far (Neumaier 1974): their sum has twice the precision."""
     new = total + term
     lost = (total - new) + term if abs(total) >= abs(term) else (term - new) + total
     return new, carry + lost
@@ -28,7 +28,7 @@ def add(total: float, carry: float, term: float) -> tuple[float, float]:
 
 @kernel
 def empty(wake: Record, tracks: Record, segments: Any) -> None:
-    """Forget everything, as if nothing had ever been stored."""
+    """Clear the wake: no element is stored."""
     tracks.stored = 0
     tracks.held = 0
     tracks.arc_m = 0.0
@@ -52,7 +52,7 @@ def tail(wake: Record, tracks: Record, segments: Any, out_mps: Any) -> None:
 def store(
     wake: Record, tracks: Record, elements: Any, segments: Any, ex: float, ey: float, ez: float, speed_mps: float
 ) -> None:
-    """Append the element (ex, ey, ez) of size ``speed_mps``; beyond N the oldest falls off, after the comparison."""
+    """Append the element (ex, ey, ez) of size ``speed_mps``; beyond N the oldest is removed after the comparison."""
     moving = speed_mps > 0.0
     turns = moving and _turns(wake, tracks, elements, segments, ex, ey, ez, speed_mps)
     if tracks.held == wake.length:
@@ -79,7 +79,7 @@ def _turns(
     """Return whether e·e_ref < (cos β − 1e-12)|e||e_ref|.
 
     The reference is the youngest element of the current segment at least ``breaking_span`` of arc earlier, or the
-    segment's oldest while it is shorter. It only ever moves forward.
+    segment's oldest while it is shorter. It never moves backward.
     """
     if segments[wake.row + tracks.last_segment % wake.length].count == 0:
         return False
@@ -99,7 +99,7 @@ def _turns(
 
 @part
 def _open(wake: Record, tracks: Record, segments: Any) -> None:
-    """Start a new segment; the one before, unless it is the oldest or empty, now stands still."""
+    """Start a new segment; add the one before to the interior, unless it is the oldest or empty."""
     last = segments[wake.row + tracks.last_segment % wake.length]
     if last.count == 0:
         return
@@ -111,7 +111,7 @@ def _open(wake: Record, tracks: Record, segments: Any) -> None:
 
 @part
 def _join(wake: Record, tracks: Record, segments: Any, element: Record) -> None:
-    """Add the newest element to the newest segment, whose direction it becomes, and to the sums."""
+    """Add the newest element to the sums and to the newest segment, and set the segment's direction to its own."""
     segment = segments[wake.row + tracks.last_segment % wake.length]
     if segment.count == 0:
         tracks.reference = tracks.stored
@@ -124,7 +124,7 @@ def _join(wake: Record, tracks: Record, segments: Any, element: Record) -> None:
 
 @part
 def _evict(wake: Record, tracks: Record, elements: Any, segments: Any) -> None:
-    """Let the oldest element fall off the list."""
+    """Remove the oldest element from the list."""
     oldest = tracks.stored - tracks.held
     element = elements[wake.row + oldest % wake.length]
     tracks.held -= 1
@@ -147,7 +147,7 @@ def _evict(wake: Record, tracks: Record, elements: Any, segments: Any) -> None:
 
 @part
 def _move_reference(wake: Record, tracks: Record, elements: Any) -> None:
-    """Compare with the next moving element from now on: the reference fell off, and this is its segment's oldest."""
+    """Set the reference to the next moving element, the oldest of its segment: the last one was removed."""
     tracks.reference += 1
     while elements[wake.row + tracks.reference % wake.length].moving == 0:
         tracks.reference += 1
@@ -182,7 +182,7 @@ def renew(wake: Record, tracks: Record, elements: Any, segments: Any) -> None:
 
 @part
 def _count_speed(tracks: Record, segment: Record, speed_mps: float, sign: float) -> None:
-    """Add an element's speed to its segment and to the totals, or with ``sign`` −1 take it away."""
+    """Add an element's speed to its segment and to the totals, or with ``sign`` −1 subtract it."""
     segment.speed_mps, segment.speed_carry_mps = add(segment.speed_mps, segment.speed_carry_mps, sign * speed_mps)
     tracks.speed_mps, tracks.speed_carry_mps = add(tracks.speed_mps, tracks.speed_carry_mps, sign * speed_mps)
     square = sign * speed_mps * speed_mps
@@ -191,7 +191,7 @@ def _count_speed(tracks: Record, segment: Record, speed_mps: float, sign: float)
 
 @part
 def _add_interior(tracks: Record, segment: Record, sign: float) -> None:
-    """Add what a segment contributes to the interior, or with ``sign`` −1 take exactly that away."""
+    """Add what a segment contributes to the interior, or with ``sign`` −1 subtract exactly that."""
     speed_mps = segment.speed_mps + segment.speed_carry_mps
     for axis in range(3):
         term = sign * (segment.direction[axis] * speed_mps)
@@ -202,7 +202,7 @@ def _add_interior(tracks: Record, segment: Record, sign: float) -> None:
 
 @part
 def _clear_sums(wake: Record, tracks: Record, segments: Any) -> None:
-    """No moving element is left: every sum is exactly zero, and the scale may begin anew."""
+    """Reset all sums to exactly zero, and the scale to 1: no moving element is left."""
     tracks.first_segment = 0
     tracks.last_segment = 0
     _clear(segments[wake.row])

@@ -1,7 +1,7 @@
-"""The loop's memory, its thread, and all the ways it ends.
+"""The loop's memory, its thread, and the ways it ends.
 
-Whatever ends the host ends the loop, and with it the force: being stopped, an exception, the last reference to the
-servo, the interpreter's exit, and those signals that would otherwise kill the process on the spot.
+The loop and the force end with the host: by a stop, an exception, the last reference to the servo, the interpreter's
+exit, and signals that would otherwise kill the process at once.
 """
 
 import signal
@@ -22,10 +22,10 @@ from study_app.haptics.kernels.loop import (
     DeviceCalls,
     Output,
     Records,
-    let_go,
     offer_numbers,
     offer_scene,
     run,
+    send_zero_force,
 )
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.model.device_dynamics import MOST_DELAY
@@ -39,36 +39,36 @@ from study_app.haptics.runtime.telemetry import Telemetry
 
 _FOREVER = -1
 _PATIENCE_S = 2.0  # until the loop ends when asked; it takes one tick
-_STUCK_NS = 75_000_000  # a tick late by this may never come: seen with the next frame, it is known within 100 ms
-_SUSPENDED_NS = 100_000_000  # less is the error of two clocks that are read one after the other
-_THAW_S = 0.25  # within which a loop goes on that stood still with the whole process
+_STUCK_NS = 75_000_000  # lateness that counts as hanging: checked every frame, it is detected within 100 ms
+_SUSPENDED_NS = 100_000_000  # less is the error of reading two clocks in sequence
+_THAW_S = 0.25  # time for the loop to continue after the whole process stood still
 
 
 class LoopThread:
-    """What the loop needs to run, kept apart from the servo, so that a servo without references is collected.
+    """The data and thread of the loop, separate from the servo, so that a servo without references is collected.
 
     Parameters
     ----------
     driver : Driver
         The device that the loop reads and writes.
     clock : Clock
-        When a tick is due.
+        The clock of the ticks.
     rest : Scene
-        A scene without liquids, with which the loop begins.
+        The initial scene, without liquids.
     elements : int
-        Wake elements for which each of the two slots has room.
+        Capacity of each of the two slots for wake elements.
     telemetry : Telemetry
-        Where every tick's sample goes.
+        Receives every tick's sample.
     real_time : bool
-        Whether to ask for a thread that runs before others.
+        Whether to request a higher priority of the thread.
     """
 
     def __init__(
         self, driver: Driver, clock: Clock, rest: Scene, elements: int, telemetry: Telemetry, *, real_time: bool = True
     ) -> None:
         self.clock = clock
-        self._driver = driver  # both kept alive: the loop has nothing but addresses of theirs
-        self.live = False  # begun, and not ended
+        self._driver = driver  # both kept alive: the loop has only their addresses
+        self.live = False  # started and not ended
         self.thread: threading.Thread | None = None
         self.grant: Grant = NO_THREAD
         self.control = records(CONTROL, 1)
@@ -94,8 +94,8 @@ class LoopThread:
         )
 
     def compile(self) -> None:
-        """Compile the loop for its arguments, or load it from the cache: zero force is written, no tick taken."""
-        let_go(self._exchanged.command, self._device)
+        """Compile the loop for its arguments, or load it from the cache: zero force is written, no tick is run."""
+        send_zero_force(self._exchanged.command, self._device)
         self._run(*self._arguments, 0)
 
     @cached_property
@@ -104,9 +104,9 @@ class LoopThread:
 
     @property
     def stuck(self) -> bool:
-        """Whether the tick that is due, or under way, has been so for so long that something hangs.
+        """Whether the tick that is due or running is so late that the loop hangs.
 
-        Where the whole process stood still, whoever asks may run before the loop: then the loop gets time to go on.
+        After the whole process stood still, the caller may run before the loop: then the loop gets time to continue.
         """
         ticks = int(self.control[0].ticks)
         late_ns = self._late_ns
@@ -122,7 +122,7 @@ class LoopThread:
 
     @property
     def _late_ns(self) -> int:
-        """How long a tick is due while the loop runs [ns]."""
+        """The lateness of the next tick while the loop runs [ns]."""
         running = self.thread is not None and self.live and self.control[0].run != 0
         return self.clock.now_ns() - int(self.control[0].deadline_ns) if running else 0
 
@@ -130,8 +130,8 @@ class LoopThread:
     def worst_gap_ns(self) -> int:
         """The longest time between two ticks since the newest scene was handed over, up to now [ns].
 
-        The loop keeps it itself, whatever telemetry lost. The time that the machine was suspended counts, during which
-        the loop's clock stands still (`Clock.suspended_ns`).
+        The loop measures it, even if telemetry loses samples. Suspensions of the machine count, during which the loop's
+        clock stops (`Clock.suspended_ns`).
         """
         host = self.control[0]
         now_ns = self.clock.now_ns() - int(host.began_ns)
@@ -140,7 +140,7 @@ class LoopThread:
         return max(now_ns, kept_ns, suspended_ns if suspended_ns > _SUSPENDED_NS else 0)
 
     def start(self) -> None:
-        """Run in a thread of its own until `end`; until then Ctrl-Z does not stop it with its force on."""
+        """Run in a separate thread until `end`; until then Ctrl-Z does not suspend it while it exerts force."""
         self._begin()
         refuse_suspension(self)
         ready = threading.Event()
@@ -149,15 +149,15 @@ class LoopThread:
         ready.wait()
 
     def advance(self, ticks: int) -> int:
-        """Take ``ticks`` in the calling thread; return how many were taken."""
+        """Run ``ticks`` in the calling thread; return the number completed."""
         if not self.live:
             self._begin()
         return int(self._run(*self._arguments, max(ticks, 0)))
 
     def hand_over(self, scene: Scene, serial: int, *, goes_on: bool = False) -> None:
-        """Pack ``scene`` into the spare slot and let the next tick take it; first let it take the one before.
+        """Pack ``scene`` into the spare slot for the next tick; first wait until the last scene was taken.
 
-        With ``goes_on`` the tick takes nothing but its numbers.
+        With ``goes_on`` the tick takes only its parameters.
         """
         host = self.control[0]
         patience = time.monotonic() + _PATIENCE_S
@@ -173,7 +173,7 @@ class LoopThread:
 
     @property
     def delay_ticks(self) -> int:
-        """How many ticks late a force is believed to act at present."""
+        """The assumed delay of a force at present [ticks]."""
         return int(self.safety[0].delay_ticks)
 
     @property
@@ -182,12 +182,12 @@ class LoopThread:
         return bool(host.taken == host.request and host.numbers_taken == host.numbers)
 
     def end(self) -> None:
-        """End the loop, wait for it, and write zero force once more from here; then rest is what it would begin with.
+        """End the loop, wait for it, write zero force once more, and load rest for the next start.
 
         Raises
         ------
         ServoFault
-            The loop does not answer: the device's driver hangs.
+            The loop does not respond: the device's driver hangs.
         """
         if not self.live:
             return
@@ -198,12 +198,12 @@ class LoopThread:
                 raise self._silence()
         self.thread = None
         self.live = False
-        let_go(self._exchanged.command, self._device)
+        send_zero_force(self._exchanged.command, self._device)
         allow_suspension(self)
         self.hand_over(self._rest, 0)
 
     def _blocks(self) -> Blocks:
-        """Return the memory that the loop works in."""
+        """Return the memory blocks of the loop."""
         models = (array for model in self.slots for array in model.arrays)
         arrays = (self.control, *models, self.safety, *self._exchanged, *self._output)
         return [(array.ctypes.data, array.nbytes) for array in arrays if array.nbytes]
@@ -219,7 +219,7 @@ class LoopThread:
         Raises
         ------
         DeviceError
-            The device is so slow that no force is stable.
+            The device's delay is so long that no force is stable.
         """
         driver = self._driver
         delay_ticks = driver.dynamics.delay_ticks(self._rate_hz)
@@ -251,14 +251,14 @@ class LoopThread:
         try:
             self._run(*self._arguments, _FOREVER)
         finally:
-            let_go(self._exchanged.command, self._device)
+            send_zero_force(self._exchanged.command, self._device)
 
 
 _live: weakref.WeakSet[LoopThread] = weakref.WeakSet()
 
 
 def _leave_by_the_exit() -> None:
-    """Let signals that would kill the process at once end it as ``sys.exit`` does; others keep their handlers."""
+    """Handle signals that would kill the process at once like ``sys.exit``; keep handlers already set."""
     if threading.current_thread() is not threading.main_thread():
         return
     for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK"):

@@ -1,4 +1,4 @@
-"""Added mass: to move the ball is to move the liquid around it."""
+"""Added mass: an accelerating ball also accelerates the liquid around it."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ def added_mass_force(
 ) -> None:
     """Add F = −C_a ρ V_sub dw/dt to the force, (3,) [N]; C_a = ½ for a sphere in potential flow (Lamb 1932, §92).
 
-    dw/dt is the difference of w over Δt, smoothed over τ: a ← a + (1 − e^(−Δt/τ))(Δw/Δt − a). Unsmoothed, one count of
-    an encoder would be a spike of 0.3 N. The first tick in a liquid knows no acceleration yet; what is left of one when
-    motion is even ends as 0, not as a denormal number. A loop is stable with a part of it.
+    dw/dt is the difference of w over Δt, smoothed over τ: a ← a + (1 − e^(−Δt/τ))(Δw/Δt − a). Unsmoothed, one encoder
+    count would cause a spike of 0.3 N. In the first tick in a liquid the acceleration is 0; in uniform motion it decays
+    to 0, not to a denormal number. Only the share that keeps the loop stable is sent.
     """
     mass, tracks, w = liquid.added_mass, local.added_mass, local.relative_mps
     if local.ticks == 0:
@@ -40,7 +40,7 @@ def added_mass_force(
 
 @part
 def accelerate(acceleration_mps2: Any, w: Any, previous_mps: Any, filter_per_s: float, interval_s: float) -> None:
-    """Set dw/dt, (3,), smoothed, from w and that of the tick before."""
+    """Set the smoothed dw/dt, (3,), from w and w of the tick before."""
     weight = -math.expm1(-filter_per_s * interval_s)
     for axis in range(3):
         difference_mps2 = (w[axis] - previous_mps[axis]) / interval_s
@@ -50,11 +50,11 @@ def accelerate(acceleration_mps2: Any, w: Any, previous_mps: Any, filter_per_s: 
 
 @part
 def storing_square(parameters: Record, mass: Record, local: Record, tracks: Record) -> float:
-    """Return the square of the velocity [m²/s²] by which the added mass m holds energy, ½ m v².
+    """Return v² [m²/s²] of the energy ½ m v² that the added mass m stores.
 
-    Its force is -m dw_s/dt, w_s being w smoothed over τ: w_s' = (w - w_s)/τ. So the hand does the work ∫m w_s' w dt =
-    ½ m w_s² + ∫m τ w_s'² dt: what can come back is that of w_s = w - τ w_s', which at a reversal is not 0 when w is.
-    With the other estimators their own storage, of a longer lag, covers the difference.
+    Its force is -m dw_s/dt, w_s being w smoothed over τ: w_s' = (w - w_s)/τ. So the hand does the work ∫m w_s' w dt = ½
+    m w_s² + ∫m τ w_s'² dt: only ½ m w_s² can be returned, with w_s = w - τ w_s', which at a reversal is not 0 when w
+    is. With the other estimators their own stored energy, of a longer lag, covers the difference.
     """
     if parameters.estimator != kalman.CODE:
         return float(square(local.motion_mps))

@@ -1,4 +1,4 @@
-"""Buoyancy: the liquid carries the ball, and the ball has a weight."""
+"""Buoyancy of the ball in the liquids, and the weight of the ball."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from study_app.haptics.model.effects.buoyancy import BIT
 def buoyancy_force(model: Any) -> None:
     """Add (Σ ρ V_sub − ρ_body V) g, upward [N], to the force (Archimedes); V_sub is the ball's volume in each liquid.
 
-    The weight counts once, where any liquid that asks for buoyancy is, or is below: a ball that rises through the
-    surface goes on weighing, so its force has no step there. [choice] Without a surface it comes and goes with the
-    border.
+    The weight counts once, if the ball is in or above any liquid that has buoyancy: a ball that rises through the
+    surface keeps its weight, so the force has no step there. [choice] Without a surface the weight fades in and out at
+    the border.
     """
     parameters, state = model.parameters[0], model.state[0]
     lift_n = 0.0

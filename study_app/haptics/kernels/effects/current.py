@@ -10,11 +10,11 @@ from study_app.haptics.model.layout import Record
 
 @part
 def current_velocity(liquid: Record, local: Record, state: Record) -> None:
-    """Take v_current(p), (3,) [m/s], from the motion that the other effects see; no force of its own.
+    """Subtract v_current(p), (3,) [m/s], from the velocity that the other effects use; it adds no force.
 
-    Uniform: the same everywhere. Channel: u (1 − (s/h)²), s across from midway, 2h from wall to wall, at rest beyond
-    (plane Poiseuille flow). Vortex: u · 2(r/a)/(1 + (r/a)²) around the upright axis, fastest at r = a, still in the
-    middle, falling as 1/r far out (Kaufmann 1962; Scully 1975).
+    Uniform: the same everywhere. Channel: u (1 − (s/h)²), s the distance from the middle, 2h the width between the
+    walls, at rest beyond (plane Poiseuille flow). Vortex: u · 2(r/a)/(1 + (r/a)²) around the vertical axis, fastest at
+    r = a, 0 in the centre, proportional to 1/r far out (Kaufmann 1962; Scully 1975).
     """
     current, flow = liquid.current, local.current.velocity_mps
     if current.kind == CURRENT_UNIFORM:

@@ -1,13 +1,13 @@
-"""History: the boundary layer around the ball remembers how it was accelerated.
+"""History force: the boundary layer around the ball depends on its past acceleration.
 
 The Basset–Boussinesq force of creeping flow (Landau & Lifshitz, Fluid Mechanics, §24),
 
     F = −6 R² √(πρµ) φ ∫ dw/dτ (t − τ)^(−½) dτ ,
 
-with w piecewise linear between ticks. Intervals younger than the window are integrated as they are; for the rest the
-kernel 1/√τ is replaced by ten exponentials Σ a_i √(e/t_i) e^(−τ/2t_i), t_i = t̃_i · window (van Hinsberg, ten Thije
-Boonkkamp & Clercx 2011, J. Comput. Phys. 230:1465): within 0.7 % up to 100 windows, and each sum decays by itself. At
-Reynolds numbers far above 1 the true force fades sooner; this is an upper bound.
+with w piecewise linear between ticks. Intervals younger than the window are integrated exactly; for the rest the kernel
+1/√τ is replaced by ten exponentials Σ a_i √(e/t_i) e^(−τ/2t_i), t_i = t̃_i · window (van Hinsberg, ten Thije Boonkkamp
+& Clercx 2011, J. Comput. Phys. 230:1465): within 0.7 % up to 100 windows, and each sum decays recursively. At Reynolds
+numbers far above 1 the true force decays faster; this is an upper bound.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ WEIGHTS = (
     0.63661146557001,
 )  # a_i
 NOTHING = 1e-30
-PERIOD_S = 1.0  # of the sway whose inertia counts as a storage
-ROUNDING_S = 1e-9  # so that a window of whole ticks holds as many of them, however their sum is rounded
+PERIOD_S = 1.0  # oscillation whose inertia counts as stored energy
+ROUNDING_S = 1e-9  # a window of n ticks holds n of them, however their sum is rounded
 
 
 @part
@@ -45,8 +45,8 @@ def basset_force(
 ) -> None:
     """Add the history force, (3,) [N], to the force; φ is the share of the volume in the liquid.
 
-    w is smoothed over τ before, as for the added mass. A loop is stable with a part of it. It holds the energy of its
-    inertia in a sway of 1 Hz, 3πR² √(2µρ/ω) (Landau & Lifshitz, §24).
+    w is first smoothed over τ, as for the added mass. Only the share that keeps the loop stable is sent. It stores the
+    energy of its inertia in an oscillation of 1 Hz, 3πR² √(2µρ/ω) (Landau & Lifshitz, §24).
     """
     history, tracks = liquid.history, local.history
     intervals, exponentials = rows.intervals, rows.exponentials
@@ -62,7 +62,7 @@ def basset_force(
         exponential = exponentials[history.tail_row + i]
         for axis in range(3):
             force_n[axis] += exponential.memory[axis]
-    _hand_on(history, tracks, intervals, exponentials, oldest_s)
+    _move_to_exponentials(history, tracks, intervals, exponentials, oldest_s)
     for axis in range(3):
         force_n[axis] *= -history.factor_kg_rs * local.share
         state.force_n[axis] += force_n[axis]
@@ -74,7 +74,7 @@ def basset_force(
 
 @part
 def _storing_square(parameters: Record, local: Record, tracks: Record) -> float:
-    """Return the square of the velocity [m²/s²] by which it holds energy: smoothed, as of the added mass."""
+    """Return v² [m²/s²] of the energy that it stores, with v smoothed as for the added mass."""
     if parameters.estimator != kalman.CODE:
         return float(square(local.motion_mps))
     square_m2ps2 = 0.0
@@ -86,7 +86,7 @@ def _storing_square(parameters: Record, local: Record, tracks: Record) -> float:
 
 @part
 def _reset_tracks(history: Record, tracks: Record, w: Any, exponentials: Any) -> None:
-    """Begin at the present velocity, as if it had always been so."""
+    """Begin at the present velocity, as if the motion had always been uniform."""
     tracks.first = 0
     tracks.held = 0
     for axis in range(3):
@@ -108,7 +108,7 @@ def _fade(history: Record, exponentials: Any, interval_s: float) -> None:
 
 @part
 def _append(history: Record, tracks: Record, w: Any, intervals: Any, interval_s: float) -> None:
-    """Put the newest interval into the window; there is room for it. What is left of w at rest ends as 0."""
+    """Append the newest interval to the window, which has room for it. At rest, w becomes exactly 0."""
     weight = -math.expm1(-history.filter_per_s * interval_s)
     newest = intervals[history.row + _wrapped(tracks.first + tracks.held, history.rows)]
     for axis in range(3):
@@ -123,7 +123,7 @@ def _append(history: Record, tracks: Record, w: Any, intervals: Any, interval_s:
 
 @part
 def _integrate(history: Record, tracks: Record, intervals: Any, force_n: Any) -> float:
-    """Add ∫ dw/dτ (t − τ)^(−½) dτ over the window to the force; return how long ago its oldest interval began."""
+    """Add ∫ dw/dτ (t − τ)^(−½) dτ over the window to the force; return the age of its oldest interval [s]."""
     age_s = root = 0.0
     for back in range(1, tracks.held + 1):
         interval = intervals[history.row + _wrapped(tracks.first + tracks.held - back, history.rows)]
@@ -137,8 +137,8 @@ def _integrate(history: Record, tracks: Record, intervals: Any, force_n: Any) ->
 
 
 @part
-def _hand_on(history: Record, tracks: Record, intervals: Any, exponentials: Any, oldest_s: float) -> None:
-    """Move intervals that are older than the window into the exponentials, the oldest also where rows run out."""
+def _move_to_exponentials(history: Record, tracks: Record, intervals: Any, exponentials: Any, oldest_s: float) -> None:
+    """Move intervals that are older than the window into the exponentials, the oldest also if no row is free."""
     while tracks.held > 0:
         interval = intervals[history.row + tracks.first]
         ended_s = oldest_s - interval.duration_s

@@ -1,16 +1,16 @@
-"""The local wake: the position tail tied to the places it was left at.
+"""The local wake: a position tail whose elements keep the places where they arose.
 
-The tail (``wake``) acts wherever the body is: who leaves fast after a stop still feels what was stirred up elsewhere
-(Rek 2024, §6.3). Here the newest N elements e_j, one a tick, are kept in at most 64 cells of one body diameter of path
-each, and a cell acts by its distance r from the body:
+The tail (``wake``) acts at any place of the body: after a stop and a fast departure the body still meets the wake it
+left elsewhere (Rek 2024, §6.3). Here the newest N elements e_j, one per tick, are stored in at most 64 cells of one
+body diameter of path each, and the effect of a cell depends on its distance r from the body:
 
     v_tail = (1/S) Σ_c w_c λ^age_c Σ_{j in c} e_j ,   w_c = (σ_0/σ_c)³ exp(−r²/2σ_c²) ,   σ_c² = σ_0² + s_c + 2ν age_c .
 
-σ_0 is the reach, about a diameter; the momentum of a cell spreads as in a viscous liquid, ever wider and weaker: its
-age counts from its last element, s_c is how far its elements had spread by then, and how far merged cells were apart.
-Elements are summed as vectors, so there are no segments: a turn on the spot cancels, and a circle leaves every part of
-it in its own place. v_wake = v_tail · response(|v_tail| / m̄) as in ``wake``, with m̄ weighted likewise. As w_c ≤ 1 and
-N ≤ S, the liquid never outruns the body. Places drift with the current. [choice]
+σ_0 is the reach, about a diameter; the momentum of a cell spreads as in a viscous liquid, over a growing width: its age
+counts from its last element, s_c is the variance of its elements at that time, including the distance of merged cells.
+Elements are summed as vectors, so there are no segments: a turn on the spot cancels, and a circle keeps each of its
+parts in place. v_wake = v_tail · response(|v_tail| / m̄) as in ``wake``, with m̄ weighted likewise. As w_c ≤ 1 and N ≤
+S, the liquid is never faster than the body. Places drift with the current. [choice]
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from study_app.haptics.kernels.vector import clear, norm
 from study_app.haptics.model.effects.local_wake import CELLS
 from study_app.haptics.model.layout import Record
 
-FARTHEST = 40.0  # r²/2σ² beyond which a cell is not felt: e^-40
+FARTHEST = 40.0  # r²/2σ² beyond which a cell has no effect: e^-40
 
 
 @part
@@ -68,7 +68,7 @@ def local_wake_velocity(
 
 @part
 def deposit_local_wake(liquid: Record, local: Record, state: Record, cells: Any, interval_s: float) -> None:
-    """Let the wake take in this tick, after the force: its time, and one element, zero below 1 mm/s."""
+    """Update the wake after the force: advance its time, and add one element, zero below 1 mm/s."""
     wake, tracks, h = liquid.local_wake, local.local_wake, local.motion_mps
     tracks.time_s += interval_s
     hx, hy, hz = h[0], wake.vertical * h[1], h[2]
@@ -91,7 +91,7 @@ def deposit_local_wake(liquid: Record, local: Record, state: Record, cells: Any,
 
 @part
 def _clear(tracks: Record) -> None:
-    """Forget everything, as if nothing had ever been stored."""
+    """Clear the wake: no element is stored."""
     tracks.first = 0
     tracks.cells = 0
     tracks.held = 0
@@ -108,7 +108,7 @@ def _is_full(wake: Record, tracks: Record, newest: Record, moves: bool) -> bool:
 
 @part
 def _open(wake: Record, tracks: Record, cells: Any) -> None:
-    """Begin a cell; where all 64 are taken, the two oldest become one."""
+    """Begin a cell; if all 64 are in use, merge the two oldest first."""
     if tracks.cells == CELLS:
         _merge_oldest(wake, tracks, cells)
     tracks.cells += 1
@@ -130,7 +130,7 @@ def _newest(wake: Record, tracks: Record, cells: Any) -> Any:
 
 @part
 def _merge_oldest(wake: Record, tracks: Record, cells: Any) -> None:
-    """Put the oldest cell into the next: sums add up, the place is that of the momentum, its variance is kept."""
+    """Merge the oldest cell into the next: add the sums, set the place to the momentum's mean, keep its variance."""
     oldest = cells[wake.row + tracks.first]
     cell = cells[wake.row + _wrapped(tracks.first + 1)]
     elapsed_s = cell.time_s - oldest.time_s
@@ -153,7 +153,7 @@ def _merge_oldest(wake: Record, tracks: Record, cells: Any) -> None:
 
 @part
 def _grow(wake: Record, tracks: Record, cell: Record, x_m: float, y_m: float, z_m: float) -> None:
-    """Bring the newest cell to the present, and count one more element at this place."""
+    """Update the newest cell to the present, and add one element at this place."""
     tracks.held += 1
     elapsed_s = tracks.time_s - cell.time_s
     _scale_cell(cell, math.exp(wake.log_decay_per_s * elapsed_s))
@@ -170,7 +170,7 @@ def _grow(wake: Record, tracks: Record, cell: Record, x_m: float, y_m: float, z_
 
 @part
 def _evict(wake: Record, tracks: Record, cells: Any) -> None:
-    """Let the oldest element fall off: the oldest cell loses the mean of its elements."""
+    """Remove the oldest element: subtract the mean of its elements from the oldest cell."""
     oldest = cells[wake.row + tracks.first]
     tracks.held -= 1
     if oldest.count == 1:
@@ -192,7 +192,7 @@ def _drop_oldest(tracks: Record) -> None:
 
 @part
 def _scale_cell(cell: Record, keep: float) -> None:
-    """Multiply every element of a cell."""
+    """Multiply every element of a cell by a factor."""
     for axis in range(3):
         cell.velocity_mps[axis] *= keep
     cell.speed_mps *= keep
@@ -201,7 +201,7 @@ def _scale_cell(cell: Record, keep: float) -> None:
 
 @part
 def _place(tracks: Record, state: Record) -> tuple[float, float, float]:
-    """Return where the body is in the liquid that drifts with the current."""
+    """Return the place of the body in the frame that drifts with the current."""
     return (
         state.position_m[0] - tracks.drift_m[0],
         state.position_m[1] - tracks.drift_m[1],

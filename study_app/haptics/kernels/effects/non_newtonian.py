@@ -7,12 +7,12 @@ With w the velocity relative to the liquid, τ_v = K (|w|/D)^n and η the effect
     Maxwell           F = 3πη₀D v,    v' = (w − v)/λ
     shear thickening  F = 3πηD w, η from η₀ to the thickened viscosity between the onset γ̇ = 2|w|/D and twice that
 
-All are multiplied by φ(Re), Re = ρ|w|D/η (``laws.finite_reynolds``), and oppose the motion; what φ adds to F_y acts
-along w, so that the elastic stiffness stays. X: Gu & Tanner 1985. The
-elastic displacement s is that of an elastic-plastic solid, ds = dp − |dp| s/s_y: at rest the liquid holds the ball, and
-it flows once the force exceeds F_y; |dp| leaves out what is within two encoder counts. s and v follow positions, which
-lag less than a velocity estimate: the loop is stable with F_y/s_y up to 400 N/m at the hand where the viscous part
-keeps 0.75 of the slope limit, and with any λ. A power law has F_y = 0, a Bingham liquid n = 1.
+All are multiplied by φ(Re), Re = ρ|w|D/η (``laws.finite_reynolds``), and oppose the motion; the part (φ − 1) F_y acts
+along w, so that the elastic stiffness is unchanged. X: Gu & Tanner 1985. The elastic displacement s is that of an
+elastic-plastic solid, ds = dp − |dp| s/s_y: at rest the liquid holds the ball, and it flows once the force exceeds F_y;
+|dp| ignores motion within two encoder counts. s and v are computed from positions, which lag less than a velocity
+estimate: the loop is stable with F_y/s_y up to 400 N/m at the hand where the viscous part keeps 0.75 of the slope
+limit, and with any λ. A power law has F_y = 0, a Bingham liquid n = 1.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from study_app.haptics.model.laws.drag_laws import finite_reynolds
 from study_app.haptics.model.layout import GROWS_AS_SPEED, GROWS_LESS, Record
 
 SLACK_COUNTS = 2.0
-"""Of the encoder: motion within them relaxes no stress, or a hand at rest would creep by noise. [choice]"""
+"""Encoder counts: motion within them relaxes no stress, otherwise noise would let a hand at rest creep. [choice]"""
 
 MOST_STRAIN = 3.0
-"""In a tick that strains the liquid more, it flows: the shear stress is that of yielding then."""
+"""In a tick that strains the liquid more, it flows, with the yield stress as shear stress."""
 
 _herschel_bulkley = part(rheology.herschel_bulkley)
 _carreau = part(rheology.carreau)
@@ -50,8 +50,8 @@ def non_newtonian_force(
 ) -> None:
     """Add F to the force, (3,) [N], by the share φ of the frontal area.
 
-    The slope limit B holds the viscous part. What exceeds it in an elastic liquid, and what grows more steeply in one
-    that thickens, is passed on as ``local.excess_n``, for the safety layer to take away.
+    The slope limit B bounds the viscous part. The excess over B in an elastic or thickening liquid is passed on as
+    ``local.excess_n``, which the safety layer removes.
     """
     law, tracks = liquid.non_newtonian, local.non_newtonian
     if local.ticks == 0:
@@ -75,7 +75,7 @@ def non_newtonian_force(
 
 @part
 def _yielding(parameters: Record, law: Any, tracks: Record, local: Record, state: Record, limit_nspm: float) -> None:
-    """Herschel–Bulkley; what the elastic displacement stores, ½ F_y s²/s_y, it may give back."""
+    """Herschel–Bulkley; the elastic energy ½ F_y s²/s_y may be returned to the hand."""
     w, strain = local.relative_mps, tracks.strain
     speed_mps = norm(w)
     viscous_n = _herschel_bulkley(speed_mps, law.viscous, law.plastic, law.exponent)
@@ -91,7 +91,7 @@ def _yielding(parameters: Record, law: Any, tracks: Record, local: Record, state
         return
     stable = min(limit_nspm / law.full_nspm, 1.0)
     per_m = law.stiffness_npm * stable * stable / law.yield_n
-    x = min(_slipped_m(tracks, SLACK_COUNTS * parameters.count_m * parameters.scale) * per_m, MOST_STRAIN)
+    x = min(_play_step_m(tracks, SLACK_COUNTS * parameters.count_m * parameters.scale) * per_m, MOST_STRAIN)
     share = _mean(x)
     for axis in range(3):
         strain[axis] += share * (tracks.step_m[axis] * per_m - x * strain[axis])
@@ -109,8 +109,8 @@ def _mean(x: float) -> float:
 
 
 @part
-def _slipped_m(tracks: Record, slack_m: float) -> float:
-    """Return how far the ball moved in this tick, encoder noise and dither left out: a play operator's step."""
+def _play_step_m(tracks: Record, slack_m: float) -> float:
+    """Return the ball's motion in this tick [m] without encoder noise and dither: the step of a play operator."""
     ahead_m = tracks.ahead_m
     for axis in range(3):
         ahead_m[axis] += tracks.step_m[axis]
@@ -166,7 +166,7 @@ def _viscous(law: Any, local: Record, state: Record, limit_nspm: float) -> None:
 
 @part
 def _add_limited_force(local: Record, state: Record, w: Any, resistance_nspm: float) -> None:
-    """Add −R w to the force, as one that the slope limit holds."""
+    """Add −R w to the force as damping, which the slope limit bounds."""
     for axis in range(3):
         force_n = -resistance_nspm * w[axis]
         local.damping_n[axis] += force_n
@@ -175,7 +175,7 @@ def _add_limited_force(local: Record, state: Record, w: Any, resistance_nspm: fl
 
 @part
 def _add_excess_force(local: Record, state: Record, w: Any, resistance_nspm: float) -> None:
-    """Add −R w to the force, as one that exceeds the slope limit."""
+    """Add −R w to the force, and the part above the slope limit to the excess."""
     for axis in range(3):
         local.excess_n[axis] = -resistance_nspm * w[axis]
         state.force_n[axis] += local.excess_n[axis]

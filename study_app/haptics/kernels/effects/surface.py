@@ -1,8 +1,9 @@
-"""Surface: how much of the ball is under the top face of a liquid, for the effects that depend on it.
+"""Surface: the submerged share of the ball, for the effects that depend on it.
 
 With the depth h of the ball's lowest point, 0 … 2R, and u = 1 − h/R: the spherical cap has the volume πh²(3R − h)/3;
-vertical motion meets the waterplane π(2Rh − h²) until half the ball is under, then all of πR²; horizontal motion meets
-the circular segment R²(arccos u − u√(1 − u²)). Nothing steps at the surface, and the volume does not even bend.
+the frontal area of vertical motion is the waterplane π(2Rh − h²) until half the ball is submerged, then πR²; that of
+horizontal motion is the circular segment R²(arccos u − u√(1 − u²)). All are continuous at the surface, and the volume
+has a continuous slope.
 """
 
 from __future__ import annotations
@@ -31,9 +32,9 @@ def submerge(liquid: Record, local: Record, place_m: Record, radius_m: float) ->
 
 @part
 def wetted_fraction(local: Record) -> None:
-    """Set the share φ of the frontal area that the motion w shows to the liquid: upright's and level's by w's squares.
+    """Set the share φ of the frontal area for the motion w: vertical and horizontal shares weighted by w's squares.
 
-    Exact for vertical and horizontal motion; in between a blend that never leaves the two. [choice]
+    Exact for vertical and horizontal motion; a weighted mean for other directions. [choice]
     """
     w, surface = local.relative_mps, local.surface
     level = w[0] * w[0] + w[2] * w[2]

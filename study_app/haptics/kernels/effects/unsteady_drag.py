@@ -1,4 +1,4 @@
-"""Unsteady drag: drag, added mass and history of a ball in one law that holds at finite Reynolds numbers, too.
+"""Unsteady drag: drag, added mass and history of a ball in one law that is also valid at finite Reynolds numbers.
 
 With w the velocity relative to the liquid, ν = µ/ρ, and vectors w, y, z, s, e, h, m_i::
 
@@ -6,15 +6,15 @@ With w the velocity relative to the liquid, ν = µ/ρ, and vectors w, y, z, s, 
     u  = √(|w|² + |z|²)                                 speed of convection: of the ball, or of its wake after a stop
     z' = c_z u/D (w − z)                                velocity of the wake behind the ball
     s' = c_s u/D (w − s)                                velocity of the wake farther behind
-    e  = w − Re_u/(Re_u + R₀) (β o z + p s)             velocity that the ball meets, Re_u = uD/ν, with
-    o  = min(max(1 − w·z/|z|², 0), 1)                   how far the wake overtakes it or meets it; 0 where z = 0
-    p  = min(max(−w·s/|s|², 0), 1)                      how far it goes back through its wake; 0 where s = 0
-    y' = c_y u/D (φ(|e|) e − w − y)                     drag beyond Stokes', built up over a way; φ: `finite_reynolds`
-    h  = D/(2√(πν)) Σ b_i m_i,  m_i' = dw/dt − (k_i + c_m u/D) m_i   history, carried away with the flow
+    e  = w − Re_u/(Re_u + R₀) (β o z + p s)             effective relative velocity, Re_u = uD/ν, with
+    o  = min(max(1 − w·z/|z|², 0), 1)                   how far the wake overtakes or opposes it; 0 if z = 0
+    p  = min(max(−w·s/|s|², 0), 1)                      how far it moves back through its wake; 0 if s = 0
+    y' = c_y u/D (φ(|e|) e − w − y)                     drag beyond Stokes', rising over distance; φ: `finite_reynolds`
+    h  = D/(2√(πν)) Σ b_i m_i,  m_i' = dw/dt − (k_i + c_m u/D) m_i   history, convected with the flow
 
 The exponentials are 1/√t within 1.5 % from 1 ms to 30 s. As Re → 0, F is that of Stokes, the added mass and Basset.
 The constants are fitted to this project's fluid solver at Re 0.3 to 100 by ``liquid-study cfd --refit``, which prints
-the errors. Each tick costs the same, and a step is stable however long it is.
+the errors. The cost per tick is constant, and a step of any length is stable.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ OVERTAKING = 2.96  # β
 OVERTAKING_REYNOLDS = 11.0  # R₀
 RATES_PER_S = (0.0212334, 0.257773, 1.39978, 7.11516, 36.0112, 182.242, 927.902)  # k_i
 WEIGHTS_RPS = (0.33973, 0.52101, 1.09144, 2.44114, 5.48942, 12.3529, 28.26937)  # b_i [1/√s]
-SHORT = 4.0  # up to here `_mean` needs no exp
+SHORT = 4.0  # `_mean` needs no exp up to this value
 NOTHING = 1e-30
-PERIOD_S = 1.0  # of the sway whose history counts as a storage
+PERIOD_S = 1.0  # oscillation whose history force counts as stored energy
 
 _over_stokes = part(laws.finite_reynolds)
 
@@ -50,11 +50,12 @@ def unsteady_drag_force(
 ) -> None:
     """Add F to the force, (3,) [N]; dw/dt is smoothed, as for the effects "added_mass" and "history".
 
-    The share φ of the frontal area counts for drag, that of the volume for added mass and history. A body that moves
-    when it meets the liquid begins as if it had always moved so. The slope limit B holds 3πµDw, and what is left of it
-    3πµDy, at 0.6 of the speed u: at w it would remove the push of a wake on a body that rests. y grows as the speed to
-    the power of 1.7, so its slope is that much steeper than its secant: at the whole speed, freed handles of 100 g and
-    less swung on a steady drift at scales of 10 and 20. A loop is stable with a part of added mass and history.
+    The share φ of the frontal area counts for drag, that of the volume for added mass and history. A body that enters
+    the liquid in motion begins as if it had always moved so. The slope limit B bounds 3πµDw, and the rest of B bounds
+    3πµDy at 0.6 of the speed u: at w it would remove the push of a wake on a body at rest. y grows with the speed to
+    the power of 1.7, so its slope is 1.7 times its secant: at the full speed, released handles of 100 g and less
+    oscillated on a steady drift at scales of 10 and 20. Only the shares of added mass and history that keep the loop
+    stable are sent.
     """
     law, tracks, w = liquid.unsteady_drag, local.unsteady_drag, local.relative_mps
     if local.ticks == 0:
@@ -86,7 +87,7 @@ def unsteady_drag_force(
 
 @part
 def _reset_tracks(law: Any, tracks: Record, w: Any) -> None:
-    """Begin at the present velocity, as if it had always been so."""
+    """Begin at the present velocity, as if the motion had always been uniform."""
     excess = _over_stokes(law.reynolds_spm * norm(w)) - 1.0
     copy(w, tracks.previous_mps)
     clear(tracks.acceleration_mps2)
@@ -101,7 +102,7 @@ def _reset_tracks(law: Any, tracks: Record, w: Any) -> None:
 
 @part
 def _update_wakes(law: Any, tracks: Record, w: Any, u_mps: float, wake2: float, interval_s: float) -> None:
-    """Move y, then z and s, toward what they follow."""
+    """Advance y, then z and s, by one step."""
     wake, far, excess = tracks.wake_mps, tracks.far_wake_mps, tracks.excess_mps
     far2 = square(far)
     overtaking = min(max(1.0 - dot(w, wake) / wake2, 0.0), 1.0) if wake2 > 0.0 else 0.0
@@ -128,7 +129,7 @@ def _update_wakes(law: Any, tracks: Record, w: Any, u_mps: float, wake2: float, 
 
 @part
 def _update_memory(law: Any, tracks: Record, u_mps: float, interval_s: float, history: Any) -> None:
-    """Add dw/dt to the exponentials and let them decay; set ``history`` to Σ b_i m_i and what that lacks [m/s/√s]."""
+    """Add dw/dt to the exponentials and let them decay; set ``history`` to Σ b_i m_i plus its remainder [m/s/√s]."""
     acceleration, memory = tracks.remembered_mps2, tracks.memory_mps
     loss_per_s = MEMORY_LOSS * u_mps * law.per_m
     hx = hy = hz = youngest = 0.0
@@ -156,5 +157,5 @@ def _mean(x: float) -> float:
 
 @part
 def _cleared(value: float) -> float:
-    """Return the value, or 0 for what is left of one at rest."""
+    """Return the value, or 0 if it has decayed to nearly 0."""
     return value if abs(value) > NOTHING else 0.0

@@ -1,4 +1,4 @@
-"""The position tail: the liquid velocity left by the body's recent path, at a constant cost a tick.
+"""The position tail: the liquid velocity left by the body's recent path, at a constant cost per tick.
 
 Definition (Rek 2024, §4.3, eq. 1): the newest N elements e_j, each the velocity of one tick, fall into segments; a new
 segment starts where the path turns by more than the breaking angle β. With d_i the unit direction of a segment's newest
@@ -6,9 +6,9 @@ element,
 
     v_tail = (1/S) Σ_i d_i Σ_{j in i} |e_j| ,      v_wake = v_tail · response(|v_tail| / m̄) .
 
-All of it is linear in the |e_j|, so sums are kept and only what enters or leaves is added or taken: here, the response
-to the sums and what a tick does to the list; in ``segments``, the bookkeeping. ``evaluation.reference_model`` is
-the same by the letter, element by element.
+This is linear in the |e_j|, so sums are stored and only entering and leaving elements are added and subtracted: this
+module computes the response to the sums and updates the list per tick; ``wake_segments`` maintains segments and sums.
+``evaluation.reference_model`` is the literal definition, element by element.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def wake_velocity(parameters: Record, liquid: Record, local: Record, state: Reco
 
 @part
 def returnable_j(parameters: Record, liquid: Record, wake_mps: Any, length: int) -> float:
-    """Return the most energy [J, scene] that a wake of ``length`` N gives to a body: max R(u - v) (u - v) v, for N T.
+    """Return the greatest energy [J, scene] that a wake of ``length`` N gives to a body: max R(u - v) (u - v) v · N T.
 
     For a constant coefficient that power is (4/27) c u³, at v = u/3; R of the other laws grows less, so R(u) u²/4
     bounds it.
@@ -62,7 +62,7 @@ def returnable_j(parameters: Record, liquid: Record, wake_mps: Any, length: int)
 
 @part
 def response(fill: float, exponent: float) -> float:
-    """Return what |v_tail| is multiplied by where it is the share ``fill`` of the elements' mean speed.
+    """Return the factor of |v_tail|, which is ``fill`` times the elements' mean speed.
 
     The response acts on the fill x = |v_tail|/m̄ with m̄ = Σ|e|²/Σ|e|: straight motion fills the wake as x^y. For y < 1
     a smooth floor x_0 keeps x^(y-1) finite where opposed segments cancel.
@@ -76,11 +76,11 @@ def response(fill: float, exponent: float) -> float:
 
 @part
 def update_wake(liquid: Record, local: Record, state: Record, elements: Any, segments: Any, interval_s: float) -> None:
-    """Let the wake take in this tick, after the force: decay, arc, and an element where the rules ask for one.
+    """Update the wake after the force: decay, arc length, and a new element if the rules require one.
 
-    What enters is the motion through the current: a body that drifts with a river leaves no wake. Slower than 1 mm/s it
-    stores a zero element, which belongs to no segment and still takes one of the N places; a moving one stores its
-    velocity once it is ``resolution`` away from where it last stored.
+    Elements hold the motion relative to the current: a body that drifts with the current leaves no wake. A body slower
+    than 1 mm/s stores a zero element, which belongs to no segment but takes one of the N places; a moving body stores
+    its velocity at each ``resolution`` of distance from its last stored element.
     """
     wake, tracks, h = liquid.wake, local.wake, local.motion_mps
     tracks.scale *= math.exp(wake.log_decay_per_s * interval_s)

@@ -1,16 +1,16 @@
-"""A Kalman filter of velocity that knows the force just sent and learns the mass that the force moves.
+"""A Kalman filter of velocity that uses the sent force and estimates the mass that the force moves.
 
 Per axis the state is position, velocity and acceleration, driven by white jerk of density q that grows with speed and
-acceleration, and where innovations exceed their variance; all axes share one covariance. The force, delayed as the loop
-is believed to be, passes two high-pass filters, since only its fast part is certain to meet the device's own mass and
-not the hand. Its effect is the state's response to it at 1 kg, V, times the inverse mass θ, estimated separately: a
-two-stage filter (Friedland 1969, IEEE TAC 14:359). So the estimate lags neither behind the hand nor behind what the
-loop itself does to the handle.
+acceleration, and where innovations exceed their variance; all axes share one covariance. The force, delayed by the
+assumed loop delay, passes two high-pass filters, since only its fast part surely accelerates the device's mass and not
+the hand. Its effect is the state's response V to it at 1 kg, times the inverse mass θ, estimated separately: a
+two-stage filter (Friedland 1969, IEEE TAC 14:359). So the estimate lags neither behind the hand nor behind the effect
+of the force on the handle.
 
-A position that stays the same while the handle must have moved is a sample that the device repeated: it is passed over,
-but a second one in a row is believed. Innovations far outside their variance for 20 ms, or a delay that changes, are
-trouble: from that tick on the estimate is that of EWMA, which runs along, and after a second without trouble the
-filter's again. What is then between the two is carried and fades, so that the estimate does not jump.
+If the position is unchanged although the handle must have moved, the device repeated a sample: it is skipped, but a
+second one in a row is used. Innovations far outside their variance for 20 ms, or a change of the delay, are a fault:
+from that tick on the estimate is that of EWMA, which runs in parallel, and after a second without a fault the filter's
+again. Their difference then is added and fades out, so that the estimate does not jump.
 """
 
 from __future__ import annotations
@@ -27,35 +27,35 @@ JERK_OF_SPEED_PS3: Final = 4000.0
 JERK_OF_ACCELERATION_PS: Final = 10.0
 JERK_OF_SURPRISE_M2PS5: Final = 300.0
 SURPRISE: Final = 4.0
-"""Mean of Σ innovation² / its variance from which on the jerk is raised: a reach that begins within 50 ms at rest."""
+"""Mean of Σ innovation² / its variance above which the jerk is raised: a reach that begins within 50 ms at rest."""
 TIMING_S: Final = 20e-6
 """Standard deviation of a sample's time."""
 CORNER_RADPS: Final = 2.0 * math.pi * 6.0
 """Of both high-pass filters."""
 USUAL_PER_KG: Final = 1.5
 LEARNING_PKG2S: Final = 10.0
-"""By how much the variance of θ grows in a second [1/(kg² s)]."""
+"""Growth rate of the variance of θ [1/(kg² s)]."""
 FORGETTING_S: Final = 0.5
-"""How fast θ returns to what is usual."""
+"""Rate at which θ returns to its usual value."""
 FIRST_SPEED_MPS: Final = 0.01
 FIRST_ACCELERATION_MPS2: Final = 1.0
 
 TROUBLE: Final = 16.0
-"""Mean of Σ innovation² / its variance over three axes, from which on it is far outside; single ones count up to twice
-that."""
+"""Mean of Σ innovation² / its variance over three axes above which it is far outside; single ones count up to twice
+this."""
 REPEATED: Final = 9.0
-"""Innovation² / its variance from which on an unchanged position is taken for a repeated sample."""
+"""Innovation² / its variance above which an unchanged position counts as a repeated sample."""
 TROUBLE_S: Final = 20e-3
 """Over what time."""
 QUIET_S: Final = 1.0
 CARRIED_S: Final = 10e-3
 NOTHING: Final = 1e-30
-"""Smaller values become 0: denormal numbers would slow arithmetic down [SI units]."""
+"""Smaller values become 0, since denormal numbers would slow arithmetic down [SI units]."""
 
 
 @part
 def begin_filter(parameters: Record, filtered: Record) -> None:
-    """Forget all motion and force; trust the filter."""
+    """Reset motion and force; use the filter."""
     for axis in range(3):
         filtered.passed_n[axis] = filtered.input_n[axis] = 0.0
         filtered.offset_m[axis] = filtered.velocity_mps[axis] = filtered.acceleration_mps2[axis] = 0.0
@@ -77,7 +77,7 @@ def begin_filter(parameters: Record, filtered: Record) -> None:
 
 @part
 def take_force(state: Record, safety: Record) -> None:
-    """Take the mean force that acted since the last sample, as late as the loop is believed to be."""
+    """Set the mean force that acted since the last sample, delayed by the assumed loop delay."""
     passivity, filtered = safety.passivity, state.kalman
     late = passivity.row - safety.delay_ticks
     late_n = passivity.acted_n[late if late >= 0 else late + passivity.acted_n.shape[0]]
@@ -183,7 +183,7 @@ def _correct(parameters: Record, state: Record, filtered: Record, interval_s: fl
 
 @part
 def _repeats(parameters: Record, state: Record, filtered: Record, t: float, variance_m2: float) -> bool:
-    """Return whether a sample is the one before where the handle must have moved on by far more than is uncertain."""
+    """Return whether a sample repeats the last one although the predicted motion far exceeds its uncertainty."""
     half, squares_m2 = 0.5 * t * t, 0.0
     for axis in range(3):
         if state.position_m[axis] != state.previous_m[axis]:
@@ -198,7 +198,7 @@ def _repeats(parameters: Record, state: Record, filtered: Record, t: float, vari
 
 @part
 def _distrust(filtered: Record, ratio: float, interval_s: float) -> int:
-    """Return 1 where EWMA is to be used at this tick, 0 where the filter is."""
+    """Return 1 if this tick uses EWMA, 0 if it uses the filter."""
     share = interval_s / TROUBLE_S
     weight = share / (1.0 + share * (0.5 + share / 12.0))
     filtered.surprise += weight * (min(ratio, 2.0 * TROUBLE) - filtered.surprise)

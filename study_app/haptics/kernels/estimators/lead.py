@@ -1,6 +1,6 @@
 """EWMA with lead: v̂ = e + 3.4 ms · a, with e by EWMA of weight 0.2 and a its derivative, smoothed over 20 ms.
 
-Even motion is exact once EWMA has settled. In slow motion v̂ lags by 4.5 - 3.4 = 1.1 ms at 1 kHz.
+Uniform motion is exact once EWMA has settled. In slow motion v̂ lags by 4.5 - 3.4 = 1.1 ms at 1 kHz.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ NOTHING_MPS2 = 1e-30
 
 @part
 def begin_lead(tracks: Record) -> None:
-    """Forget all motion."""
+    """Reset the motion to rest."""
     clear(tracks.smoothed_mps)
     clear(tracks.previous_mps)
     clear(tracks.acceleration_mps2)

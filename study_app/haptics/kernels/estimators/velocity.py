@@ -1,4 +1,4 @@
-"""From positions to the velocity the liquids act on: estimator, then speed knee."""
+"""The velocity that the liquids act on, from positions: estimator, then speed limiter (knee)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NOTHING_MPS = 1e-30
 
 @part
 def reset_estimator(parameters: Record, state: Record) -> None:
-    """Begin anew: a position alone says nothing about velocity, so it is 0. A given velocity is already there."""
+    """Reset the estimate: the velocity is 0, since one position does not determine it, unless it is measured."""
     if parameters.estimator not in (given.CODE, device.CODE):
         clear(state.estimate_mps)
         state.window_held = 0
@@ -54,8 +54,8 @@ def estimate_velocity(parameters: Record, state: Record, window: Any, interval_s
 def _ewma(parameters: Record, state: Record, velocity_mps: Any, interval_s: float) -> None:
     """Move ``velocity_mps`` (3,) to the newest difference u = Δp/Δt: v ← v + α(Δt)(u − v) (Rek 2024, §4.2).
 
-    α(Δt) = 1 − (1 − α)^(Δt/1 ms) makes it the same filter at any rate; while Δt stays as it is, so does α. What is left
-    at rest ends as 0: in denormal numbers, where it would stay, arithmetic is slow.
+    α(Δt) = 1 − (1 − α)^(Δt/1 ms) makes it the same filter at any rate; α is recomputed only if Δt changes. At rest the
+    estimate becomes exactly 0: arithmetic on denormal numbers is slow.
     """
     if interval_s != state.weighted_s:
         state.weighted_s = interval_s
@@ -76,7 +76,7 @@ def _raw(state: Record, interval_s: float) -> None:
 
 @part
 def _store_sample(parameters: Record, state: Record, window: Any, interval_s: float) -> None:
-    """Put the newest sample into the window, in place of the oldest once it is full, and say how old all are."""
+    """Add the newest sample to the window, replacing the oldest if it is full, and update their ages."""
     samples = parameters.window_samples
     state.window_newest = (state.window_newest + 1) % samples
     state.window_held = min(state.window_held + 1, samples)
@@ -92,13 +92,13 @@ def _store_sample(parameters: Record, state: Record, window: Any, interval_s: fl
 
 @part
 def _back(parameters: Record, state: Record, window: Any, back: int) -> Any:
-    """Return the sample that came ``back`` samples before the newest."""
+    """Return the sample ``back`` samples before the newest."""
     return window[(state.window_newest + parameters.window_samples - back) % parameters.window_samples]
 
 
 @part
 def _line(parameters: Record, state: Record, window: Any) -> None:
-    """Take the slope of the least-squares line through the samples: v = Σ(t − t̄)p / Σ(t − t̄)², with their own times."""
+    """Set the slope of the least-squares line through the samples: v = Σ(t − t̄)p / Σ(t − t̄)², with measured times."""
     mean_s = squares_s2 = 0.0
     for back in range(state.window_held):
         mean_s += _back(parameters, state, window, back).age_s / state.window_held
@@ -114,16 +114,16 @@ def _line(parameters: Record, state: Record, window: Any) -> None:
 
 @part
 def _foaw(parameters: Record, state: Record, window: Any) -> None:
-    """Take the slope of the best-fit line through as many samples as lie along it.
+    """Set the slope of the best-fit line through as many samples as lie along it.
 
-    First-order adaptive windowing (Janabi-Sharifi, Hayward & Chen 2000, IEEE TCST 8:1003, best-fit): from the newest
-    two samples on, one more is taken in while every sample in between lies within the tolerance of the line through
-    the newest one that has the slope of least squares. Distances are those of places in space, so one window serves
-    all axes and no direction is preferred. [choice]
+    First-order adaptive windowing (Janabi-Sharifi, Hayward & Chen 2000, IEEE TCST 8:1003, best-fit): starting with the
+    newest two samples, one more is added while every sample in between lies within the tolerance of the line through
+    the newest one with the least-squares slope. Distances are Euclidean, so one window serves all axes and no direction
+    is preferred. [choice]
     """
     clear(state.estimate_mps)
     ages_s = squares_s2 = 0.0
-    sx = sy = sz = tx = ty = tz = 0.0  # Σ p and Σ age · p, p as seen from the newest
+    sx = sy = sz = tx = ty = tz = 0.0  # Σ p and Σ age · p, p relative to the newest
     for back in range(1, state.window_held):
         row = _back(parameters, state, window, back)
         px = row.position_m[0] - state.position_m[0]
@@ -147,7 +147,7 @@ def _foaw(parameters: Record, state: Record, window: Any) -> None:
 def _is_along(parameters: Record, state: Record, window: Any, until: int, vx: float, vy: float, vz: float) -> bool:
     """Return whether the samples between the newest and ``until`` lie along the line of this slope.
 
-    Counts of an encoder often lie off by exactly the tolerance: that is within it, whatever the rounding.
+    Encoder counts often deviate by exactly the tolerance: that counts as within it, despite rounding.
     """
     most_m2 = parameters.tolerance_m * parameters.tolerance_m * (1.0 + TIE)
     for back in range(1, until):
@@ -162,7 +162,7 @@ def _is_along(parameters: Record, state: Record, window: Any, until: int, vx: fl
 
 @part
 def _knee(parameters: Record, state: Record) -> None:
-    """Lower speeds above the threshold, keep the direction; the estimate itself stays as it is.
+    """Lower speeds above the threshold and keep the direction; the estimate itself is unchanged.
 
     ``sqrt`` has unit slope at the threshold: s' = s0 + √(1 + 2(s − s0)) − 1 with s, s0 in m/s. ``square`` is the
     literal "squaring the part above" of Rek 2024, which raises any excess over 1 m/s.
