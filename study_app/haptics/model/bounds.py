@@ -1,7 +1,7 @@
-"""The most each effect can do to the force, over how the body is expected to move; plain arithmetic, no compiler.
+"""Upper bounds of each effect's force over the expected motion of the body; plain arithmetic, no compiler.
 
 The motion box of a scene allows every motion with |v| ≤ v_max, |a| ≤ a_max and a depth of the body's centre within its
-range. A bound is the greatest change of the force [N] that leaving the effect out makes for any of them; each effect's
+range. A bound is the greatest change of the force [N] if the effect is omitted, over all these motions; each effect's
 formula is in its descriptor (``haptics.model.effects``).
 """
 
@@ -26,7 +26,7 @@ def bounds(scene: Scene, liquid: Liquid) -> Mapping[Effect, float]:
 
 @dataclass(frozen=True)
 class Extremes:
-    """The extremes of the motion in one liquid of a scene, and what the bounds of effects are made of."""
+    """The extremes of the motion in one liquid of a scene, and the quantities of which effects compute bounds."""
 
     scene: Scene
     liquid: Liquid
@@ -56,13 +56,13 @@ class Extremes:
 
     @cached_property
     def relative_mps(self) -> float:
-        """The greatest speed of the body, after the knee, against the flow that may be called for."""
+        """The greatest speed of the body, after the knee, relative to any flow that may be selected."""
         flow_mps = sum(it.speed_mps for it in _flows(self.liquid, called_for=True))
         return met_mps(self.scene, self.liquid, self.scene.motion_in(self.liquid).speed_mps or 0.0) + flow_mps
 
     @cached_property
     def speed_mps(self) -> float:
-        """The greatest speed of the body in the liquid, after the knee; 0 where it is never in it."""
+        """The greatest speed of the body in the liquid, after the knee; 0 if it is never in it."""
         if self._is_outside:
             return 0.0
         return met_mps(self.scene, self.liquid, self.scene.motion_in(self.liquid).speed_mps or 0.0)
@@ -74,7 +74,7 @@ class Extremes:
 
     @cached_property
     def flow(self) -> Flow:
-        """How fast the liquid flows by itself."""
+        """The speed and shear of the liquid's own flow."""
         if self._is_outside:
             return Flow(0.0, 0.0)
         flows = _flows(self.liquid)
@@ -100,7 +100,7 @@ class Extremes:
 
     @property
     def lift_n(self) -> float:
-        """The weight of the liquid in the place of the whole body."""
+        """The weight of the liquid that the whole body displaces."""
         return self.liquid.density_kg_m3 * self.volume_m3 * GRAVITY_MPS2
 
     @property
@@ -122,7 +122,7 @@ class Extremes:
         return accelerated_n(self, self.acceleration_mps2, self.speed_mps) + self._sheared_n(accelerated_n)
 
     def sheared_n(self) -> float:
-        """Return what inertial effects make of the shear of the flow."""
+        """Return the force of inertial effects in the shear of the flow."""
         return sum(self._sheared_n(effect.accelerated_n) for effect in EFFECTS if effect.accelerated_n is not None)
 
     def _sheared_n(self, accelerated_n: Callable[[Extremes, float, float], float]) -> float:
@@ -137,7 +137,7 @@ class Extremes:
         return submerged(depth_m, self.radius_m)
 
     def doubtful_shares(self) -> tuple[float, float]:
-        """Return how much of frontal area and volume is wrong at most, 0 … 1, if the ball is all in or all out."""
+        """Return the greatest error of frontal area and volume, 0 … 1, if the ball counts as fully in or out."""
         nearest_m = max(self.depth_m[0], -self.depth_m[1], 0.0)
         if nearest_m == 0.0:
             return 1.0, 1.0
@@ -149,7 +149,7 @@ class Extremes:
 
 
 def _flows(liquid: Liquid, *, called_for: bool = False) -> list[Flow]:
-    """Return the flows that the liquid has a table of, or only those that are called for or left to the gate."""
+    """Return the flows that the liquid has a table of, or only those selected or left to the gate."""
     return [
         effect.flow(getattr(liquid, effect.name))
         for effect in EFFECTS
@@ -166,12 +166,12 @@ def submerged(depth_m: float, radius_m: float) -> float:
 
 
 def met_mps(scene: Scene, liquid: Liquid, speed_mps: float) -> float:
-    """Return a speed [m/s] as the effects of a liquid meet it: after the knee, but for a damper."""
+    """Return the speed [m/s] that a liquid's effects use: after the knee, except for a damper."""
     return speed_mps if liquid.drag.law == "linear" else lowered_mps(speed_mps, scene.knee)
 
 
 def lowered_mps(speed_mps: float, knee: Knee) -> float:
-    """Return a speed after the knee [m/s], as the effects meet it."""
+    """Return a speed after the knee [m/s], which the effects use."""
     excess_mps = speed_mps - knee.threshold_mps
     if excess_mps <= 0 or knee.law == "none":
         return speed_mps

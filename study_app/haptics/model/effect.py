@@ -23,16 +23,15 @@ TAIL_RATE_HZ = 1000.0
 
 KALMAN_SMOOTHING_S = 0.015
 
-LEAST, MOST = 0.0, 1.0  # of a parameter that says nothing else: then its model's own range counts
+LEAST, MOST = 0.0, 1.0  # of a parameter without a range: then the range in its model counts
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter in the lab: what it is called, and what it may be, SI; as shown it is ``factor`` times as much.
+    """One parameter in the lab: its label and its range, in SI units; shown numbers are ``factor`` times as large.
 
-    ``default`` is what its model gives it, or what the scene has where that gives nothing. A parameter with ``choices``
-    (value, words) is one of those, and ``least``, ``most`` mean nothing. ``decimals`` of the shown number are
-    significant.
+    ``default`` is the default of its model, or else the scene's value. A parameter with ``choices`` (value, words) is
+    one of those, and ``least`` and ``most`` are unused. The displayed number has ``decimals`` decimals.
     """
 
     name: str
@@ -49,7 +48,7 @@ class Parameter:
     decimals: int = 2
 
     def shown(self, value: float) -> str:
-        """Return a number with its unit, as people read it."""
+        """Return a number with its unit as text."""
         number = f"{value * self.factor:.{self.decimals}f}"
         number = number.rstrip("0").rstrip(".") if "." in number else number
         return f"{number} {self.shown_unit}".rstrip()
@@ -63,7 +62,7 @@ class Flow(NamedTuple):
 
 
 class LiquidLike(Protocol):
-    """What descriptors read of a ``liquid.Liquid``, which is made of their tables and so imports them."""
+    """The part of a ``liquid.Liquid`` that descriptors read; the class itself imports them for their tables."""
 
     @property
     def density_kg_m3(self) -> float: ...  # noqa: D102
@@ -75,7 +74,7 @@ class LiquidLike(Protocol):
 
 
 class BodyLike(Protocol):
-    """What descriptors read of a ``scene.Body``."""
+    """The part of a ``scene.Body`` that descriptors read."""
 
     @property
     def diameter_m(self) -> float: ...  # noqa: D102
@@ -86,7 +85,7 @@ class BodyLike(Protocol):
 
 
 class SceneLike(Protocol):
-    """What descriptors read of a ``scene.Scene``."""
+    """The part of a ``scene.Scene`` that descriptors read."""
 
     @property
     def scale(self) -> float: ...  # noqa: D102
@@ -101,7 +100,7 @@ class SceneLike(Protocol):
 
 
 class ExtremesLike(Protocol):
-    """What descriptors read of the ``bounds.Extremes`` of the motion in one liquid of a scene."""
+    """The part of the ``bounds.Extremes`` of the motion in one liquid that descriptors read."""
 
     @property
     def scene(self) -> SceneLike: ...  # noqa: D102
@@ -139,10 +138,10 @@ class ExtremesLike(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """Rows that an effect owns in arrays of the model, as many and from the same first row in each of ``arrays``.
+    """Rows that an effect owns in arrays of the model: the same rows in each of ``arrays``.
 
-    ``needed`` returns how many a liquid needs at a rate [Hz]; ``most`` how many any liquid can need, None where only
-    whoever packs the scenes can know. ``words`` name them in messages.
+    ``needed`` returns the number that a liquid needs at a rate [Hz]; ``most`` the greatest number that any liquid
+    needs, None if only the caller that packs the scenes knows it. ``words`` name them in messages.
     """
 
     words: str
@@ -152,7 +151,7 @@ class Rows:
 
 
 def _nothing_to_fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str, int]) -> None:
-    """Fill in nothing: the effect has no parameters of its own."""
+    """Write nothing: the effect has no parameters."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -162,46 +161,45 @@ class Effect:
     Parameters
     ----------
     name : str
-        As files, records and tables call it.
+        Name in files, records and tables.
     label : str
-        As windows call it.
+        Name in windows.
     bit : int
         Of ``layout.LIQUID``'s ``effects``; effects are listed in the order of their bits.
     bound_n : callable
-        The greatest change of the force [N] that leaving it out makes; None where the liquid has no parameters
-        for it.
+        The greatest change of the force [N] if it is omitted; None if the liquid has no parameters for it.
     exerted_n : callable, optional
-        About the greatest force [N] of its own; None where it acts through others.
+        Estimate of its greatest force [N]; None if it acts through others.
     extent : "area" | "volume"
-        What of the wetted body it grows with; "" where a surface does not change it.
+        The wetted quantity that it is proportional to; "" if a surface does not change it.
     accelerated_n : callable, optional
-        The force [N] where the liquid changes its velocity along the body's path by Δv [m/s] at a [m/s²].
+        The force [N] if the liquid's velocity along the body's path changes by Δv [m/s] at a [m/s²].
     flow : callable, optional
-        How fast the liquid flows by itself, from the table.
+        The speed and shear of the liquid's own flow, from the table.
     format : int
-        The format of files that it came with.
+        The first format of files that has it.
     automatic : bool
         Whether the gate may choose it.
     bars : callable, optional
-        Effects that the gate may not choose in a scene of its format, by what it knows of them, and why.
+        Effects that the gate may not choose in a scene of its format, with reasons.
     choose : callable, optional
         The table that the gate gives it, and why, in words.
     note : callable, optional
-        What follows why it is chosen or named, where it has no ``choose``.
+        Text appended to the reason why it is chosen or named, if it has no ``choose``.
     model : Any
         Type of its table in a liquid; None without a table.
     default : Any
-        Its table where a file has none.
+        Its table if a file has none.
     missing : str
-        What a message says of a table that is missing.
+        Description of a missing table in messages.
     through : tuple of str
         The effects that it can act through, one of which it needs; the usual one first.
     excludes : tuple of str
-        Effects that are models of the same thing.
+        Other models of the same effect.
     replaces : tuple of str
-        Fields of the liquid that must be empty with it: the lab empties them.
+        Fields of the liquid that must be empty with it: the lab clears them.
     problem : callable, optional
-        What is wrong with a liquid that selects it, in a sentence.
+        The error in a liquid that selects it, in a sentence.
     parameters : tuple, optional
         Fields of its record of parameters in a liquid; ``fill`` writes them.
     state : tuple, optional
@@ -209,21 +207,20 @@ class Effect:
     fill : callable
         Writes its parameters into a liquid's record.
     rows : tuple of Rows
-        What it owns in the arrays of the model.
+        Its rows in the arrays of the model.
     damping_nspm : callable, optional
-        The damping [N·s/m, scene] that fast motion meets, by its parameters; a loop tolerates only a part of
-        such a force, and the kernel writes it to the next row of ``local.inertia_n``.
+        Its damping [N·s/m, scene] of fast motion, from its parameters; the loop is stable with only a share of such a
+        force, and the kernel writes it to the next row of ``local.inertia_n``.
     adjustable : bool
-        Whether its numbers may change while it acts.
+        Whether its parameters may change while it acts.
     controls : tuple of Parameter
         Its parameters in the lab.
     with_liquid : bool
         Whether the lab shows them with the liquid's own, selected or not.
     open_values : mapping
-        What follows from the scene where a parameter is left open.
+        Values of unset parameters, computed from the scene.
     start : callable, optional
-        The table that the lab begins with, of a kind ("": the usual one), around a centre [m] within a reach
-        [m].
+        The initial table of a kind ("": the default kind) in the lab, around a centre [m] within a reach [m].
     thresholds : tuple of str
         Parameters that cannot be fitted: the force jumps with them or does not change.
     """
@@ -262,10 +259,10 @@ class Effect:
 
 
 def smoothing_s(velocity: Any, given_s: float | None, usual_s: float) -> float:
-    """Return over what time [s] an effect smooths: ``given_s`` by its table, or as suits the velocity estimator.
+    """Return the smoothing time [s] of an effect: ``given_s`` in its table, or by the velocity estimator.
 
-    Velocities that come with the motion are not smoothed; that of "kalman" lags less and may be smoothed for longer
-    before a history.
+    Velocities given with the motion are not smoothed; that of "kalman" lags less and may be smoothed for longer before
+    the history force.
     """
     if velocity.kind == "given":
         return 0.0

@@ -1,4 +1,4 @@
-"""The descriptor of a velocity estimator: what files, packing, checks, lab and sweeps need to know about it.
+"""The descriptor of a velocity estimator: its properties for files, packing, checks, lab and sweeps.
 
 An estimator is a descriptor in ``haptics.model.estimators``, a kernel in ``haptics.kernels.estimators`` with a line in
 ``velocity.estimate_velocity``, and its model in ``scene.Velocity``. Descriptors are found by importing the modules of
@@ -15,7 +15,7 @@ from study_app.haptics.model.effect import Fields
 from study_app.haptics.model.ranges import Frozen
 
 NOMINAL_S: Final = 1e-3
-"""A weight is given for differences over this time."""
+"""Weights of EWMA apply to differences over this time."""
 
 
 WINDOWS: Final = (2, 3, 5, 8, 11, 15, 16)
@@ -24,7 +24,7 @@ WINDOWS: Final = (2, 3, 5, 8, 11, 15, 16)
 
 @dataclass(frozen=True, slots=True)
 class EstimatorKind:
-    """What one velocity estimator is.
+    """The properties of one velocity estimator.
 
     Parameters
     ----------
@@ -37,19 +37,19 @@ class EstimatorKind:
     model : Frozen subclass
         Its table in files; its values are the ``velocity`` of the callables below.
     passed_share : callable
-        Re V/(jωX) of ``velocity`` in an even swing of ω [rad/s], sampled every ``period_s``.
+        Re V/(jωX) of ``velocity`` in a steady oscillation at ω [rad/s], sampled every ``period_s``.
     fill : callable
         Write the parameters of ``velocity`` into a record of ``layout.PARAMETERS``, in a scene of some scale.
     samples : callable
-        How many samples it looks back at; 0 where it keeps none.
+        Number of past samples that it uses; 0 if it stores none.
     state : Fields, optional
         The fields of its own state.
     parameter : str, optional
         The field of ``model`` over which the table of slope limits is measured.
     measured : tuple of float
-        At which values.
+        The values at which it is measured.
     of_device : bool
-        Whether it estimates from a device's positions, and files may name it.
+        Whether it uses a device's positions, so that files may name it.
     """
 
     name: str
@@ -66,7 +66,7 @@ class EstimatorKind:
 
 
 def fill_ewma(record: Any, alpha: float) -> float:
-    """Write the weight of EWMA into a record; return its lag [s] as far as it stores energy."""
+    """Write the weight of EWMA into a record; return the part of its lag [s] that stores energy."""
     keep = 1 - alpha
     record.log_keep_per_s = math.log(keep) / NOMINAL_S if keep > 0 else -math.inf
     record.fallback_lag_s = keep / alpha * NOMINAL_S
@@ -74,14 +74,14 @@ def fill_ewma(record: Any, alpha: float) -> float:
 
 
 def ewma_response(alpha: float, period_s: float, omega_per_s: float) -> complex:
-    """Return V/(jωX) of EWMA in an even swing."""
+    """Return V/(jωX) of EWMA in a steady oscillation."""
     keep = math.pow(1 - alpha, period_s / NOMINAL_S)
     back = cmath.exp(-1j * omega_per_s * period_s)
     return (1 - keep) * (1 - back) / period_s / (1 - keep * back) / (1j * omega_per_s)
 
 
 def line_share(samples: int, period_s: float, omega_per_s: float) -> float:
-    """Return Re V/(jωX) of the least-squares slope through so many samples in an even swing."""
+    """Return Re V/(jωX) of the least-squares slope through ``samples`` samples in a steady oscillation."""
     back = cmath.exp(-1j * omega_per_s * period_s)
     middle = (samples - 1) / 2
     squares = sum((k - middle) ** 2 for k in range(samples))

@@ -1,4 +1,4 @@
-"""The link between the force model and the hand: by how much a study delays the force, and how unevenly."""
+"""The link between the force model and the hand: delay, jitter and loss of the force in a study."""
 
 import math
 from typing import Annotated, Final
@@ -9,7 +9,7 @@ MOST_DELAY_MS: Final = 200
 MOST_JITTER_MS: Final = 50
 MOST_LOSS: Final = 0.5
 FORCES: Final = 1024
-"""So many forces are kept: delay and jitter together are shorter [ticks]."""
+"""Number of stored forces: delay and jitter together are shorter [ticks]."""
 
 
 class ForceLink(Frozen):
@@ -34,7 +34,7 @@ class ForceLink(Frozen):
 
     @property
     def acts(self) -> bool:
-        """Whether it changes the force at all."""
+        """Whether it changes the force."""
         return self.delay_s > 0 or self.jitter_s > 0 or self.loss > 0
 
     def ticks(self, rate_hz: float) -> tuple[int, int]:
@@ -42,21 +42,21 @@ class ForceLink(Frozen):
         return round(self.delay_s * rate_hz), round(self.jitter_s * rate_hz)
 
     def mean_delay_s(self, rate_hz: float) -> float:
-        """Return about how late a force is sent on average [s].
+        """Return the approximate mean delay of a force [s].
 
-        Of forces with a uniform jitter of J ticks none older than the last is sent: √(πJ/2) ticks are left of it.
+        A force older than the last one is skipped, so a uniform jitter of J ticks adds about √(πJ/2) ticks.
         """
         return self.delay_s + math.sqrt(math.pi / 2 * self.ticks(rate_hz)[1]) / rate_hz
 
     def fits(self, rate_hz: float) -> bool:
-        """Return whether the kept forces reach back far enough."""
+        """Return whether enough forces are stored for the delay."""
         return sum(self.ticks(rate_hz)) < FORCES
 
 
 def too_long(rate_hz: float) -> str:
-    """Return what is wrong with a link that does not fit."""
+    """Return the error message of a link that does not fit."""
     return f"delay and jitter of the force must be below {1000 * FORCES / rate_hz:g} ms together at {rate_hz:g} Hz"
 
 
 PROMPT: Final = ForceLink()
-"""The link of all other studies: the force of a tick is sent in that tick."""
+"""No link, the default: the force of a tick is sent in that tick."""

@@ -1,11 +1,11 @@
-"""Which effects a scene calls for, and why: "simulate only the effects a scene calls for", made a rule.
+"""The gate selects the effects of a scene, with reasons: "simulate only the effects a scene calls for".
 
 A liquid names its effects, or says ``effects = "auto"``. Then the effects with the smallest bounds (``bounds``) are
-left out as long as the *sum* of what is left out stays within the scene's accuracy: 5 % of the sum of all bounds or
-0.05 N, whichever is greater, by default. That is below the smallest difference of force that people feel, 7 %; since
-the force limit caps what is felt, a greater sum counts as that. [choice] Drag takes the cheapest law of C_d that
-stays within the same target of the reference law at every speed. A wake is never taken by itself: it has no parameters
-that density and viscosity could tell.
+omitted as long as the *sum* of the omitted bounds stays within the scene's accuracy: by default 5 % of the sum of all
+bounds or 0.05 N, whichever is greater. That is below the difference threshold of force, 7 %; the sum of all bounds is
+capped at the force limit. [choice] Drag uses the least expensive law of C_d that stays within the same target of the
+reference law at every speed. A wake is never selected automatically: density and viscosity do not determine its
+parameters.
 """
 
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ NEVER_BY_ITSELF: Final = tuple(effect.name for effect in EFFECTS if not effect.a
 
 
 class Verdict(NamedTuple):
-    """What becomes of one effect in one liquid: ``share`` is its bound over the sum of the bounds, 0 … 1."""
+    """The verdict on one effect in one liquid: ``share`` is its bound over the sum of the bounds, 0 … 1."""
 
     liquid: str
     effect: Effect
@@ -43,7 +43,7 @@ def resolve(scene: Scene) -> Scene:
 
 
 def describe_gate(scene: Scene, cost_ns: Mapping[tuple[str, Effect], float] | None = None) -> tuple[str, ...]:
-    """Return the verdicts as lines of text, a table per liquid, with the measured cost of a tick where it is given.
+    """Return the verdicts as lines of text, a table per liquid, with the measured cost per tick if given.
 
     ``cost_ns`` maps (liquid, effect) to nanoseconds.
     """
@@ -54,7 +54,7 @@ def describe_gate(scene: Scene, cost_ns: Mapping[tuple[str, Effect], float] | No
 
 
 def _budget_n(scene: Scene, total_n: float) -> float:
-    """Return how much force may be left out."""
+    """Return the force that may be omitted."""
     return max(scene.accuracy.relative * min(total_n, scene.force_limit_n), scene.accuracy.absolute_n)
 
 
@@ -71,7 +71,7 @@ def _verdicts(scene: Scene, liquid: Liquid) -> tuple[Verdict, ...]:
 
 
 def _barred(scene: Scene, liquid: Liquid, found: Mapping[Effect, float]) -> dict[Effect, str]:
-    """Return the effects that cannot be among those that are chosen or named, and why."""
+    """Return the effects that cannot be chosen, with reasons."""
     if liquid.effects != "auto":
         rivals = {it.name: it.excludes for it in EFFECTS if it.excludes and it.name in found}
         names = [name for one, others in rivals.items() for name in (others if one in liquid.effects else (one,))]
@@ -87,7 +87,7 @@ def _barred(scene: Scene, liquid: Liquid, found: Mapping[Effect, float]) -> dict
 
 
 def _named(liquid: Liquid, found: Mapping[Effect, float]) -> dict[Effect, tuple[bool, str]]:
-    """Return what the file says."""
+    """Return the verdicts on effects that the file names."""
     judged: dict[Effect, tuple[bool, str]] = dict.fromkeys(found, (False, "not named"))
     for name in found:
         if name in liquid.effects:
@@ -99,7 +99,7 @@ def _named(liquid: Liquid, found: Mapping[Effect, float]) -> dict[Effect, tuple[
 def _chosen(
     scene: Scene, liquid: Liquid, found: Mapping[Effect, float], barred: Mapping[Effect, str], total_n: float
 ) -> dict[Effect, tuple[bool, str]]:
-    """Leave out the smallest while the sum of what is left out stays within the target."""
+    """Omit the smallest effects while their sum stays within the target."""
     budget_n = _budget_n(scene, total_n)
     judged: dict[Effect, tuple[bool, str]] = {name: (False, why) for name, why in barred.items()}
     left_out_n = 0.0
@@ -131,7 +131,7 @@ def _left_out(bound_n: float, left_out_n: float, budget_n: float) -> str:
 
 
 def _tables(scene: Scene, liquid: Liquid) -> dict[Effect, tuple[Any, str]]:
-    """Return the tables that effects choose, and why."""
+    """Return the tables that effects choose, with reasons."""
     extremes = Extremes(scene, liquid)
     return {effect.name: effect.choose(extremes) for effect in EFFECTS if effect.choose is not None}
 

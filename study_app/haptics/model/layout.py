@@ -1,7 +1,7 @@
-"""The memory that Python and compiled code share: shapes, units and meaning of every field, said here once.
+"""The memory shared by Python and compiled code: shape, unit and meaning of every field.
 
-Records are rows of ``np.recarray``: compiled they are plain structs, uncompiled (``NUMBA_DISABLE_JIT=1``) they still
-have attributes. Positions and forces are float64; unless a name says otherwise, m, m/s, N, s.
+Records are rows of ``np.recarray``: plain structs in compiled code, objects with attributes otherwise
+(``NUMBA_DISABLE_JIT=1``). Positions and forces are float64; unless a name says otherwise, m, m/s, N, s.
 """
 
 from typing import Any, TypeAlias
@@ -31,7 +31,7 @@ LIMITER_FADE = 1 << 5
 LIMITER_STALE = 1 << 6
 LIMITER_GLITCH = 1 << 7  # the position was rejected and must not be used
 LIMITER_STOP = 1 << 8
-LIMITER_ESTIMATOR = 1 << 9  # the velocity is EWMA's: the Kalman filter was in trouble within the last second
+LIMITER_ESTIMATOR = 1 << 9  # the velocity is EWMA's: the Kalman filter had a fault within the last second
 
 LIMITER_NAMES = ("slope", "non_finite", "energy", "norm", "slew", "fade", "stale", "glitch", "stop", "estimator")
 
@@ -41,11 +41,11 @@ STATUS_STALE_FAULT = 1
 STATUS_DEVICE_LOST = 2
 STATUS_NON_FINITE = 3
 
-# The device button that stops the force, heard by the servo itself, as a bit of Sample.buttons: button 4.
+# The device button that stops the force, evaluated by the servo, as a bit of Sample.buttons: button 4.
 BUTTON_STOP = 1 << 3
 
 FORCE_STEP_N = 2.0**-14
-"""Recordings hold forces as whole multiples of it [N]; whoever judges a force judges it so, live and afterwards."""
+"""Resolution of forces in recordings [N]; checks round forces to it, both live and afterwards."""
 
 SAMPLE = np.dtype(
     [
@@ -53,16 +53,16 @@ SAMPLE = np.dtype(
         ("time_ns", np.int64),  # when the device was read, on the servo's monotonic clock
         ("lateness_ns", np.int64),  # how late the tick began after its deadline
         ("busy_ns", np.int64),  # how long the tick took, from reading to writing
-        ("scene", np.int64),  # serial number of the scene in force; 0 is rest (no liquid, no force)
+        ("scene", np.int64),  # serial number of the active scene; 0 is rest (no liquid, no force)
         ("position_m", np.float64, (3,)),  # device, hand frame
         ("velocity_mps", np.float64, (3,)),  # scene frame, after estimator and knee
         ("wake_mps", np.float64, (3,)),  # scene frame, as used by this tick's drag
         ("force_n", np.float64, (3,)),  # sum of the effects on the body, before slope limit and safety
-        ("command_n", np.float64, (3,)),  # the force on the hand that the servo asked the device for
+        ("command_n", np.float64, (3,)),  # the force on the hand that the servo commanded
         ("device_force_n", np.float64, (3,)),  # the force on the hand that the device sent
         ("permitted_n", np.float64),  # size of the force after slope limits, norm and fades
-        ("withheld_n", np.float64),  # size of what passivity controller, slew limit and device changed of it
-        ("delay_ticks", np.int64),  # how many writes late a force is believed to act
+        ("withheld_n", np.float64),  # size of its change by passivity controller, slew limit and device
+        ("delay_ticks", np.int64),  # assumed delay of a force, in writes
         ("buttons", np.int64),  # bit set: button 1 is bit 0
         ("limiters", np.int64),  # LIMITER_* bits that acted
         ("fresh", np.int64),  # 1 where the device reported a new sample
@@ -91,7 +91,7 @@ READING = np.dtype(
         ("size_bytes", np.int64),  # bytes of this record, by the servo: a driver writes nothing beyond
         ("position_m", np.float64, (3,)),  # hand frame, after the driver's mapping
         ("buttons", np.int64),
-        ("delay_ticks", np.int64),  # how many writes late a force acts, as measured while running; -1: not measured
+        ("delay_ticks", np.int64),  # delay of a force in writes, measured while running; -1: not measured
         # from version 2 on
         ("measured", np.int64),  # MEASURED_* bits of what follows; the servo sets it to 0 before each reading
         ("velocity_mps", np.float64, (3,)),  # of the handle, hand frame
@@ -113,9 +113,8 @@ COMMAND = np.dtype(
 )
 
 
-# What follows is the memory of one scene ("model", haptics.pack) and of the safety layer, in the scene frame unless
-# said otherwise. The fields of an effect sit in records of their own (``model.effects``), untouched where the effect is
-# not asked for.
+# The memory of one scene ("model", haptics.runtime.pack) and of the safety layer, in the scene frame unless stated
+# otherwise. The fields of an effect are in separate records (``model.effects``), unused if the effect is not selected.
 
 REGION_EVERYWHERE = 0
 REGION_BOX = 1
@@ -135,7 +134,7 @@ LINK = np.dtype(
     [
         ("acts", np.int64),  # 0: the force of a tick is sent in that tick
         ("delay_ticks", np.int64),
-        ("jitter_ticks", np.int64),  # a force is later by 0 to so many ticks
+        ("jitter_ticks", np.int64),  # greatest additional delay in ticks
         ("loss", np.float64),  # share of ticks whose force is lost
         ("seed", np.int64),  # of jitter and loss
     ],
@@ -145,7 +144,7 @@ LINK = np.dtype(
 LINK_STATE = np.dtype(
     [
         ("ticks", np.int64),  # since the scene began
-        ("arrived", np.int64),  # the force sent last is of this tick, counted from 1; 0: none has arrived yet
+        ("arrived", np.int64),  # tick of the force sent last, counted from 1; 0: none has arrived yet
         ("force_n", np.float64, (3,)),  # that force
     ],
     align=True,
@@ -153,30 +152,27 @@ LINK_STATE = np.dtype(
 
 PARAMETERS = np.dtype(
     [
-        ("scale", np.float64),  # scene metres a hand metre
-        ("origin_m", np.float64, (3,)),  # where the hand's origin is
+        ("scale", np.float64),  # scene metres per hand metre
+        ("origin_m", np.float64, (3,)),  # the hand's origin in the scene
         ("period_s", np.float64),  # nominal time between ticks
-        ("liquids", np.int64),  # how many of the liquids' rows count
-        ("effects", np.int64),  # bits of the effects that any of them asks for
+        ("liquids", np.int64),  # number of liquids in use
+        ("effects", np.int64),  # bits of the effects that any of them selects
         ("radius_m", np.float64),  # of the body
         ("weight_n", np.float64),  # of the body
         ("estimator", np.int64),  # code of `estimators`
-        (
-            "log_keep_per_s",
-            np.float64,
-        ),  # ln(1 - α) a second: the share of the old velocity kept after t is exp of it · t
-        ("window_samples", np.int64),  # of line and foaw: the most samples they look at
+        ("log_keep_per_s", np.float64),  # ln(1 - α) per second: after t the share of the old velocity is exp of it · t
+        ("window_samples", np.int64),  # of line and foaw: their greatest number of samples
         ("tolerance_m", np.float64),  # of foaw, in the scene
         ("knee_law", np.int64),  # KNEE_*
         ("knee_threshold_mps", np.float64),
         ("slope_limit_nspm", np.float64, (MOST_DELAY + 1,)),  # greatest |drag| / |w| [N·s/m, scene], by the delay
         ("force_limit_n", np.float64),
-        ("fade_s", np.float64),  # how long the force takes to fade in
-        ("slew_n", np.float64),  # the most that the force changes within a tick, while the loop shows no energy debt
-        ("filter_lag_s", np.float64),  # mean delay of the velocity estimator, as far as it stores energy
-        ("fallback_lag_s", np.float64),  # the same of EWMA, which stands in for a Kalman filter in trouble
+        ("fade_s", np.float64),  # duration of the fade-in
+        ("slew_n", np.float64),  # greatest change of the force per tick while the loop has no energy debt
+        ("filter_lag_s", np.float64),  # the part of the velocity estimator's mean delay that stores energy
+        ("fallback_lag_s", np.float64),  # the same of EWMA, which replaces a Kalman filter after a fault
         ("count_m", np.float64),  # one encoder count of the device, hand frame
-        ("mass_kg", np.float64),  # the least mass that the device presents
+        ("mass_kg", np.float64),  # the device's least effective mass
         ("link", LINK),
     ],
     align=True,
@@ -193,7 +189,7 @@ REGION = np.dtype(
 
 LIQUID = np.dtype(
     [
-        ("effects", np.int64),  # bits of those it asks for
+        ("effects", np.int64),  # bits of the effects it selects
         ("inertia_share", np.float64, (MOST_DELAY + 1,)),  # stable share of inertial forces, by the delay
         ("region", REGION),
         *((effect.name, record_type(effect.parameters)) for effect in EFFECTS if effect.parameters is not None),
@@ -205,7 +201,7 @@ STATE = np.dtype(
     [
         ("tracking", np.int64),  # 1 once a position was accepted
         ("placed", np.int64),  # 1 once the body was found inside or outside of each liquid
-        ("rejected", np.int64),  # samples refused in a row
+        ("rejected", np.int64),  # samples rejected in a row
         ("accepted_ns", np.int64),  # when the last accepted sample was taken
         ("hand_m", np.float64, (3,)),  # the last accepted position, hand frame
         ("position_m", np.float64, (3,)),  # the same in the scene
@@ -220,9 +216,9 @@ STATE = np.dtype(
         ("wake_mps", np.float64, (3,)),  # of the last listed liquid that acts, as used by drag
         ("drift_mps", np.float64, (3,)),  # velocity of the current at the body, of the same liquid
         ("force_n", np.float64, (3,)),  # sum of the effects
-        ("lift_n", np.float64, (3,)),  # what of it is buoyancy and weight
-        ("returnable_j", np.float64),  # the most that effects can give back, times the scale
-        ("growth", np.int64),  # GROWS_*: of the force that grows least with the speed
+        ("lift_n", np.float64, (3,)),  # buoyancy and weight within it
+        ("returnable_j", np.float64),  # the greatest energy that effects can return, times the scale
+        ("growth", np.int64),  # GROWS_* of the force that depends least on the speed
         ("link", LINK_STATE),
     ],
     align=True,
@@ -232,7 +228,7 @@ WINDOW = np.dtype(
     [
         ("position_m", np.float64, (3,)),  # of one accepted sample
         ("interval_s", np.float64),  # Δt from the sample before it
-        ("age_s", np.float64),  # scratch: how long ago it was, at this tick
+        ("age_s", np.float64),  # scratch: its age at this tick
     ],
     align=True,
 )
@@ -243,25 +239,25 @@ LIQUID_STATE = np.dtype(
     [
         ("inside", np.int64),  # 1 while the body is within the borders (with hysteresis)
         ("border", np.float64),  # 0 outside, 1 inside, faded between
-        ("share", np.float64),  # φ of the volume: border, times what of the body is under the surface
+        ("share", np.float64),  # φ of the volume: border share times submerged share
         ("frontal", np.float64),  # φ of the frontal area, likewise; of the motion w
         ("motion_mps", np.float64, (3,)),  # v - v_current
-        ("wake_mps", np.float64, (3,)),  # v_wake; zero where no wake is asked for
+        ("wake_mps", np.float64, (3,)),  # v_wake; zero without a wake
         ("relative_mps", np.float64, (3,)),  # w = v - v_current - v_wake
-        ("ticks", np.int64),  # ticks since the body entered; 0 where effects begin anew
-        ("damping_n", np.float64, (3,)),  # sum of the forces that are held to the slope limit
-        ("excess_n", np.float64, (3,)),  # what of the forces grows more steeply than the slope limit
-        ("late_n", np.float64, (3,)),  # drag that builds up late, held to what the slope limit leaves
-        ("late_mps", np.float64),  # the speed that its limit counts at; 0 where there is none
+        ("ticks", np.int64),  # ticks since the body entered; 0: effects are reset
+        ("damping_n", np.float64, (3,)),  # sum of the forces that the slope limit bounds
+        ("excess_n", np.float64, (3,)),  # part of the forces that is steeper than the slope limit
+        ("late_n", np.float64, (3,)),  # delayed drag, bounded by the rest of the slope limit
+        ("late_mps", np.float64),  # the speed for its limit; 0: no delayed drag
         ("prompt_nspm", np.float64),  # the slope of the drag that acts at once
-        ("inertial", np.int64),  # how many inertial forces are reduced
+        ("inertial", np.int64),  # number of reduced inertial forces
         ("inertia_n", np.float64, (MOST_INERTIAL, 3)),  # these forces, in the order of their effects
         *((effect.name, record_type(effect.state)) for effect in EFFECTS if effect.state is not None),
     ],
     align=True,
 )
 
-# What of force and motion is fast, and the work in it, at the hand (haptics.incremental).
+# The fast part of force and motion, and its work, at the hand (haptics.kernels.incremental_passivity).
 INCREMENTAL = np.dtype(
     [
         ("force_n", np.float64, (3,)),  # mean force since the last sample
@@ -275,21 +271,21 @@ INCREMENTAL = np.dtype(
     align=True,
 )
 
-# The energy that hand and liquid owe each other, at the hand (haptics.energy).
+# The energy balances of hand and liquid, at the hand (haptics.kernels.passivity).
 PASSIVITY = np.dtype(
     [
-        ("balance_j", np.float64),  # E: what the hand put in and did not get back yet, were forces to act at once
-        ("late_balance_j", np.float64),  # the same, if they act as late as the loop is believed to be
-        ("later_balance_j", np.float64),  # the same, if they act one tick later still
+        ("balance_j", np.float64),  # E: energy from the hand not yet returned, if forces act at once
+        ("late_balance_j", np.float64),  # the same, if they act after the assumed loop delay
+        ("later_balance_j", np.float64),  # the same, if they act another tick later
         ("row", np.int64),  # the row of the newest force below
         ("sent_n", np.float64, (MOST_DELAY + 2, 3)),  # forces of the last ticks, without buoyancy and weight
-        ("acted_n", np.float64, (MOST_DELAY + 2, 3)),  # the same of what moved the hand: another liquid's, in a shadow
-        ("acted_impulse_ns", np.float64, (3,)),  # of such forces, as late as the loop is believed to be, times time
-        ("reserve_j", np.float64),  # the most that liquids and estimator could give back at the last sample
+        ("acted_n", np.float64, (MOST_DELAY + 2, 3)),  # the same of the forces on the hand (a shadow's differ)
+        ("acted_impulse_ns", np.float64, (3,)),  # of such forces after the assumed loop delay, times time
+        ("reserve_j", np.float64),  # greatest energy that liquids and estimator could return at the last sample
         ("stored_j", np.float64, (MOST_DELAY + 2,)),  # what the velocity estimator stored then, at the hand
         ("impulse_ns", np.float64, (3,)),  # such a force times time, summed since the last sample [N·s]
         ("late_impulse_ns", np.float64, (3,)),  # the same of late forces
-        ("later_impulse_ns", np.float64, (3,)),  # the same of forces one tick later still
+        ("later_impulse_ns", np.float64, (3,)),  # the same of forces another tick later
         ("impulse_s", np.float64),  # the time since then
         ("fast", INCREMENTAL),
         ("velocity_mps", np.float64, (3,)),  # the hand's in the frame of the current, smoothed over 2 ms
@@ -297,14 +293,14 @@ PASSIVITY = np.dtype(
         ("strongest_n", np.float64),  # the strongest force so far
         ("gain", np.float64),  # share of the force that is sent
         ("norm_share", np.float64),  # share of it that the force limit leaves
-        ("settling", np.int64),  # 1 if the force of the last tick was changed to pay a debt
+        ("settling", np.int64),  # 1 if the force of the last tick was changed to repay a debt
         ("lift_n", np.float64, (3,)),  # buoyancy and weight in the force that is sent
         ("lift_before_n", np.float64, (3,)),  # the same of the tick before
     ],
     align=True,
 )
 
-# Survives a change of scene; owned by whoever sends the force. The host may write stop, fault and device_limit_n.
+# Persists when the scene changes; owned by the sender of the force. The host may write stop, fault and device_limit_n.
 SAFETY = np.dtype(
     [
         ("stop", np.int64),  # nonzero: zero force at once; back to 0: the force fades in as at the start
@@ -314,16 +310,16 @@ SAFETY = np.dtype(
         ("tick_ns", np.int64),  # time of the last tick
         ("usable_ns", np.int64),  # time of the last sample that was accepted
         ("tick_s", np.float64),  # time since the tick before
-        ("late_s", np.float64),  # by how much more than is forgiven this tick came late
+        ("late_s", np.float64),  # lateness of this tick beyond the tolerance
         ("fade", np.float64),  # share of the force that is sent, 0 … 1
-        ("fade_s", np.float64),  # how long a fade from 0 to 1 takes at least: after a start; else 0
+        ("fade_s", np.float64),  # least duration of a fade from 0 to 1 after a start; else 0
         ("device_limit_n", np.float64),  # the device's own force limit
-        ("delay_ticks", np.int64),  # how many writes late a force is believed to act, 0 … MOST_DELAY
-        ("slower", np.int64),  # samples in a row that the device measured a longer delay at
-        ("faster", np.int64),  # samples in a row that it measured a shorter one at
+        ("delay_ticks", np.int64),  # assumed delay of a force in writes, 0 … MOST_DELAY
+        ("slower", np.int64),  # samples in a row with a longer measured delay
+        ("faster", np.int64),  # samples in a row with a shorter one
         ("permitted_n", np.float64, (3,)),  # the force after slope limits, norm and fades
         ("slewed_n", np.float64, (3,)),  # the force of the last tick, before the passivity controller changed it
-        ("passivity", PASSIVITY),  # begins anew with each scene
+        ("passivity", PASSIVITY),  # reset with each scene
     ],
     align=True,
 )
@@ -335,12 +331,12 @@ def records(dtype: np.dtype[Any], count: int) -> Any:
 
 
 def new_reading() -> Any:
-    """Return one ``READING``, shape (1,), that says its version and size."""
+    """Return one ``READING``, shape (1,), with its version and size."""
     return _versioned(READING)
 
 
 def new_command() -> Any:
-    """Return one ``COMMAND``, shape (1,), that says its version and size and commands zero force."""
+    """Return one ``COMMAND``, shape (1,), with its version and size and zero force."""
     return _versioned(COMMAND)
 
 

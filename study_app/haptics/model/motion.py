@@ -1,4 +1,4 @@
-"""Motions and what became of them as tables: strict to read, exact and atomic to write."""
+"""Motions and their results as tables, which are read strictly and written exactly and atomically."""
 
 import csv
 import math
@@ -16,7 +16,7 @@ Floats: TypeAlias = NDArray[np.floating[Any]]
 PLACES = ("t_s", "x_m", "y_m", "z_m")
 VELOCITIES = ("vx_mps", "vy_mps", "vz_mps")
 MOST_PROBLEMS = 20
-SHOWN = 200  # letters of a bad value that a message repeats
+SHOWN = 200  # characters of a bad value shown in messages
 
 HEADER = "t_s,x_m,y_m,z_m, one row per tick"
 
@@ -55,7 +55,7 @@ def read(path: Path) -> Motion:
     Raises
     ------
     ProtocolError
-        Every bad row by number (1 is the first after the header) and line.
+        Lists every bad row by number (1 is the first after the header) and line.
     StudyError
         The file cannot be read.
     """
@@ -81,7 +81,7 @@ def read(path: Path) -> Motion:
 
 
 def refuse_device(path: Path) -> None:
-    """Refuse to read a device, such as ``/dev/zero``, which may have no end.
+    """Refuse to read a device such as ``/dev/zero``, whose data may not end.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def refuse_device(path: Path) -> None:
 
 
 def _numbers(path: Path, lines: list[list[str]], columns: int) -> Floats:
-    """Return all rows as numbers, or name those that are none, are too short, or go back in time."""
+    """Return all rows as numbers, or raise an error that lists rows with other text, few fields or decreasing times."""
     problems = []
     rows: list[list[float]] = []
     for number, fields in enumerate(lines, start=1):

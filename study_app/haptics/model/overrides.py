@@ -13,9 +13,9 @@ from study_app.haptics.model.scene import Scene
 
 Tables: TypeAlias = "dict[str, list[dict[str, Any]]]"
 
-SHOWN = 200  # characters of a bad value that a message repeats
+SHOWN = 200  # characters of a bad value shown in messages
 
-# Where a parameter may sit; the places that a plain name means first come first.
+# The tables a parameter may be in, in the order in which a plain name is looked up.
 _OF_A_LIQUID = ("region", *(it.name for it in EFFECTS if it.model is not None and not it.with_liquid))
 _OF_THE_SCENE = ("body", "velocity", "knee", "accuracy", "motion")
 _FIXED = {"id", "liquids", "link"}
@@ -54,7 +54,7 @@ def override_all(scene: Scene, values: Mapping[str, object]) -> Scene:
 
 
 def value_of(scene: Scene, name: str) -> float:
-    """Return the number called ``name`` as it is in a scene; see `override_all` for names.
+    """Return the number called ``name`` in a scene; see `override_all` for names.
 
     Raises
     ------
@@ -76,13 +76,13 @@ def number_names(scene: Scene) -> tuple[str, ...]:
 
 
 def _shown(value: object) -> str:
-    """Return a value as a message repeats it."""
+    """Return a value as messages show it."""
     text = str(value)
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
 
 
 def _reason(place: tuple[int | str, ...], message: str) -> str:
-    """Return what is wrong with a parameter, in a scene's own words."""
+    """Return the message of a scene's validation error."""
     name = ".".join(str(part) for part in place if part != "liquids" and not isinstance(part, int))
     said = message.removeprefix("Value error, ").split(", unable to parse")[0].replace("Input should be", "must be")
     if "valid dictionary" in said:
@@ -137,7 +137,7 @@ def _set(table: dict[str, Any], field: str, value: object) -> None:
 
 
 def _read(text: str, present: object, field: str) -> object:
-    """Return what a text stands for, as far as the field's own type does not say."""
+    """Return the value of a text that the field's type alone does not determine."""
     if text.startswith("{"):
         try:
             return tomllib.loads(f"table = {text}")["table"]

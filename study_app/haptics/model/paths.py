@@ -1,4 +1,4 @@
-"""Programmed motions, one library for figures, tests and `simulate`: exact places with their ideal velocities.
+"""Programmed motions for figures, tests and `simulate`: exact places with their ideal velocities.
 
 All are horizontal (y = 0), in the scene frame, start at full speed, and are sampled at ``rate_hz``. At a stop the body
 is at its final place and the velocity is exactly zero from that tick on.
@@ -64,7 +64,7 @@ def reverse(
 
 
 def line(rate_hz: float, *, speed_mps: float = SPEED_MPS, moving_s: float = 6.0) -> Motion:
-    """Straight along x, without end (Rek 2024, Figs 7 and 8)."""
+    """Straight along x, without a stop (Rek 2024, Figs 7 and 8)."""
     t_s = _times(moving_s, rate_hz)
     return _horizontal(t_s, x=t_s * speed_mps, vx=np.full_like(t_s, speed_mps))
 
@@ -88,7 +88,7 @@ def zigzag(rate_hz: float, *, speed_mps: float = SPEED_MPS, leg_s: float = 0.5, 
 def reach(
     rate_hz: float, *, distance_m: float = 0.6, reach_s: float = 0.8, dwell_s: float = 0.5, reaches: float = 6
 ) -> Motion:
-    """Minimum-jerk reaches to and fro along x, with a rest at each end (Flash & Hogan 1985)."""
+    """Minimum-jerk back-and-forth reaches along x, with a rest at each end (Flash & Hogan 1985)."""
     t_s = _times((reach_s + dwell_s) * reaches, rate_hz)
     count = _count(t_s, reach_s + dwell_s, reaches)
     phase = np.clip((t_s - count * (reach_s + dwell_s)) / reach_s, 0.0, 1.0)
@@ -114,7 +114,7 @@ def _times(duration_s: float, rate_hz: float) -> Floats:
 
 
 def _count(t_s: Floats, each_s: float, most: float) -> Floats:
-    """Return how many stretches of ``each_s`` are over, at most one less than there are."""
+    """Return the number of completed intervals of ``each_s``, at most one less than their total."""
     over: Floats = np.floor(t_s / each_s + 1e-9)
     return np.minimum(over, most - 1)
 

@@ -1,11 +1,11 @@
-"""Values that a file may give: ranges of numbers, each with its reason, which a message about it repeats."""
+"""Ranges of the numbers in files, each with its reason, which error messages state."""
 
 from typing import Annotated, Any, Final, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 
 REASON: Final = "reason"
-"""Where the JSON Schema of a number keeps why its range is what it is."""
+"""JSON Schema key of the reason for a number's range."""
 
 
 class Frozen(BaseModel):

@@ -1,4 +1,4 @@
-"""The maximum stable damping of a sampled loop: the table behind the slope limit, which knows nothing of compiled code.
+"""The maximum stable damping of a sampled loop: the table of slope limits, without compiled code.
 
 The table is ``slope_limits.csv`` in this folder, measured by ``validation.stability`` on the servo's own
 tick; how its numbers follow from the measurement is said there.
@@ -16,27 +16,27 @@ from study_app.haptics.model.estimators.device import DeviceVelocity
 from study_app.haptics.model.scene import Ewma, Foaw, Given, Kalman, Velocity
 
 SLOWEST_HZ: Final = 500.0
-"""Slower servos are for trying out: what participants would feel there is the limits rather than the liquids."""
+"""Slower servos are for trials only: participants would feel the limits rather than the liquids."""
 
 
 INERTIA_SHARE: Final = 0.3
-"""Of the limit on drag, for added mass and history, where they need not be felt as they are."""
+"""Share of the drag limit for added mass and history if they need not be exact."""
 CUT_INERTIA_SHARE: Final = 0.15
-"""The same where added mass and history do not fit whole: with more of them, freed handles of 50 g swung for 0.6 s."""
+"""The same if added mass and history exceed their limit: with more, released handles of 50 g oscillated for 0.6 s."""
 
 MEASURED_KG: Final = 0.1
-"""The free handle that the table was measured with."""
+"""Mass of the free handle in the measurement of the table."""
 LIGHTER: Final = 2.0
-"""The limit of a lighter handle is lower by this power of the ratio of masses: at 1.7, freed handles of 50 g oscillated
-in honey, where the delay was one tick longer than believed; from 1.8 on none of 801 handles of 30 to 250 g was."""
+"""The limit of a lighter handle is lower by this power of the mass ratio: at 1.7, released handles of 50 g oscillated
+in honey if the delay was one tick longer than assumed; from 1.8 on none of 801 handles of 30 to 250 g did."""
 SLEW_N: Final = 1.5
-"""The most that the force on a handle of `MEASURED_KG` or more changes within a millisecond."""
+"""Greatest change of the force within a millisecond on a handle of `MEASURED_KG` or more."""
 KALMAN_SLEW: Final = 0.8
-"""Share of it with "kalman": at 1, a freed handle in tar swung where the delay was one tick longer than believed."""
+"""Its share with "kalman": at 1, a released handle oscillated in tar if the delay was one tick longer than assumed."""
 SLEW_S: Final = 1e-3
 
 _THESIS: Final = Ewma()
-_SAME: Final = 1e-9  # of two periods that differ by rounding alone
+_SAME: Final = 1e-9  # tolerance for periods that differ only by rounding
 
 
 class DampingLimits(NamedTuple):
@@ -68,11 +68,11 @@ def slope_limit(period_s: float, delay_ticks: int, velocity: Velocity | DeviceVe
 def damping_limits(period_s: float, delay_ticks: int, velocity: Velocity | DeviceVelocity = _THESIS) -> DampingLimits:
     """Return the limits of a loop with a tick period [s], a delay [ticks] and a velocity estimator.
 
-    Between two entries of the table, of periods as of parameters, the worse one counts, and of delays the next longer;
-    beyond the fastest, less in the ratio of the periods. An adaptive window of smaller tolerance than usual also has
-    the limit of the raw difference. A given velocity has no estimator; it is taken as the thesis' own, "ewma". The
-    velocity that a device measures has the limits of a line of the same lag (`DeviceVelocity.window`). The entries of
-    "kalman" hold where the delay is one tick longer or shorter than believed, and while EWMA stands in.
+    Between two periods or parameters in the table the lower limit counts, between two delays the longer one; below the
+    shortest period, the limit falls in proportion to the period. An adaptive window of smaller tolerance than usual
+    also has the limit of the raw difference. A given velocity has no estimator; it is taken as the thesis' own, "ewma".
+    The velocity that a device measures has the limits of a line of the same lag (`DeviceVelocity.window`). The entries
+    of "kalman" also hold if the delay is one tick longer or shorter than assumed, and while EWMA replaces it.
 
     Raises
     ------
@@ -92,9 +92,9 @@ def damping_limits(period_s: float, delay_ticks: int, velocity: Velocity | Devic
 
 
 def slew_limit_n(period_s: float, dynamics: Dynamics, velocity: Velocity | DeviceVelocity = _THESIS) -> float:
-    """Return the most that the force on a device's handle changes within a tick [N].
+    """Return the greatest change of the force on a device's handle per tick [N].
 
-    A loop slower than 1 kHz gets as much a millisecond. A device that measures no delay has "ewma" for "kalman".
+    A loop slower than 1 kHz has the same change per millisecond. Without a measured delay "ewma" replaces "kalman".
     """
     share = KALMAN_SLEW if isinstance(velocity, Kalman) and dynamics.delay_s is not None else 1.0
     return share * SLEW_N * min(dynamics.mass_kg / MEASURED_KG, 1.0) * max(period_s / SLEW_S, 1.0)
@@ -129,7 +129,7 @@ def _neighbours(row: tuple[str, float | None], period_s: float, delay_ticks: int
 
 @cache
 def table() -> tuple[Entry, ...]:
-    """Return the table as it ships."""
+    """Return the shipped table."""
     with (resources.files("study_app.haptics.model") / "slope_limits.csv").open(encoding="utf-8") as file:
         return tuple(
             Entry(
@@ -144,7 +144,7 @@ def table() -> tuple[Entry, ...]:
 
 
 def refuses(rate_hz: float) -> str | None:
-    """Return why a servo of this rate must not run a participant, in a sentence; None where it may."""
+    """Return why a servo of this rate must not run a participant, in a sentence; None if it may."""
     if rate_hz >= SLOWEST_HZ:
         return None
     return (

@@ -1,4 +1,4 @@
-"""The force of an even motion by arithmetic: what the servo will send, computed without the compiler."""
+"""The force that the servo sends in uniform motion, computed without the compiler."""
 
 import math
 from typing import Final, Literal, NamedTuple
@@ -12,11 +12,11 @@ from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import slope_limit
 
 HAND_MPS: Final = 0.1
-"""A hand that explores a liquid [m/s]."""
+"""Hand speed while exploring a liquid [m/s]."""
 
 
 class Steady(NamedTuple):
-    """The force [N] that is sent, the drag before safety, and which limit shortened it, if one did."""
+    """The sent force [N], the drag before the safety layer, and the limit that reduced it, if any."""
 
     force_n: float
     drag_n: float
@@ -24,10 +24,10 @@ class Steady(NamedTuple):
 
 
 def steady(scene: Scene, hand_mps: float = HAND_MPS) -> Steady:
-    """Return the force against a hand that moves evenly, at ``hand_mps``, through the scene's liquid at rest.
+    """Return the force on a hand in uniform motion at ``hand_mps`` through the scene's liquid at rest.
 
-    Drag alone, after safety: no wake yet, no acceleration, and buoyancy left aside. The scene has one liquid; the loop
-    one tick of delay.
+    Only drag, after the safety layer: without wake, acceleration and buoyancy. The scene has one liquid; the loop one
+    tick of delay.
     """
     (liquid,) = resolve(scene).liquids
     if not {"drag", "unsteady_drag", "non_newtonian"} & set(liquid.effects):
@@ -43,7 +43,7 @@ def steady(scene: Scene, hand_mps: float = HAND_MPS) -> Steady:
         stable_n = held_n + min(viscous_n, slope_n * (VISCOUS_SHARE if held_n > 0 else 1.0))
     else:
         drag_n, stokes_n = even_n(scene, liquid, speed_mps)
-        most_late_n = LATE_SHARE * math.sqrt(2) * max(slope_n - stokes_n, 0.0)  # the ball moves as fast as its wake
+        most_late_n = LATE_SHARE * math.sqrt(2) * max(slope_n - stokes_n, 0.0)  # ball and wake have the same speed
         stable_n = drag_n if drag_n - stokes_n <= most_late_n else min(stokes_n, slope_n) + most_late_n
     force_n = min(stable_n, scene.force_limit_n)
     if force_n == drag_n:

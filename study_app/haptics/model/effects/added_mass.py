@@ -1,4 +1,4 @@
-"""Added mass: to move the ball is to move the liquid around it."""
+"""Added mass: an accelerating ball also accelerates the liquid around it."""
 
 import math
 from collections.abc import Mapping
@@ -55,7 +55,7 @@ def _fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str,
 
 
 def damping_nspm(mass_kg: float, filter_per_s: float) -> float:
-    """Return M/τ: the damper that fast motion meets in an added mass M smoothed over τ."""
+    """Return M/τ: the damping of fast motion by an added mass M smoothed over τ."""
     return float(mass_kg * filter_per_s) if math.isfinite(filter_per_s) else 0.0
 
 

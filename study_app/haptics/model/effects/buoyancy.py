@@ -1,4 +1,4 @@
-"""Buoyancy: the liquid carries the ball, and the ball has a weight."""
+"""Buoyancy of the ball in the liquids, and the weight of the ball."""
 
 from collections.abc import Mapping
 from typing import Any

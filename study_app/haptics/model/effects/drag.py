@@ -26,11 +26,11 @@ _LAWS: Final[dict[Law, int]] = {
 }
 
 REFERENCE: Final[Law] = "haider-levenspiel"
-"""The law that others are measured by: its published constants are confirmed, and it is nearest to experiments."""
+"""The reference law of drag: its published constants are confirmed, and it is closest to experiments."""
 _SPEEDS: Final = 60
 DAMPING_NSPM: Final = (0.01, 200.0)
 _DAMPING_NSPM: Final = 8.0
-"""The damper that the lab begins with: heavier than honey in a slow hand, far below any slope limit. [choice]"""
+"""Initial damping in the lab: more than honey in slow motion, far below any slope limit. [choice]"""
 
 DampingNspm: TypeAlias = Annotated[
     float,
@@ -65,14 +65,14 @@ class Drag(Frozen):
 
     @model_serializer(mode="wrap")
     def _without_no_damping(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Omit a damping that is not there: files of format 1 keep their bytes."""
+        """Omit an unset damping, so that files of format 1 stay identical byte by byte."""
         return {name: value for name, value in plain(self).items() if name != "damping_nspm" or value is not None}
 
 
 def resistance_n(scene: SceneLike, liquid: LiquidLike, relative_mps: float, law: Law | None = None) -> float:
-    """Return the size of the drag [N] on the scene's body at a relative speed; by default the truest law there is.
+    """Return the size of the drag [N] on the scene's body at a relative speed; by default by the most accurate law.
 
-    That of a damper is always its own.
+    A damper always uses its own law.
     """
     if liquid.drag.damping_nspm is not None:
         return float(liquid.drag.damping_nspm / scene.scale * relative_mps)
@@ -140,7 +140,7 @@ def _bound_n(extremes: ExtremesLike) -> float:
 
 
 def _exerted_n(extremes: ExtremesLike) -> float:
-    """Return the drag by the liquid's own law, of a body against the current that is called for."""
+    """Return the drag by the liquid's own law, of a body moving against the selected current."""
     return resistance_n(extremes.scene, extremes.liquid, extremes.relative_mps, extremes.liquid.drag.law)
 
 

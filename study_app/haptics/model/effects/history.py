@@ -1,4 +1,4 @@
-"""History: the boundary layer around the ball remembers how it was accelerated."""
+"""History force: the boundary layer around the ball depends on its past acceleration."""
 
 import math
 from collections.abc import Mapping
@@ -52,8 +52,7 @@ class History(Frozen):
 def _accelerated_n(extremes: ExtremesLike, acceleration_mps2: float, change_mps: float) -> float:
     """Return 12 R² √(2π ρ µ a v).
 
-    The Basset integral for a body that was carried along at −v and then turned to v at a: no motion in the box makes it
-    greater.
+    The Basset integral for a body that moved at −v and reversed to v at a, the greatest of any motion in the box.
     """
     liquid = extremes.liquid
     per_root = 12 * extremes.radius_m**2 * math.sqrt(2 * math.pi * liquid.density_kg_m3 * (liquid.viscosity_pa_s or 0))
@@ -70,7 +69,7 @@ def _problem(liquid: LiquidLike) -> str | None:
 
 
 def _intervals(window_s: float, rate_hz: float) -> int:
-    """Return the rows that a window takes at the scene's rate, with room for a late tick or two."""
+    """Return the number of rows of a window at the scene's rate, with room for a late tick or two."""
     return math.ceil(window_s * rate_hz) + 4
 
 

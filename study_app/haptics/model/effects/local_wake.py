@@ -1,4 +1,4 @@
-"""The local wake: the position tail tied to the places it was left at."""
+"""The local wake: a position tail whose elements keep the places where they arose."""
 
 import math
 from collections.abc import Mapping
@@ -55,9 +55,9 @@ PARAMETERS: Fields = (
     ("exponent", FLOAT),  # y
     ("log_decay_per_s", FLOAT),  # ln λ a second
     ("vertical", FLOAT),  # 1 where vertical motion enters, else 0
-    ("cell_m", FLOAT),  # how much path a cell takes
-    ("cell_elements", INT),  # how many elements it takes at most
-    ("reach_m", FLOAT),  # σ_0: how far from a place its wake is felt
+    ("cell_m", FLOAT),  # greatest path of a cell
+    ("cell_elements", INT),  # greatest number of its elements
+    ("reach_m", FLOAT),  # σ_0: reach of the wake around a place
     ("spreading_m2ps", FLOAT),  # ν
 )
 
@@ -67,7 +67,7 @@ STATE: Fields = (
     ("held", INT),  # elements in them, those at rest too
     ("path_m", FLOAT),  # path of the newest cell
     ("time_s", FLOAT),  # since the wake was empty
-    ("drift_m", FLOAT, (3,)),  # how far the current has carried the liquid since
+    ("drift_m", FLOAT, (3,)),  # displacement of the liquid by the current since then
 )
 
 CELL: Fields = (
@@ -94,7 +94,7 @@ EFFECT = Effect(
     state=STATE,
     fill=_fill,
     rows=(Rows("cells of local wakes", {"cells": CELL}, lambda liquid, rate_hz: CELLS, lambda rate_hz: CELLS),),
-    adjustable=False,  # its cells depend on its numbers
+    adjustable=False,  # its cells depend on its parameters
     open_values={"reach_m": lambda scene: scene.body.diameter_m},
     start=start_tail,
     controls=(

@@ -28,7 +28,7 @@ STIFFNESS_NPM: Final = 400.0
 """Greatest elastic stiffness at the hand below the yield stress, of a loop that is stable with `FULL_NSPM`."""
 FULL_NSPM: Final = 53.0
 VISCOUS_SHARE: Final = 0.75
-"""Of the slope limit, for the viscous force of a liquid that is also elastic. [choice]"""
+"""Share of the slope limit for the viscous force of a liquid that is also elastic. [choice]"""
 
 _REPLACES: Final = ("drag", "unsteady_drag", "history")
 _START: Final[dict[str, dict[str, float]]] = {
@@ -41,27 +41,27 @@ _START: Final[dict[str, dict[str, float]]] = {
         "onset_shear_rate_per_s": 5.0,
     },
 }
-"""What the lab begins with: ketchup, shampoo, slime and cornstarch in water."""
+"""Initial values in the lab: ketchup, shampoo, slime and cornstarch in water."""
 _NOT_MODELLED: Final = "not modelled: thixotropy, impact, fracture, yielding by unsteady flow"
 
 
 def steady_n(
     scene: SceneLike, liquid: LiquidLike, speed_mps: float, steepest_nspm: float = math.inf
 ) -> tuple[float, float]:
-    """Return the force [N] against an even motion: that of the yield stress, and the viscous part."""
+    """Return the force [N] in uniform motion: that of the yield stress, and the viscous part."""
     diameter_m = scene.body.diameter_m
     return even_n(liquid.non_newtonian, liquid.density_kg_m3, diameter_m, speed_mps, steepest_nspm)
 
 
 def _bound_n(extremes: ExtremesLike) -> float | None:
-    """Return F(v) of an even motion."""
+    """Return F(v) of uniform motion."""
     if extremes.liquid.non_newtonian is None:
         return None
     return sum(steady_n(extremes.scene, extremes.liquid, extremes.speed_mps)) if extremes.speed_mps > 0 else 0.0
 
 
 def _exerted_n(extremes: ExtremesLike) -> float | None:
-    """Return the force of a body against the current that is called for; strokes faster than λ build up less stress."""
+    """Return the force of a body moving against the selected current; strokes shorter than λ build up less stress."""
     rheology = extremes.liquid.non_newtonian
     if rheology is None:
         return None
@@ -122,8 +122,8 @@ PARAMETERS: Fields = (
 
 STATE: Fields = (
     ("strain", FLOAT, (3,)),  # Herschel–Bulkley: s/s_y, elastic displacement over that of yielding, 0 … 1
-    ("ahead_m", FLOAT, (3,)),  # how far the ball is ahead of the place that |dp| counts from
-    ("velocity_mps", FLOAT, (3,)),  # Maxwell: the velocity that a Newtonian liquid of the same force would meet
+    ("ahead_m", FLOAT, (3,)),  # distance of the ball from the place that |dp| counts from
+    ("velocity_mps", FLOAT, (3,)),  # Maxwell: the velocity at which a Newtonian liquid exerts the same force
     ("step_m", FLOAT, (3,)),  # motion relative to the current within the tick
 )
 

@@ -1,4 +1,4 @@
-"""Surface: how much of the ball is under the top face of a liquid, for the effects that depend on it."""
+"""Surface: the submerged share of the ball, for the effects that depend on it."""
 
 from study_app.haptics.model.effect import FLOAT, Effect, ExtremesLike, Fields, LiquidLike
 
@@ -6,7 +6,7 @@ BIT = 1 << 5
 
 
 def _bound_n(extremes: ExtremesLike) -> float | None:
-    """Return all of the others where the centre can cross the surface, for without it the ball is in or out."""
+    """Return the sum of the other effects if the centre can cross the surface: without it the ball is in or out."""
     if not extremes.has_top:
         return None
     area, volume = extremes.doubtful_shares()

@@ -1,4 +1,4 @@
-"""Unsteady drag: drag, added mass and history of a ball in one law that holds at finite Reynolds numbers, too."""
+"""Unsteady drag: drag, added mass and history of a ball in one law that is also valid at finite Reynolds numbers."""
 
 import math
 from collections.abc import Mapping
@@ -21,15 +21,15 @@ BIT = 1 << 8
 
 EXPONENTIALS = 7
 LATE_SHARE: Final = 0.6
-"""Share of what the slope limit leaves that drag which builds up late may have."""
+"""Share of the remaining slope limit that delayed drag may use."""
 HIGHEST_REYNOLDS: Final = 1000.0
-"""There are no solutions of the flow to compare it with above Re 200; up to here it is nearer to experiments."""
+"""Above Re 200 no flow solution exists for comparison; up to this value it is closer to experiments."""
 
 _IN_PLACE_OF: Final = (drag.EFFECT, added_mass.EFFECT, history.EFFECT)
 
 
 def even_n(scene: SceneLike, liquid: LiquidLike, speed_mps: float) -> tuple[float, float]:
-    """Return the force [N] against an even motion, and Stokes' part of it, which acts at once."""
+    """Return the force [N] in uniform motion, and its Stokes part, which acts at once."""
     viscosity_pa_s = liquid.viscosity_pa_s or 0.0
     stokes_n = 3 * math.pi * viscosity_pa_s * scene.body.diameter_m * speed_mps
     reynolds = liquid.density_kg_m3 * speed_mps * scene.body.diameter_m / viscosity_pa_s
@@ -37,14 +37,14 @@ def even_n(scene: SceneLike, liquid: LiquidLike, speed_mps: float) -> tuple[floa
 
 
 def _bound_n(extremes: ExtremesLike) -> float | None:
-    """Return the sum of what it replaces."""
+    """Return the sum of the bounds of the effects that it replaces."""
     if extremes.liquid.viscosity_pa_s is None or extremes.liquid.drag.law == "linear":
         return None
     return sum(effect.bound_n(extremes) or 0.0 for effect in _IN_PLACE_OF)
 
 
 def _bars(extremes: ExtremesLike) -> tuple[tuple[str, ...], str]:
-    """Return what it replaces where the Reynolds number permits it; else itself, and the history of creeping flow."""
+    """Bar the effects it replaces if the Reynolds number permits it; else itself, and the history of creeping flow."""
     reynolds = f"Re is up to {extremes.reynolds:.3g}"
     if extremes.reynolds <= HIGHEST_REYNOLDS:
         return tuple(
@@ -69,7 +69,7 @@ def _fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str,
 
 
 def _damping_nspm(record: Any) -> float:
-    """Return the dampers that fast motion meets in its added mass and in its history."""
+    """Return the damping of fast motion by its added mass and by its history."""
     of_mass_nspm = added_mass.damping_nspm(record.mass_kg, record.filter_per_s)
     return of_mass_nspm + history.damping_nspm(record.factor_kg_rs, record.history_filter_per_s)
 

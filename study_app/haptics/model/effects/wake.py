@@ -64,7 +64,7 @@ class Wake(Frozen):
 
 
 class Tail(Protocol):
-    """What the parameters of both wakes have in common."""
+    """Common parameters of both wakes."""
 
     @property
     def length(self) -> int: ...  # noqa: D102 - elements
@@ -103,7 +103,7 @@ def scaled_length(wake: Tail, rate_hz: float) -> int:
 
 
 def fill_tail(record: Any, wake: Tail, rate_hz: float, row: int) -> None:
-    """Write what the two wakes have in common."""
+    """Write the common parameters of the two wakes."""
     record.row = row
     record.length = scaled_length(wake, rate_hz)
     record.scaling = max(wake.scaling * rate_hz / TAIL_RATE_HZ, record.length)
@@ -113,9 +113,9 @@ def fill_tail(record: Any, wake: Tail, rate_hz: float, row: int) -> None:
 
 
 def tail_bound_n(extremes: ExtremesLike, wake: Tail | None) -> float | None:
-    """Return F(v + u) − F(v), u = v (N/S)^y the most that the liquid can follow.
+    """Return F(v + u) − F(v), with u = v (N/S)^y the greatest speed of the wake.
 
-    The laws are convex, so this is more than what a following liquid takes away.
+    The laws are convex, so this exceeds the force that a wake removes.
     """
     if wake is None:
         return None
@@ -154,7 +154,7 @@ STATE: Fields = (
     ("last_segment", INT),  # number of the newest, to which elements are added
     ("reference", INT),  # number of the element the next one is compared with
     ("scanned", INT),  # number of the first element not yet considered as reference
-    ("evicted", INT),  # moving elements that fell off since the last renewal
+    ("evicted", INT),  # moving elements removed since the last renewal
     ("arc_m", FLOAT),  # a: path travelled in this liquid
     ("stored_at_m", FLOAT, (3,)),  # where the body was when an element was last stored
     ("scale", FLOAT),  # speeds and sums are stored divided by this common decay

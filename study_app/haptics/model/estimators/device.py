@@ -10,7 +10,7 @@ from study_app.haptics.model.ranges import Frozen
 CODE = 7
 
 MOST_LAG_TICKS: Final = (MAX_WINDOW - 1) / 2
-"""A velocity that lags by more is not used: no stable force is known for it."""
+"""Greatest lag of a velocity that is used: beyond it no stable force is known."""
 _ROUNDING_TICKS: Final = 1e-6
 
 

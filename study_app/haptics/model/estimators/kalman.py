@@ -1,4 +1,4 @@
-"""A Kalman filter of velocity that knows the force: its state, all at the hand."""
+"""A Kalman filter of velocity that uses the force: its state, at the hand."""
 
 import math
 from typing import Any, Final, Literal
@@ -10,7 +10,7 @@ from study_app.haptics.model.ranges import Frozen
 
 CODE = 5
 LAG_S: Final = 2e-3
-"""What the filter lags by where a motion changes abruptly; in smooth ones less."""
+"""Lag of the filter at abrupt changes of motion; in smooth motion it is less."""
 
 
 class Kalman(Frozen):
@@ -28,24 +28,24 @@ STATE: Fields = (
     ("before_n", FLOAT, (3,)),  # the same at the sample before
     ("passed_n", FLOAT, (3,)),  # output of the first high-pass filter
     ("input_n", FLOAT, (3,)),  # output of the second
-    ("offset_m", FLOAT, (3,)),  # estimated less measured position, of a filter that knows no force
+    ("offset_m", FLOAT, (3,)),  # estimated less measured position, of a filter without the force
     ("velocity_mps", FLOAT, (3,)),
     ("acceleration_mps2", FLOAT, (3,)),
-    ("response_m", FLOAT, (3,)),  # how these three would have moved with a force on 1 kg [1/kg · m …]
+    ("response_m", FLOAT, (3,)),  # response of these three to the force on 1 kg [1/kg · m …]
     ("response_mps", FLOAT, (3,)),
     ("response_mps2", FLOAT, (3,)),
     ("covariance", FLOAT, (6,)),  # of one axis, the same for all: pp, pv, pa, vv, va, aa
     ("per_kg", FLOAT),  # θ, the inverse of the mass that the force moves
     ("per_kg_variance", FLOAT),
-    ("estimate_mps", FLOAT, (3,)),  # velocity with the force known
-    ("smoothed_mps", FLOAT, (3,)),  # by EWMA, in the scene: what is used while the filter is not trusted
-    ("carried_mps", FLOAT, (3,)),  # in the scene: left of the difference when one took over from the other
-    ("believed_ticks", INT),  # delay of the loop, as believed at this sample
+    ("estimate_mps", FLOAT, (3,)),  # velocity estimated with the force
+    ("smoothed_mps", FLOAT, (3,)),  # by EWMA, in the scene: used after a fault of the filter
+    ("carried_mps", FLOAT, (3,)),  # in the scene: the remaining difference after a change between the two
+    ("believed_ticks", INT),  # delay of the loop assumed at this sample
     ("delay_ticks", INT),  # the same at the sample before
     ("distrusted", INT),  # 1 while EWMA is used
     ("surprise", FLOAT),  # mean of squared innovations over their variance
-    ("quiet_s", FLOAT),  # time since the last trouble
-    ("repeated", INT),  # 1 where the last sample was taken for a repeated one
+    ("quiet_s", FLOAT),  # time since the last fault
+    ("repeated", INT),  # 1 if the last sample counted as a repeated one
 )
 
 

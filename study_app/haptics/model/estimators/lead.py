@@ -30,7 +30,7 @@ STATE: Fields = (
 
 
 def _fill(record: Any, _velocity: Lead, _scale: float) -> None:
-    record.filter_lag_s = fill_ewma(record, ALPHA)  # at high frequency, where the lead is smoothed away
+    record.filter_lag_s = fill_ewma(record, ALPHA)  # at high frequency, at which smoothing removes the lead
 
 
 def _passed_share(_velocity: Lead, period_s: float, omega_per_s: float) -> float:

@@ -1,8 +1,8 @@
 """How a sphere's drag depends on the Reynolds number Re = ρ|w|D/µ: plain functions, compiled or not.
 
 Each law gives the drag as a multiple of Stokes', F / (3πµD|w|) = C_d Re / 24, which is 1 at Re = 0 where C_d itself is
-infinite. Above Re = 2·10⁵ the drag coefficient keeps its value there: the laws know nothing of the drag crisis.
-``effects.drag`` compiles these functions as they stand; ``gate`` calls them.
+infinite. Above Re = 2·10⁵ the drag coefficient keeps its value there: the laws do not model the drag crisis.
+``effects.drag`` compiles these functions unchanged; ``gate`` calls them.
 """
 
 import math
@@ -49,7 +49,7 @@ def finite_reynolds(reynolds: float) -> float:
     """Return F/F_Stokes for 1 + (3/16) Re/(1 + 0.450 √Re) + (0.486/24) Re/(1 + (4040/Re)^0.70).
 
     Oseen's term and a constant C_d at great Re, between them fitted to this project's fluid solver: within 1.7 % at
-    Re 1 to 200. Of ``unsteady_drag`` alone; below Re = 10⁵ within 2.7 % of the mean of the published laws.
+    Re 1 to 200. Used only by ``unsteady_drag``; below Re = 10⁵ within 2.7 % of the mean of the published laws.
     """
     grown = math.pow(reynolds, 0.70)
     oseen = 3.0 / 16.0 * reynolds / (1.0 + 0.450 * math.sqrt(reynolds))

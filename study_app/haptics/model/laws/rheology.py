@@ -1,7 +1,7 @@
 """Non-Newtonian liquids: flow curves by a rheometer's parameters, and the steady force on a sphere in creeping flow.
 
-The functions of plain numbers are compiled as they stand (``kernels.effects.non_newtonian``). What they are not:
-thixotropy, impact, and yielding in unsteady flow other than by the elastic-plastic state of that kernel.
+The functions of plain numbers are compiled unchanged (``kernels.effects.non_newtonian``). They do not model thixotropy,
+impact, or yielding in unsteady flow other than by the elastic-plastic state of that kernel.
 """
 
 import math
@@ -105,7 +105,7 @@ def shape_factor(flow_index: float) -> float:
 
 
 def herschel_bulkley(speed_mps: float, viscous: float, plastic: float, half_index: float) -> float:
-    """Return the viscous part of the force [N]: a w^n + b w^(n/2), of what flows and of the plastic layer around it."""
+    """Return the viscous part of the force [N]: a w^n + b w^(n/2), of the flow and of its plastic boundary layer."""
     root = math.pow(speed_mps, half_index)
     return (viscous * root + plastic) * root
 
@@ -180,7 +180,7 @@ def creeping_n(
 
 
 def inertial_factor(force_n: float, speed_mps: float, inertia_kg_m: float) -> float:
-    """Return φ(Re), by which a creeping flow's force grows: Re = ρ|w|D/η with the effective viscosity η = F/(3πD|w|).
+    """Return the factor φ(Re) on the force of creeping flow: Re = ρ|w|D/η with the effective viscosity η = F/(3πD|w|).
 
     ``inertia_kg_m`` is 3πρD².
     """
@@ -190,7 +190,7 @@ def inertial_factor(force_n: float, speed_mps: float, inertia_kg_m: float) -> fl
 def even_n(
     rheology: Any, density_kg_m3: float, diameter_m: float, speed_mps: float, steepest_nspm: float = math.inf
 ) -> tuple[float, float]:
-    """Return the force [N] on a sphere that moves evenly: that of the yield stress, and the viscous part."""
+    """Return the force [N] on a sphere in uniform motion: that of the yield stress, and the viscous part."""
     held_n, viscous_n = creeping_n(rheology, diameter_m, speed_mps)
     ratio = inertial_factor(held_n + viscous_n, speed_mps, 3 * math.pi * density_kg_m3 * diameter_m**2)
     limited_n = creeping_n(rheology, diameter_m, speed_mps, steepest_nspm)[1]
