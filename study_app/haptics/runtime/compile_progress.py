@@ -1,4 +1,4 @@
-"""Progress while the force model is compiled: how many functions were, and what is expected in all."""
+"""Progress while the force model is compiled: the number of compiled functions and the expected total."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -7,21 +7,21 @@ from typing import Any, Final
 from numba.core import event
 
 EXPECTED: Final = 194
-"""Functions that a first session compiles, about; a test compares it with what a device and its servo need."""
+"""Approximate number of functions that a first session compiles; a test compares it with a device and its servo."""
 
 
 class _Counter(event.Listener):
-    """Counts compiled functions, also one within another."""
+    """Counts compiled functions, including nested compilations."""
 
     def __init__(self, progress: Callable[[float], object]) -> None:
         self._progress = progress
         self.compiled = 0
 
     def on_start(self, event: Any) -> None:
-        """Do nothing: a function that begins is not compiled."""
+        """Do nothing: a function that starts to compile does not count yet."""
 
     def on_end(self, event: Any) -> None:
-        """Count a function, and give the share."""
+        """Count a function, and report the share."""
         self.compiled += 1
         self._progress(min(0.99, self.compiled / EXPECTED))
 

@@ -1,4 +1,4 @@
-"""The force along a motion, by the servo's own tick, without a device and without a clock."""
+"""The force along a motion, computed by the servo's tick without device and clock."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ COLUMNS = ("t_s", *(name for names in _VECTORS.values() for name in names), "lim
 
 
 def simulate(scene: Scene, path: Motion | str | os.PathLike[str]) -> Table:
-    """Return what a body feels along a motion (or a CSV file with one): a recarray of n rows, named `COLUMNS`.
+    """Return the forces on a body along a motion (or a CSV file with one): a recarray of n rows, named `COLUMNS`.
 
     Every row is a new accepted sample and one tick. Δt is the time since the row before, clamped as in the servo; the
-    first row takes the scene's nominal period. Velocities that come with the motion are used as they are, only the knee
-    follows. ``vx_mps …`` is the velocity after filter and knee, ``wake_x_mps …`` the wake that this tick's drag met,
-    ``fx_n …`` the sum of the effects, ``device_fx_n …`` the force as it would be sent, the start fade over, by a loop
-    of 1 ms with one tick of delay; ``limiters`` the ``LIMITER_*`` bits that acted on it. Places and velocities are in
-    the scene frame; a force is the same vector at the hand.
+    first row takes the scene's nominal period. Velocities given with the motion are used unfiltered, only the knee is
+    applied. ``vx_mps …`` is the velocity after filter and knee, ``wake_x_mps …`` the wake in this tick's drag, ``fx_n
+    …`` the sum of the effects, ``device_fx_n …`` the force that a loop of 1 ms with one tick of delay would send after
+    the start fade; ``limiters`` the ``LIMITER_*`` bits that acted on it. Places and velocities are in the scene frame;
+    a force is the same vector at the hand.
 
     Raises
     ------
     StudyError
-        The motion cannot be read, or the scene wants a given velocity and there is none.
+        The motion cannot be read, or the scene requires a given velocity and there is none.
 
     Examples
     --------
@@ -66,7 +66,7 @@ def simulate(scene: Scene, path: Motion | str | os.PathLike[str]) -> Table:
 
 
 def samples_along(scene: Scene, motion: Motion, dynamics: Dynamics | None = None) -> Any:
-    """Return what `simulate` tabulates as the servo's own samples: (n,) recarray of ``layout.SAMPLE``.
+    """Return the results of `simulate` as the servo's samples: (n,) recarray of ``layout.SAMPLE``.
 
     ``dynamics`` are those of a device: limits, slew and delay are then those of its loop at the scene's rate. By
     default the loop is that of `simulate`. A velocity that the device measures is the difference of the positions.
@@ -81,12 +81,12 @@ def samples_along(scene: Scene, motion: Motion, dynamics: Dynamics | None = None
 
 
 class ModelAlong:
-    """A scene's model along a motion that comes piece by piece; see `samples_along`.
+    """A scene's model along a motion given in pieces; see `samples_along`.
 
     Parameters
     ----------
     scene : Scene
-        What the body moves in.
+        The scene in which the body moves.
     dynamics : Dynamics, optional
         Of a device; by default the loop is that of `simulate`.
     given : bool
@@ -127,9 +127,9 @@ class ModelAlong:
 
 @kernel
 def _run(model: Any, safety: Record, samples: Any, t_s: Any, before_s: float) -> None:
-    """Take the samples one after another, positions in the scene frame; fill in the rest of them.
+    """Process the samples in order, positions in the scene frame; set their other fields.
 
-    ``before_s`` is the time of the sample before them, NaN where there is none.
+    ``before_s`` is the time of the sample before them, NaN if there is none.
     """
     parameters, state = model.parameters[0], model.state[0]
     for k in range(len(samples)):
@@ -151,7 +151,7 @@ def _run(model: Any, safety: Record, samples: Any, t_s: Any, before_s: float) ->
 
 
 def _table(t_s: Any, samples: Any) -> Table:
-    """Return the samples with a column of its own for every component."""
+    """Return the samples with one column for every component."""
     table = np.recarray(len(samples), [(name, np.int64 if name == "limiters" else np.float64) for name in COLUMNS])
     table["t_s"] = t_s
     table["limiters"] = samples.limiters

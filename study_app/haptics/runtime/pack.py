@@ -1,4 +1,4 @@
-"""A scene becomes the memory the compiled code reads: allocated once, here, and refilled in place."""
+"""Packs a scene into the memory that compiled code reads, which is allocated once and refilled in place."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -38,36 +38,36 @@ _KNEES = {"none": layout.KNEE_NONE, "sqrt": layout.KNEE_SQRT, "square": layout.K
 
 
 class Model(NamedTuple):
-    """The memory of one scene: recarrays of the types in ``layout``; the first two constant, the others moving."""
+    """The memory of one scene: recarrays of the types in ``layout``; the first two are constant, the others state."""
 
     parameters: Any  # (1,) PARAMETERS
     liquids: Any  # (n,) LIQUID
     state: Any  # (1,) STATE
     liquid_states: Any  # (n,) LIQUID_STATE
-    window: Any  # (rows,) WINDOW, the newest samples of the estimators that look back
-    forces_n: Any  # (FORCES, 3) the newest forces [N], where the scene's link delays them; else (0, 3)
-    rows: Any  # `EffectRows`: what effects own, each liquid's rows in a stretch of its own
+    window: Any  # (rows,) WINDOW, the newest samples, of estimators with a window
+    forces_n: Any  # (FORCES, 3) the newest forces [N], if the scene's link delays them; else (0, 3)
+    rows: Any  # `EffectRows`: arrays of the effects, with contiguous rows per liquid
 
     @property
     def arrays(self) -> tuple[Any, ...]:
-        """Every array of it, those of effects last."""
+        """All its arrays, those of effects last."""
         return (*self[:-1], *self.rows)
 
 
 def elements_needed(scene: Scene) -> int:
-    """Return how many wake rows the scene owns: none where no liquid asks for a wake."""
+    """Return the number of wake rows of the scene: 0 if no liquid has a wake."""
     return count_open_ended(rows_needed(resolve(scene)))
 
 
 def window_needed(scene: Scene) -> int:
-    """Return how many samples the velocity estimator keeps: none for those that do not look back."""
+    """Return the number of samples that the velocity estimator stores: 0 without a window."""
     return ESTIMATORS[scene.velocity.kind].samples(scene.velocity)
 
 
 def pack(
     scene: Scene, *, capacity: int | None = None, limits: DampingLimits | None = None, dynamics: Dynamics = UNKNOWN
 ) -> Model:
-    """Return the memory of ``scene``; where it leaves the choice of effects, ``gate`` makes it.
+    """Return the memory of ``scene``; ``gate`` selects effects that the scene leaves open.
 
     ``capacity`` is the least number of wake rows to own, with room for any number of liquids, so that other scenes fit
     in later (`pack_into`); by default the model owns exactly what the scene calls for. ``limits`` is the greatest
@@ -99,7 +99,7 @@ def pack(
 
 
 def pack_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> None:
-    """Fill memory made by `pack` with another scene, its state afresh, for a device of these ``dynamics``.
+    """Fill memory made by `pack` with another scene and a reset state, for a device of these ``dynamics``.
 
     Raises
     ------
@@ -135,16 +135,16 @@ def pack_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> No
 
 
 def adjust_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> None:
-    """Give memory of `pack` the numbers of a scene built like the one in it (`built_alike`); its state goes on."""
+    """Write the parameters of a scene like the one in memory of `pack` (`built_alike`) into it; keep its state."""
     scene = _for_device(scene, dynamics)
     _fill_constants(model, scene, _by_delay(scene, dynamics), dynamics)
 
 
 def built_alike(scene: Scene, other: Scene) -> bool:
-    """Return whether one scene's state means the same to the other: only numbers differ that no state was made with.
+    """Return whether one scene's state is valid in the other: only parameters differ on which no state depends.
 
-    Of rows, effects, laws and kinds nothing may differ, nor how the hand is placed in the scene. Some effects keep what
-    depends on their numbers, and cannot be adjusted.
+    Rows, effects, laws, kinds and the mapping of the hand into the scene must be equal. The state of some effects
+    depends on their parameters, which therefore cannot be adjusted.
     """
     mine, others = _constants(resolve(scene)), _constants(resolve(other))
     fixed = sum(effect.bit for effect in EFFECTS if not effect.adjustable)
@@ -159,7 +159,7 @@ def built_alike(scene: Scene, other: Scene) -> bool:
 
 
 def _constants(scene: Scene) -> Model:
-    """Return a resolved scene's constants, in memory that holds nothing else."""
+    """Return a resolved scene's constants, in new memory."""
     nothing = [layout.records(layout.STATE, 0)] * (len(Model._fields) - 2)
     model = Model(layout.records(layout.PARAMETERS, 1), layout.records(layout.LIQUID, len(scene.liquids)), *nothing)
     _fill_constants(model, scene, _by_delay(scene, UNKNOWN), UNKNOWN)
@@ -167,14 +167,14 @@ def _constants(scene: Scene) -> Model:
 
 
 def _whole_numbers(rows: Any) -> list[int]:
-    """Return every whole number in records: rows owned, effects, laws, kinds."""
+    """Return all integers in records: rows owned, effects, laws, kinds."""
     if rows.dtype.names is None:
         return [int(it) for it in rows.ravel()] if rows.dtype.kind == "i" else []
     return [number for name in rows.dtype.names for number in _whole_numbers(rows[name])]
 
 
 def _for_device(scene: Scene, dynamics: Dynamics) -> Scene:
-    """Return the scene with its effects chosen, and with the velocity as the device permits it.
+    """Return the scene with its effects chosen, and with a velocity estimator that the device permits.
 
     A device that measures its velocity replaces the scene's estimator; "kalman" is for devices that measure their
     delay, others get "ewma".
@@ -239,9 +239,9 @@ def _fill_constants(model: Model, scene: Scene, limits: Sequence[DampingLimits],
 
 
 def _inertia_share(record: layout.Record, limits: DampingLimits, scale: float) -> float:
-    """Return the stable share of inertial forces, taken as the dampers that fast motion meets in them.
+    """Return the stable share of inertial forces, which count by their damping of fast motion.
 
-    What does not fit whole is cut down to the share that is stable in any loop. [choice]
+    Forces above the limit are reduced to the share that is stable in any loop. [choice]
     """
     damping_nspm = 0.0
     for effect in EFFECTS:

@@ -1,8 +1,8 @@
-"""Ticks taken again from what telemetry says of them, and the places at which they left a wake.
+"""Recomputes ticks from their telemetry, and the places of the wake that they left.
 
-A sample says when and where the device was read, whether that was new, and whether the force was stopped: all that a
-tick takes from outside. So the same tick outside the servo, with a model and a safety record of its own, answers with
-the same force to the last bit, or with that of another liquid on the same motion.
+A sample contains all inputs of a tick: when and where the device was read, whether that was new, and whether the force
+was stopped. So the same tick outside the servo, with a separate model and safety record, yields the same force to the
+last bit, or that of another liquid on the same motion.
 """
 
 from typing import Any
@@ -19,7 +19,7 @@ from study_app.haptics.model.layout import LIMITER_STOP, STATUS_DEVICE_LOST, Rec
 
 PLACE = np.dtype(
     [
-        ("hand_m", np.float64, (3,)),  # where the hand was, hand frame
+        ("hand_m", np.float64, (3,)),  # place of the hand, hand frame
         ("segment", np.int64),  # number of the wake's segment
         ("moving", np.int64),  # 0 for a zero element
     ],
@@ -28,9 +28,9 @@ PLACE = np.dtype(
 
 TRAIL = np.dtype(
     [
-        ("left", np.int64),  # elements left since the wake was empty; number q is in row q % (rows of the ring)
-        ("held", np.int64),  # how many of them are still in the wake
-        ("segments", np.int64),  # segments that hold one of them
+        ("left", np.int64),  # elements stored since the wake was empty; number q is in row q % (rows of the ring)
+        ("held", np.int64),  # elements still in the wake
+        ("segments", np.int64),  # segments that contain one of them
         ("time_s", np.float64),  # of a local wake, after the last tick
     ],
     align=True,
@@ -44,7 +44,7 @@ def new_wake_places(elements: int) -> tuple[Any, Any]:
 
 @part
 def was_lost_at_read(sample: Record) -> bool:
-    """Return whether the servo read a lost device: it took no tick then, and the device says what it holds."""
+    """Return whether the servo found the device lost: then it ran no tick, and the force is the device's own."""
     return bool(
         sample.status == STATUS_DEVICE_LOST
         and sample.fresh == 0
@@ -56,10 +56,10 @@ def was_lost_at_read(sample: Record) -> bool:
 
 @part
 def take_sample(model: Any, safety: Record, sample: Record, delivered: bool) -> None:
-    """Recompute the tick of a sample from what it says of the servo's input: stop, delay, and what the device sent.
+    """Recompute the tick of a sample from the servo's inputs in it: stop, delay, and the force that the device sent.
 
-    Where that was not ``delivered`` for this model's command, only the velocity estimator receives it: the hand moved
-    under that force.
+    If that force was not ``delivered`` for this model's command, only the velocity estimator receives it, since it
+    moved the hand.
     """
     sent_x, sent_y, sent_z = sample.device_force_n[0], sample.device_force_n[1], sample.device_force_n[2]
     as_asked = sent_x == sample.command_n[0] and sent_y == sample.command_n[1] and sent_z == sample.command_n[2]
@@ -74,10 +74,10 @@ def take_sample(model: Any, safety: Record, sample: Record, delivered: bool) -> 
 
 @kernel
 def recompute_sample(model: Any, safety: Record, samples: Any, trail: Record, places: Any, delivered: bool) -> None:
-    """Take each of ``samples`` as the servo took it, and write what comes out into them.
+    """Recompute each of ``samples`` like the servo, and write the results into them.
 
     ``trail`` and ``places`` follow the wake of the model's first liquid. ``delivered`` says that the forces in
-    ``samples`` answer this model's commands: where the device sent another one, it is logged.
+    ``samples`` result from this model's commands: if the device sent another one, it is logged.
     """
     for k in range(samples.shape[0]):
         sample = samples[k]
@@ -89,11 +89,11 @@ def recompute_sample(model: Any, safety: Record, samples: Any, trail: Record, pl
 
 @part
 def _note(model: Any, trail: Record, places: Any) -> None:
-    """Remember where the hand was, if this tick left an element of the wake there."""
+    """Store the place of the hand if this tick left an element of the wake there."""
     if model.parameters[0].liquids == 0:
         return
     liquid, local, state = model.liquids[0], model.liquid_states[0], model.state[0]
-    if local.ticks == 0:  # outside of the liquid, which forgets the body
+    if local.ticks == 0:  # outside the liquid, whose state is then reset
         trail.left = trail.held = trail.segments = 0
         trail.time_s = 0.0
     elif liquid.effects & wake.BIT:

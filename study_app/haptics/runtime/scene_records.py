@@ -1,4 +1,4 @@
-"""A liquid becomes the record its effects read, and rows of the model's arrays for those effects that own some."""
+"""Converts a liquid into the record that its effects read, and into the rows of the effects' arrays."""
 
 from collections import namedtuple
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ KINDS: Final[tuple[Rows, ...]] = tuple(rows for effect in EFFECTS for rows in ef
 _ARRAYS: Final = tuple(name for kind in KINDS for name in kind.arrays)
 
 EffectRows: Final[Any] = namedtuple("EffectRows", _ARRAYS)  # type: ignore[misc]
-EffectRows.__doc__ = "What effects own in the arrays of a model, an array for each name."
+EffectRows.__doc__ = "The arrays of a model that effects own, by name."
 
 Counts: TypeAlias = Mapping[str, int]
 """A number of rows for each of these arrays."""
@@ -34,7 +34,7 @@ def no_rows() -> Counts:
 
 
 def rows_after(rows: Counts, liquid: Liquid, rate_hz: float) -> Counts:
-    """Return the rows with those that a liquid's effects own added."""
+    """Return the rows plus those that a liquid's effects own."""
     added = {
         name: kind.needed(liquid, rate_hz)
         for effect in EFFECTS
@@ -46,19 +46,19 @@ def rows_after(rows: Counts, liquid: Liquid, rate_hz: float) -> Counts:
 
 
 def most_rows(liquids: int, capacity: int, rate_hz: float) -> Counts:
-    """Return the rows that any ``liquids`` own, ``capacity`` where only whoever packs them knows."""
+    """Return the rows for any ``liquids``; ``capacity`` where only the caller knows their number."""
     return {
         name: capacity if kind.most is None else liquids * kind.most(rate_hz) for kind in KINDS for name in kind.arrays
     }
 
 
 def count_open_ended(rows: Counts) -> int:
-    """Return the most of those rows whose number only whoever packs scenes knows."""
+    """Return the greatest number of the rows that only the caller that packs scenes knows."""
     return max((rows[name] for kind in KINDS if kind.most is None for name in kind.arrays), default=0)
 
 
 def fill(record: layout.Record, liquid: Liquid, scene: Scene, first: Counts) -> None:
-    """Write what a liquid's effects need, and nothing else, for rows from ``first`` on."""
+    """Write only the parameters of a liquid's effects, for rows from ``first`` on."""
     _fill_region(record.region, liquid.region)
     for effect in EFFECTS:
         if effect.name in liquid.effects:

@@ -1,4 +1,4 @@
-"""The servo as the rest of the program knows it: started and stopped, given scenes, asked for faults and telemetry."""
+"""The servo's interface to the program: start and stop, scenes, faults and telemetry."""
 
 import threading
 import weakref
@@ -31,8 +31,8 @@ _STUCK = "or the computer blocked the servo: no tick for 75 ms; turn it off if i
 class Servo:
     """One device's servo: start it, load scenes, look at its telemetry, stop it.
 
-    As a context manager it starts on entry, on a clock that runs by itself, and stops on exit. On a ``VirtualClock``
-    nothing runs but `advance`, in the calling thread, through the same compiled loop.
+    As a context manager it starts on entry, on a clock that runs by itself, and stops on exit. On a ``VirtualClock`` it
+    runs only within `advance`, in the calling thread, by the same compiled loop.
 
     Parameters
     ----------
@@ -41,11 +41,11 @@ class Servo:
     clock : Clock, optional
         ``SystemClock`` (default) or ``VirtualClock``.
     rate_hz : float
-        Ticks a second; every scene must be made for this rate.
+        Ticks per second; every scene must be made for this rate.
     elements : int
-        The most wake elements a scene may call for (``pack.elements_needed``).
+        The greatest number of wake elements of a scene (``pack.elements_needed``).
     real_time : bool
-        False: the thread asks for no more than an ordinary one has.
+        False: the thread keeps the ordinary priority.
     """
 
     def __init__(
@@ -71,13 +71,13 @@ class Servo:
         self._ending = weakref.finalize(self, self.loop.end)
 
     def prepare(self) -> None:
-        """Compile all that runs later, or load it from the cache; takes seconds when first used after a change."""
+        """Compile all functions that run later, or load them from the cache; takes seconds after a change."""
         self.loop.compile()
         self.telemetry.position_at(0)
         self.telemetry.reader().read()
 
     def start(self) -> None:
-        """Run in a thread of its own from now on, at rest unless a scene is loaded; the force fades in."""
+        """Start in a separate thread, at rest unless a scene is loaded; the force fades in."""
         if not self.loop.clock.runs:
             raise StudyError("a servo on a virtual clock does not run by itself: call advance(ticks)")
         if self.loop.live:
@@ -86,7 +86,7 @@ class Servo:
         self.loop.start()
 
     def advance(self, ticks: int) -> int:
-        """Take ``ticks`` ticks in this thread; return how many were taken: fewer after a fault (see `check`)."""
+        """Run ``ticks`` ticks in this thread; return the number completed: fewer after a fault (see `check`)."""
         if self.loop.thread is not None:
             raise StudyError("this servo runs in its own thread: stop it before advancing it manually")
         return self.loop.advance(ticks)
@@ -97,28 +97,27 @@ class Servo:
         self.loop.end()
 
     def load(self, scene: Scene) -> int:
-        """Let the next tick present ``scene``; return the serial number by which telemetry knows it.
+        """Load ``scene`` from the next tick on; return its serial number in telemetry.
 
         Raises
         ------
         StudyError
-            The scene is of another rate, or calls for more wake elements than this servo has.
+            The scene has another rate, or needs more wake elements than this servo has.
         ServoFault, DeviceLost
             The servo has stopped itself.
         """
         return self._present(scene, goes_on=False)
 
     def adjust(self, scene: Scene) -> int:
-        """Let the next tick go on with the scene in force, its wake and its force kept, with the numbers of ``scene``.
+        """Change the parameters of the active scene to those of ``scene`` at the next tick; keep its wake and force.
 
-        The force moves by no more than the slew limit in a tick, and the passivity controller continues: what the hand
-        did not put in does not come back, whatever the numbers are now. Returns the serial number that telemetry has
-        from then on.
+        The force changes by at most the slew limit per tick, and the passivity controller continues: no more energy
+        than the hand supplied is returned with any parameters. Returns the new serial number in telemetry.
 
         Raises
         ------
         StudyError
-            The scene is not built like the one in force (``pack.built_alike``), or cannot be loaded.
+            The scene is not built like the active one (``pack.built_alike``), or cannot be loaded.
         ServoFault, DeviceLost
             The servo has stopped itself.
         """
@@ -127,7 +126,7 @@ class Servo:
         return self._present(scene, goes_on=True)
 
     def may_adjust(self, scene: Scene) -> bool:
-        """Return whether `adjust` takes a scene now."""
+        """Return whether `adjust` accepts a scene now."""
         return not self._rests and built_alike(self._scene, scene)
 
     def _present(self, scene: Scene, *, goes_on: bool) -> int:
@@ -150,29 +149,29 @@ class Servo:
             return self.serial
 
     def rest(self) -> None:
-        """Let the next tick present no liquid, scene 0: the force fades to zero."""
+        """Load no liquid (scene 0) at the next tick: the force fades to zero."""
         with self._loading:
             self._rests = True
             self.loop.hand_over(self._scene.model_copy(update={"liquids": ()}), 0)
 
     def stop_force(self) -> None:
-        """Send zero force from the next tick on, past all fades, until `fade_in`."""
+        """Send zero force from the next tick on, without a fade, until `fade_in`."""
         self.loop.control[0].stop = 1
 
     def fade_in(self) -> None:
-        """Let the force return after `stop_force`, as slowly as at a start."""
+        """Fade the force in after `stop_force`, as slowly as at a start."""
         self.loop.control[0].stop = 0
 
     @property
     def force_is_on(self) -> bool:
-        """Whether forces are sent: not stopped by hand, and no fault."""
+        """Whether forces are sent: not stopped manually, and no fault."""
         return bool(self.loop.control[0].stop == 0) and self.fault is None
 
     @property
     def fault(self) -> str | None:
-        """Why the servo stopped itself, or hangs, in a sentence; None while it does neither.
+        """Why the servo stopped itself, or hangs, in a sentence; None without a fault.
 
-        A device that knows more of the cause says it as its ``failure``.
+        A device that knows the cause reports it as its ``failure``.
         """
         status = int(self.loop.control[0].status)
         reason = _STUCK if status == STATUS_OK and self.loop.stuck else _FAULTS.get(status)
@@ -183,7 +182,7 @@ class Servo:
 
     @property
     def overruns(self) -> int:
-        """How many deadlines were passed over because a tick did not fit."""
+        """The number of deadlines skipped because a tick took too long."""
         return int(self.loop.control[0].overruns)
 
     @property
@@ -196,7 +195,7 @@ class Servo:
         fault = self.fault
         if fault is not None:
             status = int(self.loop.control[0].status)
-            if status == STATUS_OK:  # it hangs: the device's state is unknown
+            if status == STATUS_OK:  # hanging: the device's state is unknown
                 raise ServoFault(fault)
             raise (DeviceLost if status == STATUS_DEVICE_LOST else ServoFault)(f"{fault}; the force is zero")
 
@@ -206,24 +205,24 @@ class Servo:
 
     @property
     def dynamics(self) -> Dynamics:
-        """What the device measured of itself when it was opened."""
+        """The dynamics that the device measured when it was opened."""
         return self._device.dynamics
 
     @property
     def delay_ticks(self) -> int:
-        """How many ticks late a force is believed to act at present."""
+        """The assumed delay of a force at present [ticks]."""
         return self.loop.delay_ticks
 
     @property
     def grant(self) -> Grant:
-        """What the system granted to the servo's thread."""
+        """The priority that the system granted to the servo's thread."""
         return self.loop.grant
 
     def describe(self) -> dict[str, Any]:
-        """Return what a receipt should record: rate, the thread's priority, and how late a force is believed to act.
+        """Return the values for a receipt: rate, the thread's priority, and the assumed delay of a force.
 
-        ``estimator`` is "device" where the device measures the velocity, else "scene": the protocol names it. Nothing
-        that follows from the liquids: they are blinded.
+        ``estimator`` is "device" if the device measures the velocity, else "scene": the protocol names it. No value
+        depends on the liquids: they are blinded.
         """
         return {
             "rate_hz": self.rate_hz,

@@ -1,4 +1,4 @@
-"""No suspending while something may push: a program that Ctrl-Z stops leaves its last force on, and its guard asleep.
+"""Prevents suspension while a device may exert force: Ctrl-Z would leave the last force on and stop the guard.
 
 SIGSTOP cannot be refused. Loads no compiler.
 """
@@ -8,23 +8,23 @@ import threading
 from typing import Final
 
 SUSPENDING: Final = ("SIGTSTP", "SIGTTIN", "SIGTTOU")
-"""What a terminal stops programs with: by Ctrl-Z, and those behind another that read from it, or write to it."""
+"""Signals by which a terminal stops programs: Ctrl-Z, and access to the terminal from the background."""
 
 _pushing: set[int] = set()
 _refused: set[int] = set()
 
 
 def refuse_suspension(by: object) -> None:
-    """Ignore what a terminal suspends programs with until `allow_suspension`, whoever else refuses it meanwhile.
+    """Ignore the terminal's stop signals until `allow_suspension` is called for all callers of this function.
 
-    Handlers that somebody has set stay. Only the main thread can do so; from any other nothing changes.
+    Handlers already set stay. Only the main thread can do so; from any other thread nothing changes.
     """
     _pushing.add(id(by))
     _settle()
 
 
 def allow_suspension(by: object) -> None:
-    """Take back what was refused for ``by``; a second call does nothing."""
+    """End the refusal for ``by``; a second call does nothing."""
     _pushing.discard(id(by))
     _settle()
 

@@ -1,8 +1,7 @@
-"""What the servo did, tick by tick: a ring with one writer, and any number of readers that never hold it up.
+"""Samples of every tick of the servo: a ring with one writer, and any number of readers that never block it.
 
-The servo fills the slot after the newest sample, then advances the count of samples written. A reader copies, looks at
-the count again, and drops what may have been overwritten meanwhile, counting it; so the slot being filled and all that
-was lost are known without a lock.
+The servo fills the slot after the newest sample, then advances the count of samples written. A reader copies, reads the
+count again, and drops and counts samples that may have been overwritten meanwhile; so no lock is needed.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ class Telemetry:
 
     def __init__(self, history: int = HISTORY) -> None:
         self.ring = records(SAMPLE, history)
-        self.ring.status = 0  # touches every page of memory now, so that the servo meets no page fault
+        self.ring.status = 0  # touches every page of memory now, so that the servo has no page fault
         self.written = np.zeros(1, np.int64)
 
     def reader(self) -> Reader:
@@ -47,11 +46,11 @@ class Telemetry:
         return self.ring[newest : newest + 1].copy()[0]
 
     def position_at(self, time_ns: int) -> tuple[np.ndarray[Any, Any], int]:
-        """Return where the handle was at a moment [m, (3,), hand frame], and the moment this is true of [ns].
+        """Return the place of the handle at a time [m, (3,), hand frame], and the time for which it holds [ns].
 
-        Between two samples the position is interpolated and the moment is ``time_ns`` itself; before the oldest and
-        after the newest it is that sample's place and time, never an extrapolation. Samples whose position is not
-        finite or was refused at the door are passed over. Before the first sample: the origin, at 0.
+        Between two samples the position is interpolated and the time is ``time_ns``; before the oldest and after the
+        newest both are that sample's, without extrapolation. Samples with a position that is not finite or was rejected
+        are skipped. Before the first sample: the origin, at 0.
         """
         position = np.zeros(3)
         moment = _position_at(self.ring, self.written, time_ns, position)
@@ -59,7 +58,7 @@ class Telemetry:
 
 
 class Reader:
-    """One reader's place in the ring; ``dropped`` counts the samples that were overwritten before it read them."""
+    """One reader's position in the ring; ``dropped`` counts the samples that were overwritten before it read them."""
 
     def __init__(self, telemetry: Telemetry) -> None:
         self._ring = telemetry.ring
@@ -80,10 +79,10 @@ class Reader:
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """How regularly the servo ran: all zero where too little was seen to say.
+    """The timing of the servo: all zero with too few samples.
 
-    ``rate_hz`` is the rate achieved, lateness how late ticks began, ``worst_gap_s`` the longest time between two
-    readings of the device, ``overruns`` how many deadlines were passed over.
+    ``rate_hz`` is the rate achieved, lateness that of the ticks, ``worst_gap_s`` the longest time between two readings
+    of the device, ``overruns`` the number of skipped deadlines.
     """
 
     ticks: int
@@ -116,7 +115,7 @@ def timing(samples: Any, rate_hz: float) -> Timing:
 def _copy(ring: Any, written: Any, wanted: int, out: Any) -> tuple[int, int]:
     """Copy samples from number ``wanted`` on into ``out``; return the numbers of the first one kept and of the next.
 
-    Sample i is whole as long as sample i + n is not begun, that is while fewer than i + n are written.
+    Sample i is valid until sample i + n begins, that is while fewer than i + n are written.
     """
     size = ring.shape[0]
     following = written[0]
@@ -135,7 +134,7 @@ def _copy(ring: Any, written: Any, wanted: int, out: Any) -> tuple[int, int]:
 
 @kernel
 def _position_at(ring: Any, written: Any, time_ns: int, position: Any) -> Any:
-    """Write the position at ``time_ns`` into ``position`` (3,); return the moment it is true of [ns]."""
+    """Write the position at ``time_ns`` into ``position`` (3,); return the time for which it holds [ns]."""
     size = ring.shape[0]
     end = written[0]
     fence()

@@ -1,7 +1,7 @@
 """Time for the servo: monotonic nanoseconds and a sleep to an absolute deadline, as C functions.
 
-``SystemClock`` is the machine's own clock, ``VirtualClock`` a number that a sleep sets forward, so that the same loop
-runs as fast as it computes. Both have what the loop takes: ``now``, ``sleep`` (see ``cfunctions``) and ``context``.
+``SystemClock`` is the machine's clock, ``VirtualClock`` a number that a sleep advances, so that the same loop runs as
+fast as it computes. Both have the interface of the loop: ``now``, ``sleep`` (see ``c_functions``) and ``context``.
 """
 
 import sys
@@ -29,10 +29,10 @@ _virtual_at = record_at(VIRTUAL)
 
 
 class Clock(Protocol):
-    """What the servo asks of a clock.
+    """The interface of a clock for the servo.
 
-    ``now`` and ``sleep`` are C functions, ``context`` is the address of the clock's own memory, handed to both, and
-    ``runs``: whether time passes by itself.
+    ``now`` and ``sleep`` are C functions, ``context`` is the address of the clock's memory, passed to both, and
+    ``runs`` tells whether time passes by itself.
     """
 
     now: Any
@@ -45,7 +45,7 @@ class Clock(Protocol):
         ...
 
     def suspended_ns(self) -> int:
-        """Return how long this clock stood still while the machine was suspended, since its start [ns]."""
+        """Return how long this clock stopped during suspensions of the machine since its start [ns]."""
         ...
 
 
@@ -55,7 +55,7 @@ class SystemClock:
     Parameters
     ----------
     spin_us : float, optional
-        How long before a deadline a sleep ends early, to look at the clock until it is there [µs]; by default what this
+        Time before a deadline at which a sleep ends, to poll the clock until the deadline [µs]; by default as this
         system's timer needs. It takes up to ``spin_us`` of a core's time every period, which `spun_ns` counts.
 
     Raises
@@ -79,11 +79,11 @@ class SystemClock:
         return int(self.now.ctypes(self.context))
 
     def suspended_ns(self) -> int:
-        """Return how long the machine was suspended since its start [ns], at most a little too much.
+        """Return how long the machine was suspended since its start [ns], with a small error upward.
 
-        The loop sleeps on CLOCK_MONOTONIC of Linux and ``mach_absolute_time`` of macOS, which stand still meanwhile: no
-        tick is late after a suspension. CLOCK_BOOTTIME and ``mach_continuous_time`` go on, so the difference is the
-        suspension. The counter of Windows goes on by itself: there a suspension is a late tick, and this is 0.
+        The loop sleeps on CLOCK_MONOTONIC of Linux and ``mach_absolute_time`` of macOS, which stop during a suspension:
+        no tick is late after it. CLOCK_BOOTTIME and ``mach_continuous_time`` continue, so the difference is the
+        suspension. The counter of Windows continues: there a suspension is a late tick, and this is 0.
         """
         if sys.platform == "linux":
             return _ahead_ns(time.CLOCK_BOOTTIME, time.CLOCK_MONOTONIC)
@@ -94,14 +94,14 @@ class SystemClock:
 
     @property
     def spun_ns(self) -> int:
-        """How long all sleeps together looked at the clock instead of sleeping [ns]."""
+        """The total time in which sleeps polled the clock [ns]."""
         return int(self.memory[0].spun_ns)
 
 
 class VirtualClock:
-    """A clock that stands still but for sleeps: each sets it to its deadline at once.
+    """A clock that advances only by sleeps: each sets it to its deadline at once.
 
-    ``suspension_ns`` is how long the machine is said to have been suspended.
+    ``suspension_ns`` is the simulated duration of suspensions.
     """
 
     runs = False
@@ -110,7 +110,7 @@ class VirtualClock:
         self.suspension_ns = 0
         self.memory = records(VIRTUAL, 1)
         self.memory[0].now_ns = start_ns
-        self._now_ns = self.memory.view(np.ndarray)["now_ns"]  # a field of a record is looked for ten times as long
+        self._now_ns = self.memory.view(np.ndarray)["now_ns"]  # access to a field of a record takes ten times as long
         self.now, self.sleep = _virtual_functions()
         self.context = int(self.memory.ctypes.data)
 
@@ -124,14 +124,14 @@ class VirtualClock:
 
 
 def raise_priority(blocks: Blocks = (), *, real_time: bool = True) -> Grant:
-    """Ask the system to run the calling thread before others, and to keep memory at hand; return what it granted.
+    """Ask the system for a higher priority of the calling thread and for locked memory; return what it granted.
 
     Parameters
     ----------
     blocks : Blocks
-        The thread's memory, of which none is locked where this is empty.
+        The thread's memory; if empty, none is locked.
     real_time : bool
-        False: stay an ordinary thread, whose timers are exact nevertheless.
+        False: keep the ordinary priority; timers are still exact.
     """
     grant = platform.raise_priority(real_time=real_time)
     if not (blocks and real_time):
@@ -142,7 +142,7 @@ def raise_priority(blocks: Blocks = (), *, real_time: bool = True) -> Grant:
 if sys.platform != "win32":
 
     def _ahead_ns(clock: int, of: int) -> int:
-        """Return how far a clock is ahead of another [ns]: the least of several readings, one may be interrupted."""
+        """Return how far a clock is ahead of another [ns]: the least of several readings, as one may be interrupted."""
         return min(-time.clock_gettime_ns(of) + time.clock_gettime_ns(clock) for _ in range(3))
 
 

@@ -1,4 +1,4 @@
-"""What the system granted to the servo's thread, and in words how to be granted more."""
+"""The priority that the system granted to the servo's thread, and advice on how to get more."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ Blocks: TypeAlias = Sequence[tuple[int, int]]
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """What a thread may do.
+    """The priority of a thread.
 
     ``level`` is its priority class ("none": there is no thread), ``how`` the system's name for it; ``locked`` tells
-    whether the servo's memory cannot be swapped out, None where that was not asked for; ``advice`` how to be granted
-    what was refused, empty where nothing was.
+    whether the servo's memory cannot be swapped out, None if that was not requested; ``advice`` says how to get what
+    was refused, empty if nothing was.
     """
 
     level: Level
@@ -33,7 +33,7 @@ class Grant:
         return f"{self.level} ({self.how})" if self.how else self.level
 
     def with_memory(self, *, locked: bool, advice: str) -> Grant:
-        """Return the same, memory locked or not; ``advice`` is how to have it locked, where no other is given."""
+        """Return a copy with memory locked or not; ``advice`` says how to lock it, if there is no other advice."""
         return replace(self, locked=locked, advice=self.advice if locked or self.advice else (advice,))
 
     def __str__(self) -> str:

@@ -1,6 +1,6 @@
-"""Linux: ``clock_gettime`` and ``clock_nanosleep`` on CLOCK_MONOTONIC; SCHED_FIFO where it is granted.
+"""Linux: ``clock_gettime`` and ``clock_nanosleep`` on CLOCK_MONOTONIC; SCHED_FIFO if permitted.
 
-An ordinary user is granted it by a limit (``rtprio``), or SCHED_RR by the desktop's real-time service.
+A limit (``rtprio``) permits it to an ordinary user; the desktop's real-time service grants SCHED_RR.
 """
 
 import ctypes
@@ -36,7 +36,7 @@ _clock_nanosleep = external("clock_nanosleep", types.int32(types.int32, types.in
 _PR_SET_TIMERSLACK = 29
 _PRIORITY = 60  # of 1 to 99: above ordinary real-time audio, below the kernel's own threads
 _NICE = -15
-_LOCK_ALL = 1 | 2 | 4  # what is there, what comes, and each page once it is used: unused pages are not loaded
+_LOCK_ALL = 1 | 2 | 4  # present and future pages, each when it is used: unused pages are not loaded
 
 RIGHTS = (
     'for real-time priority write "USER - rtprio 70" and "USER - memlock unlimited", with your user\'s name, into '
@@ -66,7 +66,7 @@ def now(_context: int) -> Any:
 
 
 def sleep(context: int, deadline_ns: int) -> Any:
-    """``SLEEP``: to an absolute deadline, whatever signals arrive meanwhile; the last of it by looking at the clock."""
+    """``SLEEP``: to an absolute deadline despite signals; at the end by polling the clock."""
     clock = _clock_at(context)
     address = _timespec_on_stack()
     deadline = _timespec_at(address)
@@ -84,7 +84,7 @@ def sleep(context: int, deadline_ns: int) -> Any:
 
 
 def raise_priority(*, real_time: bool = True) -> Grant:
-    """Make the calling thread real-time, or at least nicer to itself; ask for timers without slack in any case."""
+    """Make the calling thread real-time, or lower its nice level; request timers without slack in any case."""
     if sys.platform != "linux":
         return Grant("normal", REFUSED)
     ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, ctypes.c_ulong(1), 0, 0, 0)
@@ -104,7 +104,7 @@ def raise_priority(*, real_time: bool = True) -> Grant:
 
 
 def _priorities() -> tuple[int, ...]:
-    """Return the real-time priorities to ask for: the one we want, and what a limit allows at most."""
+    """Return the real-time priorities to request: the preferred one, and the highest that a limit allows."""
     if sys.platform != "linux":
         return ()
     import resource  # noqa: PLC0415 - of POSIX; this file is read on every system
@@ -114,9 +114,9 @@ def _priorities() -> tuple[int, ...]:
 
 
 def lock_memory(blocks: Blocks) -> bool:
-    """Keep memory from being swapped out: the process' where no limit forbids it, else ``blocks``; tell whether it is.
+    """Lock memory: that of the process if there is no limit, else ``blocks``; return whether it is locked.
 
-    With a limit the whole process must not be locked: what it asks for later, beyond the limit, would be refused.
+    With a limit the process must not be locked as a whole: later allocations beyond the limit would fail.
     """
     if sys.platform != "linux":
         return False

@@ -54,13 +54,13 @@ def open_clock(spin_ns: int) -> Any:
 
 
 def now(context: int) -> Any:
-    """``NOW``: mach absolute time (125/3 ns a tick on Apple silicon: no overflow within two years of uptime)."""
+    """``NOW``: mach absolute time (125/3 ns per tick on Apple silicon: no overflow within two years of uptime)."""
     base = _timebase_at(context)
     return _mach_absolute_time() * base.numerator // base.denominator
 
 
 def sleep(context: int, deadline_ns: int) -> Any:
-    """``SLEEP``: to an absolute deadline, rounded up to a tick; the last of it by looking at the clock."""
+    """``SLEEP``: to an absolute deadline, rounded up to a tick; at the end by polling the clock."""
     base = _timebase_at(context)
     deadline = -(-deadline_ns * base.denominator // base.numerator)
     until = -(-(deadline_ns - base.spin_ns) * base.denominator // base.numerator)
@@ -75,7 +75,7 @@ def sleep(context: int, deadline_ns: int) -> Any:
 
 
 def raise_priority(*, real_time: bool = True) -> Grant:
-    """Promise the scheduler short ticks in return for starting them on time."""
+    """Declare short ticks to the scheduler (time-constraint policy), so that they start on time."""
     if not real_time:
         return NOT_ASKED
     base = open_clock(0)[0]

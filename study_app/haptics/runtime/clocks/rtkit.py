@@ -14,15 +14,15 @@ SERVICE: Final = "org.freedesktop.RealtimeKit1"
 OBJECT: Final = "/org/freedesktop/RealtimeKit1"
 BUS: Final = "org.freedesktop.DBus"
 PATIENCE_S: Final = 2.0  # the service may have to be started first
-PRIORITY: Final = 20  # what it grants at most, where it does not say
+PRIORITY: Final = 20  # highest level granted if it reports none
 
 _CALL, _RETURN, _ERROR = 1, 2, 3
 _PATH, _INTERFACE, _MEMBER, _DESTINATION, _SIGNATURE = 1, 2, 3, 6, 8
-_LONGEST = 1 << 20  # of a message [bytes]; a bus that sends more is none
+_LONGEST = 1 << 20  # longest message of a real bus [bytes]
 
 
 def make_real_time(thread: int, address: str | None = None) -> int:
-    """Let a thread of this process be real-time; return the priority it got.
+    """Make a thread of this process real-time; return its new priority.
 
     Parameters
     ----------
@@ -50,14 +50,14 @@ def make_real_time(thread: int, address: str | None = None) -> int:
 
 
 def make_high_priority(thread: int, nice: int, address: str | None = None) -> int:
-    """Let a thread of this process go before ordinary ones without being real-time; return the nice level it got.
+    """Raise a thread of this process above ordinary ones without real-time priority; return its new nice level.
 
     Parameters
     ----------
     thread : int
         The system's id of the thread.
     nice : int
-        The level wished for, below 0.
+        The requested level, below 0.
     address : str, optional
         Path of the bus' socket; by default the system bus.
 

@@ -1,6 +1,6 @@
-"""Windows: the performance counter, and a high-resolution waitable timer for all but the last half millisecond.
+"""Windows: the performance counter, and a high-resolution waitable timer except for the last half millisecond.
 
-The thread is one of the multimedia class scheduler's where that service runs, else time-critical within its process.
+The thread belongs to the multimedia class scheduler if that service runs, else it is time-critical in its process.
 """
 
 import ctypes
@@ -17,7 +17,7 @@ from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.model.layout import records
 from study_app.haptics.runtime.clocks.grants import NOT_ASKED, REFUSED, Blocks, Grant
 
-SPIN_US = 500.0  # the timer may be this late; the rest is waited for by looking at the counter
+SPIN_US = 500.0  # greatest lateness of the timer; the rest is waited by polling the counter
 
 COUNTER = np.dtype(
     [("frequency_hz", np.int64), ("timer", np.intp), ("spin_ns", np.int64), ("spun_ns", np.int64)], align=True
@@ -45,7 +45,7 @@ MEMORY = "to lock it close other programs: the working set is too small"
 
 
 def open_clock(spin_ns: int) -> Any:
-    """Return the memory of a clock: the counter's frequency and a timer of its own, closed with the memory."""
+    """Return the memory of a clock: the counter's frequency and a timer, closed with the memory."""
     memory = records(COUNTER, 1)
     memory[0].spin_ns = spin_ns
     if sys.platform == "win32":
@@ -83,7 +83,7 @@ def now(context: int) -> Any:
 
 
 def sleep(context: int, deadline_ns: int) -> Any:
-    """``SLEEP``: on the timer to shortly before the deadline, then by looking at the counter."""
+    """``SLEEP``: on the timer until shortly before the deadline, then by polling the counter."""
     clock = _counter_at(context)
     time_ns = _counter_ns(clock.frequency_hz)
     if deadline_ns - time_ns > clock.spin_ns:
@@ -110,7 +110,7 @@ def raise_priority(*, real_time: bool = True) -> Grant:
 
 
 def ask(avrt: Any, kernel32: Any) -> Grant:
-    """Ask these libraries of Windows for what `raise_priority` says."""
+    """Raise the priority as `raise_priority` specifies, by these libraries of Windows."""
     avrt.AvSetMmThreadCharacteristicsW.restype = ctypes.c_void_p
     avrt.AvSetMmThreadPriority.argtypes = [ctypes.c_void_p, ctypes.c_int]
     task = avrt.AvSetMmThreadCharacteristicsW(ctypes.c_wchar_p("Pro Audio"), ctypes.byref(ctypes.c_uint32(0)))
