@@ -1,4 +1,4 @@
-"""Two settings side by side, which of them is felt, and the history of edits, as a frozen value.
+"""Two settings for comparison, the one presented, and the history of edits, as a frozen value.
 
 Nothing here uses a device or a window. Every change makes a new `Workbench`, so undo returns the previous one.
 """
@@ -23,7 +23,7 @@ _SWITCHES_BY_CHANCE: Final = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A liquid as it was chosen, and as it is now; ``name`` is what people call it."""
+    """A liquid as chosen, and as edited; ``name`` is its displayed name."""
 
     name: str
     origin: Scene
@@ -31,31 +31,31 @@ class Setting:
 
     @property
     def is_edited(self) -> bool:
-        """Whether it is another liquid by now than the one chosen."""
+        """Whether it was edited since it was chosen."""
         return self.scene != self.origin
 
     @property
     def title(self) -> str:
-        """What it is called now."""
+        """Its displayed name, with a note if it was edited."""
         return f"{self.name}, edited" if self.is_edited else self.name
 
     def value(self, name: str) -> Value:
-        """Return what a parameter is now."""
+        """Return the present value of a parameter."""
         return value_of(self.scene, name)
 
     def chosen_value(self, name: str) -> Value:
-        """Return what a parameter was as the liquid was chosen; None where it had none."""
+        """Return the value of a parameter when the liquid was chosen; None if it had none."""
         return value_of(self.origin, name)
 
     def changed_names(self) -> tuple[str, ...]:
-        """Return the parameters that are something else than they were."""
+        """Return the parameters that were changed."""
         names = (it.name for section in sections(self.scene) for it in section.parameters)
         return tuple(name for name in names if self.value(name) != self.chosen_value(name))
 
 
 @dataclass(frozen=True, slots=True)
 class Workbench:
-    """Settings A and B; ``felt`` is the one in the hand.
+    """Settings A and B; ``felt`` is the one presented to the hand.
 
     While ``blind`` the assignment is hidden: ``first`` is the one called "setting 1", and nothing can be edited.
     ``held`` is the parameter whose slider is being dragged.
@@ -76,38 +76,38 @@ class Workbench:
 
     @property
     def in_hand(self) -> Setting:
-        """The setting that is felt, which edits go to."""
+        """The presented setting, which edits change."""
         return self.setting(self.felt)
 
     @property
     def may_undo(self) -> bool:
-        """Whether there is an edit to take back."""
+        """Whether there is an edit to undo."""
         return bool(self.past) and not self.blind
 
     @property
     def may_redo(self) -> bool:
-        """Whether an edit was taken back that can be made again."""
+        """Whether an undone edit can be redone."""
         return bool(self.future) and not self.blind
 
     def shown_name(self, side: Side) -> str:
-        """Return what a side may be called now."""
+        """Return the label of a side, which hides the assignment while blind."""
         if self.blind:
             return "Setting 1" if side == self.first else "Setting 2"
         return self.setting(side).title
 
     def changed_names(self, side: Side) -> tuple[str, ...]:
-        """Return the parameters of a side that are something else than they were; while blind, none."""
+        """Return the changed parameters of a side; while blind, none."""
         return () if self.blind else self.setting(side).changed_names()
 
     def change(self, name: str, value: Value, *, held: bool = False) -> Workbench:
-        """Return this with one parameter of the felt setting changed.
+        """Return a copy with one parameter of the presented setting changed.
 
-        While a slider is ``held`` its values are one step for undo, including the value at its release.
+        While a slider is ``held`` its values are one undo step, including the value at its release.
 
         Raises
         ------
         StudyError
-            It cannot be this, and why; or nothing may be edited now.
+            The value is not permitted, with the reason; or nothing may be edited now.
         """
         self._refuse_blind("edited")
         key = (self.felt, name)
@@ -119,7 +119,7 @@ class Workbench:
         return self._edited(self.felt, edited, held=key if held else None, goes_on=goes_on)
 
     def put(self, scene: Scene, key: str | None = None) -> Workbench:
-        """Return this with another scene selected; changes of one ``key`` after another are one step for undo.
+        """Return a copy with another scene selected; successive changes of one ``key`` are one undo step.
 
         Raises
         ------
@@ -135,42 +135,42 @@ class Workbench:
         )
 
     def choose(self, side: Side, name: str, scene: Scene) -> Workbench:
-        """Return this with another liquid on a side.
+        """Return a copy with another liquid on a side.
 
         Raises
         ------
         StudyError
-            The scene is not one of one liquid; or nothing may be edited now.
+            The scene does not have exactly one liquid; or nothing may be edited now.
         """
         self._refuse_blind("exchanged")
         the_liquid(scene)
         return self._edited(side, Setting(name, scene, scene))
 
     def copy_felt_to_other(self) -> Workbench:
-        """Return this with the felt setting on the other side too."""
+        """Return a copy with the presented setting on both sides."""
         self._refuse_blind("copied")
         return self._edited(other(self.felt), self.in_hand)
 
     def undo(self) -> Workbench:
-        """Return this without the last edit; the same where there is none."""
+        """Return a copy with the last edit undone; the same if there is none."""
         if not self.may_undo:
             return self
         (a, b), past = self.past[-1], self.past[:-1]
         return replace(self, a=a, b=b, past=past, future=(*self.future, (self.a, self.b)), held=None)
 
     def redo(self) -> Workbench:
-        """Return this with the edit that was taken back last; the same where there is none."""
+        """Return a copy with the last undone edit redone; the same if there is none."""
         if not self.may_redo:
             return self
         (a, b), future = self.future[-1], self.future[:-1]
         return replace(self, a=a, b=b, past=(*self.past, (self.a, self.b)), future=future, held=None)
 
     def switch(self) -> Workbench:
-        """Return this with the other setting in the hand."""
+        """Return a copy that presents the other setting."""
         return replace(self, felt=other(self.felt), held=None)
 
     def blinded(self, chance: Random) -> Workbench:
-        """Return this with nothing to be known: which is setting 1, and which of them is felt now, is drawn."""
+        """Return a blind copy: setting 1 and the presented setting are drawn at random."""
         if self.blind:
             return self
         drawn = [chance.random() < _SWITCHES_BY_CHANCE for _ in range(2)]
@@ -178,13 +178,13 @@ class Workbench:
         return replace(self, blind=True, first=first, felt=felt, held=None)
 
     def revealed(self) -> Workbench:
-        """Return this with everything to be known again."""
+        """Return a copy that is no longer blind."""
         return replace(self, blind=False, first="A")
 
     def _edited(
         self, side: Side, setting: Setting, *, held: tuple[Side, str] | None = None, goes_on: bool = False
     ) -> Workbench:
-        """Return this with another setting on a side; the one before can be had again."""
+        """Return a copy with another setting on a side, as an edit that can be undone."""
         past = self.past if goes_on else (*self.past, (self.a, self.b))[-MOST_STEPS:]
         a, b = (setting, self.b) if side == "A" else (self.a, setting)
         return replace(self, a=a, b=b, past=past, future=(), held=held)

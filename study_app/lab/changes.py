@@ -1,7 +1,7 @@
-"""One parameter of a scene set by its name: a new scene, or one line that says why not.
+"""Sets one parameter of a scene by its name: returns a new scene, or raises an error of one line.
 
-Beyond ``haptics.model.overrides`` it knows components of vectors, effects one by one, and the default values of a table
-that the liquid does not have yet.
+Unlike ``haptics.model.overrides`` it supports vector components, single effects, and the default values of a table that
+the liquid does not have yet.
 """
 
 import math
@@ -17,7 +17,7 @@ from study_app.lab.parameters import AUTO, AXES, ON, parameter, read, the_liquid
 
 _HALF_HAND_M: Final = 0.05
 _KINDS: Final = ("kind", "law")
-"""Fields that decide which others a table has."""
+"""Fields that determine which other fields a table has."""
 
 
 def changed(scene: Scene, name: str, value: Value) -> Scene:
@@ -26,7 +26,7 @@ def changed(scene: Scene, name: str, value: Value) -> Scene:
     Raises
     ------
     StudyError
-        The scene has no such parameter, or it cannot be this.
+        The scene has no such parameter, or the value is not permitted.
     """
     it = parameter(scene, name)
     value = _checked(it, value)
@@ -45,20 +45,20 @@ def changed(scene: Scene, name: str, value: Value) -> Scene:
         if value == read(scene, name):
             return scene
         return override_all(scene, by_hand | {f"liquid.{place}": _begun(scene, place, str(value))})
-    if read(scene, name) is None and value == value_of(scene, name):  # what is left open, and is so already
+    if read(scene, name) is None and value == value_of(scene, name):  # an unset value, unchanged
         return scene
     return override_all(scene, by_hand | _without_replaced(scene, place, field) | {name: value})
 
 
 def _without_replaced(scene: Scene, place: str, field: str) -> dict[str, None]:
-    """Return the tables that a field of the liquid replaces, of effects that are off, to be emptied."""
+    """Return the tables of disabled effects that a field of the liquid replaces, which are to be cleared."""
     taken = resolve(scene).liquids[0].effects
     replaced = (it.name for it in EFFECTS if place == "liquid" and field in it.replaces and it.name not in taken)
     return {f"liquid.{name}": None for name in replaced}
 
 
 def _checked(it: Parameter, value: Value) -> Value:
-    """Return the value as its parameter takes it."""
+    """Return the value converted and checked for its parameter."""
     if it.choices:
         if value not in {choice for choice, _ in it.choices}:
             words = ", ".join(repr(choice) for choice, _ in it.choices)
@@ -66,7 +66,7 @@ def _checked(it: Parameter, value: Value) -> Value:
         return value
     if isinstance(value, str) or value is None or not math.isfinite(value):
         raise StudyError(f"{it.label} must be a number, not {value!r}")
-    slack = 1e-9 * (abs(it.least) + abs(it.most))  # of a number that was written in other units
+    slack = 1e-9 * (abs(it.least) + abs(it.most))  # of a number in other units
     if not it.least - slack <= value <= it.most + slack:
         raise StudyError(f"{it.label} must be {it.shown(it.least)} to {it.shown(it.most)}, not {it.shown(value)}")
     value = min(max(float(value), it.least), it.most)
@@ -74,7 +74,7 @@ def _checked(it: Parameter, value: Value) -> Value:
 
 
 def _with_effect(scene: Scene, effect: str, *, on: bool) -> Scene:
-    """Return the scene with an effect on or off, and what it cannot do without."""
+    """Return the scene with an effect on or off, and the effects that it requires."""
     liquid = the_liquid(scene)
     wanted = set(resolve(scene).liquids[0].effects)
     if on:
@@ -98,14 +98,14 @@ def _with_effect(scene: Scene, effect: str, *, on: bool) -> Scene:
 
 
 def _named(scene: Scene) -> dict[str, object]:
-    """Return effects and the tables that the gate chooses, as it takes them, to be set by name."""
+    """Return effects and tables as the gate chooses them, by name."""
     taken = resolve(scene).liquids[0]
     tables = {f"liquid.{it.name}": getattr(taken, it.name).model_dump() for it in EFFECTS if it.choose is not None}
     return {"effects": taken.effects, **tables}
 
 
 def _begun(scene: Scene, place: str, kind: str) -> dict[str, Any]:
-    """Return what a region or an effect's table begins with: as large as the hand reaches, around its middle."""
+    """Return the initial table of a region or an effect: around the middle of the hand's reach, as large as that."""
     centre_m, reach_m = scene.origin_m, scene.scale * _HALF_HAND_M
     if place in NAMED:
         start = NAMED[place].start

@@ -1,4 +1,4 @@
-"""Which limiter acted, and in how many of the last 10 s' ticks."""
+"""Counts the ticks of the last 10 s in which each limiter acted."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -34,12 +34,12 @@ WORDS: Final = {
     LIMITER_STOP: "Force stopped",
     LIMITER_ESTIMATOR: "Velocity filter",
 }
-"""What people call each limiter, in every window; the order is that of the lab's card."""
+"""The displayed name of each limiter in all windows, in the order of the lab's card."""
 
 
 @dataclass(frozen=True, slots=True)
 class Limiter:
-    """A limiter, the ticks of the last 10 s it acted in, and whether it does now."""
+    """A limiter, the number of ticks in the last 10 s in which it acted, and whether it acts now."""
 
     name: str
     ticks: int

@@ -1,7 +1,7 @@
-"""Device and servo of the lab: scenes felt as they are edited, paths that move the hand, and what came of it.
+"""Device and servo of the lab: edited scenes, programmed paths that move the hand, and their results.
 
-It has no thread: whoever owns it calls `poll` some thirty times a second. The servo is only given whole scenes and
-asked for telemetry; whatever ends the lab calls `close`, which writes zero force before it lets go of the device.
+It has no thread: its owner calls `poll` about thirty times per second. The servo only receives complete scenes and
+provides telemetry; at the end of the lab `close` writes zero force before it closes the device.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ Vector = tuple[float, float, float]
 
 WORKSPACE_M: Final[Vector] = (0.1, 0.06, 0.06)
 FORCE_LIMIT_N: Final = 8.0
-ELEMENTS: Final = 100_000  # the most that a wake's length can be
-SPACING_NS: Final = 50_000_000  # a fade: a drag that loaded scenes faster would never be felt
+ELEMENTS: Final = 100_000  # greatest length of a wake
+SPACING_NS: Final = 50_000_000  # duration of a fade: with faster changes by a slider no scene would be felt
 _LONGEST_GAP_NS: Final = 200_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """Where the hand is [m, hand frame], the force on it [N], the wake the body meets [m/s, scene], and the servo.
+    """Place of the hand [m, hand frame], the force on it [N], the wake at the body [m/s, scene], and the servo's state.
 
-    ``fault`` is why the servo stopped itself, in a sentence; empty while it has not.
+    ``fault`` is why the servo stopped itself, in a sentence; empty while it runs.
     """
 
     position_m: Vector
@@ -54,7 +54,7 @@ class Reading:
 
 
 class Live:
-    """One device's servo, felt with.
+    """One device's servo in the lab.
 
     Parameters
     ----------
@@ -79,16 +79,16 @@ class Live:
         self._closed = False
 
     def prepare(self) -> None:
-        """Compile all that runs later, or load it from the cache; takes seconds when first used after a change."""
+        """Compile all functions that run later, or load them from the cache; takes seconds after a change."""
         self.servo.prepare()
         self.shadow.prepare()
 
     def feel(self, bench: Workbench, *, anew: bool = False) -> None:
-        """Present the felt setting of ``bench`` from the next tick on, and compute the other on the same motion.
+        """Present the selected setting of ``bench`` from the next tick on, and compute the other on the same motion.
 
-        Numbers change under the hand, whose wake goes on (`Servo.adjust`). What changes more begins with a fade of
-        50 ms; if it comes sooner after another it waits for its end, the newest counts. What is felt already goes on as
-        it is, unless it is to begin ``anew``: for a hand that may not know.
+        Changes of parameters keep the wake (`Servo.adjust`). Other changes begin with a fade of 50 ms; the newest
+        change during a fade waits for its end. A setting already presented continues unchanged, unless it is to begin
+        ``anew``, in a blind comparison.
 
         Raises
         ------
@@ -112,18 +112,18 @@ class Live:
 
     @property
     def due_in_s(self) -> float | None:
-        """How long until a scene that waits may be loaded, by `poll`; None where none waits."""
+        """Time until `poll` may load a waiting scene; None if none waits."""
         if self._due is None or self._loaded_ns is None:
             return None
         return max(self._loaded_ns + SPACING_NS - self.servo.now_ns(), 0) * 1e-9
 
     def poll(self) -> None:
-        """Follow what the servo did since, load a scene that waited, and begin a path again that is over.
+        """Process new telemetry, load a waiting scene, and restart a path that has ended.
 
         Raises
         ------
         StudyError
-            A scene that waited cannot be presented.
+            A waiting scene cannot be presented.
         """
         samples = self._reader.read()
         lost, self._dropped = self._reader.dropped != self._dropped, self._reader.dropped
@@ -137,14 +137,14 @@ class Live:
             self._lead()
 
     def play(self, name: str | None) -> None:
-        """Move the hand along a programmed path, again and again; with None give it back.
+        """Move the hand along a programmed path repeatedly; with None stop.
 
-        A device that a person holds goes on as it is: then the path is only computed and drawn.
+        A device held by a person is not moved: then the path is only computed and drawn.
 
         Raises
         ------
         StudyError
-            No such path, or nothing is felt yet.
+            No such path, or no setting is presented yet.
         """
         self.path, self._ghost = None, None
         if name is None:
@@ -162,13 +162,13 @@ class Live:
                 self._ghost.begin(self.felt.felt, a, b)
 
     def point_to(self, x_m: float, y_m: float, z_m: float) -> None:
-        """Say where the pointer is [m, hand frame], to a device that has one, unless a path moves it."""
+        """Set the pointer [m, hand frame] of a device that has one, unless a path moves it."""
         point_to: Callable[[float, float, float], None] | None = getattr(self.device, "point_to", None)
         if point_to is not None and self.path is None:
             point_to(x_m, y_m, z_m)
 
     def press(self, buttons: int) -> None:
-        """Hold down exactly these buttons of a device that has a pointer: button 1 is bit 0."""
+        """Press exactly these buttons of a device that has a pointer: button 1 is bit 0."""
         if self.hand is not None and hasattr(self.device, "point_to"):
             self.hand.press(buttons)
 
@@ -177,7 +177,7 @@ class Live:
         self.servo.stop_force()
 
     def fade_in(self) -> None:
-        """Let the force return after `stop_force`, as slowly as at a start."""
+        """Fade the force in after `stop_force`, as slowly as at a start."""
         self.servo.fade_in()
 
     def limiters(self) -> tuple[Limiter, ...]:
@@ -188,15 +188,15 @@ class Live:
         return self._counts.rows(limit_n, slew_n)
 
     def trace(self) -> Trace | None:
-        """Return the last 2.5 s as A and as B have it."""
+        """Return the last 2.5 s for A and for B."""
         return self._shown.trace()
 
     def tail(self, side: Side) -> Tail | None:
-        """Return the tail of a side; None where it has no wake."""
+        """Return the tail of a side; None without a wake."""
         return self._shown.tail(side)
 
     def reading(self) -> Reading | None:
-        """Return where things are now; None before the first tick."""
+        """Return the present state; None before the first tick."""
         latest = self.servo.telemetry.latest()
         if latest is None:
             return None
@@ -209,7 +209,7 @@ class Live:
         )
 
     def close(self) -> None:
-        """End in the order of safety: zero force, the servo's end, then the device; a second call does nothing."""
+        """End in a safe order: zero force, stop the servo, close the device; a second call does nothing."""
         if self._closed:
             return
         self._closed = True
@@ -237,7 +237,7 @@ class Live:
         self._present(bench, goes_on=False)
 
     def _present(self, bench: Workbench, *, goes_on: bool) -> None:
-        """Present the felt setting with the servo, and let the shadows follow."""
+        """Present the selected setting with the servo, and update the shadows."""
         a, b = (self._presentable(it.scene) for it in (bench.a, bench.b))
         serial = (self.servo.adjust if goes_on else self.servo.load)(a if bench.felt == "A" else b)
         self.felt = bench
@@ -254,14 +254,14 @@ class Live:
         return programme(name, scene, self.device.workspace_m)
 
     def _lead(self) -> None:
-        """Send the hand along the path, from where it is."""
+        """Move the hand along the path, from its present place."""
         assert self.path is not None and self.hand is not None  # noqa: S101, PT018 - called for a path and a hand
         motion = led_to(self._programme(self.path), self.hand.aim_m)
         self.hand.follow(motion.t_s, motion.position_m)
 
 
 class _Ghost:
-    """A path without a hand: samples as a servo would take them, for a shadow of its own."""
+    """A path without a hand: samples as a servo would produce them, for a separate shadow."""
 
     def __init__(self, motion: Motion, rate_hz: float, limit_n: float, now_ns: int) -> None:
         self.shadow = Shadow(Scene(rate_hz=rate_hz), ELEMENTS, limit_n, alone=True)
@@ -271,12 +271,12 @@ class _Ghost:
         self._serial = 0
 
     def begin(self, felt: Side, a: Scene, b: Scene, *, goes_on: bool = False) -> None:
-        """Present these from the next sample on."""
+        """Present these settings from the next sample on."""
         self._serial += 1
         self.shadow.expect(self._serial, felt, a, b, goes_on=goes_on)
 
     def follow(self, now_ns: int) -> None:
-        """Take what a servo would have taken by now; what was waited for too long is passed over."""
+        """Compute the ticks that a servo would have run by now; skip those overdue for too long."""
         first_ns = max(self._next_ns, now_ns - _LONGEST_GAP_NS)
         times_ns = np.arange(first_ns, now_ns, self._period_ns)
         if len(times_ns) == 0:
@@ -302,13 +302,13 @@ def open_live(
     Parameters
     ----------
     options : values by name; those that the device takes are used
-    progress : is given what a device asks for while it is opened
-    cancelled : is asked whether to give up opening it
+    progress : receives the device's requests while it is opened
+    cancelled : returns whether to stop opening it
 
     Raises
     ------
     StudyError
-        It cannot be opened; then nothing of it is left open.
+        It cannot be opened; then nothing is left open.
     """
     taken = {option.name for option in descriptor_of(name).options}
     settings = RigSettings(

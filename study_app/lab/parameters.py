@@ -1,8 +1,8 @@
-"""Which parameters a scene of one liquid has, as sliders and fields need them: words, units, ranges, choices.
+"""The parameters of a scene with one liquid, for sliders and fields: labels, units, ranges, choices.
 
-Ranges are those of the scene's own models; where those have no bound, or one far from anything that is felt, the rows
-below state the range that the lab offers [choice]. A value of a preset beyond it widens it. Names are ``table.field``,
-as ``haptics.model.overrides`` takes them; ``.x``, ``.y``, ``.z`` after a name mean a component, ``effects.NAME`` one
+Ranges are those of the scene's models; if those have no bound, or one far outside perceptible values, the rows below
+define the lab's range [choice]. A preset's value beyond it extends it. Names are ``table.field``, as
+``haptics.model.overrides`` takes them; ``.x``, ``.y``, ``.z`` after a name mean a component, ``effects.NAME`` one
 effect.
 """
 
@@ -50,7 +50,7 @@ _ROWS: Final = QUANTITIES | _CHOICES
 
 
 def sections(scene: Scene) -> tuple[Section, ...]:
-    """Return the parameters of a scene with one liquid, those of an effect only where it is called for.
+    """Return the parameters of a scene with one liquid, those of an effect only if it is selected.
 
     Raises
     ------
@@ -88,9 +88,9 @@ def parameter(scene: Scene, name: str) -> Parameter:
 
 
 def value_of(scene: Scene, name: str) -> Value:
-    """Return what a parameter is in a scene, SI or one of its choices; None where it has none, such as a viscosity.
+    """Return the value of a parameter in a scene, SI or one of its choices; None if unset, such as a viscosity.
 
-    What follows from other parameters while it is left open is what follows: a reach is one diameter of the body.
+    An unset value that other parameters determine is returned: a reach is one diameter of the body.
     """
     liquid = the_liquid(scene)
     place, _, field = name.partition(".")
@@ -107,7 +107,7 @@ def value_of(scene: Scene, name: str) -> Value:
 
 
 def read(scene: Scene, name: str) -> Any:
-    """Return what stands in a scene under ``table.field`` or a component of it; None where nothing does."""
+    """Return the value of ``table.field`` or of its component in a scene; None if unset."""
     liquid = the_liquid(scene)
     place, field, *axis = name.split(".")
     table = {"liquid": liquid, "scene": scene}.get(place) or getattr(liquid, place, None) or getattr(scene, place, None)
@@ -116,7 +116,7 @@ def read(scene: Scene, name: str) -> Any:
 
 
 def the_liquid(scene: Scene) -> Liquid:
-    """Return the liquid of a scene that has one.
+    """Return the liquid of a scene with exactly one.
 
     Raises
     ------
@@ -131,7 +131,7 @@ def the_liquid(scene: Scene) -> Liquid:
 
 
 def _has_section(liquid: Liquid, effect: Effect) -> bool:
-    """Return whether an effect's table stands in the liquid, and is shown by itself."""
+    """Return whether an effect's table is in the liquid, and shown separately."""
     return effect.model is not None and not effect.with_liquid and getattr(liquid, effect.name) is not None
 
 
@@ -159,13 +159,13 @@ def _names(scene: Scene, place: str) -> tuple[str, ...]:
 
 
 def _has_value(table: BaseModel, place: str, field: str) -> bool:
-    """Return whether a field has a value, or one that follows from the scene or stands in its row."""
+    """Return whether a field has a value, one computed from the scene, or a default in its row."""
     follows = place in NAMED and field in NAMED[place].open_values
     return getattr(table, field) is not None or follows or _ROWS[f"{place}.{field}"].default is not None
 
 
 def _accuracy(liquid: Liquid) -> tuple[str, ...]:
-    """Return what decides which effects are left out: nothing, where they are named."""
+    """Return the parameters that determine the omitted effects: none if effects are named."""
     if liquid.effects != "auto":
         return ()
     return "accuracy.relative", "accuracy.absolute_n", "motion.speed_mps", "motion.acceleration_mps2"
@@ -208,7 +208,7 @@ def _model(scene: Scene, place: str) -> type[BaseModel]:
 
 
 def _default(scene: Scene, place: str, field: str, row: Parameter) -> Any:
-    """Return what a field's model gives it; None where it gives nothing."""
+    """Return a field's default in its model; None without one."""
     model = _model(scene, place)
     if place in NAMED and field in NAMED[place].open_values:
         return NAMED[place].open_values[field](scene)

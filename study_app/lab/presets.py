@@ -1,4 +1,4 @@
-"""The liquids at hand, and a setting kept as a preset: a scene file that every command takes."""
+"""The available liquids, and settings saved as presets: scene files that every command accepts."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from study_app.workspace import workspace
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """A liquid that a side can be set to: the file or shipped name it is from, its id there, and what it is called."""
+    """A liquid for a side: its file or shipped name, its id there, and its displayed name."""
 
     source: str
     liquid: str
@@ -23,19 +23,19 @@ class Choice:
 
     @property
     def scene(self) -> Scene:
-        """The scene it is.
+        """The scene of the liquid.
 
         Raises
         ------
         ProtocolError
-            The file does not hold it any more.
+            The file no longer contains it.
         """
         return load_scene(self.source, self.liquid)
 
     def setting(self) -> Setting:
-        """Return it as a side of the workbench begins with it.
+        """Return its initial setting on a side of the workbench.
 
-        Where its file has the usual "ewma", the lab has "kalman", and so do presets saved there.
+        If its file has the default "ewma", the lab uses "kalman", also in presets saved there.
         """
         scene = for_new_file(self.scene)
         return Setting(spoken(self.liquid), scene, scene)
@@ -45,7 +45,7 @@ def liquids_at_hand(folders: tuple[Path, ...] | None = None, saved: tuple[str, .
     """Return every liquid of the shipped protocols, of the files in ``folders``, and of those ``saved``.
 
     ``folders`` is by default the workspace's ``protocols``.
-    A broken file has none; a file of a shipped one's name in ``folders`` is that one.
+    A broken file has none; a file in ``folders`` with the name of a shipped one replaces it.
     """
     folders = (workspace().protocols,) if folders is None else folders
     own = [str(path) for folder in folders for path in sorted(folder.glob("*.toml")) if path.stem not in shipped()]
@@ -68,7 +68,7 @@ def liquids_of(source: str) -> tuple[Choice, ...]:
 
 
 def preset_text(setting: Setting) -> str:
-    """Return a setting as a scene file, with what was changed named above it."""
+    """Return a setting as a scene file, with a comment that lists the changes."""
     changed = ", ".join(setting.changed_names())
     said = [f"{setting.name}, as set in the liquid lab."]
     if changed:
@@ -77,7 +77,7 @@ def preset_text(setting: Setting) -> str:
 
 
 def save(path: Path, text: str) -> None:
-    """Write a preset, whole or not at all.
+    """Write a preset atomically.
 
     Raises
     ------
@@ -88,6 +88,6 @@ def save(path: Path, text: str) -> None:
 
 
 def spoken(liquid_id: str) -> str:
-    """Return the name of a liquid as people say it."""
+    """Return the displayed name of a liquid."""
     words = liquid_id.replace("_", " ")
     return words[:1].upper() + words[1:]

@@ -1,4 +1,4 @@
-"""Programmed paths for a hand: those of the figures (``haptics.model.paths``), as large as the workspace permits."""
+"""Programmed paths for a hand: those of the figures (``haptics.model.paths``), scaled to the workspace."""
 
 from typing import Any, Final
 
@@ -25,13 +25,13 @@ SHORTEST_APPROACH_S: Final = 0.5
 _REST_S: Final = 2.0
 _LEGS: Final = 5
 _RATE_HZ: Final = 1000.0
-_HALF_TURN: Final = 0.7071  # of a leg, to either side of the way
+_HALF_TURN: Final = 0.7071  # of a leg, to either side of the path
 
 
 def programme(name: str, scene: Scene, half_m: Vector) -> Motion:
     """Return a path in the hand frame, about the middle of a workspace of these half extents [m].
 
-    Its speed is that of the figures in the scene, 1 m/s; its size is theirs, or as much of it as fits.
+    Its speed is that of the figures in the scene, 1 m/s; its size is theirs, reduced to fit.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def programme(name: str, scene: Scene, half_m: Vector) -> Motion:
 
 
 def led_to(motion: Motion, from_m: Any) -> Motion:
-    """Return a motion that begins where the hand is, (3,) [m], with a smooth way to its first place."""
+    """Return a motion that begins at the hand, (3,) [m], with a smooth path to its first place."""
     way_m = motion.position_m[0] - np.asarray(from_m, np.float64)
     lasts_s = max(float(np.linalg.norm(way_m)) / APPROACH_MPS, SHORTEST_APPROACH_S)
     t_s = np.arange(round(lasts_s * _RATE_HZ)) / _RATE_HZ

@@ -17,11 +17,11 @@ from study_app.protocol.load import load
 from study_app.store.atomic import cannot_read, write_file
 
 SHARED: Final = {"scale": "scale", "velocity": "velocity filter", "knee": "speed limit", "rate_hz": "servo rate"}
-"""What a study decides for all of its liquids, and a liquid file cannot."""
+"""Tables that a study sets for all of its liquids, and a liquid file cannot set."""
 
 
 def use_in_study(study: Path, setting: Setting, file: Path | None) -> str:
-    """Add a table ``[liquids.NAME]`` with a setting's liquid file at the end of a study's file; say so in a sentence.
+    """Add a table ``[liquids.NAME]`` with a setting's liquid file at the end of a study's file; return a message.
 
     Parameters
     ----------
@@ -31,7 +31,8 @@ def use_in_study(study: Path, setting: Setting, file: Path | None) -> str:
     Raises
     ------
     StoreError
-        The study's file is not one, takes no such table, or a file cannot be read or written. It is unchanged then.
+        The study's file is not valid, cannot have such a table, or a file cannot be read or written. It is unchanged
+        then.
     """
     before = _read(study)
     document = _document(study, before)
@@ -80,7 +81,7 @@ def _free_file(wanted: Path) -> Path:
 
 
 def _relative(file: Path, folder: Path) -> str:
-    """Return a file's path from a folder; as it is where there is none, as between drives."""
+    """Return a file's path relative to a folder; unchanged if there is none, as between drives."""
     try:
         return Path(os.path.relpath(file, folder)).as_posix()
     except ValueError:
@@ -92,7 +93,7 @@ def _quoted(text: str) -> str:
 
 
 def _replaced(study: Path, scene: Scene) -> str:
-    """Return which of the lab's settings the study replaces by its own; nothing if the study cannot be read."""
+    """Return a sentence on the lab's settings that the study overrides; "" if the study cannot be read."""
     try:
         protocol = load(study)
     except ProtocolError:

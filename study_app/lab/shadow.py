@@ -1,9 +1,9 @@
-"""What was felt, recomputed outside the servo, and what the other setting would have been on the same motion.
+"""Recomputes the presented setting outside the servo, and the other setting on the same motion.
 
-Telemetry comes in batches; the servo's own tick (``haptics.runtime.recompute``) answers for A and for B, each with a
-state of its own. The felt side shares what survives a change of scene with the servo's safety layer, so that its
-forces are the servo's to the last bit; the other side continues with a copy of it. Both velocity filters know the
-force that was sent: it moved the hand. Nothing here can delay the servo.
+Telemetry is processed in batches by the servo's tick (``haptics.runtime.recompute``) for A and for B, each with a
+separate state. The presented side starts with the persistent state of the servo's safety layer, so that its forces
+equal the servo's to the last bit; the other side continues with a copy of it. Both velocity filters use the force that
+was sent, since it moved the hand. Nothing here can delay the servo.
 """
 
 from dataclasses import dataclass
@@ -43,11 +43,11 @@ _ROW: Final = np.dtype(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trace:
-    """The last 2.5 s of one motion as A and as B have it; ``t_s`` (n,) ends at 0, the newest sample.
+    """The last 2.5 s of one motion for A and for B; ``t_s`` (n,) ends at 0, the newest sample.
 
-    ``force_a_n``, ``force_b_n`` (n, 3) are the forces on the hand, sent by the servo where the side was felt and as
-    they would have been sent where it was not; ``body_mps``, ``wake_a_mps`` and ``wake_b_mps`` (n,) speeds in the
-    scene; ``felt_a`` (n,) says where A was felt.
+    ``force_a_n``, ``force_b_n`` (n, 3) are the forces on the hand, sent by the servo or, for the side not presented, as
+    they would have been sent; ``body_mps``, ``wake_a_mps`` and ``wake_b_mps`` (n,) speeds in the scene; ``felt_a`` (n,)
+    tells where A was presented.
     """
 
     t_s: Floats
@@ -61,7 +61,7 @@ class Trace:
 
 @dataclass(slots=True)
 class _Presented:
-    """What the servo presents from a scene's first sample on."""
+    """The side and scene that the servo presents from the scene's first sample on."""
 
     felt: Side
     scenes: dict[Side, Scene]
@@ -74,10 +74,8 @@ class Shadow:
     Parameters
     ----------
     rest : the scene without liquids that the servo begins with
-    elements : wake elements there is room for
-    limit_n : the device's own force limit [N]
-    dynamics : of the device
-    alone : there is no servo behind the samples: what comes of them here is shown for both sides
+    elements : capacity for wake elements limit_n : the device's own force limit [N] dynamics : of the device alone :
+    the samples are not from a servo: both sides show recomputed results
     """
 
     def __init__(
@@ -89,11 +87,11 @@ class Shadow:
         self._serial = 0
         self._expected: dict[int, _Presented] = {}
         self._recent = _Recent()
-        self.differing = 0  # ticks of which the felt side's force was not the servo's, to the last bit
-        self.followed = 0  # ticks that were compared
+        self.differing = 0  # ticks in which the presented side's force differed from the servo's in any bit
+        self.followed = 0  # ticks compared
 
     def prepare(self) -> None:
-        """Compile all that runs later, or load it from the cache."""
+        """Compile all functions that run later, or load them from the cache."""
         for half in self._sides.values():
             half.begin(half.scene)
             half.answer(records(SAMPLE, 0), felt=True)
@@ -104,14 +102,14 @@ class Shadow:
         self._expected[serial] = _Presented(felt, {"A": a, "B": b}, goes_on)
 
     def put_unfelt(self, side: Side, scene: Scene) -> None:
-        """Exchange the scene of the side that is not felt; nothing happens where it is that already."""
+        """Set the scene of the side not presented, if it differs."""
         for it in self._expected.values():
             it.scenes[side] = scene
         if self._sides[side].scene != scene:
             self._sides[side].begin(scene)
 
     def take(self, samples: Any, *, lost: bool = False) -> None:
-        """Follow the servo's next samples (recarray of ``SAMPLE``); ``lost`` where some before them were dropped."""
+        """Process the servo's next samples (recarray of ``SAMPLE``); ``lost`` if some before them were dropped."""
         if lost:
             for half in self._sides.values():
                 half.begin(half.scene)
@@ -127,7 +125,7 @@ class Shadow:
         return self._recent.trace()
 
     def tail(self, side: Side) -> Tail | None:
-        """Return the tail of a side; None where it has no wake."""
+        """Return the tail of a side; None without a wake."""
         return self._sides[side].tail()
 
     def _change_to(self, serial: int) -> None:
@@ -150,7 +148,7 @@ class Shadow:
         self._felt = presented.felt
 
     def _follow(self, samples: Any) -> None:
-        """Let both sides answer to samples of one scene; of the felt one, what the servo sent is shown."""
+        """Recompute both sides for samples of one scene; show the servo's own forces for the presented side."""
         out = {side: half.answer(samples, felt=side == self._felt) for side, half in self._sides.items()}
         if not self._alone:
             again, out[self._felt] = out[self._felt], samples
@@ -160,7 +158,7 @@ class Shadow:
 
 
 class _Half:
-    """One side: its scene, the memory it lives in, and the safety layer behind it."""
+    """One side: its scene, packed model and safety layer."""
 
     def __init__(self, rest: Scene, elements: int, limit_n: float, dynamics: Dynamics) -> None:
         self.scene = rest
@@ -170,23 +168,23 @@ class _Half:
         self._trail, self._places = new_wake_places(elements)
 
     def restart(self) -> None:
-        """Be as before the first sample."""
+        """Reset to the state before the first sample."""
         self.safety = new_safety(self.safety[0].device_limit_n)
 
     def begin(self, scene: Scene) -> None:
-        """Present a scene from now on, as the servo does: its state afresh, its force faded in."""
+        """Present a scene from now on, like the servo: reset its state and fade its force in."""
         self.scene = scene
         pack_into(self._model, scene, dynamics=self._dynamics)
         begin_scene(self.safety[0])
         self._trail.view(np.uint8)[:] = 0
 
     def go_on(self, scene: Scene) -> None:
-        """Take a scene's numbers, as the servo does that adjusts: state and force go on."""
+        """Take a scene's parameters, like the servo's `adjust`: keep state and force."""
         self.scene = scene
         adjust_into(self._model, scene, dynamics=self._dynamics)
 
     def answer(self, samples: Any, *, felt: bool) -> Any:
-        """Return the samples with what comes of them here; ``felt`` where the device was sent this side's force."""
+        """Return the samples with recomputed results; ``felt`` if the device was sent this side's force."""
         out = samples.copy()
         recompute_sample(self._model, self.safety[0], out, self._trail[0], self._places, felt)
         return out
@@ -204,13 +202,13 @@ class _Half:
 
 
 class _Recent:
-    """The newest samples of both sides, as many as a trace shows."""
+    """The newest samples of both sides, for the length of a trace."""
 
     def __init__(self) -> None:
         self._rows: Any = records(_ROW, 0)
 
     def add(self, time_ns: Any, a: Any, b: Any, *, felt_a: bool) -> None:
-        """Add samples of the same moments, one array a side."""
+        """Add samples of the same times, one array per side."""
         rows = records(_ROW, len(time_ns))
         rows.time_ns, rows.force_a_n, rows.force_b_n = time_ns, a.device_force_n, b.device_force_n
         rows.body_mps = np.linalg.norm((a if felt_a else b).velocity_mps, axis=1)
@@ -221,7 +219,7 @@ class _Recent:
         self._rows = joined[joined["time_ns"] > time_ns[-1] - round(SPAN_S * 1e9)].view(np.recarray)
 
     def trace(self) -> Trace | None:
-        """Return them; None where there are none."""
+        """Return the trace; None without samples."""
         rows = self._rows
         if len(rows) == 0:
             return None

@@ -1,4 +1,4 @@
-"""What a setting's steady flow is like: its flow curve, and the force over the speed of the hand."""
+"""The steady flow of a setting: its flow curve, and the force over the speed of the hand."""
 
 from dataclasses import dataclass
 from typing import Final, TypeAlias

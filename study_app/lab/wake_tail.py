@@ -1,4 +1,4 @@
-"""The wake as places on a screen: where the body left what it meets now."""
+"""The wake as places on a screen: where the body left the elements that act on it now."""
 
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
@@ -16,8 +16,8 @@ class Tail:
     """The moving elements of a wake as places, from the oldest to the newest, thinned to at most 400.
 
     ``positions_m`` (n, 3) [m, hand frame]; ``breaks`` (n,) bool, true where a segment begins; ``ages`` (n,) from 0, the
-    newest element there can be, to 1, the oldest. ``alive`` of at most ``elements`` are held now, those at rest
-    included, in ``segments`` segments (cells of a local wake).
+    newest possible element, to 1, the oldest. ``alive`` of at most ``elements`` are stored now, including those at
+    rest, in ``segments`` segments (cells of a local wake).
     """
 
     positions_m: Floats
@@ -50,7 +50,7 @@ def tail_of(trail: Any, places: Any, elements: int) -> Tail:
 
 
 def _thinned(breaks: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the rows to be drawn: evenly spread, the newest, and where segments begin as long as there is room."""
+    """Return the rows to draw: evenly spaced ones, the newest, and starts of segments if they fit."""
     count = len(breaks)
     if count <= MOST_POINTS:
         return np.arange(count)

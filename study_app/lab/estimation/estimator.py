@@ -1,8 +1,8 @@
-"""Parameters of a liquid from a stream of measured force: the present estimate, or why there is none.
+"""Estimates parameters of a liquid from a stream of measured force, or gives the reason without an estimate.
 
 The drag coefficient alone follows each batch of rows by recursive least squares (``recursive_drag``). With length and
-scaling of the wake the newest rows are searched once a second of the stream (``wake_fit``); whoever shows windows may
-let an executor do so. A value counts only where the motion identifies it (``information``).
+scaling of the wake the newest rows are searched once per second of the stream (``wake_fit``), in an executor if the
+caller has windows. A value counts only if the motion identifies it (``information``).
 """
 
 import math
@@ -23,28 +23,28 @@ from study_app.lab.estimation.wake_fit import WakeFit, WakeSearch
 
 MEMORY_S: Final = 10.0
 LEAST_S: Final = 1.0
-"""Before so much was measured nothing is estimated."""
+"""Least measured time for an estimate."""
 SEARCH_S: Final = 2.0
-"""Time of the stream between two searches for the wake."""
+"""Interval of stream time between two searches for the wake."""
 KEPT_S: Final = 15.0
 MISFIT: Final = 0.2
-"""Of the measured force: where more than that is left and is not noise, the model is another liquid's. [choice]"""
+"""Share of the measured force: if the residual without noise exceeds it, the model does not fit the liquid. [choice]"""
 _SURE: Final = 0.02
-"""Likewise: where more is left, the next search looks farther for a better minimum."""
+"""Likewise: if the residual exceeds it, the next search covers a wider range."""
 _RATE_ROWS: Final = 20
 _SLOWEST_HZ: Final = 50.0
 _MOST_DRAG: Final = 10.0
-"""What the scene's model permits."""
+"""Drag coefficients that the scene's model permits."""
 WORDS: Final = {"drag_coefficient": "the drag coefficient", "length": "the length", "scaling": "the scaling"}
 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """Values by name with their 95 % intervals, empty where nothing can be said yet.
+    """Values by name with their 95 % intervals, empty before the first estimate.
 
-    ``identified`` is whether the motion identifies them: only then may they be used. ``reason`` is why not, in a
+    ``identified`` tells whether the motion identifies them: only then may they be used. ``reason`` is why not, in a
     sentence. ``smallest`` is the smallest eigenvalue of the information matrix, of `NEEDED`. ``rms_n`` is that of the
-    residual, ``force_rms_n`` that of the measured force [N]; ``seconds`` is how long was measured.
+    residual, ``force_rms_n`` that of the measured force [N]; ``seconds`` is the measured time.
     """
 
     values: dict[str, float]
@@ -61,18 +61,18 @@ NOTHING: Final = Estimate({}, {}, identified=False, reason="nothing was measured
 
 
 class OnlineEstimator:
-    """An estimator that takes rows as they come.
+    """An online estimator that receives rows in batches.
 
     Parameters
     ----------
     scene : Scene
-        With one liquid; its values are where the search begins.
+        With one liquid; the search starts from its values.
     names : tuple of str
         ``("drag_coefficient",)``, or with ``"length"``, ``"scaling"`` or both.
     memory_s : float
-        A row of this age counts by 1/e.
-    executor : Executor, optional
-        Searches for the wake; by default `take` does so itself.
+        Age at which a row has the weight 1/e [s].
+
+        executor : Executor, optional Searches for the wake; by default `take` does so itself.
 
     Raises
     ------
@@ -99,7 +99,7 @@ class OnlineEstimator:
         self.restart()
 
     def restart(self) -> None:
-        """Forget all rows: the next one is the first of a liquid at rest."""
+        """Discard all rows: the next one is the first of a liquid at rest."""
         self._rate_hz: float | None = None
         self._waiting = no_rows()
         self._kept: list[Rows] = []
@@ -122,12 +122,12 @@ class OnlineEstimator:
         return self._estimate
 
     def take(self, rows: Rows) -> None:
-        """Take the next rows; a gap in time begins the estimation again.
+        """Process the next rows; a gap in time restarts the estimation.
 
         Raises
         ------
         StudyError
-            The rows come too slowly.
+            The rate of rows is too low.
         """
         if len(rows) == 0:
             return
@@ -151,7 +151,7 @@ class OnlineEstimator:
             self._search(rows)
 
     def _recur(self, rows: Rows) -> None:
-        """Follow rows by recursive least squares."""
+        """Update the estimate with rows by recursive least squares."""
         assert self._rate_hz is not None  # noqa: S101 - known before
         if self._model is None:
             self._model = LiquidModel(self._scene, self._rate_hz)
@@ -167,7 +167,7 @@ class OnlineEstimator:
         self._estimate = self._judged(fit)
 
     def _search(self, rows: Rows) -> None:
-        """Keep rows, and search them now and then."""
+        """Store rows, and search them at intervals."""
         assert self._rate_hz is not None  # noqa: S101 - known before
         self._kept.append(rows)
         if self._seconds < LEAST_S:
@@ -191,7 +191,7 @@ class OnlineEstimator:
             self._pending = self._executor.submit(search.run, *start, anew=self._known is None)
 
     def _finish(self, fit: WakeFit | None) -> None:
-        """Take over what a search found."""
+        """Set the estimate from the result of a search."""
         if fit is None:
             self._estimate, self._known = _waits(self._seconds), None
             return
@@ -200,7 +200,7 @@ class OnlineEstimator:
         self._known = dict(fit.values) if sure else None
 
     def _judged(self, fit: WakeFit) -> Estimate:
-        """Return what is to be said of values that were found."""
+        """Return the estimate with a verdict on the values found."""
         half = fit.information.half
         reason = self._doubt(fit)
         intervals = {n: interval(it, float(h)) for (n, it), h in zip(fit.values.items(), half, strict=True) if it > 0}
@@ -216,7 +216,7 @@ class OnlineEstimator:
         )
 
     def _doubt(self, fit: WakeFit) -> str:
-        """Return why values that were found must not be used, "" where they may."""
+        """Return why the values found must not be used, "" if they may."""
         if not all(math.isfinite(it) and it > 0 for it in fit.values.values()):
             return "the measured force does not oppose the motion: check its signs and its unit"
         if fit.values[DRAG] > _MOST_DRAG:
@@ -239,7 +239,7 @@ class OnlineEstimator:
 
 
 def value_words(estimate: Estimate, name: str) -> tuple[str, str]:
-    """Return a value of an estimate and its interval as they are shown."""
+    """Return a value of an estimate and its interval as displayed text."""
     lower, upper = estimate.intervals[name]
     return f"{estimate.values[name]:.4g}", f"({lower:.4g} … {upper:.4g})"
 
@@ -250,7 +250,7 @@ def rate_of(rows: Rows) -> float:
     Raises
     ------
     StudyError
-        They come too slowly.
+        The rate is too low.
     """
     rate_hz = 1 / float(np.median(np.diff(rows.t_s)))
     if rate_hz < _SLOWEST_HZ:
@@ -259,12 +259,12 @@ def rate_of(rows: Rows) -> float:
 
 
 def _misfit_n(fit: WakeFit) -> float:
-    """Return how much of the residual is not noise [N]: neighbouring rows share it."""
+    """Return the part of the residual that is not noise [N], from its correlation between rows."""
     return math.sqrt(max(fit.following, 0.0)) * fit.rms_n
 
 
 def _waits(seconds: float) -> Estimate:
-    """Return what is said where too little was measured, or nothing moved."""
+    """Return an empty estimate with the reason: too little time measured, or no motion."""
     short = f"{seconds:.1f} s measured, {LEAST_S:g} s needed"
     reason = short if seconds < LEAST_S else "the body does not move in the liquid"
     return replace(NOTHING, reason=reason, seconds=seconds)

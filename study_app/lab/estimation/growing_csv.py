@@ -13,16 +13,16 @@ from study_app.lab.estimation.rows import FORCES, CentredVelocity, Floats, Rows,
 
 HEADER: Final = f"{','.join(PLACES + FORCES)}, with {','.join(VELOCITIES)} where they are known"
 _MOST_BYTES: Final = 65_536
-"""Read at once: the rest of a long file comes with the next calls."""
+"""Greatest number of bytes per call: later calls read the rest of a long file."""
 
 
 class GrowingCsv:
-    """A file of the columns of `HEADER`, in any order; others are not read, nor lines that begin with #.
+    """A file with the columns of `HEADER`, in any order; other columns and lines that begin with # are ignored.
 
     Parameters
     ----------
     path : Path
-        It may have rows already, or a header alone. A last line without its end is read once it has one.
+        It may have rows already, or only a header. A last line is read once its line end is written.
 
     Raises
     ------
@@ -39,7 +39,7 @@ class GrowingCsv:
         self._has_velocities = False
         self._last_s = -math.inf
         self._centred = CentredVelocity()
-        self._bytes()  # says at once that it cannot be read
+        self._bytes()  # raises at once if it cannot be read
         self._read, self._rest = 0, b""
 
     def poll(self) -> Rows:
@@ -66,7 +66,7 @@ class GrowingCsv:
         return self._centred.take(rows[:, 0], rows[:, 1:4], rows[:, 4:7])
 
     def _bytes(self) -> list[str]:
-        """Return the whole lines that were not read yet."""
+        """Return the complete lines not yet read."""
         try:
             refuse_device(self.path)
             with self.path.open("rb") as file:

@@ -6,8 +6,8 @@ variance of the residuals and ρ their correlation from row to row,
     I = (1 − ρ)/(1 + ρ) · Jᵀ W J / σ² .
 
 Its inverse is the covariance of the logarithms (Cramér–Rao; the factor of ρ is that of Bayley & Hammersley 1946 for a
-first-order process). A motion identifies the parameters where the smallest eigenvalue of I is at least `NEEDED`: in
-every direction of the parameters the half width of the 95 % interval is then 5 % or less.
+first-order process). A motion identifies the parameters if the smallest eigenvalue of I is at least `NEEDED`: in every
+direction of the parameters the half width of the 95 % interval is then 5 % or less.
 """
 
 import math
@@ -18,16 +18,16 @@ import numpy as np
 from study_app.lab.estimation.rows import Floats
 
 Z: Final = 1.959964
-"""Of a normal distribution: 95 % are within so many deviations."""
+"""Half width of the 95 % interval of a normal distribution, in standard deviations."""
 PERCENT: Final = 5.0
 NEEDED: Final = (100 * Z / PERCENT) ** 2
 LEAST_DEVIATION_N: Final = 1e-6
-"""Of residuals: a stream without noise has no smaller one."""
+"""Least variance of residuals, for streams without noise."""
 _LOADING: Final = 0.1
 
 
 class Information(NamedTuple):
-    """``smallest`` eigenvalue of the matrix, half widths (p,) of the intervals, and the parameters that are too vague.
+    """``smallest`` eigenvalue of the matrix, half widths (p,) of the intervals, and which parameters are vague.
 
     ``half`` are of the logarithms; ``vague`` (p,) are true for parameters in directions below `NEEDED`.
     """

@@ -1,4 +1,4 @@
-"""The force of a scene's liquid as the estimators need it: linear in the drag coefficient.
+"""The force of a scene's liquid for the estimators, linear in the drag coefficient.
 
 With the constant law of drag the force is C_d·g + h: g depends on the wake, h is that of effects without drag. The wake
 does not depend on C_d, so one run along a motion serves every C_d.
@@ -21,19 +21,19 @@ SCALING: Final = "scaling"
 WAKE: Final = (LENGTH, SCALING)
 NAMES: Final = (DRAG, *WAKE)
 PLACES: Final = {DRAG: "body.drag_coefficient", LENGTH: "wake.length", SCALING: "wake.scaling"}
-"""What the lab calls them (``lab.parameters``)."""
+"""Their names in the lab (``lab.parameters``)."""
 _DRAG_ALONE: Final = {"drag", "wake", "local_wake", "current", "surface"}
-"""Effects without a force besides drag."""
+"""Effects that exert no force themselves, and drag."""
 
 
 def prepare() -> None:
-    """Compile what follows a motion, or load it from the cache."""
+    """Compile the model, or load it from the cache."""
     nowhere = np.zeros((1, 3))
     ModelAlong(Scene(), given=True).follow(np.zeros(1), nowhere, nowhere)
 
 
 def refusal(scene: Scene, names: tuple[str, ...]) -> str:
-    """Return why parameters of a scene cannot be estimated, "" where they can."""
+    """Return why parameters of a scene cannot be estimated, "" if they can."""
     if len(scene.liquids) != 1:
         return f"a force is estimated of one liquid at a time, not of {len(scene.liquids)}: choose one of them"
     liquid = resolve(scene).liquids[0]
@@ -47,7 +47,7 @@ def refusal(scene: Scene, names: tuple[str, ...]) -> str:
 
 
 class LiquidModel:
-    """A scene's liquid along a motion that comes piece by piece.
+    """A scene's liquid along a motion given in pieces.
 
     Parameters
     ----------

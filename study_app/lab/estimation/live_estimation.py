@@ -1,4 +1,4 @@
-"""The lab's estimation: where the force comes from, what is estimated, what of it goes into the selected setting."""
+"""The lab's estimation: source of the force, estimated parameters, and their application to the selected setting."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ NO_LIVE: Final = "no device is open"
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """Where the force comes from, by ``path`` for a file, and which parameters are estimated."""
+    """Source of the force (``path`` for a file), and the parameters to estimate."""
 
     source: Source = "off"
     names: tuple[str, ...] = (DRAG,)
@@ -39,7 +39,7 @@ class Chosen:
 
 
 class LiveEstimation:
-    """An estimation next to the lab's servo; whoever owns it calls `poll` with each frame.
+    """An estimation that runs with the lab's servo; its owner calls `poll` with each frame.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class LiveEstimation:
         self._reader: Reader | None = None
 
     def choose(self, chosen: Chosen) -> None:
-        """Estimate from another source, or other parameters, from now on.
+        """Start to estimate from another source, or other parameters.
 
         Raises
         ------
@@ -78,7 +78,7 @@ class LiveEstimation:
         self.chosen = chosen
 
     def close(self) -> None:
-        """Estimate nothing from now on."""
+        """Stop the estimation."""
         if self._lsl is not None:
             self._lsl.close()
         self._file = self._lsl = self._basis = self._estimator = None
@@ -95,11 +95,11 @@ class LiveEstimation:
         return self.chosen.source not in {"off", "device"}
 
     def poll(self, live: Live | None, bench: Workbench) -> dict[str, float]:
-        """Take what was measured since; return what continuous application sets now: values by the lab's names."""
+        """Process new measurements; return the values that continuous application sets now, by the lab's names."""
         if self.chosen.source == "off":
             return {}
         if bench.blind:
-            self._basis = self._estimator = None  # begins again afterwards: nothing is known of it meanwhile
+            self._basis = self._estimator = None  # restarts afterwards: no data meanwhile
             self.follows = False
             return {}
         try:
@@ -116,7 +116,7 @@ class LiveEstimation:
         return self._following(bench)
 
     def applied(self, bench: Workbench) -> Workbench:
-        """Return a workbench whose selected setting has the estimated values, as far as they may be applied."""
+        """Return a workbench whose selected setting has the estimated values within their limits."""
         if self._live is None or not self.applies:
             return bench
         scene, live = bench.in_hand.scene, self._live
@@ -124,7 +124,7 @@ class LiveEstimation:
         return set_values(bench, values)
 
     def _begin(self, live: Live | None, bench: Workbench) -> None:
-        """Begin again where the device or what is not estimated of the settings changed."""
+        """Restart if the device or parameters that are not estimated changed."""
         scene = bench.in_hand.scene
         planted = bench.setting(other(bench.felt)).scene if self.chosen.source == "other" else None
         basis = (_without(scene, self.chosen.names), planted)
@@ -143,7 +143,7 @@ class LiveEstimation:
         self._reader = None if live is None else live.servo.telemetry.reader()
 
     def _rows(self, bench: Workbench) -> Rows:
-        """Return what was measured since."""
+        """Return the rows measured since the last call."""
         if self._file is not None:
             return self._file.poll()
         if self._lsl is not None:
@@ -170,7 +170,7 @@ class LiveEstimation:
 def set_values(bench: Workbench, values: dict[str, float], *, held: bool = False) -> Workbench:
     """Return a workbench whose selected setting has these values, by the names of the estimation.
 
-    Held, the changes since the last one that was not are one step for undo.
+    With held, successive changes are one undo step.
 
     Raises
     ------
@@ -179,14 +179,14 @@ def set_values(bench: Workbench, values: dict[str, float], *, held: bool = False
     """
     order = NAMES[::-1] if values.get(SCALING, 0.0) > values_of(bench.in_hand.scene).get(SCALING, 0.0) else NAMES
     scene = bench.in_hand.scene
-    for name in order:  # the scaling first where it grows: it is never below the length
+    for name in order:  # the scaling first if it grows: it is never below the length
         if name in values:
             scene = changed(scene, PLACES[name], values[name])
     return bench.put(scene, key="estimate" if held else None)
 
 
 def _without(scene: Scene, names: tuple[str, ...]) -> Scene:
-    """Return the scene with fixed values of what is estimated."""
+    """Return the scene with fixed values of the estimated parameters."""
     body = scene.body.model_copy(update={"drag_coefficient": 1.0})
     scene = scene.model_copy(update={"body": body})
     wake = scene.liquids[0].wake

@@ -1,7 +1,7 @@
 """Measured motion and force from an inlet of the Lab Streaming Layer, where ``pylsl`` is installed.
 
-A stream counts whose channels are labelled as the columns of a CSV file (``growing_csv.HEADER``, without ``t_s``). Its
-own time stamps are the times of the rows.
+A stream is used if its channels have the labels of a CSV file's columns (``growing_csv.HEADER``, without ``t_s``). Its
+time stamps are the times of the rows.
 """
 
 import importlib
@@ -64,7 +64,7 @@ class LslForce:
         return self._inlet is not None
 
     def poll(self) -> Rows:
-        """Return the rows that came since; none before a stream was found."""
+        """Return the rows received since the last call; none before a stream was found."""
         if self._inlet is None and not self._connected_now():
             return no_rows()
         try:
@@ -92,7 +92,7 @@ class LslForce:
             inlet.close_stream()
 
     def _connected_now(self) -> bool:
-        """Take over a stream that was opened meanwhile, or look for one; return whether there is one."""
+        """Use a stream that was opened meanwhile, or search for one; return whether there is one."""
         if self._executor is None:
             found = self._connect()
         elif self._connecting is None:

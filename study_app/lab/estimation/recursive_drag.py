@@ -1,9 +1,9 @@
 """The drag coefficient by recursive least squares with forgetting.
 
-The force is C_d·g + h (``liquid_model``). Of y = measured − h the sums Σ w g², Σ w g·y, Σ w y² and those of
-neighbouring rows are kept, each multiplied by exp(−Δt/τ) as time passes: the estimate Σ w g·y / Σ w g² is that of all
-rows, weighted by their age (the information form of recursive least squares; Ljung 1999, System Identification,
-§11.2), and residuals at the present estimate follow from the same sums.
+The force is C_d·g + h (``liquid_model``). With y = measured − h the sums Σ w g², Σ w g·y, Σ w y² and those of
+neighbouring rows are stored, each multiplied by exp(−Δt/τ) per row: the estimate Σ w g·y / Σ w g² is that of all rows,
+weighted by their age (the information form of recursive least squares; Ljung 1999, System Identification, §11.2), and
+residuals at the present estimate follow from the same sums.
 """
 
 import math
@@ -19,7 +19,7 @@ _GG, _GY, _YY, _GG1, _GY1, _YY1 = range(_SUMS)
 
 
 class RecursiveDrag:
-    """The estimate of all rows so far.
+    """Estimates the drag coefficient from all rows so far.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class RecursiveDrag:
 
     @property
     def value(self) -> float:
-        """C_d; NaN while nothing moved."""
+        """C_d; NaN without motion."""
         size = float(self._sums[_GG].sum())
         return float(self._sums[_GY].sum()) / size if size > 0 else math.nan
 

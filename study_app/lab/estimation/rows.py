@@ -1,4 +1,4 @@
-"""Measured motion and force as they come: rows of a stream, and velocities from positions without lag."""
+"""Measured motion and force: rows of a stream, and velocities from positions without lag."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ Floats: TypeAlias = NDArray[np.float64]
 
 FORCES: Final = ("fx_n", "fy_n", "fz_n")
 HALF_S: Final = 0.0125
-"""To each side of a row, positions that give its velocity: a tenth of the period of strokes of 4 Hz. [choice]"""
+"""Half width of the window for velocities: a tenth of the period of strokes of 4 Hz in total. [choice]"""
 GAP_S: Final = 0.05
-"""A longer time between two rows begins the estimation again: the motion between them is unknown."""
+"""A longer time between two rows restarts the estimation, since the motion between them is unknown."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,7 +22,7 @@ class Rows:
     """Rows of a stream in the scene frame.
 
     ``t_s`` (n,) increases; ``position_m``, ``velocity_mps`` and ``force_n`` (the liquid's on the body) are (n, 3).
-    Where ``usable`` (n,) is false the motion is known, and the force is not.
+    Where ``usable`` (n,) is false only the motion is known.
     """
 
     t_s: Floats
@@ -45,14 +45,14 @@ def no_rows() -> Rows:
 
 
 def joined(*parts: Rows) -> Rows:
-    """Return rows that follow one another as one."""
+    """Return successive rows joined."""
     return Rows(*(np.concatenate([getattr(it, name) for it in parts]) for name in Rows.__slots__))
 
 
 class CentredVelocity:
-    """Velocities of a stream that has none: the slope through the positions 12.5 ms to both sides.
+    """Computes velocities of a stream without them: the slope through the positions 12.5 ms to both sides.
 
-    A row comes out once the positions after it are known. A gap begins it again.
+    A row is returned once the positions after it are known. A gap restarts the window.
     """
 
     def __init__(self) -> None:

@@ -14,7 +14,7 @@ from study_app.haptics.runtime.offline import ModelAlong
 from study_app.lab.estimation.rows import Floats, Rows, no_rows
 
 NOISE_N: Final = 0.03
-"""Of the simulated sensor, the standard deviation along each axis."""
+"""Standard deviation of the simulated sensor along each axis."""
 _SEED: Final = 1
 
 
@@ -24,9 +24,9 @@ def as_measured(scene: Scene) -> Scene:
 
 
 class DeviceForce:
-    """The force that the device sent; it counts where no limiter changed it.
+    """The force that the device sent; usable where no limiter changed it.
 
-    ``began`` says after `take` that the servo began a scene anew: its wake is another than the one before.
+    ``began`` tells after `take` that the servo began a new scene, so that the last wake is lost.
     """
 
     def __init__(self) -> None:
@@ -52,7 +52,7 @@ class DeviceForce:
 
 
 class OtherLiquidForce:
-    """The force of another liquid on the same motion, with the noise of a sensor: values to be found, for trying out.
+    """The force of another liquid on the same motion, with sensor noise: known values for trials of the estimation.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class OtherLiquidForce:
 
 
 def _accepted(samples: Any) -> Any:
-    """Return the samples that moved the model."""
+    """Return the samples in which the model moved."""
     return samples[(samples.fresh != 0) & (samples.limiters & LIMITER_GLITCH == 0) & (samples.status == STATUS_OK)]
 
 

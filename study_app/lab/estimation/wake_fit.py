@@ -1,9 +1,9 @@
-"""Drag coefficient, length and scaling of a wake: Gauss–Newton over the newest rows, older ones counting less.
+"""Drag coefficient, length and scaling of a wake, by Gauss–Newton over the newest rows with weights by age.
 
 The drag coefficient enters linearly and is solved for at every step (variable projection; Golub & Pereyra 1973); length
-N and scaling S are searched by their logarithms, from the best of a grid where nothing is known yet. The
-liquid is at rest before the first row of a stream; where older rows were dropped, the first N ticks of those left only
-fill the wake and do not count.
+N and scaling S are searched by their logarithms, initially from the best point of a grid. The liquid is at rest before
+the first row of a stream; if older rows were dropped, the first N ticks of the others only fill the wake and do not
+count.
 """
 
 import itertools
@@ -21,9 +21,9 @@ from study_app.lab.estimation.liquid_model import DRAG, LENGTH, SCALING, LiquidM
 from study_app.lab.estimation.rows import Floats, Rows
 
 LONGEST: Final = 7_500
-"""Ticks of a wake that the rows kept can show."""
+"""Longest wake that the stored rows can identify [ticks]."""
 GRID: Final = (0.5, 0.71, 1.0, 1.41, 2.0)
-"""Lengths that a search begins at, and scalings for each of them, in multiples of the scene's."""
+"""Initial lengths of a search, and initial scalings for each, in multiples of the scene's."""
 _STEPS: Final = 8
 _HALVINGS: Final = 4
 _MOST_STEP: Final = 0.4
@@ -31,17 +31,17 @@ _ENDS: Final = 1e-3
 _LENGTH_STEP: Final = 0.02
 _SCALING_STEP: Final = 0.01
 _EDGE: Final = 0.9
-"""A length beyond this share of what was measured may as well be longer."""
+"""A length beyond this share of the measurement may in fact be longer."""
 _DAMPING: Final = 1e-6
-"""Of the eigenvalues of the normal matrix, relative to the greatest: what the motion does not show is not moved."""
+"""Least relative eigenvalue of the normal matrix: other directions are not changed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WakeFit:
-    """What a search found: values by name, the information of the motion about them, and what is left of the force.
+    """The result of a search: values by name, the information of the motion about them, and the residual force.
 
-    ``following`` is the correlation of residuals from row to row; ``edge`` is whether the wake may be longer than what
-    was measured: nothing has left it yet.
+    ``following`` is the correlation of residuals from row to row; ``edge`` tells whether the wake may be longer than
+    the measurement: no element has left it yet.
     """
 
     values: dict[str, float]
@@ -70,11 +70,11 @@ class WakeSearch:
     Parameters
     ----------
     scene : Scene
-        With one liquid; it holds what is not searched.
+        With one liquid; it has the fixed parameters.
     names : sequence of str
         Of ``liquid_model.NAMES``, the drag coefficient among them.
     from_rest : bool
-        Whether the stream began with the first of the rows.
+        Whether the first row is the start of the stream.
     memory_s : float
         A row of this age counts by 1/e.
     """
@@ -88,7 +88,7 @@ class WakeSearch:
         self._axes = np.flatnonzero(rows.force_n.any(axis=0))
 
     def run(self, length: int, scaling: float, *, anew: bool) -> WakeFit | None:
-        """Return the best values, from these on, None where nothing moved; ``anew`` looks at the grid around before."""
+        """Return the best values, starting from these, None without motion; ``anew`` searches the grid first."""
         grid = GRID if anew else (1.0,)
         starts = {self._bounded(length * n, scaling * s) for n, s in itertools.product(grid, grid)}
         at = min((self._at(*start) for start in starts), key=lambda it: it.cost)
@@ -105,7 +105,7 @@ class WakeSearch:
         return self._fit(at, slopes)
 
     def _stepped(self, at: _At, slopes: Floats) -> tuple[_At | None, bool]:
-        """Return where a step of Gauss–Newton leads, None where none is better, and whether it is a small one."""
+        """Return the result of a Gauss–Newton step, None if none is better, and whether the step is small."""
         weights = self._counting(at.length)
         residual_n = self._flat(at.y_n - at.drag * at.g_n)
         normal = np.einsum("ni,n,nj->ij", slopes, weights, slopes)
@@ -126,7 +126,7 @@ class WakeSearch:
         return None, True
 
     def _bounded(self, length: float, scaling: float) -> tuple[int, float]:
-        """Return a permitted length and scaling: N ≤ S, and what is not searched as it is."""
+        """Return a permitted length and scaling: N ≤ S, with fixed parameters unchanged."""
         wake = self._scene.liquids[0].wake
         assert wake is not None  # noqa: S101 - refused before
         length = length if LENGTH in self._names else wake.length
@@ -203,10 +203,10 @@ class WakeSearch:
         return np.repeat(weights, len(self._axes))
 
     def _flat(self, vectors_n: Floats) -> Floats:
-        """Return the components that count of (rows, 3) as (m,)."""
+        """Return the components in use of (rows, 3) as (m,)."""
         return np.ascontiguousarray(vectors_n[:, self._axes]).ravel()
 
 
 def _dot(weights: Floats, one: Floats, other: Floats) -> float:
-    """Return Σ w a b, in one thread: a linear algebra library would take others for so little."""
+    """Return Σ w a b, in one thread: a linear algebra library would use several even for small sums."""
     return float(np.einsum("n,n,n->", weights, one, other))
