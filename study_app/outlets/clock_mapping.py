@@ -1,4 +1,4 @@
-"""How the servo's clock maps to that of the Lab Streaming Layer: measured at the start, and again while it runs."""
+"""The mapping of the servo's clock to that of the Lab Streaming Layer, measured at the start and while it runs."""
 
 import time
 from collections.abc import Callable
@@ -9,11 +9,11 @@ READINGS: Final = 8
 
 
 class ClockMapping:
-    """The offset between two clocks, as an interval that holds it for sure.
+    """The offset between two clocks, as an interval that certainly contains it.
 
     A reading of the other clock between two of the servo's bounds the offset. Bounds of later readings are intersected
-    with those before; where they have nothing in common, the clocks drifted apart and the newest hold. Use it from one
-    thread.
+    with earlier ones; if the intersection is empty, the clocks have drifted and the newest bounds count. Use it from
+    one thread.
     """
 
     def __init__(self, now_ns: Callable[[], int], other_s: Callable[[], float]) -> None:
@@ -37,16 +37,16 @@ class ClockMapping:
         self._due_s = time.monotonic() + EVERY_S
 
     def measure_if_due(self) -> None:
-        """Measure it again where the last measurement is more than `EVERY_S` old."""
+        """Measure it again if the last measurement is older than `EVERY_S`."""
         if time.monotonic() >= self._due_s:
             self.measure()
 
     @property
     def offset_s(self) -> float:
-        """What is added to the servo's time to get the other clock's [s]."""
+        """The other clock's time minus the servo's time [s]."""
         return 0.5 * (self._low_s + self._high_s)
 
     @property
     def uncertainty_s(self) -> float:
-        """How far the offset may be off [s]."""
+        """The greatest error of the offset [s]."""
         return 0.5 * (self._high_s - self._low_s)

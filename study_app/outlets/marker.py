@@ -1,7 +1,7 @@
-"""Markers: what other programs are given of an event of the journal, as text and as a trigger code.
+"""Markers: events of the journal for other programs, as text and as a trigger code.
 
-A marker holds codes and counts alone, by a list of what may be said: no condition, no answer, no measure, no text that
-somebody wrote, and nothing that the journal seals.
+A marker contains only codes and counts from a list of permitted fields: no condition, answer, measure or entered text,
+and nothing that the journal seals.
 """
 
 import json
@@ -46,12 +46,12 @@ _UNCODED: Final = frozenset(
 """Events that are markers without a trigger code."""
 
 _SAID: Final = ("trial", "attempt", "interval", "block", "phase", "code", "item", "form", "page", "target", "by")
-"""The fields of an event that a marker repeats; ``code`` is the blinded one, such as L2."""
+"""The fields of an event that a marker contains; ``code`` is the blinded one, such as L2."""
 
 
 @dataclass(frozen=True, slots=True)
 class Marker:
-    """An event as other programs get it.
+    """An event for other programs.
 
     ``time_ns`` is when it happened on the servo's clock, ``t_s`` the same on the session's, which the journal has.
     ``byte`` is its trigger code, None of an event without one.
@@ -77,7 +77,7 @@ class Marker:
 
 
 def marker_of(event: str, t_s: float, origin_ns: int, fields: Mapping[str, Any]) -> Marker | None:
-    """Return the marker of an event of the journal, None of one that other programs need not know.
+    """Return the marker of an event of the journal, None if the event has no marker.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def marker_of(event: str, t_s: float, origin_ns: int, fields: Mapping[str, Any])
     origin_ns : int
         The servo's clock at the origin of the session's [ns].
     fields : mapping
-        What the journal's line says besides.
+        The other fields of the journal's line.
     """
     if event not in CODES and event not in _UNCODED:
         return None

@@ -1,8 +1,8 @@
 """The servo's samples as a stream of the Lab Streaming Layer, at the servo's rate.
 
-A thread of its own reads the telemetry as the recorder's readers do, so the servo's thread never calls the library, and
-neither a window nor the disk delays the stream. It runs from before the first page to the end of the session, with
-recordings or without. Every sample has the time at which the device was read.
+A separate thread reads the telemetry like the recorder's readers, so the servo's thread never calls the library, and
+neither a window nor the disk delays the stream. It runs from before the first page to the end of the session, with or
+without recordings. Every sample has the time at which the device was read.
 """
 
 import threading
@@ -26,7 +26,7 @@ CHANNELS: Final = (
 
 
 def channels_of(samples: Any) -> NDArray[np.float32]:
-    """Return what the stream says of samples (array of ``layout.SAMPLE``).
+    """Return the channels of the stream for samples (array of ``layout.SAMPLE``).
 
     Returns
     -------
@@ -82,17 +82,17 @@ class SampleStream:
 
     @property
     def described(self) -> Mapping[str, Any]:
-        """What the receipt says of it."""
+        """The record of the stream in the receipt."""
         return {"stream": SAMPLES, "clock_uncertainty_us": round(1e6 * self.mapping.uncertainty_s, 3)}
 
     @property
     def listens(self) -> bool:
         """Whether a program receives the stream."""
-        outlet = self._outlet  # its thread may let go of it meanwhile
+        outlet = self._outlet  # its thread may release it meanwhile
         return bool(outlet is not None and outlet.have_consumers())
 
     def close(self) -> None:
-        """Send what is left, and end the stream."""
+        """Send the remaining samples, and end the stream."""
         self._ending.set()
         self._thread.join(PATIENCE_S)
 

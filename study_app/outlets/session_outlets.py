@@ -1,6 +1,6 @@
-"""The outlets of a session: opened before it, given its events, and closed after it.
+"""The outlets of a session: opened before it, fed with its events, and closed after it.
 
-One that cannot be opened, or fails later, is named in `Outlets.lost` with the reason; the session goes on without it.
+An outlet that cannot be opened or fails later is in `Outlets.lost` with the reason; the session continues without it.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -17,11 +17,11 @@ from study_app.outlets.sample_stream import SampleStream
 from study_app.outlets.sink import Sink, SinkKind, SinkThread
 
 SampleChoice: TypeAlias = Literal["off", "single-blind", "always"]
-"""In which studies samples are streamed: in none, in those that are not double-blind, in all."""
+"""The studies in which samples are streamed: none, those that are not double-blind, all."""
 
 
 class SampledServo(Protocol):
-    """What is asked of the servo (``haptics.runtime.servo.Servo``)."""
+    """The part of the servo (``haptics.runtime.servo.Servo``) that outlets use."""
 
     rate_hz: float
     telemetry: Any
@@ -31,11 +31,11 @@ class SampledServo(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class OutletStatus:
-    """How an outlet is, for the pre-flight.
+    """The state of an outlet, for the pre-flight.
 
-    ``listens`` says whether a program receives it, None where that cannot be known; ``lost`` why it does not work,
-    empty where it does. ``withheld`` says that it is off because the study is double-blind, ``shows_force`` that it
-    lets a viewer see the force in a double-blind study.
+    ``listens`` tells whether a program receives it, None if unknown; ``lost`` why it does not work, empty if it does.
+    ``withheld`` tells that it is off because the study is double-blind, ``shows_force`` that it shows the force in a
+    double-blind study.
     """
 
     title: str
@@ -53,7 +53,7 @@ def sink_kinds() -> Mapping[str, SinkKind]:
 
 
 def is_port(address: str) -> bool:
-    """Return whether an address is that of a port for triggers, such as ``serial:COM3``; it is not opened."""
+    """Return whether an address is that of a trigger port, such as ``serial:COM3``, without opening it."""
     name, _, place = address.partition(":")
     kind = sink_kinds().get(name)
     return kind is not None and ":" in kind.example and bool(place) and place.isprintable()
@@ -99,7 +99,7 @@ class Outlets:
 
     @contextmanager
     def _failing(self, title: str) -> Iterator[None]:
-        """Keep why an outlet cannot be opened, for any reason: no session depends on it."""
+        """Store why an outlet cannot be opened, for any error: no session depends on it."""
         try:
             yield
         except OutletError as error:
@@ -109,20 +109,20 @@ class Outlets:
 
     @property
     def described(self) -> dict[str, Any]:
-        """What the receipt says of the outlets, by title."""
+        """The records of the outlets in the receipt, by title."""
         there = {one.title: dict(one.described) for one in self._open()}
         return there | {title: {"failed": reason} for title, reason in self._failed.items()}
 
     @property
     def lost(self) -> dict[str, str]:
-        """Why an outlet does not work, by its title; nothing of those that do."""
+        """The reasons why outlets do not work, by title; without those that work."""
         failed = {one.sink.title: one.lost for one in self._threads if one.lost}
         if self._samples is not None and self._samples.lost:
             failed[self._samples.title] = self._samples.lost
         return self._failed | failed
 
     def statuses(self) -> tuple[OutletStatus, ...]:
-        """Return how each outlet is at present."""
+        """Return the present state of each outlet."""
         lost = self.lost
         found = [
             OutletStatus(
@@ -139,12 +139,12 @@ class Outlets:
         return tuple(found)
 
     def mark(self, marker: Marker) -> None:
-        """Hand an event over to every sink."""
+        """Pass an event to every sink."""
         for thread in self._threads:
             thread.mark(marker)
 
     def close(self) -> None:
-        """Send what waits, for a limited time, and close all outlets."""
+        """Send waiting markers and samples for a limited time, and close all outlets."""
         for thread in self._threads:
             thread.close()
         if self._samples is not None:

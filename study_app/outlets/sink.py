@@ -1,7 +1,7 @@
-"""Where markers go: a kind's descriptor, an open sink, and the thread that serves it.
+"""Sinks of markers: the descriptor of a kind, an open sink, and the thread that serves it.
 
-A session hands a marker over and goes on at once. A sink that fails, or that hangs, holds up neither the session nor
-the servo: it gets no more markers, and `SinkThread.lost` says why.
+A session queues a marker and continues at once. A sink that fails or hangs delays neither the session nor the servo: it
+gets no more markers, and `SinkThread.lost` gives the reason.
 """
 
 import threading
@@ -15,7 +15,7 @@ from study_app.errors import OutletError
 from study_app.outlets.marker import Marker
 
 ROOM: Final = 1000
-"""Markers that may wait."""
+"""Greatest number of waiting markers."""
 HANGS_S: Final = 5.0
 """A sink that takes longer over one marker counts as lost at the next. [choice]"""
 ADVICE: Final = "no more are sent; check the connection, then end and resume the session"
@@ -24,21 +24,21 @@ PATIENCE_S: Final = 1.0
 
 
 class Sink(Protocol):
-    """A place that markers go to. `send` and `close` may wait and come from one thread, the properties from others."""
+    """A sink of markers. One thread calls `send` and `close`, which may block; others read the properties."""
 
     @property
     def title(self) -> str:
-        """What the operator calls it."""
+        """Its name for the operator."""
         ...
 
     @property
     def described(self) -> Mapping[str, Any]:
-        """What the receipt says of it."""
+        """Its record in the receipt."""
         ...
 
     @property
     def listens(self) -> bool | None:
-        """Whether a program receives the markers; None where that cannot be known."""
+        """Whether a program receives the markers; None if unknown."""
         ...
 
     def send(self, marker: Marker) -> None:
@@ -47,20 +47,20 @@ class Sink(Protocol):
         Raises
         ------
         OutletError
-            It was not sent, and those after it will not be either.
+            Neither this marker nor later ones are sent.
         """
         ...
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close it."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class SinkKind:
-    """What a kind of sink says of itself.
+    """The descriptor of a kind of sink.
 
-    ``name`` stands before the colon of an address, ``example`` is an address; ``open`` is given what follows the
+    ``name`` is the part of an address before the colon, ``example`` an address; ``open`` receives the part after the
     colon and the servo's clock [ns].
     """
 
@@ -71,12 +71,12 @@ class SinkKind:
 
 
 class SinkThread:
-    """Sends markers to a sink in a thread of its own.
+    """Sends markers to a sink in a separate thread.
 
     Attributes
     ----------
     lost : str
-        Why the sink gets no more markers; empty while it does.
+        Why the sink gets no more markers; empty while it works.
     """
 
     def __init__(self, sink: Sink) -> None:
@@ -90,7 +90,7 @@ class SinkThread:
         self._thread.start()
 
     def mark(self, marker: Marker) -> None:
-        """Hand a marker over; returns at once."""
+        """Queue a marker; returns at once."""
         with self._changed:
             if self.lost or self._closing:
                 return
@@ -105,7 +105,7 @@ class SinkThread:
                 self._changed.notify_all()
 
     def close(self, patience_s: float = PATIENCE_S) -> None:
-        """Send what waits, for so long, and let go of the sink; one that hangs is left to its thread."""
+        """Send waiting markers within the time limit, and close the sink; a hanging one is left to its thread."""
         with self._changed:
             self._closing = True
             self._changed.notify_all()

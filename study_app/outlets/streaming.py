@@ -1,4 +1,4 @@
-"""What the two streams of the Lab Streaming Layer have in common; the library is the extra ``lsl``."""
+"""Common parts of the two streams of the Lab Streaming Layer; the library is the extra ``lsl``."""
 
 import platform
 import time
@@ -11,7 +11,7 @@ from study_app.errors import OutletError
 MARKERS: Final = "liquid-study markers"
 SAMPLES: Final = "liquid-study samples"
 DELIVERY_S: Final = 0.2
-"""How long a stream with listeners stays open after its last sample, for that to be delivered."""
+"""Time for which a stream with receivers stays open after its last sample, to deliver it."""
 
 
 def library() -> Any:
@@ -30,9 +30,9 @@ def library() -> Any:
 
 
 def stream_info(lsl: Any, name: str, kind: str, labels: Sequence[str], rate_hz: float, form: str) -> Any:
-    """Return the description of a stream: its name, its channels, and who sends it; nothing of a session.
+    """Return the description of a stream: its name, its channels and the sender; no data of a session.
 
-    ``labels`` are those of the channels, with the unit after a blank where there is one.
+    ``labels`` are those of the channels, followed by a blank and the unit if there is one.
     """
     source = f"{name} of {platform.node()}"
     info = lsl.StreamInfo(name, kind, len(labels), rate_hz, form, source)
@@ -50,6 +50,6 @@ def stream_info(lsl: Any, name: str, kind: str, labels: Sequence[str], rate_hz: 
 
 
 def close_outlet(outlet: Any) -> None:
-    """Let the last samples be delivered where somebody listens; the outlet ends with its last reference."""
+    """Wait for delivery of the last samples if a program receives them; the outlet ends with its last reference."""
     if outlet is not None and outlet.have_consumers():
         time.sleep(DELIVERY_S)

@@ -1,6 +1,6 @@
 """Trigger codes on the lines of a port: the byte of an event, then 0.
 
-Two events of one moment come one after the other, each as a pulse of its own.
+Two simultaneous events are sent as two successive pulses.
 """
 
 import time
@@ -12,28 +12,28 @@ from study_app.outlets.marker import CODES, Marker
 
 HIGH_S: Final = 0.010
 LOW_S: Final = 0.004
-"""How long a port is 0 at least between two codes: an amplifier of 500 Hz sees it."""
+"""Least time at 0 between two codes, so that an amplifier at 500 Hz samples it."""
 
 
 class TriggerPort(Protocol):
-    """Eight lines that are written at once."""
+    """A port of eight lines that are written together."""
 
     @property
     def title(self) -> str:
-        """What the operator calls it."""
+        """Its name for the operator."""
         ...
 
     @property
     def address(self) -> str:
-        """How it is asked for, such as ``serial:/dev/ttyUSB0``."""
+        """Its address, such as ``serial:/dev/ttyUSB0``."""
         ...
 
     def write(self, byte: int) -> None:
-        """Put a byte on the lines; returns when the port has it (OutletError: it does not take it)."""
+        """Write a byte to the lines; returns when the port has it (OutletError: it does not accept it)."""
         ...
 
     def close(self) -> None:
-        """Let go of the port."""
+        """Close the port."""
         ...
 
 
@@ -55,7 +55,7 @@ class TriggerSink:
     Attributes
     ----------
     delays_ns : list of int
-        From each event that was sent to its byte being written [ns].
+        Time from each event to the writing of its byte [ns].
     """
 
     listens = None
@@ -78,7 +78,7 @@ class TriggerSink:
 
     @property
     def described(self) -> Mapping[str, Any]:
-        """What the receipt says of it."""
+        """Its record in the receipt."""
         return {"address": self._port.address, "high_ms": 1e3 * HIGH_S, "codes": dict(CODES)}
 
     def send(self, marker: Marker) -> None:

@@ -1,6 +1,6 @@
-"""A live camera, or any live stream that FFmpeg opens; read in a thread of its own from opening to closing.
+"""A live camera, or any live stream that FFmpeg opens; read in a separate thread from opening to closing.
 
-It is open throughout a session, so that neither its light nor its sound tells when a condition shows it.
+It is open throughout a session, so that neither its light nor its sound reveals when a condition shows it.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ USUAL: Final = {"linux": "v4l2:/dev/video0", "darwin": "avfoundation:0"}.get(sys
 KINDS: Final = ("v4l2", "avfoundation", "dshow")
 OPENS_S, STALLS_S, ENDS_S = 8.0, 1.0, 5.0
 MOST_AGE_S: Final = 10.0
-"""Time stamps further from both clocks of the system are not on either. [choice]"""
+"""Time stamps that differ more from both system clocks are from another clock. [choice]"""
 SPARE_NS: Final = SECOND_NS // 2
 LOGIN: Final = re.compile(r"//[^/@]*@")
 COUNTED: Final = 30
-"""So many times between frames give the period by their median."""
+"""Number of intervals between frames whose median is the period."""
 
 
 class Camera:
@@ -40,7 +40,7 @@ class Camera:
     source : str
         ``v4l2:/dev/video0``, ``avfoundation:0``, ``dshow:video=NAME``, or an URL.
     holds_s : float
-        Frames up to this old are asked for [s].
+        Greatest age of frames that are requested [s].
 
     Raises
     ------
@@ -49,7 +49,7 @@ class Camera:
     """
 
     def __init__(self, source: str, now_ns: Callable[[], int], holds_s: float) -> None:
-        self.source = source  # may hold a name and a password: `without_login` for what is shown or kept
+        self.source = source  # may contain a name and a password: use `without_login` to show or store it
         if not source:
             raise VideoError("no camera is set: set one under This machine, such as dshow:video=NAME")
         self._now_ns = now_ns
@@ -71,7 +71,7 @@ class Camera:
 
     @property
     def works(self) -> bool:
-        """Whether frames still come."""
+        """Whether it still receives frames."""
         return self.thread.is_alive() and not self._stalls
 
     @property
@@ -80,7 +80,7 @@ class Camera:
 
     @property
     def newest(self) -> VideoFrame:
-        """The frame that came last."""
+        """The last frame received."""
         return self._frames[-1]
 
     def fit(self, width: int, height: int) -> None:
@@ -94,7 +94,7 @@ class Camera:
         """Do nothing: it is live."""
 
     def frame_at(self, moment_ns: int) -> VideoFrame | None:
-        """Return the newest frame that was ready at a moment [ns, servo's clock]; None where none was.
+        """Return the newest frame that was ready at a time [ns, servo's clock]; None if none was.
 
         Raises
         ------
@@ -110,7 +110,7 @@ class Camera:
         return next((frame for frame in reversed(held) if frame.due_ns <= moment_ns), None)
 
     def close(self) -> None:
-        """Let go of the camera; what still waits for its next frame ends by itself."""
+        """Close the camera; a thread that still waits for its next frame ends by itself."""
         self._closed = True
         self.thread.join(ENDS_S)
 
@@ -158,7 +158,7 @@ def without_login(source: str) -> str:
 
 
 class _Numbers:
-    """Counts the frames of a camera, those that were lost on the way included."""
+    """Counts the frames of a camera, including lost ones."""
 
     def __init__(self, period_ns: int) -> None:
         self.period_ns = period_ns
@@ -167,7 +167,7 @@ class _Numbers:
         self._gaps_s: deque[float] = deque(maxlen=COUNTED)
 
     def of(self, stamp_s: float | None) -> int:
-        """Return the number of a frame with this time stamp [s]; of one without, that after the last."""
+        """Return the number of a frame with this time stamp [s]; without one, the number after the last."""
         missed = 0
         if stamp_s is not None and self._before_s is not None and (gap_s := stamp_s - self._before_s) > 0:
             self._gaps_s.append(gap_s)
@@ -180,7 +180,7 @@ class _Numbers:
 
 
 def _age_ns(stamp_s: float | None) -> int | None:
-    """Return how old a frame with this time stamp is now [ns], by whichever clock of the system stamps are on."""
+    """Return the present age of a frame with this time stamp [ns], by the system clock that the stamps are from."""
     for clock in (time.monotonic, time.time):
         if stamp_s is not None and -0.001 <= (age_s := clock() - stamp_s) < MOST_AGE_S:
             return max(0, round(age_s * SECOND_NS))

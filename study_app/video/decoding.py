@@ -1,4 +1,4 @@
-"""Opening and scaling videos with PyAV, which is an optional extra and imported here alone."""
+"""Opening and scaling videos with PyAV, an optional extra that only this module imports."""
 
 import os
 import sys
@@ -11,9 +11,9 @@ from study_app.errors import VideoError
 
 EXTRA: Final = "needs the optional extra video: pip install 'liquid-study[video]'"
 SIZE: Final = (1280, 720)
-"""What frames are scaled to until the tank says how large it is [px]."""
+"""Size of scaled frames until the tank sets its own [px]."""
 NICE: Final = 5
-"""How much less urgent a decoding thread is than the others, where the system lets threads differ. [choice]"""
+"""Nice level of a decoding thread above the others, if the system permits one per thread. [choice]"""
 SECOND_NS: Final = 1_000_000_000
 USUAL_RATE_HZ: Final = 30.0
 RATES_HZ: Final = (1.0, 240.0)
@@ -58,14 +58,14 @@ def open_video(source: str, *, kind: str | None = None, timeout: Any = None, **o
 
 
 def reason(error: Exception) -> str:
-    """Return why a video cannot be read, in the words of the system or of FFmpeg."""
-    if type(error).__name__ == "ExitError":  # FFmpeg: "Immediate exit requested", after the time that it was given
+    """Return why a video cannot be read, as the system or FFmpeg reports it."""
+    if type(error).__name__ == "ExitError":  # FFmpeg: "Immediate exit requested", after its time limit
         return "no data came in time"
     return str(getattr(error, "strerror", None) or error or type(error).__name__)
 
 
 def period_ns(stream: Any) -> int:
-    """Return the time from one frame of a stream to the next, as the stream states it [ns]."""
+    """Return the frame period that a stream states [ns]."""
     for rate in (stream.average_rate, stream.guessed_rate):
         if rate is not None and RATES_HZ[0] <= float(rate) <= RATES_HZ[1]:
             return round(SECOND_NS / float(rate))
@@ -73,7 +73,7 @@ def period_ns(stream: Any) -> int:
 
 
 class Scaler:
-    """Turns decoded frames into pixels that fit into a size, which another thread may change."""
+    """Converts decoded frames to pixels that fit into a size, which another thread may change."""
 
     def __init__(self) -> None:
         from av.video.reformatter import VideoReformatter  # noqa: PLC0415 - an optional extra
@@ -82,7 +82,7 @@ class Scaler:
         self.size = SIZE
 
     def pixels(self, frame: Any) -> Pixels:
-        """Return a frame's pixels, as wide or as high as the size, with the frame's own ratio."""
+        """Return a frame's pixels, scaled to the width or height of the size with the frame's aspect ratio."""
         wide, high = self.size
         share = min(wide / frame.width, high / frame.height)
         width, height = max(2, round(share * frame.width)), max(2, round(share * frame.height))
@@ -92,7 +92,7 @@ class Scaler:
 
 
 def make_less_urgent() -> None:
-    """Let other threads run before this one."""
+    """Lower the priority of this thread."""
     if sys.platform == "linux":
         with suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICE)

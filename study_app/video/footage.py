@@ -1,4 +1,4 @@
-"""Footage: a file that is played from the beginning of each trial, again and again; decoded in a thread of its own."""
+"""Footage: a file played in a loop from the beginning of each trial; decoded in a separate thread."""
 
 import threading
 from collections import deque
@@ -12,7 +12,7 @@ from study_app.video.decoding import SECOND_NS, Scaler, make_less_urgent, open_v
 from study_app.video.frames import VideoFrame, stopped
 
 AHEAD: Final = 15
-"""Frames that wait decoded: half a second at 30 Hz, 45 MB at 1152 x 648 pixels. [choice]"""
+"""Capacity for decoded frames: half a second at 30 Hz, 45 MB at 1152 x 648 pixels. [choice]"""
 PATIENCE_S: Final = 5.0
 
 
@@ -52,7 +52,7 @@ class Footage:
 
     @property
     def works(self) -> bool:
-        """Whether it can be read on."""
+        """Whether it can still be read."""
         return self.thread.is_alive()
 
     @property
@@ -65,7 +65,7 @@ class Footage:
         self._scaler.size = (width, height)
 
     def rewind(self) -> None:
-        """Begin the footage anew; its first frame is kept, so that a trial need not wait for the decoder."""
+        """Restart the footage; its first frame is stored, so that a trial need not wait for the decoder."""
         with self._changed:
             self._play += 1
             self._frames.clear()
@@ -73,11 +73,11 @@ class Footage:
             self._changed.notify_all()
 
     def begin(self, at_ns: int) -> None:
-        """Run from this moment on [ns, servo's clock]; the first frame stands until then."""
+        """Run from this time on [ns, servo's clock]; until then the first frame is shown."""
         self._began_ns = at_ns
 
     def frame_at(self, moment_ns: int) -> VideoFrame | None:
-        """Return the frame of a moment [ns, servo's clock]; None where it is not decoded yet.
+        """Return the frame of a time [ns, servo's clock]; None if it is not decoded yet.
 
         Raises
         ------
@@ -89,7 +89,7 @@ class Footage:
             self._media_ns = max(0, moment_ns - began_ns)
             while self._frames and self._frames[0].due_ns <= self._media_ns:
                 self._shown = self._frames.popleft()
-            if len(self._frames) <= AHEAD // 2:  # seldom: the decoder contends with the painting for the interpreter
+            if len(self._frames) <= AHEAD // 2:  # rarely: the decoder competes with painting for the interpreter lock
                 self._changed.notify_all()
             if self._failure and not self._frames:
                 raise stopped(self._failure)
@@ -97,7 +97,7 @@ class Footage:
         return None if shown is None else replace(shown, due_ns=began_ns + shown.due_ns)
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
@@ -117,7 +117,7 @@ class Footage:
                 self._failure = reason(error)
 
     def _decoded(self, container: Any, play: int) -> Iterator[VideoFrame]:
-        """Yield frame after frame from the beginning, again and again; overdue ones but the first are not scaled."""
+        """Yield the frames in a loop from the beginning; overdue ones except the first are not scaled."""
         number = offset_ns = 0
         while True:
             container.seek(0)
@@ -136,7 +136,7 @@ class Footage:
             offset_ns += end_ns
 
     def _put(self, frame: VideoFrame, play: int) -> bool:
-        """Hand a frame over when there is room; return whether it is still wanted."""
+        """Queue a frame when there is room; return whether it is still needed."""
         with self._changed:
             while len(self._frames) >= AHEAD and play == self._play and not self._closed:
                 self._changed.wait()

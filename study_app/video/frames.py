@@ -1,4 +1,4 @@
-"""What the tank is given of a video: frames ready to be painted, and where they come from."""
+"""Video frames ready to be painted by the tank, and their sources."""
 
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -7,7 +7,7 @@ from study_app.errors import VideoError
 
 
 def stopped(why: str) -> VideoError:
-    """Return the error of a source that fails in a trial: it names no source, which would tell the condition."""
+    """Return the error of a source that fails in a trial, without its name, which would reveal the condition."""
     return VideoError(f"a video of the study stopped ({why}): check camera and files")
 
 
@@ -24,9 +24,9 @@ class VideoFrame:
     pixels : buffer
         Rows of 32-bit pixels: blue, green, red, unused.
     due_ns : int
-        When it would be shown without a delay [ns, servo's clock]: when it was ready, or its time in the footage.
+        Its display time without a delay [ns, servo's clock]: when it was ready, or its time in the footage.
     age_ns : int or None
-        How old the picture was then, by the source's time stamps; None where these do not say it, 0 for footage.
+        Age of the picture then, by the source's time stamps; None if unknown, 0 for footage.
     period_ns : int
         Time from one frame of the source to the next.
     """
@@ -42,16 +42,16 @@ class VideoFrame:
 
 
 class VideoSource(Protocol):
-    """Where frames come from; every method returns at once."""
+    """A source of frames; every method returns at once."""
 
     def rewind(self) -> None:
-        """Make ready for a trial."""
+        """Prepare for a trial."""
 
     def begin(self, at_ns: int) -> None:
-        """Hear that the trial began at this moment [ns, servo's clock]: footage runs from then on."""
+        """Set the start of the trial [ns, servo's clock], from which footage runs."""
 
     def frame_at(self, moment_ns: int) -> VideoFrame | None:
-        """Return the frame of a moment [ns, servo's clock]; None where there is none yet.
+        """Return the frame of a time [ns, servo's clock]; None if there is none yet.
 
         Raises
         ------

@@ -20,7 +20,7 @@ CAMERA = "camera"
 
 @dataclass(frozen=True, slots=True)
 class VideosFound:
-    """What was found of a study's videos: in words, and why they cannot be used ("" where they can)."""
+    """The result of opening a study's videos: a description, and why they cannot be used ("" if they can)."""
 
     about: str
     fault: str = ""
@@ -32,9 +32,9 @@ class Videos:
     Parameters
     ----------
     folder : Path
-        Where its file is; footage is relative to it.
+        The folder of its file; paths of footage are relative to it.
     camera : str
-        The camera of this machine, as in `camera.Camera`; "" for the usual one of the system.
+        The camera of this machine, as in `camera.Camera`; "" for the system's default.
     """
 
     def __init__(self, protocol: Protocol, folder: Path, camera: str, now_ns: Callable[[], int]) -> None:
@@ -50,7 +50,7 @@ class Videos:
         self._closed = False
 
     def open(self) -> VideosFound:
-        """Open what is not open yet, or failed; return what was found."""
+        """Open videos that are not open or failed; return the result."""
         with self._opening:
             for view in self.views:
                 before = self._open.get(view)
@@ -65,12 +65,12 @@ class Videos:
         return VideosFound("; ".join(self._words()))
 
     def reopen(self) -> None:
-        """Open what failed in a session.
+        """Open videos that failed in a session.
 
         Raises
         ------
         VideoError
-            It cannot be opened; the source is not named, which would tell the condition.
+            It cannot be opened; without the name of the source, which would reveal the condition.
         """
         if self.open().fault:
             raise VideoError("a video of the study cannot be opened: check camera and files")
@@ -85,7 +85,7 @@ class Videos:
             one.fit(width, height)
 
     def describe(self) -> dict[str, Any]:
-        """Return what the receipt records: nothing that tells which condition shows what."""
+        """Return the record for the receipt, which does not reveal the video of a condition."""
         found: dict[str, Any] = {"footage_sha256": sorted(set(self._hashes.values()))} if self._hashes else {}
         if isinstance(camera := self._open.get(CAMERA), Camera):
             age_ns = camera.newest.age_ns
@@ -98,7 +98,7 @@ class Videos:
         return found
 
     def close(self) -> None:
-        """Let go of all, also of what another thread is still opening."""
+        """Close all, including those that another thread is still opening."""
         with self._changing:
             self._closed = True
             every = tuple(self._open.values())
@@ -106,7 +106,7 @@ class Videos:
             one.close()
 
     def _keep(self, view: str, source: Camera | Footage) -> None:
-        """Keep an open source; close it where all were closed meanwhile."""
+        """Store an open source; close it if all were closed meanwhile."""
         with self._changing:
             closed = self._closed
             if not closed:
@@ -134,7 +134,7 @@ class Videos:
 
 
 def missing_here(protocol: Protocol, folder: Path, camera: str, now_ns: Callable[[], int]) -> str:
-    """Return why this machine cannot show the study's videos, "" where it can.
+    """Return why this machine cannot show the study's videos, "" if it can.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What is measured of the video in a trial: frames shown, late and lost, and how old the camera's pictures were."""
+"""Statistics of the video in a trial: frames shown, late and lost, and the age of the camera's pictures."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ from study_app.video.frames import VideoFrame
 
 
 class VideoStatistics:
-    """Counts the frames of a video as they are painted; with no frame nothing was measured."""
+    """Counts the frames of a video as they are painted; without a frame there are no statistics."""
 
     def __init__(self) -> None:
         self._number: int | None = None
@@ -15,7 +15,7 @@ class VideoStatistics:
         self._ages_ns: list[int] = []
 
     def frame(self, painted_ns: int, video: VideoFrame, delay_s: float) -> None:
-        """Take what was seen of the video in a frame painted at a moment [ns], at the delay then asked for [s]."""
+        """Add the video frame that was painted at a time [ns], with the delay requested then [s]."""
         if video.number == self._number:
             return
         error_ns = painted_ns - video.due_ns - round(delay_s * 1e9)
@@ -28,7 +28,7 @@ class VideoStatistics:
             self._ages_ns.append(video.age_ns)
 
     def columns(self) -> dict[str, Any]:
-        """Return the columns of the trial's row, None where no video was seen."""
+        """Return the columns of the trial's row, None without a video."""
         seen = self._frames > 0
         ages_ns = self._ages_ns
         return {

@@ -1,1 +1,1 @@
-"""Where markers may go: a module for each kind, with its descriptor `SINK`."""
+"""The kinds of sinks for markers: one module each, with its descriptor `SINK`."""

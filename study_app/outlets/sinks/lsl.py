@@ -31,13 +31,13 @@ class MarkerStream:
 
     @property
     def described(self) -> Mapping[str, Any]:
-        """What the receipt says of it."""
+        """Its record in the receipt."""
         return {"stream": MARKERS, "clock_uncertainty_us": round(1e6 * self.mapping.uncertainty_s, 3)}
 
     @property
     def listens(self) -> bool:
         """Whether a program receives the stream."""
-        outlet = self._outlet  # its thread may let go of it meanwhile
+        outlet = self._outlet  # its thread may release it meanwhile
         return bool(outlet is not None and outlet.have_consumers())
 
     def send(self, marker: Marker) -> None:

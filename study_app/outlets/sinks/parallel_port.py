@@ -1,7 +1,7 @@
 """Trigger codes on a parallel port of Linux, by the ioctl calls of ``ppdev``: eight data lines and a strobe.
 
-The code is put on the data lines first and the strobe pulsed then, so that a receiver that latches on the strobe reads
-lines that are settled; one that watches the lines reads them for as long as the code is held.
+The code is written to the data lines before the strobe is pulsed, so that a receiver that latches on the strobe reads
+settled lines; one that polls the lines reads them while the code is held.
 """
 
 import os

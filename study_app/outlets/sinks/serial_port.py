@@ -63,7 +63,7 @@ class SerialPort:
 
 
 def _cause(error: Exception) -> str:
-    """Return the system's words for an error where it has a number, else its own."""
+    """Return the system's message for an error with a number, else its own message."""
     number = getattr(error, "errno", None)
     return os.strerror(number) if isinstance(number, int) else str(error)
 
