@@ -1,4 +1,4 @@
-"""The client of a worker process: it gives orders and collects answers, and never waits for the process."""
+"""The client of a worker process: it sends orders and receives answers, and never blocks on the process."""
 
 import threading
 from contextlib import suppress
@@ -11,7 +11,7 @@ from study_app.workers.server import serve
 from study_app.workers.spawning import CONTEXT
 
 PATIENCE_S: Final = 3.0
-"""A process that was asked to end and still lives after this is killed."""
+"""Time after which a process that was asked to end is killed."""
 
 Order = TypeVar("Order")
 Answer = TypeVar("Answer")
@@ -20,20 +20,20 @@ Answer = TypeVar("Answer")
 class WorkerClient(Generic[Order, Answer]):
     """A worker process that carries out orders, one after the other.
 
-    A new order, like `stop`, asks the one before to give up; its task decides whether it does.
+    A new order, like `stop`, asks the last one to stop early; its task decides whether to do so.
 
     Parameters
     ----------
     task : str
         The function that carries out an order (see `study_app.workers.server.Task`), as "package.module:function".
-        The process alone imports it. Orders and answers are pickled.
+        Only the process imports it. Orders and answers are pickled.
     background : bool
         Whether the process gets the lowest priority.
 
     Raises
     ------
     OSError
-        The system starts no process.
+        The system cannot start a process.
     """
 
     def __init__(self, task: str, *, name: str, background: bool = False) -> None:
@@ -64,20 +64,20 @@ class WorkerClient(Generic[Order, Answer]):
         return not self.process.is_alive()
 
     def order(self, order: Order) -> int:
-        """Give an order; return the number that its answers have. Answers to earlier orders may still come."""
+        """Send an order; return the number of its answers. Answers to earlier orders may still arrive."""
         self._ordered += 1
         self._open.append(self._ordered)
         self._send((self._ordered, order))
         return self._ordered
 
     def stop(self) -> None:
-        """Ask that the order that is carried out be given up."""
+        """Ask the current order to stop early."""
         self._send(None)
 
     def answers(self, wait_s: float = 0.0) -> list[tuple[int, Answer | Refused | Crashed]]:
         """Return the answers since the last call, with the numbers of their orders.
 
-        The last answer to an order is what its task returns, `Refused`, or `Crashed` where the process ended.
+        The last answer to an order is what its task returns, `Refused`, or `Crashed` if the process ended.
 
         Parameters
         ----------

@@ -63,7 +63,7 @@ class ClusterExecutor(CancellingExecutor):
         threading.Thread(target=self._watch, name="cluster", daemon=True).start()
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Have a case computed by a worker."""
+        """Compute a case on a worker."""
         future: Future[T] = Future()
         with self._pending_lock:
             self._pending.add(future)
@@ -73,7 +73,7 @@ class ClusterExecutor(CancellingExecutor):
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Leave the cluster; what has not finished is cancelled, or waited for first."""
+        """Disconnect from the cluster, after unfinished cases are cancelled or complete."""
         with self._pending_lock:
             pending = tuple(self._pending)
         if cancel_futures:
@@ -95,7 +95,7 @@ class ClusterExecutor(CancellingExecutor):
             future.set_exception(_in_words(self.address, error))
 
     def _begin_settling(self, future: Future[Any]) -> bool:
-        """Return whether the caller is to give the case its outcome: it is the first, and the case not cancelled."""
+        """Return whether the caller sets the outcome of the case: it is the first, and the case not cancelled."""
         with self._pending_lock:
             if future not in self._pending:
                 return False
@@ -131,7 +131,7 @@ def _compute(expected: Mapping[str, str], fn: Callable[..., T], args: tuple[Any,
 
 
 def _in_words(address: str, error: BaseException) -> BaseException:
-    """Return what a failure of the cluster, not of a case, means."""
+    """Return the message for a failure of the cluster, as opposed to a case."""
     if isinstance(error, CancelledError):
         why = f"the cluster at {address} was lost: start it again, then the same command"
     elif type(error).__name__ == "KilledWorker":
@@ -146,12 +146,12 @@ def _in_words(address: str, error: BaseException) -> BaseException:
 
 
 def _check_that_something_answers(address: str) -> None:
-    """Refuse an address within seconds, where Dask would wait for long or fail at exit.
+    """Reject an unusable address within seconds; Dask would wait for long or fail at exit.
 
     Raises
     ------
     WorkerError
-        The address is none, or nothing is there that could be a scheduler.
+        The address is not valid, or no scheduler can be at it.
     """
     parts = ADDRESS.fullmatch(address)
     if parts is None:

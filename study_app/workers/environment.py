@@ -1,4 +1,4 @@
-"""What a case's result depends on besides the case: the program's files, Python and the numerical libraries."""
+"""The environment on which a case's result depends: the program's files, Python and the numerical libraries."""
 
 import hashlib
 import platform
@@ -35,7 +35,7 @@ def environment_digest() -> str:
 
 
 def difference(other: Mapping[str, str]) -> str:
-    """Return in words how another environment differs from this one; empty where it does not."""
+    """Return a description of how another environment differs from this one; empty if it does not."""
     own = environment()
     return "; ".join(
         f"{name} {own.get(name, 'missing')} instead of {other.get(name, 'missing')}"

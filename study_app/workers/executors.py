@@ -1,7 +1,7 @@
 """The executor for many independent cases, each of which draws from its own seed: processes here, or a Dask cluster.
 
 Code that has many cases takes a `concurrent.futures.Executor` and uses only its ``submit`` and ``map``: results do not
-depend on who computed them.
+depend on the executor.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Workers:
-    """Who computes: ``count`` processes of this computer (None: one per core), or a cluster by its address."""
+    """The workers: ``count`` processes of this computer (None: one per core), or a cluster by its address."""
 
     count: int | None = None
     cluster: str | None = None

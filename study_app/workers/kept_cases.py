@@ -1,8 +1,8 @@
 """Finished cases of a computation that was interrupted, on disk: the next start computes only the others.
 
-A case is known by its function and arguments, and belongs to one environment: the same program, Python and libraries.
-Every start appends to a file of its own, so that two programs need no lock. A computation that ends removes what it
-used. The files hold pickles, as those of the compiler's cache do: the folder is this user's alone.
+A case is identified by its function and arguments, and belongs to one environment: the same program, Python and
+libraries. Every start appends to a separate file, so that two programs need no lock. A completed computation removes
+the cases that it used. The files contain pickles, like the compiler's cache: only this user can access the folder.
 """
 
 import contextlib
@@ -26,7 +26,7 @@ from study_app.workers.processes import CancellingExecutor
 log = logging.getLogger(__name__)
 
 OLD_S: Final = 30 * 86_400.0
-"""What no computation asked for in so long is removed."""
+"""Cases not used for this time are removed."""
 _ENDING: Final = ".cases"
 _KEY: Final = 32
 _LENGTH: Final = 8
@@ -36,7 +36,7 @@ T = TypeVar("T")
 
 
 class KeptCases(CancellingExecutor):
-    """An executor that stores each finished case, and takes from the store what an earlier start finished.
+    """An executor that stores each finished case, and reuses cases that an earlier start finished.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class KeptCases(CancellingExecutor):
         self.reused = self.stored = 0
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Return the stored outcome of a case, or have it computed."""
+        """Return the stored outcome of a case, or compute it."""
         key = _key_of((fn, args, kwargs))
         self._used.add(key)
         if key not in self._kept:
@@ -111,12 +111,12 @@ class _KeyPickler(pickle.Pickler):
     """Pickles sets in the same order in every start; their hashes differ."""
 
     def persistent_id(self, value: object) -> object:
-        """Return what stands for a set."""
+        """Return the pickled form of a set."""
         return sorted(map(_key_of, value)) if isinstance(value, set | frozenset) else None
 
 
 def _key_of(call: object) -> bytes:
-    """Return a digest of a call, which does not depend on which of its values are one object."""
+    """Return a digest of a call, which does not depend on the identity of its values."""
     content = io.BytesIO()
     pickler = _KeyPickler(content, pickle.HIGHEST_PROTOCOL)
     pickler.fast = True
@@ -125,7 +125,7 @@ def _key_of(call: object) -> bytes:
 
 
 def _records(path: Path) -> Iterator[tuple[bytes, bytes]]:
-    """Yield the cases (key, pickled outcome) of a file, up to one that is not whole: the program was killed there."""
+    """Yield the cases (key, pickled outcome) of a file, up to an incomplete one, at which the program was killed."""
     try:
         whole = path.read_bytes()
     except OSError:

@@ -1,4 +1,4 @@
-"""What a worker process may answer to any order, besides the values of its task."""
+"""Answers of a worker process to any order, besides the values of its task."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from study_app.errors import StudyError
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """An order could not be carried out, and why; nothing was half-done. ``stopped`` where that was asked for."""
+    """An order could not be carried out, with the reason and without partial effects. ``stopped``: by request."""
 
     sentence: str
     stopped: bool = False
@@ -24,11 +24,11 @@ class Crashed:
 
     @property
     def sentence(self) -> str:
-        """What happened, for a person."""
+        """The description of the event for the user."""
         if self.exit_code is not None and self.exit_code < 0:
             return f"the process was ended by signal {-self.exit_code}"
         return f"the process ended with exit code {self.exit_code}; the terminal may show why"
 
 
 class Stopped(StudyError):
-    """An order was given up because that was asked for, or another order came."""
+    """An order stopped early, by request or because of another order."""

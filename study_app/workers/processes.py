@@ -16,9 +16,9 @@ from study_app.errors import WorkerError
 from study_app.workers.spawning import CONTEXT, compute_in_one_thread, ignore_interrupts
 
 ATTEMPTS: Final = 3
-"""A case that was under way in so many pools that broke is not tried again."""
+"""A case that was being computed in this many broken pools is not tried again."""
 AHEAD: Final = 2
-"""Cases handed to the pool for each process: the one it computes, and the next."""
+"""Cases in the pool per process: the one it computes, and the next."""
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -63,10 +63,10 @@ class _Shutdown:
 
 
 class ProcessExecutor(CancellingExecutor):
-    """Processes that are started when cases are there, import anew what they need, and ignore Ctrl+C.
+    """Processes that start when there are cases, import their own modules, and ignore Ctrl+C.
 
-    They end with the executor, or with its program. When one ends unexpectedly, its pool is replaced, and the cases
-    under way are computed again. One thread owns the pool; futures of cancelled cases are never the pool's own.
+    They end with the executor, or with its program. When one ends unexpectedly, its pool is replaced, and the
+    unfinished cases are computed again. One thread owns the pool; futures of cancelled cases are never the pool's own.
     """
 
     def __init__(self, workers: int) -> None:
@@ -79,7 +79,7 @@ class ProcessExecutor(CancellingExecutor):
         self._dispatcher.start()
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Have a case computed.
+        """Compute a case.
 
         Raises
         ------
@@ -150,11 +150,11 @@ class ProcessExecutor(CancellingExecutor):
         )
 
     def _start(self, case: _Case, pool: ProcessPoolExecutor) -> None:
-        """Hand a case to the pool; its end is reported to the dispatcher, which alone decides what to do about it."""
+        """Submit a case to the pool; its end is reported to the dispatcher, which alone handles it."""
         function, args, kwargs = case.call
         try:
             found = pool.submit(function, *args, **kwargs)
-        except (BrokenExecutor, OSError, RuntimeError) as error:  # the system starts no process
+        except (BrokenExecutor, OSError, RuntimeError) as error:  # the system cannot start a process
             found = Future()
             found.set_exception(BrokenExecutor(str(error)) if isinstance(error, OSError) else error)
         found.add_done_callback(lambda found: self._messages.put(_Finished(case, pool, found)))
@@ -166,7 +166,7 @@ def _lost(found: Future[Any]) -> bool:
 
 
 def _settled(case: _Case, found: Future[Any], *, cancel: bool) -> bool:
-    """Give a case its outcome; return False where it is to be computed again."""
+    """Set the outcome of a case; return False if it must be computed again."""
     error = found.exception()
     if _lost(found):
         case.attempts += 1
@@ -196,7 +196,7 @@ def _drop(case: _Case) -> None:
 
 
 def _start_process(watched: Connection) -> None:
-    """Prepare a process of the pool before it imports what computes."""
+    """Prepare a process of the pool before it imports the computing modules."""
     ignore_interrupts()
     compute_in_one_thread()  # there are as many processes as cores
     threading.Thread(target=_exit_at_end_of, args=(watched,), name="end of program", daemon=True).start()

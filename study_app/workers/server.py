@@ -1,4 +1,4 @@
-"""The worker process: it carries out one order after the other, by one function, until its client is gone."""
+"""The worker process: it carries out orders in sequence, by one function, until its client has ended."""
 
 import threading
 from collections.abc import Callable
@@ -19,7 +19,7 @@ Send: TypeAlias = Callable[[Any], object]
 """Sends an answer before the last one."""
 
 Stop: TypeAlias = Callable[[], bool]
-"""Whether to give up: that was asked for, another order waits, or the client is gone."""
+"""Whether to stop early: by request, because another order waits, or because the client has ended."""
 
 Task: TypeAlias = Callable[[Any, Send, Stop], object]
 """Carries out an order; what it returns is its last answer. A `StudyError` is answered by `Refused`."""
@@ -29,7 +29,7 @@ _END: Final = object()
 
 
 def serve(orders: Connection, answers: Connection, task: str, *, background: bool) -> None:
-    """Carry out orders (number, order) until there is no client any more; answers are (number, answer, last).
+    """Carry out orders (number, order) until the client has ended; answers are (number, answer, last).
 
     Parameters
     ----------
@@ -45,12 +45,12 @@ def serve(orders: Connection, answers: Connection, task: str, *, background: boo
     waiting: SimpleQueue[Any] = SimpleQueue()
     # Orders are read at once: a full pipe would make the client's window wait.
     threading.Thread(target=_read, args=(orders, waiting), name="orders", daemon=True).start()
-    with suppress(ModuleNotFoundError):  # then the first order says so
+    with suppress(ModuleNotFoundError):  # then the first order reports it
         resolve_name(task)
     with suppress(BrokenPipeError, ConnectionResetError):
         while (received := waiting.get()) is not _END:
             if received is _STOP:
-                continue  # the order that it was about has come to its end
+                continue  # its order has ended
             number, order = received
             try:
                 with naming_the_extra():

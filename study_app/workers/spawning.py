@@ -1,4 +1,4 @@
-"""How worker processes begin: by spawn, and without Ctrl+C, which the terminal sends to all processes of a program."""
+"""Start of worker processes: by spawn, and ignoring Ctrl+C, which the terminal sends to all processes of a program."""
 
 import os
 import signal
@@ -31,11 +31,11 @@ CONTEXT: Final = _WorkerContext()
 
 
 def ignore_interrupts() -> None:
-    """Leave Ctrl+C to the program that started this process; it ends its workers itself."""
+    """Ignore Ctrl+C: the program that started this process ends its workers."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def compute_in_one_thread() -> None:
-    """Let the linear algebra of this process run in one thread; numpy must not be imported yet."""
+    """Limit the linear algebra of this process to one thread; numpy must not be imported yet."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
