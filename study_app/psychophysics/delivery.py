@@ -1,8 +1,8 @@
-"""What an interval delivered to the hand, computed from its samples: the one formula of session and analysis.
+"""The levels delivered to the hand in an interval, computed from its samples, for session and analysis alike.
 
 Velocity and acceleration of the hand come from its positions by a cubic Savitzky-Golay filter (Savitzky & Golay 1964,
 Analytical Chemistry 36, 1627) over ±20 ms, independent of the servo's own velocity estimator. Samples are first
-interpolated to even times, so that late ticks do not bend the curve.
+interpolated to even times, so that late ticks do not distort the curve.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ Times = NDArray[np.float64]
 Vectors = NDArray[np.float64]
 
 HALF_S: Final = 0.02
-"""The filter looks so far back and ahead [s]."""
+"""Half width of the filter [s]."""
 EARLIER: Final = 5
-"""So many rows earlier than the force model's may the force sent seem to be."""
+"""Greatest negative lag of the sent force relative to the force model's [rows]."""
 LEAST_SPEED_MPS: Final = 1e-4
-"""A hand that moves less is at rest: no damping can be computed. [choice]"""
+"""Least speed of a moving hand: below it no damping can be computed. [choice]"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class Motion:
         return float(np.sqrt(np.einsum("ij,ij->", self.velocity_mps, self.velocity_mps) / rows))
 
     def after(self, from_s: float, to_s: float = math.inf) -> Motion:
-        """Return the motion from a time on, to another one [s]."""
+        """Return the motion between two times [s]."""
         later = (self.times_s >= from_s) & (self.times_s <= to_s)
         return Motion(self.times_s[later], self.velocity_mps[later], self.acceleration_mps2[later])
 
@@ -61,7 +61,7 @@ def motion(times_s: NDArray[np.float64], position_m: Vectors, period_s: float) -
     Parameters
     ----------
     times_s : array (n,)
-        When the positions were taken, ascending [s].
+        Times of the positions, ascending [s].
     position_m : array (n, 3)
         Positions [m].
     period_s : float
@@ -70,7 +70,7 @@ def motion(times_s: NDArray[np.float64], position_m: Vectors, period_s: float) -
     Returns
     -------
     Motion
-        Without the first and the last 20 ms; empty where the motion lasts no longer than the filter.
+        Without the first and the last 20 ms; empty if the motion is not longer than the filter.
     """
     half = max(2, round(HALF_S / period_s))
     count = 0 if len(times_s) == 0 else int((times_s[-1] - times_s[0]) / period_s * (1 + 1e-12)) + 1
@@ -82,7 +82,7 @@ def motion(times_s: NDArray[np.float64], position_m: Vectors, period_s: float) -
 
 
 def at(wanted_s: NDArray[np.float64], times_s: NDArray[np.float64], vectors: Vectors) -> Vectors:
-    """Return vectors (n, 3) of some times interpolated linearly at other times: (m, 3)."""
+    """Return vectors (n, 3) interpolated linearly at other times: (m, 3)."""
     return np.array([np.interp(wanted_s, times_s, axis) for axis in vectors.T]).T
 
 
@@ -94,12 +94,12 @@ def damping(force_n: Vectors, moved: Motion) -> tuple[float, float] | None:
     force_n : array (n, 3)
         The force sent to the hand [N], at the times of the motion.
     moved : Motion
-        How the hand moved.
+        The motion of the hand.
 
     Returns
     -------
     tuple of float, or None
-        None where the hand was at rest, or moved without changing its velocity.
+        None if the hand was at rest, or moved at constant velocity.
     """
     v, a = moved.velocity_mps, moved.acceleration_mps2
     vv, va, aa = (float(np.einsum("ij,ij->", one, other)) for one, other in ((v, v), (v, a), (a, a)))
@@ -123,7 +123,7 @@ def share(sent_n: Vectors, model_n: Vectors) -> float | None:
 
 
 def lag(sent_n: Vectors, model_n: Vectors, most: int) -> float | None:
-    """Return by how many rows the force sent lags behind the force model's, by least squares; None without force.
+    """Return the lag of the sent force behind the force model's [rows], by least squares; None without force.
 
     Each lag of whole rows has the residual of F_sent = g F_model with the best share g; a parabola through the least
     residual and its neighbours gives the fraction.
@@ -133,7 +133,7 @@ def lag(sent_n: Vectors, model_n: Vectors, most: int) -> float | None:
     sent_n, model_n : array (n, 3)
         The force sent to the hand, and the sum of the effects before any limit [N], at even times.
     most : int
-        The longest lag that is looked for; the force sent is compared from this row on.
+        The longest lag searched; the sent force is compared from this row on.
     """
     compared = sent_n[most : len(sent_n) - EARLIER]
     if len(compared) == 0:
@@ -154,12 +154,12 @@ def lag(sent_n: Vectors, model_n: Vectors, most: int) -> float | None:
 
 
 def difference(errors: Sequence[float | None], comparisons: Sequence[bool]) -> float | None:
-    """Return the mean error of the comparisons less that of the standards, in which their common errors cancel.
+    """Return the mean error of the comparisons minus that of the standards, in which common errors cancel.
 
     Parameters
     ----------
     errors : sequence of float or None
-        The error of each interval, of delivered minus requested; None where it was not measured.
+        The error of each interval, delivered minus requested; None if it was not measured.
     comparisons : sequence of bool
         Whether the interval presented the comparison.
 
@@ -181,7 +181,7 @@ def _mean(values: Iterable[float | None]) -> float | None:
 
 @cache
 def _taps(half: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what to convolve 2 half + 1 positions with for the slope and the curvature of their cubic, per sample."""
+    """Return the convolution kernels over 2 half + 1 positions for slope and curvature of their cubic, per sample."""
     places = np.arange(-half, half + 1) / half
     powers = np.linalg.pinv(np.vander(places, 4, increasing=True))
     return powers[1][::-1] / half, 2 * powers[2][::-1] / half**2

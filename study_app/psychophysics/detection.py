@@ -24,9 +24,9 @@ Model: TypeAlias = Literal["differencing", "independent"]
 NORMAL: Final = NormalDist()
 NODES: Final = 200
 ENDS: Final = 9.0
-"""Integrals over the normal density end so many standard deviations from its mean."""
+"""Range of integrals over the normal density, in standard deviations from its mean."""
 MOST: Final = 20.0
-"""The largest d′ that is searched."""
+"""The largest d′ in searches."""
 TOLERANCE: Final = 1e-10
 
 _erfc = np.vectorize(math.erfc, otypes=[float])
@@ -39,13 +39,13 @@ class Sensitivity:
     Attributes
     ----------
     d_prime : float
-        Under ``model``; 0 at or below chance where it follows from the share correct.
+        Under ``model``; if computed from the share correct, 0 at or below chance.
     criterion : float or None
         c of yes–no and of two-interval forced choice, k of the differencing model of same–different; else None.
     variance : float or None
-        Of d′ (Gourevitch & Galanter 1967); None where no closed form exists.
+        Of d′ (Gourevitch & Galanter 1967); None if no closed form exists.
     model : "differencing" | "independent" | None
-        None where there is one model only.
+        None if there is only one model.
     other : float or None
         d′ under the other model.
     """
@@ -106,9 +106,9 @@ def two_intervals(first_of_first: float, firsts: float, first_of_second: float, 
     Parameters
     ----------
     first_of_first, firsts : float
-        How often the answer was "first", and how many trials there were, where the comparison came first.
+        Numbers of answers "first" and of trials, with the comparison first.
     first_of_second, seconds : float
-        Likewise where it came second.
+        The same with the comparison second.
     """
     found = yes_no(first_of_first, firsts, first_of_second, seconds)
     if found is None or found.variance is None:
@@ -138,11 +138,11 @@ def same_different(hits: float, differents: float, false_alarms: float, sames: f
     Parameters
     ----------
     hits, differents : float
-        How often the answer was "different", and how many trials there were, where the two differed.
+        Numbers of answers "different" and of trials, with different stimuli.
     false_alarms, sames : float
-        Likewise where they were the same.
+        The same with equal stimuli.
     model : "differencing" | "independent"
-        Which d′ is reported; `Sensitivity.other` has the other one.
+        The model of the returned d′; `Sensitivity.other` has the other one.
     """
     if not differents or not sames:
         return None
@@ -163,7 +163,7 @@ def different_rate(d_prime: float, k: float) -> float:
 
 
 def rating(noise: ArrayLike, signal: ArrayLike) -> Sensitivity | None:
-    """Return d_a = √2 z(AUC) from ratings; None where one of the two has none.
+    """Return d_a = √2 z(AUC) from ratings; None if one of the two has none.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def rating(noise: ArrayLike, signal: ArrayLike) -> Sensitivity | None:
 
 
 def _inverse(proportion_of: Callable[[float], float], proportion: float) -> float:
-    """Return where an increasing function of d′ reaches ``proportion``; 0 where it is there already at 0."""
+    """Return the d′ at which an increasing function reaches ``proportion``; 0 if it is reached at 0."""
     low, high = 0.0, MOST
     if proportion <= proportion_of(low):
         return 0.0
@@ -207,7 +207,7 @@ def _two(d_prime: float) -> float:
 
 
 def _abx(d_prime: float, divisor: float) -> float:
-    """Return P(correct): both comparisons point the right way, or both the wrong way."""
+    """Return P(correct): both comparisons have the correct sign, or both the wrong sign."""
     first, second = NORMAL.cdf(d_prime / math.sqrt(2.0)), NORMAL.cdf(d_prime / divisor)
     return first * second + (1.0 - first) * (1.0 - second)
 

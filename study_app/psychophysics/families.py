@@ -36,7 +36,7 @@ def rise(family: Family, u: ArrayLike, threshold: ArrayLike, width: ArrayLike) -
     u : array
         Levels, in the coordinate of their spacing.
     threshold : array
-        Where F is one half.
+        The level at which F is one half.
     width : array
         Distance from F = 0.05 to F = 0.95.
 
@@ -77,6 +77,6 @@ def success(
 
 
 def level_at(family: Family, percent: float, threshold: float, width: float, guess: float, lapse: float) -> float:
-    """Return the level u at which ψ is so many percent; NaN where ψ never is."""
+    """Return the level u at which ψ is ``percent``; NaN if ψ never reaches it."""
     share = (percent / 100.0 - guess) / (1.0 - guess - lapse)
     return threshold + width * position(family, share) if 0.0 < share < 1.0 else math.nan

@@ -19,7 +19,7 @@ from study_app.psychophysics.families import CLIP, Family, success
 Values = tuple[float, ...]
 
 FREE_GUESSES: Final[Values] = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3)
-"""Guess rates where the answers to noise trials determine it."""
+"""Guess rates if the answers to noise trials determine it."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Grid:
         levels : (k,) array
             The levels, in the coordinate u.
         successes, failures : (k,) array
-            How often each was answered with success and without.
+            Numbers of answers with and without success at each level.
         """
         psi = self.success(levels)
         return self.weighted(np.log(psi), np.log1p(-psi), successes, failures)

@@ -1,4 +1,4 @@
-"""How precisely a threshold is known: posteriors of many observers at once, and the interval of a group's mean."""
+"""Precision of a threshold: posteriors of many observers at once, and the interval of a group's mean."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ BETWEEN_PEOPLE: Final = 1.2
 ESTIMATE_NOISE: Final = 0.25
 """Standard deviation of the logarithm of a simulated magnitude estimate. [choice]"""
 AT_ONCE: Final = 100
-"""Posteriors that are computed together."""
+"""Number of posteriors computed together."""
 _COVERED: Final = 0.95
 _Z: Final = 1.959964
 
@@ -47,7 +47,7 @@ def estimated(grid: Grid, levels: ArrayLike, successes: Floats, failures: Floats
     levels : (k,) array
         In u; −∞ for a level of zero on log spacing.
     successes, failures : (observers, k) array
-        How often each level was answered with success and without.
+        Numbers of answers with and without success at each level.
     """
     psi = grid.success(levels).reshape(successes.shape[1], -1)
     log_success, log_failure, prior = np.log(psi), np.log1p(-psi), grid.prior.ravel()
@@ -68,7 +68,7 @@ def estimated(grid: Grid, levels: ArrayLike, successes: Floats, failures: Floats
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """What one participant's threshold at one standard, d′, d_a or exponent is expected to show.
+    """The expected precision of one participant's threshold at one standard, d′, d_a or exponent.
 
     Attributes
     ----------
@@ -77,13 +77,13 @@ class Expected:
     trials : int
         Of one standard.
     standards : int
-        How many standards the group's mean is over.
+        Number of standards in the group's mean.
     half : float
-        Half the 95 % interval of one participant, in u; infinite where nothing is measured.
-    spread : float
-        Standard deviation of the estimate's error, in u; infinite where nothing is measured.
+        Half the 95 % interval of one participant, in u; infinite if nothing is measured.
+        spread : float
+        Standard deviation of the estimate's error, in u; infinite if nothing is measured.
     threshold : float
-        About where the thresholds lie, as a level; or the d′, d_a or exponent that is assumed.
+        Approximate threshold, as a level; or the assumed d′, d_a or exponent.
     """
 
     spacing: Literal["log", "linear"]
@@ -109,7 +109,7 @@ class Expected:
         Parameters
         ----------
         participants : int
-            How many there are; infinite below two.
+            Their number; the result is infinite below two.
         trials : float, optional
             Of each standard; the variance of the error is taken to be inversely proportional to their number.
         """
@@ -128,7 +128,7 @@ class Expected:
         return sizes[place] if place < len(sizes) else None
 
     def trials_for(self, precision: float, participants: int, most: int = 1000) -> int | None:
-        """Return the fewest trials of each standard that do, in steps of ten; None: people differ by too much."""
+        """Return the fewest sufficient trials of each standard, in steps of ten; None: people differ by too much."""
         found = (n for n in range(10, most + 1, 10) if self.of_group(participants, n) <= precision)
         return next(found, None)
 

@@ -1,4 +1,4 @@
-"""QUEST+: the next level is the one after whose answer the least uncertainty is expected.
+"""QUEST+: the next level is the one whose answer is expected to leave the least uncertainty.
 
 Watson 2017 minimises the entropy of all parameters. Prins 2013 minimises that of the threshold's marginal alone, so
 that levels are not spent on the width or the lapse rate; that is the default here.
@@ -23,7 +23,7 @@ TIE_NATS: Final = 1e-9
 
 @dataclass(frozen=True)
 class Search:
-    """What QUEST+ chooses from.
+    """The parameters and levels among which QUEST+ chooses.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class Search:
     levels : tuple of float
         The levels that may be presented, in the coordinate u, ascending.
     learn : {"threshold", "all"}
-        Whose entropy is minimised.
+        The parameters whose entropy is minimised.
     noise : bool
         Whether the first of the levels is that of noise trials, which is never chosen.
     """
@@ -67,7 +67,7 @@ class Search:
         return _weighted_entropy(succeeded) + _weighted_entropy(before - succeeded)
 
     def next(self, successes: ArrayLike, failures: ArrayLike) -> int:
-        """Return the index of the level to present next: of equal ones the lowest."""
+        """Return the index of the next level to present: the lowest of equal ones."""
         first = int(self.noise)
         entropy = self.expected_entropy(self.posterior(successes, failures))[first:]
         return first + int(np.flatnonzero(entropy <= entropy.min() + TIE_NATS)[0])

@@ -1,7 +1,7 @@
 """Many tracks of simulated observers at once: the levels that a method chooses, and the answers to them.
 
-The observers answer by a psychometric function, so that what their tracks show is what a method can achieve. Levels
-are in the coordinate u; answers follow from uniform numbers that the caller draws.
+The observers answer by a psychometric function, so that their tracks show the best performance of a method. Levels are
+in the coordinate u; answers follow from uniform numbers that the caller draws.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Counts: TypeAlias = tuple[Floats, Floats]
 
 @dataclass(frozen=True, eq=False)
 class Observers:
-    """Who answers: one observer for each track.
+    """The observers: one for each track.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Observers:
     guess, lapse : float
         Guess rate and lapse rate.
     presented : callable, optional
-        From levels as they are asked to levels as they are presented, both in u; by default they are the same.
+        Maps requested to presented levels, both in u; by default they are equal.
     """
 
     family: Family
@@ -56,7 +56,7 @@ class Observers:
 
 @dataclass(frozen=True, eq=False)
 class Answers:
-    """What was presented and answered.
+    """The levels presented and the answers.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Answers:
         return Answers(self.levels[:, :trials], self.successes[:, :trials])
 
     def counts(self, places: Sequence[float]) -> Counts:
-        """Return how often each track succeeded and failed at each of ``places``, counted at the nearest one.
+        """Return the successes and failures of each track at each of ``places``, counted at the nearest one.
 
         Parameters
         ----------
@@ -90,7 +90,7 @@ class Answers:
 
 
 def constant_tracks(levels: Sequence[float], repetitions: int, observers: Observers, draws: Floats) -> Answers:
-    """Return the answers to constant stimuli: each level so many times.
+    """Return the answers to constant stimuli: each level ``repetitions`` times.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def staircase_tracks(
     draws : (tracks, trials) array
         Uniform numbers in [0, 1).
     stop : tuple of int, optional
-        A track ends after so many reversals, at the earliest after so many answers.
+        Number of reversals after which a track ends, and its least number of answers.
     """
     tracks, trials = draws.shape
     levels, successes = np.full(draws.shape, np.nan), np.zeros(draws.shape, bool)
@@ -155,7 +155,7 @@ def search_tracks(
     Parameters
     ----------
     search : Search
-        What levels are chosen from.
+        Chooses the levels.
     observers : Observers
         Who answers.
     draws : (tracks, trials) array
@@ -163,9 +163,9 @@ def search_tracks(
     begin : int, optional
         Index of the first level; by default the search chooses it.
     noise : (tracks, noise trials) array, optional
-        Uniform numbers for noise trials; the search knows their answers from the first trial on.
+        Uniform numbers for noise trials; the search uses their answers from the first trial on.
     stop : tuple, optional
-        A track ends where its 95 % interval is so narrow [u], at the earliest after so many answers.
+        Width of the 95 % interval [u] at which a track ends, and its least number of answers.
     """
     tracks, trials = draws.shape
     levels, running = np.full(draws.shape, np.nan), np.ones(tracks, bool)

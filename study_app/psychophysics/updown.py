@@ -14,9 +14,9 @@ Answer: TypeAlias = tuple[float, bool]
 """The level presented, in the coordinate u, and whether it was a success; in the order of presentation."""
 
 RATIOS: Final = {1: 0.2845, 2: 0.5488, 3: 0.7393, 4: 0.8415}
-"""Step down over step up, by the successes in a row that a step down takes."""
+"""Ratio of the step down to the step up, by the number of successes in a row before a step down."""
 DROPPED: Final = 2
-"""The first reversals, which depend on where the track began."""
+"""Number of first reversals left out, which depend on the start of the track."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class Staircase:
     Attributes
     ----------
     down_after : int
-        How many successes in a row a step down takes.
+        Number of successes in a row before a step down.
     step_up : float
         Step after a failure, in the coordinate u.
     ratio : float
@@ -50,14 +50,14 @@ class Staircase:
         return converges_to(self.down_after, self.ratio)
 
     def next(self, answers: Sequence[Answer]) -> float:
-        """Return the next level: a step from the last one that was presented, or that one again."""
+        """Return the next level: a step from the last one presented, or the same again."""
         if not answers:
             return self.begin
         last = answers[-1][0]
         return min(max(last + self._moves(answers)[-1], self.low), self.high)
 
     def reversals_at(self, answers: Sequence[Answer]) -> list[int]:
-        """Return the places, from 0, of the trials at which the direction changed."""
+        """Return the indices of the trials at which the direction changed."""
         found, before = [], 0.0
         for place, move in enumerate(self._moves(answers)):
             if move * before < 0.0:
@@ -70,9 +70,9 @@ class Staircase:
         return [answers[place][0] for place in self.reversals_at(answers)]
 
     def mean_of_reversals(self, answers: Sequence[Answer], average: int) -> float | None:
-        """Return the mean of the last even number of reversals, up to ``average``; None where there are too few.
+        """Return the mean of the last even number of reversals, up to ``average``; None if there are too few.
 
-        The first two are left out, and those at an end of the domain.
+        The first two and those at an end of the domain are excluded.
         """
         kept = [level for level in self.reversals(answers)[DROPPED:] if self.low < level < self.high]
         count = min(len(kept), average) // 2 * 2
