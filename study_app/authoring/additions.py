@@ -1,4 +1,4 @@
-"""New elements: with the keys that check asks for, and valid initial values; only their texts are left to write."""
+"""New elements with the keys that check requires and valid initial values; only their texts remain to be written."""
 
 import re
 from collections.abc import Mapping
@@ -33,13 +33,13 @@ def added(
     Parameters
     ----------
     study : Study
-        The study; faults that it has already stay.
+        The study; its existing faults stay.
     section : tuple of str or int
         A section of tables, as ``("liquids",)``, or a list of tables, as ``("questionnaires", "load", "items")``.
     kind : mapping, optional
-        Keys that the element begins with, such as its kind.
+        Initial keys of the element, such as its kind.
     name : str
-        What a table is called if that is free; "" for what its section holds.
+        Preferred name of a table; "": by its section.
     behind : str or int, optional
         The table or entry of the section that it is written after; the last one without.
 
@@ -90,7 +90,7 @@ def added(
 
 
 def additions_for(study: Study, fault: Fault) -> tuple[Repair, ...]:
-    """Return the repairs of a text that names nothing: each adds an element of that name."""
+    """Return the repairs of a reference to a missing element: each adds an element of that name."""
     name = value_at(study.document, fault.path)
     if not is_unknown_name(fault) or not isinstance(name, str):
         return ()
@@ -105,8 +105,8 @@ def additions_for(study: Study, fault: Fault) -> tuple[Repair, ...]:
 def duplicated(study: Study, path: Path, wanted: str = "") -> tuple[tuple[Edit, ...], Path]:
     """Return the edits that copy an element right after itself, as one step, and the path of the copy.
 
-    The copy has the name ``wanted``, or the next free one, the next free code letter, and a place in the session where
-    it needs one. Its texts are those of the original.
+    The copy has the name ``wanted``, or the next free one, the next free code letter, and a place in the session if it
+    needs one. Its texts are those of the original.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def duplicated(study: Study, path: Path, wanted: str = "") -> tuple[tuple[Edit, 
 
 
 def fitted(before: Study, after: Study, path: Path) -> tuple[Edit, ...]:
-    """Return the edits that a copied element needs besides: a free code letter, and a place in the session.
+    """Return the additional edits for a copied element: a free code letter, and a place in the session.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Edits that give a table another kind."""
+"""Edits that change the kind of a table."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,7 +12,7 @@ from study_app.protocol.source.document import Path, has
 
 
 def switched(study: Study, path: Path, kind: str | None, left: Mapping[str, Any]) -> tuple[Edit, ...]:
-    """Return the edits that give a table another kind.
+    """Return the edits that change the kind of a table.
 
     Keys of both kinds keep their values, the others are removed; keys that the new kind needs get the value that they
     had before, or an initial one.
@@ -24,7 +24,7 @@ def switched(study: Study, path: Path, kind: str | None, left: Mapping[str, Any]
     path : tuple of str or int
         The table.
     kind : str or None
-        Its new kind; None leaves the key out, where that is a kind.
+        Its new kind; None omits the key, if that is a kind.
     left : mapping
         Values of keys that were removed by earlier switches (`left_by`).
 

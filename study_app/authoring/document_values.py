@@ -1,4 +1,4 @@
-"""Documents with one value changed: the others are shared, nothing is written to a file."""
+"""Documents with one value changed: the other values are shared, no file is written."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,7 +7,7 @@ from study_app.protocol.source.document import Path, has
 
 
 def with_value(node: Any, path: Path, value: Any) -> Any:
-    """Return a document with a value at a path; the same where there is nothing to hold it."""
+    """Return a document with a value at a path; unchanged if its parent is missing."""
     if not path:
         return value
     step, rest = path[0], path[1:]
@@ -19,7 +19,7 @@ def with_value(node: Any, path: Path, value: Any) -> Any:
 
 
 def without_value(node: Any, path: Path) -> Any:
-    """Return a document without what is at a path; the same where there is nothing."""
+    """Return a document without the value at a path; unchanged if there is none."""
     step, rest = path[0], path[1:]
     if not has(node, step):
         return node

@@ -1,7 +1,7 @@
-"""Drafts: what was edited and not saved, kept within a second.
+"""Drafts: unsaved edits, stored within a second.
 
-A draft is one file in the user's data folder, written whole or not at all. Where two programs edit one study, each
-keeps the other's draft as a version before it writes its own.
+A draft is one file in the user's data folder, written atomically. If two programs edit one study, each stores the
+other's draft as a version before it writes its own.
 """
 
 import json
@@ -17,7 +17,7 @@ from study_app.store.journals.parsing import parse_json
 from study_app.user_folder import data_folder
 
 REST_S: Final = 0.25
-"""A draft is written so long after the first edit that it does not hold [s]."""
+"""Time from the first unsaved edit to the writing of a draft [s]."""
 Selection: TypeAlias = tuple[str | int, ...]
 
 
@@ -30,7 +30,7 @@ class Draft:
     text : str
         The text.
     base : str
-        `content_hash` of the file that was edited; "" where there was none.
+        `content_hash` of the file that was edited; "" if there was none.
     selected : tuple of str or int
         The path that was selected.
     kept_at : str
@@ -44,9 +44,9 @@ class Draft:
 
 
 class Keeper:
-    """Keeps the draft of one study: at most `REST_S` after an edit, however fast edits follow each other.
+    """Writes the draft of one study at most `REST_S` after an edit, even if edits continue.
 
-    ``others`` counts the drafts of other programs that were kept as versions.
+    ``others`` counts the drafts of other programs that were stored as versions.
     """
 
     def __init__(self, file: Path, base: str) -> None:
@@ -59,7 +59,7 @@ class Keeper:
         self._due_s = 0.0
 
     def take(self, draft: Draft) -> None:
-        """Go on with a draft that was found."""
+        """Continue with an existing draft."""
         self._own = draft.text
 
     def edited(self, text: str, selected: Selection, now_s: float) -> None:
@@ -79,7 +79,7 @@ class Keeper:
         return (self._pending is None or now_s >= self._due_s) and self.write()
 
     def write(self) -> bool:
-        """Write what is pending at once, as on leaving the place; return whether there was something.
+        """Write a pending draft at once, such as on leaving the view; return whether there was one.
 
         Raises
         ------
@@ -99,7 +99,7 @@ class Keeper:
         return True
 
     def saved(self, base: str) -> None:
-        """Forget the draft: the file holds it. One that cannot be deleted stays due; `write` says why.
+        """Delete the draft, whose text was saved. If it cannot be deleted it stays due; `write` reports why.
 
         The draft of another program stays.
         """
@@ -134,7 +134,7 @@ def keep(file: Path, draft: Draft) -> None:
 
 
 def draft_of(file: Path) -> Draft | None:
-    """Return the draft of a study's file; None where there is none that can be read."""
+    """Return the draft of a study's file; None if there is no readable one."""
     try:
         kept: Any = parse_json(_draft_file(file).read_bytes())
         selected = tuple(step for step in kept["selected"] if isinstance(step, str | int))
@@ -145,7 +145,7 @@ def draft_of(file: Path) -> Draft | None:
 
 
 def drafted_files() -> tuple[Path, ...]:
-    """Return the files that have a draft, sorted; a draft that cannot be read has none."""
+    """Return the files that have a readable draft, sorted."""
     found: list[Path] = []
     for kept in draft_files():
         try:
@@ -158,7 +158,7 @@ def drafted_files() -> tuple[Path, ...]:
 
 
 def draft_files() -> tuple[Path, ...]:
-    """Return the files that drafts are kept in."""
+    """Return the files of drafts."""
     return tuple((data_folder() / "drafts").glob("*.json"))
 
 

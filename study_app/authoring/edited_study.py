@@ -1,4 +1,4 @@
-"""A study while it is edited: its text, what the text says, and its protocol or its faults."""
+"""A study while it is edited: its text, its document, and its protocol or faults."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = ["Refused", "Study", "Trial", "WriterError", "read"]
 
 @dataclass(frozen=True)
 class Study:
-    """A study's text; everything else follows from it.
+    """A study's text, from which all else is computed.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Study:
     folder : Path
         Where the liquid files are that it names.
     before : mapping
-        The document of the last text that was TOML, which stands in while this one is not.
+        The document of the last text that was valid TOML, used while this one is not.
     """
 
     text: str
@@ -48,7 +48,7 @@ class Study:
 
     @cached_property
     def _read(self) -> tuple[dict[str, Any] | None, Places, tuple[Problem, ...]]:
-        """The document with the files that it names and the lines it stands on; None where it is not TOML, and why."""
+        """The document with the files that it names and its line numbers; None and the reason if it is not TOML."""
         try:
             return *read_document(self._source, ""), ()
         except ProtocolError as error:
@@ -64,7 +64,7 @@ class Study:
 
     @cached_property
     def document(self) -> Mapping[str, Any]:
-        """The tables of the text, arrays as tuples; those of the last text that was TOML where this one is not."""
+        """The tables of the text, arrays as tuples; those of the last valid text if this one is not TOML."""
         document = self._read[0]
         if document is None:
             return self.before
@@ -73,28 +73,28 @@ class Study:
 
     @property
     def protocol(self) -> Protocol | None:
-        """The protocol, None where there are faults."""
+        """The protocol, None if there are faults."""
         return None if self.faults else self.formed
 
     @property
     def formed(self) -> Protocol | None:
-        """The protocol, also where forces beyond a limit are its only faults; None where there are others."""
+        """The protocol, even if it has forces beyond a limit; None if there are other faults."""
         return self._examined[0]
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """What is wrong, by path."""
+        """The faults, by path."""
         return self._examined[1]
 
     @cached_property
     def problems(self) -> tuple[Problem, ...]:
-        """What is wrong, as ``check`` prints it."""
+        """The faults, as ``check`` prints them."""
         _, places, broken = self._read
         return broken or located(self.faults, places)
 
     @property
     def is_toml(self) -> bool:
-        """Whether the text can be read; otherwise only its text can be edited."""
+        """Whether the text is valid TOML; otherwise only the text can be edited."""
         return self._read[0] is not None
 
     def needs(self, place: Path) -> bool:
@@ -106,7 +106,7 @@ class Study:
 
     @property
     def trial(self) -> Trial:
-        """The same study to try edits on.
+        """The same study for trial edits.
 
         Raises
         ------
@@ -154,7 +154,7 @@ class Study:
         return (self, ()) if old == text else (self._with(text), ((splice,),))
 
     def spliced(self, steps: tuple[Splices, ...]) -> Study:
-        """Return the study with splices applied, each to the text that the ones before it made."""
+        """Return the study with splices applied in sequence."""
         text = self.text
         for step in steps:
             text = applied(text, step)
@@ -166,7 +166,7 @@ class Study:
 
 @dataclass(frozen=True)
 class Trial(Study):
-    """A study to try edits on: what they mean, without the text that they make, which takes far longer to write.
+    """A study for trial edits: applies them to the document without the text, which takes far longer to write.
 
     Files that only edits name are not read.
     """
@@ -197,7 +197,7 @@ class Trial(Study):
 
 
 def read(source: bytes, folder: File = File()) -> Study:
-    """Return the study that a file's bytes hold.
+    """Return the study from a file's bytes.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Forms: the rows of a table of the study, made from the models of the file format; no form is written by hand."""
+"""Forms: the rows of a table of the study, generated from the models of the file format."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _OF_LENGTHS: Final = {
     "maxLength": "at most {} characters",
 }
 _WORDS: Final = {"design": "Trial design", "designs": "Trial designs"}
-"""What keys are called that do not read well: a study has a design, too."""
+"""Labels of keys whose names are unclear: a study has a design, too."""
 _SENTENCES: Final = re.compile(r"((?:[a-z_0-9-]+, )*[a-z_0-9-]+): ([^;]+?)(?:; |\.?\Z)")
 
 
@@ -55,12 +55,12 @@ LABELS: Final = {
     "level_error_ms": "Level error of delays",
     "participants": "Participants planned",
 }
-"""Labels of keys that do not read well, or like another one, without their unit."""
+"""Labels of keys whose names are unclear or ambiguous, without their unit."""
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """One value that can be chosen, with its sentence ("" where the model has none); None leaves the key out."""
+    """One value that can be chosen, with its description ("" if the model has none); None omits the key."""
 
     value: str | None
     sentence: str = ""
@@ -77,27 +77,27 @@ class Row:
     kind : str
         How it is edited, see `Kind`.
     label, unit, help : str
-        Its words, "" where there are none.
+        Its texts, "" if there are none.
     value : object
-        What the file holds, None where the key is left out.
+        The value in the file, None if the key is omitted.
     default : object
-        What counts where the key is left out; None where nothing does.
+        The value if the key is omitted; None if there is no default.
     required : bool
-        Whether the key cannot be left out.
+        Whether the key cannot be omitted.
     bounds : tuple of str
-        What is permitted, as messages say it: "at least 0", "at most 8".
+        The permitted values as in messages: "at least 0", "at most 8".
     reason : str
-        Why, "" where the model does not say.
+        The reason of the bounds, "" if the model has none.
     choices : tuple of Choice
-        What can be chosen, or named.
+        The values that can be chosen, or named.
     either : tuple of Row
-        Its alternatives, of kind "either" alone.
+        Its alternatives, only of kind "either".
     instead : str
-        The key that is given instead of this one, "" where there is none: exactly one of the two is.
+        The alternative key, exactly one of the two being given; "" if there is none.
     model : str
         The title of the model whose key it is, such as "Block".
     sections : tuple of str
-        The sections whose tables are named, of references alone.
+        The sections whose tables are named, only of references.
     """
 
     path: Path
@@ -140,7 +140,7 @@ def sections_of(document: Mapping[str, Any], path: Path) -> tuple[tuple[str, tup
 
 
 def refused_at(document: Mapping[str, Any], path: Path) -> frozenset[str]:
-    """Return the keys that do not belong to a table with what it gives."""
+    """Return the keys that do not belong to a table with its present values."""
     table = value_at(document, path)
     node = table_of(node_at(document, path), table) or {}
     if not isinstance(table, Mapping):
@@ -150,7 +150,7 @@ def refused_at(document: Mapping[str, Any], path: Path) -> frozenset[str]:
 
 
 def row_at(document: Mapping[str, Any], path: Path) -> Row | None:
-    """Return the row of one place; None where it is in nothing that a model knows."""
+    """Return the row of one place; None if it is not within a model."""
     siblings, value = node_at(document, path[:-1]), value_at(document, path)
     around = table_of(siblings, value_at(document, path[:-1]))
     if around is None:
@@ -249,7 +249,7 @@ def _bounds(node: Node, numbers: Node) -> tuple[str, ...]:
 
 
 def why_not(document: Mapping[str, Any], row: Row, number: float) -> str:
-    """Return what the number of a row must be and this one is not, such as "at most 8"; "" where it is permitted."""
+    """Return the bound that a number violates, such as "at most 8"; "" if it is permitted."""
     node = node_at(document, row.path)[0]
     if row.kind == "whole number" and not isinstance(number, int):
         return "a whole number"
@@ -269,7 +269,7 @@ def label_of(step: str | int) -> str:
 
 
 def unit_of(key: str) -> str:
-    """Return the unit that a key ends in, "" where it ends in none."""
+    """Return the unit at the end of a key, "" if it has none."""
     return UNITS.get(_suffix(key), "")
 
 

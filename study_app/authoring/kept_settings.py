@@ -1,7 +1,7 @@
-"""What is known of a study beside its file: of which study it is a copy, and how it is looked at.
+"""Settings of a study outside its file: the study it is a copy of, and how it is displayed.
 
-It is looked at in a language of the preview and with a number of simulated participants where the file plans others.
-These settings are kept with drafts and versions in the user's data folder; they change no protocol.
+It is displayed in a language of the preview and with a number of simulated participants that may differ from the plan.
+These settings are stored with drafts and versions in the user's data folder; they change no protocol.
 """
 
 import contextlib
@@ -18,23 +18,23 @@ Setting: TypeAlias = Literal["participants", "language", "copy_of"]
 
 
 def kept_participants(file: Path) -> int | None:
-    """Return how many participants a study is simulated with; None if none is kept, or it cannot be read."""
+    """Return the number of simulated participants of a study; None if it is not set, or cannot be read."""
     number = _kept(file).get("participants")
     return number if isinstance(number, int) and not isinstance(number, bool) else None
 
 
 def kept_language(file: Path) -> str:
-    """Return the language in which a study's pages are shown; "" where none is kept."""
+    """Return the language in which a study's pages are shown; "" if none is set."""
     return _kept_text(file, "language")
 
 
 def kept_original(file: Path) -> str:
-    """Return the name of the study that a study was copied from; "" where it is not known to be a copy."""
+    """Return the name of the study that a study was copied from; "" if it is not known to be a copy."""
     return _kept_text(file, "copy_of")
 
 
 def keep_setting(file: Path, name: Setting, value: int | str | None) -> None:
-    """Keep a setting for a study's file, None for the usual one; where it cannot be written, it is not kept."""
+    """Store a setting for a study's file, None for the default; ignore it if it cannot be written."""
     others = {key: one for key, one in _kept(file).items() if key not in {"file", name}}
     if value is not None:
         others[name] = value
@@ -46,13 +46,13 @@ def keep_setting(file: Path, name: Setting, value: int | str | None) -> None:
 
 
 def begin_settings(file: Path, copy_of: str = "") -> None:
-    """Forget the settings of another study that had this file, and keep which study it is a copy of."""
+    """Delete the settings of another study that had this file, and store the study it is a copy of."""
     forget_settings(file)
     keep_setting(file, "copy_of", copy_of or None)
 
 
 def forget_settings(file: Path) -> None:
-    """Forget the settings of another study that had this file."""
+    """Delete the settings of another study that had this file."""
     with contextlib.suppress(OSError):
         _kept_file(file).unlink(missing_ok=True)
 

@@ -14,16 +14,16 @@ from study_app.protocol.source.document import Path, value_at
 
 @dataclass(frozen=True, eq=False)
 class _New:
-    """A new element, and the id that it began with."""
+    """A new element, and its initial id."""
 
     began: str | int
 
 
 class FollowedIds:
-    """Knows elements by section and id: a place in a list changes as others come before it.
+    """Identifies elements by section and id, since an index in a list changes with insertions.
 
-    The id that an element began with stays known, since its steps may be undone; those in between are known again only
-    where undo or redo brings them back.
+    The initial id of an element stays known, since its steps may be undone; later ids are known again only if undo or
+    redo restores them.
     """
 
     def __init__(self) -> None:
@@ -36,7 +36,7 @@ class FollowedIds:
         self._known[key] = _New(key[-1])
 
     def rename(self, study: Study, path: Path, name: str) -> None:
-        """Let an id that is given by hand stay, and elements below it go on following."""
+        """Stop an id entered by the user from following; elements below it continue."""
         key = _key(study.document, path)
         new = (*key[:-1], name)
         below = {one: its for one, its in self._below(key, new).items() if one != new}
@@ -45,18 +45,18 @@ class FollowedIds:
         self._known |= below
 
     def forget_brought(self, before: Study, after: Study) -> None:
-        """Let ids that a typed or pasted text brings in stay."""
+        """Stop ids in a typed or pasted text from following."""
         for key in _brought({**self._known, **self._left}, before, after):
             self._known.pop(key, None)
             self._left.pop(key, None)
 
     def go_on(self, before: Study, after: Study) -> None:
-        """Let ids that undo or redo brings back follow again."""
+        """Let ids that undo or redo restores follow again."""
         for key in _brought(self._left, before, after):
             self._known[key] = self._left.pop(key)
 
     def element(self, study: Study, path: Path) -> object:
-        """Return what stands for a new element whatever its id is; None where its id does not follow its text."""
+        """Return the key of a new element, which does not depend on its id; None if its id does not follow its text."""
         return self._known.get(_key(study.document, path))
 
     def followed(
@@ -71,7 +71,7 @@ class FollowedIds:
         path : tuple of str or int
             The text.
         language, text : str
-            Its language, and what it will be; of several languages the first one counts.
+            Its language, and the new text; with several languages the first one counts.
         recorded : sequence of str
             Ids of the same table with recorded answers: none is changed or given to another element.
         """
@@ -92,11 +92,11 @@ class FollowedIds:
         return renamed(document, element, name), element if isinstance(element[-1], int) else new
 
     def _below(self, key: Path, new: Path) -> dict[Path, _New]:
-        """Return an element and those below it, by what they are once it has another id."""
+        """Return an element and those below it, under the element's new id."""
         return {(*new, *one[len(key) :]): its for one, its in self._known.items() if one[: len(key)] == key}
 
     def _forget(self, key: Path) -> dict[Path, _New]:
-        """Forget an element and those below it, and return them."""
+        """Remove an element and those below it, and return them."""
         gone = self._below(key, key)
         self._known = {one: its for one, its in self._known.items() if one not in gone}
         return gone
@@ -109,7 +109,7 @@ def _key(document: Mapping[str, Any], path: Path) -> Path:
 
 
 def _brought(known: Iterable[Path], before: Study, after: Study) -> list[Path]:
-    """Return the elements that are in a study only afterwards."""
+    """Return the elements that are only in the later study."""
     return [key for key in known if _has(after.document, key) and not _has(before.document, key)]
 
 

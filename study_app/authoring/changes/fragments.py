@@ -26,7 +26,7 @@ _BULLET: Final = re.compile(r"^\s*(?:[-*•]|\d{1,3}[.)])\s+")
 
 @dataclass(frozen=True, slots=True)
 class Pasted:
-    """A study's text after pasting, the edits that follow, and the paths of what is new."""
+    """A study's text after pasting, the additional edits, and the paths of the new elements."""
 
     text: str
     edits: tuple[Edit, ...]
@@ -61,13 +61,13 @@ def copied(study: Study, paths: Sequence[Path]) -> str:
 def pasted(study: Study, selected: Path, text: str) -> Pasted:
     """Return a study after elements, as TOML, are pasted after the selected one of their kind.
 
-    Names that are taken get a number, and what names them within the pasted text follows. Lines that are not TOML
-    become questions of the selected questionnaire.
+    Names already in use get a number, also in references within the pasted text. Lines that are not TOML become
+    questions of the selected questionnaire.
 
     Raises
     ------
     Refused
-        The text holds no element of a study, or there is nothing to paste it into.
+        The text contains no element of a study, or there is no element to paste it into.
     """
     text = text.replace("\r\n", "\n").strip("\n") + "\n"
     try:
@@ -144,7 +144,7 @@ def _items(study: Study, selected: Path, text: str, document: Mapping[str, Any])
 
 
 def _inserted(study: Study, after: Sequence[Path], text: str, meant: Mapping[str, Any]) -> str:
-    """Return the study's text with another one after the first of some elements that is there, else at its end."""
+    """Return the study's text with another one after the first existing one of some elements, else at its end."""
     spans = spans_of(study.text)
     pieces = next((pieces for path in after if (pieces := spans.pieces(path))), [])
     if any(piece.node.kind not in {"table", "array table"} for piece in pieces):

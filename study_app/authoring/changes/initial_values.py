@@ -13,14 +13,14 @@ from study_app.protocol.forms.scale import POINTS
 from study_app.protocol.source.document import Path, entries, value_at
 
 SINGULAR: Final = {"items": "question", "stimuli": "stimulus", "analysis": "analysis"}
-"""What an element of a section is called, where it is not the section without its last letter."""
+"""Singular names of sections' elements that are not the section's name without its last letter."""
 _PLURAL: Final = {"items": "questions"}
-"""What several elements of a section are called, where it is not the section."""
+"""Plural names of sections' elements that are not the section's name."""
 LETTER: Final = "^[A-Z]$"
 
 
 def singular(section: str | int) -> str:
-    """Return what an element of a section is called: "liquid" of ``liquids``."""
+    """Return the name of an element of a section: "liquid" of ``liquids``."""
     return SINGULAR.get(str(section), str(section).removesuffix("s"))
 
 
@@ -30,7 +30,7 @@ def counted_elements(number: int, section: str | int) -> str:
 
 
 def new_text(section: str | int) -> str:
-    """Return the text that an element of a list begins with: "New question" of ``items``."""
+    """Return the initial text of an element of a list: "New question" of ``items``."""
     return f"New {singular(section)}"
 
 
@@ -81,7 +81,7 @@ def _initial(document: Mapping[str, Any], row: Row, node: Node) -> Any:
 
 
 def _tables(document: Mapping[str, Any], path: Path, node: Node) -> list[dict[str, Any]]:
-    """Return as many tables as a list needs, each with its required keys."""
+    """Return the least number of tables of a list, each with its required keys."""
     found: list[dict[str, Any]] = []
     for number in range(max(1, node.get("minItems", 1))):
         place = (*path, number)

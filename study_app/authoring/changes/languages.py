@@ -1,4 +1,4 @@
-"""Edits that add a language to every text of a study, fill in what it lacks, and take it away again."""
+"""Edits that add a language to every text of a study, fill in missing texts, and remove it again."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -37,7 +37,7 @@ def with_language(study: Study, code: str) -> tuple[Edit, ...]:
 
 
 def without_language(study: Study, code: str) -> tuple[Edit, ...]:
-    """Return the edits that take a language away with its texts.
+    """Return the edits that remove a language and its texts.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def without_language(study: Study, code: str) -> tuple[Edit, ...]:
 
 
 def filled_in(study: Study, code: str) -> tuple[Edit, ...]:
-    """Return the edits that copy the first language's texts where a language has none."""
+    """Return the edits that copy the first language's texts to missing texts of a language."""
     first = languages_of(study)[0]
     found: list[Edit] = []
     for path, text in texts_of(study):
@@ -73,31 +73,31 @@ def is_copied(texts: Mapping[str, Any], code: str, first: str) -> bool:
 
 
 def following(study: Study, path: Path, language: str) -> tuple[str, ...]:
-    """Return the languages whose copies follow a text that is typed in a language: it is the first one."""
+    """Return the languages whose copies follow a text that is typed in a language, if that is the first one."""
     texts, first = value_at(study.document, path), languages_of(study)[0]
     if language != first or not isinstance(texts, Mapping):
         return ()
     old = texts.get(first)
-    if old == new_text(ITEMS):  # nothing is said yet that could be translated
+    if old == new_text(ITEMS):  # there is no text to translate yet
         return ()
     return tuple(code for code in texts if code != first and texts[code] == old and is_copied(texts, code, first))
 
 
 class TypedCopies:
-    """Which languages follow a text while it is typed: decided where its typing begins, and not again at each key.
+    """Languages that follow a text while it is typed: determined when typing begins, not at each key.
 
-    So a translation that equals what is typed for a moment stays, and a copy follows through the empty text.
+    So a translation that equals the typed text for a moment stays, and a copy also follows an empty text.
     """
 
     def __init__(self) -> None:
         self._typing: tuple[object, tuple[str, ...], Mapping[str, Any]] | None = None
 
     def end(self) -> None:
-        """Let the text that is typed next begin anew."""
+        """Reset: the next typed text starts a new decision."""
         self._typing = None
 
     def following(self, study: Study, path: Path, language: str, field: object) -> tuple[str, ...]:
-        """Return the languages that follow; typing goes on in the same field, as long as the others keep their texts.
+        """Return the languages that follow; typing continues in one field while the other languages' texts stay.
 
         Parameters
         ----------
@@ -106,9 +106,9 @@ class TypedCopies:
         path : tuple of str or int
             The text.
         language : str
-            The language that is typed.
+            The language of the typed text.
         field : tuple
-            What is typed in.
+            The field in which the user types.
         """
         texts = value_at(study.document, path)
         texts = dict(texts) if isinstance(texts, Mapping) else {}

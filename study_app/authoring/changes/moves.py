@@ -12,7 +12,7 @@ from study_app.protocol.source.document import Path, has
 def moved(study: Study, entries: Sequence[Path], to: int) -> tuple[tuple[Edit, ...], tuple[Path, ...]]:
     """Return the edits that move entries of a list, in their order, before the entry ``to``, and their new paths.
 
-    Parts of the study are renumbered where they were numbered right before.
+    Parts of the study are renumbered if they were numbered correctly before.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def moved(study: Study, entries: Sequence[Path], to: int) -> tuple[tuple[Edit, .
     Raises
     ------
     Refused
-        They are not of one list.
+        They are not in one list.
     """
     places = sorted({entry[:-1] for entry in entries}, key=str)
     if len(places) != 1:

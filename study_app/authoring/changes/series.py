@@ -1,4 +1,4 @@
-"""A series of elements: copies of one that differ from it in one number, each with an id and a title that say it."""
+"""A series of elements: copies of one that differ in one number, each with that number in its id and title."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,12 +18,12 @@ from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.source.problems import Fault
 
 MOST: Final = 24
-"""So many values a series may have; code letters end at Z."""
+"""Greatest number of values of a series; code letters end at Z."""
 NUMBERS: Final = frozenset({"number", "whole number"})
-"""Kinds of rows that hold one number."""
+"""Kinds of rows with one number."""
 _DEEPEST: Final = 2
 _ALIKE: Final = frozenset({"pages"})
-"""Sections whose tables differ in their texts alone: copies of one that differ in a number are of no use."""
+"""Sections whose tables differ only in their texts, so that a series makes no sense."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class Member:
 
     @property
     def title(self) -> str:
-        """What it is called: its title in the first language, else its id in words."""
+        """Its displayed name: its title in the first language, else its id in words."""
         return next((text for _, text in self.titles), label_of(self.name))
 
 
@@ -64,7 +64,7 @@ def number_rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
 
 
 def series_starts(document: Mapping[str, Any], path: Path) -> tuple[Path, ...]:
-    """Return the elements that a series can begin with: the one at ``path``, of a section each one with a number."""
+    """Return the possible first elements of a series: the one at ``path``; for a section, each one with a number."""
     row = row_at(document, path) if len(path) == 1 else None
     inside = (
         [(*path, name) for name in names(document, str(path[0]))] if row is not None and row.kind == "tables" else []
@@ -157,9 +157,9 @@ def next_edits(study: Study, previous: Path, row: Row, member: Member) -> tuple[
 
 
 def problem_made(before: Study, after: Study, original: Path, made: Sequence[Path]) -> tuple[str, Path]:
-    """Return the first problem that a series adds to a study, in words, and its place; "" where it adds none.
+    """Return the first problem that a series adds to a study, in words, and its place; "" if it adds none.
 
-    A problem that the element had before, such as a text that is missing, may be that of its copies, too.
+    Copies may have problems that the original already had, such as a missing text.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def problem_made(before: Study, after: Study, original: Path, made: Sequence[Pat
 
 
 def _as_before(fault: Fault, original: Path, made: Sequence[Path]) -> tuple[Path, str]:
-    """Return a problem as the original element had it: with its id instead of a copy's, without list indices."""
+    """Return a problem as that of the original element: with its id instead of a copy's, without list indices."""
     path = original + fault.path[2:] if fault.path[:2] in made else fault.path
     message = fault.message
     for _, name in made:
@@ -247,7 +247,7 @@ def _free(taken: set[str], stem: str, word: str) -> str:
 def _titles(
     document: Mapping[str, Any], path: Path, value: float, row: Row, *, first: bool
 ) -> Iterator[tuple[Path, str]]:
-    """Yield an element's titles with a number: in place of the one before, else at the end of all but the first."""
+    """Yield an element's titles with a number: replacing the last one, else at the end, except the first."""
     number = re.compile(rf"(?:(?<!\w)[-{MINUS}])?\d+(?:[.,]\d+)?(?=\s*(?:{re.escape(row.unit)})?\s*$)")
     for place, text in _texts(document, path):
         last = number.search(text)

@@ -11,12 +11,12 @@ LONGEST: Final = 40
 
 
 def short_of(text: str) -> str:
-    """Return the short text that a question begins with: so many letters of its text."""
+    """Return the initial short text of a question: the beginning of its text."""
     return " ".join(text.split())[:LONGEST].rstrip(" ?.!:")
 
 
 def followed(study: Study, path: Path, language: str, text: str) -> tuple[Edit, ...]:
-    """Return the edit of the short text of a question whose text is typed; none where it says something else.
+    """Return the edit of the short text of a question whose text is typed; none if it was edited separately.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ def followed(study: Study, path: Path, language: str, text: str) -> tuple[Edit, 
     path : tuple of str or int
         The text.
     language, text : str
-        Its language, and what it will be.
+        Its language, and the new text.
     """
     place = (*path[:-1], "short")
     before, short = value_at(study.document, path), value_at(study.document, place)
