@@ -1,4 +1,4 @@
-"""Writing that is whole or absent: a reader, or the next start after a power cut, never meets half a file."""
+"""Atomic writing: neither a reader nor the next start after a power cut ever finds a partial file."""
 
 import contextlib
 import errno
@@ -16,17 +16,17 @@ from typing import BinaryIO
 
 from study_app.errors import StoreError
 
-OLD_S = 3600.0  # no program takes so long from the last write to a half to its name
-_TEMPORARY = re.compile(r"\.[^.].*\.[0-9a-f]{8}\.tmp")  # not those of hidden files: markers come and go
+OLD_S = 3600.0  # longer than from the last write of a temporary file to its renaming
+_TEMPORARY = re.compile(r"\.[^.].*\.[0-9a-f]{8}\.tmp")  # without those of hidden files: markers are created and removed
 
 
 def write_file(path: Path, content: bytes, *, waits: bool = True, changed_ns: int | None = None) -> None:
-    """Put ``content`` at ``path``, replacing what was there in one step.
+    """Write ``content`` to ``path``, replacing an existing file in one step.
 
     Written under a temporary name, flushed to the disk, renamed over the old file, and the folder's entry flushed. On
     any failure the old file is untouched and no temporary file is left. Without ``waits`` nothing is flushed: for files
-    that can be made again, since a power cut may then take them. ``changed_ns`` is when the file is said to have been
-    changed last [ns since 1970], by default now.
+    that can be recreated, since a power cut may then lose them. ``changed_ns`` is the modification time to set [ns
+    since 1970], by default now.
 
     Raises
     ------
@@ -56,12 +56,12 @@ def _passing_file(path: Path, written: Path) -> Iterator[Path]:
 
 
 def create_folder(path: Path, files: Mapping[str, bytes], *, waits: bool = True, mode: int = 0o666) -> bool:
-    """Create folder ``path`` holding ``files``, or return False where another program was first.
+    """Create folder ``path`` with ``files``, or return False if another program was first.
 
-    The folder is filled under a temporary name and renamed into place, which no system does over a folder that holds
-    something: of two programs exactly one succeeds, and the other finds every file whole. Without ``waits`` nothing is
-    flushed: for what can be made again, since a power cut may then take it. ``mode`` is what the files may be at most
-    to whom.
+    The folder is filled under a temporary name and renamed into place, which no system does over a folder that is not
+    empty: of two programs exactly one succeeds, and the other finds complete files. Without ``waits`` nothing is
+    flushed: for files that can be recreated, since a power cut may then lose them. ``mode`` limits the files'
+    permissions.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def create_folder(path: Path, files: Mapping[str, bytes], *, waits: bool = True,
 
 
 def copy_folder(folder: Path, to: Path) -> None:
-    """Copy a folder with all that it holds to ``to``, which must not exist, whole or not at all.
+    """Copy a folder with its contents to ``to``, which must not exist, atomically.
 
     Raises
     ------
@@ -110,12 +110,12 @@ def copy_folder(folder: Path, to: Path) -> None:
 def append_line(path: Path, line: bytes, *, waits: bool = True) -> None:
     """Add ``line`` (which ends in a newline) to the end of ``path`` and, with ``waits``, flush it to the disk.
 
-    A torn line left by a power cut is closed with a newline first, so that it cannot swallow this one.
+    An incomplete line left by a power cut is ended with a newline first, so that it does not merge with this one.
 
     Raises
     ------
     StoreError
-        The file cannot be written; the part of the line that was, is taken back.
+        The file cannot be written; a partly written line is removed.
     """
     try:
         with path.open("a+b", buffering=0) as file:
@@ -134,14 +134,14 @@ def append_line(path: Path, line: bytes, *, waits: bool = True) -> None:
 
 
 def replace_end(path: Path, start: int, content: bytes) -> None:
-    """Put ``content`` in the place of all that follows the first ``start`` bytes of ``path``, without a flush.
+    """Replace everything after the first ``start`` bytes of ``path`` by ``content``, without a flush.
 
     A program killed meanwhile leaves the first ``start`` bytes and the beginning of ``content``.
 
     Raises
     ------
     StoreError
-        The file cannot be written; the old end is put back as far as the system takes it.
+        The file cannot be written; the old end is restored as far as the system permits.
     """
     try:
         with path.open("r+b", buffering=0) as file:
@@ -161,26 +161,26 @@ def replace_end(path: Path, start: int, content: bytes) -> None:
 
 
 def write_whole(file: BinaryIO, content: bytes) -> None:
-    """Write all of ``content`` to an unbuffered ``file``, however many writes the system makes of it."""
+    """Write all of ``content`` to an unbuffered ``file``, in as many writes as the system needs."""
     rest = memoryview(content)
     while rest:
         rest = rest[file.write(rest) :]
 
 
 def temporary_path(path: Path) -> Path:
-    """Return a new name in the folder of ``path`` for what is to become ``path`` in one step."""
+    """Return a new temporary name in the folder of ``path``, to be renamed to ``path``."""
     return path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
 
 
 def temporaries(folder: Path) -> tuple[Path, ...]:
-    """Return what is half-written in ``folder`` itself, by a program that writes now or one that was killed."""
+    """Return the temporary files in ``folder`` itself, of a program that writes now or was killed."""
     return tuple(sorted(path for path in folder.glob(".*.tmp") if _TEMPORARY.fullmatch(path.name)))
 
 
 def sweep_old(folder: Path) -> None:
-    """Take away what a killed program left half-written in ``folder``, into which others may write now.
+    """Remove temporary files of killed programs from ``folder``, into which others may write now.
 
-    Only what is older than any such moment; what cannot be taken away stays.
+    Only files too old to be in use are removed; what cannot be removed stays.
     """
     for path in temporaries(folder):
         with contextlib.suppress(OSError):
@@ -189,20 +189,20 @@ def sweep_old(folder: Path) -> None:
 
 
 def paths_in(folder: Path) -> list[Path]:
-    """Return all files and folders at any depth of ``folder``, sorted; a folder may go while it is looked at."""
+    """Return all files and folders at any depth of ``folder``, sorted; folders may vanish meanwhile."""
     levels = os.walk(folder)
     return sorted(Path(above) / name for above, folders, names in levels for name in (*folders, *names))
 
 
 def sweep(folder: Path) -> tuple[Path, ...]:
-    """Take away what a killed program left half-written in ``folder`` itself; return what it was.
+    """Remove temporary files of killed programs from ``folder`` itself; return them.
 
     Only for a folder that no other program writes into now.
 
     Raises
     ------
     StoreError
-        Something cannot be taken away.
+        A file cannot be removed.
     """
     found = temporaries(folder)
     for path in found:
@@ -219,7 +219,7 @@ def sweep(folder: Path) -> tuple[Path, ...]:
 def probe(folder: Path) -> int:
     """Return how many bytes are free in ``folder`` (or the nearest one above it that exists), having written there.
 
-    A small file is written through to the disk and taken away again; nothing else is touched.
+    A small file is written, flushed to the disk and removed; nothing else is changed.
 
     Raises
     ------
@@ -247,7 +247,7 @@ def disk_time_ns(folder: Path) -> int:
 
 def sync_folder(path: Path) -> None:
     """Flush the folder's entries, so that a file created or renamed in it survives a power cut."""
-    if sys.platform == "win32":  # a folder cannot be opened there; the file system orders its own entries
+    if sys.platform == "win32":  # a folder cannot be opened there; the file system orders its entries itself
         return
     descriptor = os.open(path, os.O_RDONLY)
     try:
@@ -272,7 +272,7 @@ def is_there(path: Path) -> bool:
     Raises
     ------
     StoreError
-        The system does not let us look.
+        The system denies access.
     """
     try:
         path.stat()
@@ -327,7 +327,7 @@ def study_root(path: Path) -> Path:
 
 
 def cause(error: OSError) -> str:
-    """Return the system's own word for ``error``, without the path (which the message names once)."""
+    """Return the system's message for ``error``, without the path, which the caller's message names."""
     return error.strerror or type(error).__name__
 
 

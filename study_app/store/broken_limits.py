@@ -1,4 +1,4 @@
-"""Which of a trial's measures break the limits of its protocol."""
+"""Checks a trial's measures against the limits of its protocol."""
 
 from collections.abc import Mapping
 from typing import Any, TypeAlias
@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 Broken: TypeAlias = tuple[str, float, float]
 """A measured column that breaks a limit, its value and the limit, both in the limit's unit: ms or percent."""
 
-# What is judged in a trial's row by which limit of the protocol.
+# Columns of a trial's row and the protocol's limit for each.
 _JUDGED = (
     ("lateness_p99_ms", "lateness_ms"),
     ("worst_gap_ms", "worst_gap_ms"),
@@ -19,7 +19,7 @@ _LEAST = "targets_reached"  # judged by "targets_percent": the only measure with
 
 
 def within_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> bool | None:
-    """Return whether a trial's measured columns keep the protocol's limits, by size; None where nothing was measured.
+    """Return whether a trial's measured columns are within the protocol's limits, by size; None without measurements.
 
     ``limits`` are those of the journal's first line, or ``Limits`` of a protocol as a mapping.
     """

@@ -1,4 +1,4 @@
-"""``checksums.sha256``: what every file of a session was when it had ended, in the form that ``sha256sum -c`` reads."""
+"""``checksums.sha256``: SHA-256 of every file at the session's end, in the format of ``sha256sum -c``."""
 
 import hashlib
 import re
@@ -32,8 +32,8 @@ def write_checksums(session: SessionFolder, known: Mapping[str, str]) -> dict[st
 def renew_checksums(session: SessionFolder, rewritten: Collection[Path], known: Mapping[str, str]) -> bool:
     """Bring the list up to date with files that were ``rewritten``; return whether it changed.
 
-    What it says of all others stays, so that it never vouches for a file it has not seen when the session ended; a list
-    that is missing or none is made anew. Every change is noted in ``rebuilt.txt``, which is listed, too.
+    Other entries stay, so that the list only covers files as they were when the session ended; a missing or invalid
+    list is made again. Every change is noted in ``rebuilt.txt``, which is listed, too.
 
     Raises
     ------
@@ -57,10 +57,10 @@ def renew_checksums(session: SessionFolder, rewritten: Collection[Path], known: 
 
 
 def replace_checksums(session: SessionFolder, contents: Mapping[str, tuple[bytes, bytes]]) -> None:
-    """Replace the SHA-256 of files by that of their new contents, where the list has that of the old.
+    """Replace the SHA-256 of files by that of their new contents, if the list has that of the old.
 
-    ``contents`` are the old and the new by path in the session's folder. A file of which the list says something else
-    was changed since the session ended: that stays to be seen.
+    ``contents`` are the old and the new by path in the session's folder. A file with another SHA-256 in the list was
+    changed since the session ended, which must stay visible.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def replace_checksums(session: SessionFolder, contents: Mapping[str, tuple[bytes
 
 
 def note_rebuilt(session: SessionFolder, what: str) -> None:
-    """Note for good what `rebuild` made again of what proves a session: nothing before then is proved by it.
+    """Note permanently which proofs of a session `rebuild` made again: they prove nothing about earlier changes.
 
     Raises
     ------

@@ -6,7 +6,7 @@ from datetime import datetime, timedelta
 
 
 class SessionClock:
-    """Seconds since one origin on a monotonic clock; the wall clock is read once, so setting it changes nothing.
+    """Seconds since one origin on a monotonic clock; the wall clock is read only once, so setting it has no effect.
 
     Parameters
     ----------
@@ -15,7 +15,7 @@ class SessionClock:
     origin_at : datetime, optional
         Wall time at the origin, with its zone; by default so that the present moment is now.
     shown_s : float
-        What the clock shows at present: more than 0 in a session that goes on [s].
+        Present time of the clock, more than 0 in a resumed session [s].
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""What the analysis leaves out, by which rule or person and why. Data are never deleted; this list says what counts."""
+"""Exclusions from the analysis: by which rule or person, and why. Data are never deleted."""
 
 import codecs
 import contextlib
@@ -51,7 +51,7 @@ def exclude(
     reason: str,
     now: datetime | None = None,
 ) -> Exclusion:
-    """Leave a session of the study in ``folder``, or one of its trials, out of the analysis.
+    """Exclude a session of the study in ``folder``, or one of its trials, from the analysis.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def exclude(
     session : int
         The session's number.
     trial : int, optional
-        The trial's number; by default the whole session is left out.
+        The trial's number; by default the whole session is excluded.
     by : str
         The rule, or the initials of the person.
     reason : str
@@ -100,9 +100,9 @@ def include(
     reason: str,
     now: datetime | None = None,
 ) -> Exclusion:
-    """Take back that a session, or one of its trials, is left out; return the decision that no longer holds.
+    """Reverse the exclusion of a session, or of one of its trials; return that exclusion.
 
-    Its row leaves ``exclusions.csv``; ``exclusions_reversed.jsonl`` keeps it, with who took it back, when and why.
+    Its row is moved from ``exclusions.csv`` to ``exclusions_reversed.jsonl``, with who reversed it, when and why.
 
     Raises
     ------
@@ -132,12 +132,12 @@ def _refuse_empty(by: str, reason: str, why: str) -> None:
 
 
 def exclusions(folder: Path) -> tuple[Exclusion, ...]:
-    """Return what is left out of the study in ``folder``, in the order of the decisions.
+    """Return the exclusions of the study in ``folder``, in the order of the decisions.
 
     Raises
     ------
     StoreError
-        The list cannot be read, or a row of it makes no sense.
+        The list cannot be read, or a row of it is invalid.
     """
     path = StudyFolder(folder).exclusions
     try:
@@ -157,7 +157,7 @@ def exclusions(folder: Path) -> tuple[Exclusion, ...]:
 
 
 def reversals(folder: Path) -> tuple[Exclusion, ...]:
-    """Return the exclusions of the study in ``folder`` that were taken back, in the order of these decisions.
+    """Return the reversed exclusions of the study in ``folder``, in the order of the reversals.
 
     Raises
     ------
@@ -166,7 +166,7 @@ def reversals(folder: Path) -> tuple[Exclusion, ...]:
     """
     path = StudyFolder(folder).reversed_exclusions
     try:
-        lines = read_regular(path).split(b"\n")  # a reason may hold other ends of a line
+        lines = read_regular(path).split(b"\n")  # a reason may contain other line endings
     except FileNotFoundError:
         return ()
     except OSError as error:
@@ -184,7 +184,7 @@ def _reversed(path: Path, number: int, line: bytes) -> Exclusion:
 
 
 def without_mark(content: bytes) -> bytes:
-    """Return a file without the byte order mark that spreadsheets put before what they save as UTF-8."""
+    """Return a file's content without the byte order mark that spreadsheets write before UTF-8."""
     return content.removeprefix(codecs.BOM_UTF8)
 
 
@@ -225,6 +225,6 @@ def _few(ids: tuple[str, ...]) -> str:
 
 
 def named(row: Exclusion) -> str:
-    """Return what is left out, in words."""
+    """Return a description of the exclusion."""
     trial = "" if row.trial is None else f", trial {row.trial}"
     return f"participant {row.participant}, session {row.session}{trial}"

@@ -1,4 +1,4 @@
-"""Files and folders handed to the user: all of them whole, or none."""
+"""Files and folders written for the user, all or none."""
 
 import contextlib
 import hashlib
@@ -21,10 +21,10 @@ class FileCopy(NamedTuple):
 
 
 def write_files(to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, ...]:
-    """Put ``files`` (name to content) into the folder ``to``, which is created; older files of these names give way.
+    """Put ``files`` (name to content) into the folder ``to``, which is created; replace older files.
 
     All are written under temporary names and flushed to the disk before the first takes its name, so that a full disk
-    changes nothing. What a killed program left half-written there is taken away at the end, when it is old.
+    changes nothing. Old temporary files of killed programs there are removed at the end.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def _parts(copied: FileCopy) -> Iterator[bytes]:
 
 
 def make_folder(to: Path) -> None:
-    """Make the folder for reports before the work begins, not minutes or days after.
+    """Create the folder for reports before the work, so that errors appear at once.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""The program's log: a file in the user's folder that tells where something failed, and nothing of a study.
+"""The program's log: a file in the user's folder that shows where something failed, without data of a study.
 
-A message's words are in the source; what is put into them may be anything: an id, an answer, a liquid's value. So a
-record is written with the words alone, and of what stands in them only the sentence of a device's failure. An exception
-is written as its type and the places in the source that it left, without its own sentence.
+The arguments of a message may be anything: an id, an answer, a liquid's value. So a record is written as its format
+string without arguments, except the message of a device's failure. An exception is written as its type and source
+locations, without its message.
 """
 
 import logging
@@ -19,12 +19,12 @@ from study_app.user_folder import user_folder
 MOST_BYTES: Final = 250_000
 KEPT: Final = 2  # files besides the newest
 OMITTED: Final = "…"
-DEVICE_FAILED: Final = "the device failed: %s"  # an error to whoever helps; the session says it itself, and goes on
+DEVICE_FAILED: Final = "the device failed: %s"  # an error for support; the session reports it itself, and continues
 _ERROR: Final = re.compile(rf"\S+ \S+ (ERROR|CRITICAL|\S+ \S+ {DEVICE_FAILED.partition('%')[0]})")
 
 
 class PlainFormatter(logging.Formatter):
-    """Writes a record without what is put into its words."""
+    """Writes a record without its arguments."""
 
     def __init__(self) -> None:
         super().__init__("%(asctime)s %(levelname)s %(name)s: %(message)s")
@@ -39,7 +39,7 @@ class PlainFormatter(logging.Formatter):
         return super().format(record)
 
     def formatException(self, ei: Any) -> str:  # noqa: N802 - logging's name
-        """Return the type of an exception and the places that it left, outermost first."""
+        """Return the type of an exception and its source locations, outermost first."""
         kind, _, trace = ei
         places = [
             f"    {source_place(frame.filename)}:{frame.lineno} in {frame.name}"
@@ -49,19 +49,19 @@ class PlainFormatter(logging.Formatter):
 
 
 class _Quiet(RotatingFileHandler):
-    """A log that cannot be written is no reason to disturb a session."""
+    """A log file whose write errors do not disturb a session."""
 
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802 - logging's name
         """Do nothing."""
 
 
 def log_file() -> Path:
-    """Return where the log is, or would be."""
+    """Return the path of the log, which may not exist."""
     return user_folder() / "log.txt"
 
 
 def keep_log() -> None:
-    """Write what the program logs into `log_file` from now on, and warnings to the terminal as before."""
+    """Write the program's log to `log_file` from now on, and warnings still to the terminal."""
     logger = logging.getLogger("study_app")
     if any(isinstance(handler, _Quiet) for handler in logger.handlers):
         return
@@ -76,7 +76,7 @@ def keep_log() -> None:
 
 
 def kept_log() -> str:
-    """Return the log, the oldest line first; what cannot be read is left out."""
+    """Return the log, the oldest line first, without unreadable files."""
     newest = log_file()
     files = [newest.with_name(f"{newest.name}.{number}") for number in range(KEPT, 0, -1)]
     return "".join(map(_read, (*files, newest)))
@@ -89,7 +89,7 @@ def last_error(log: str) -> str:
 
 
 def source_place(path: str) -> str:
-    """Return a source file by its place in its package: where a program is installed may name its user."""
+    """Return a source file relative to its package: the folder of the installation may contain the user's name."""
     parts = Path(path).parts
     for root in ("study_app", "site-packages"):
         if root in parts:

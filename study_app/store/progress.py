@@ -1,6 +1,6 @@
-"""How far a session went and what happened in it: the one fold over a journal, which is all that it reads.
+"""The progress of a session and its events, computed only from its journal.
 
-Whoever resumes, shows or checks a session reads it here, so that they agree.
+Code that resumes, shows or checks a session uses this module, so that all agree.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -20,7 +20,7 @@ UNDELIVERED: Final = "invalid"
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """How a statement was answered so far; times on the session's clock [s], None where it did not happen yet."""
+    """The answer to a statement so far; times on the session's clock [s], None before the event."""
 
     onset_s: float | None = None
     first_s: float | None = None
@@ -39,7 +39,7 @@ class TrialAnswer:
 
 @dataclass(frozen=True, slots=True)
 class NoteLine:
-    """A note or mark as the operator wrote it, ``at_s`` in the time that was worked."""
+    """A note or mark of the operator, ``at_s`` in working time of the session."""
 
     at_s: float
     kind: str
@@ -48,7 +48,7 @@ class NoteLine:
 
 @dataclass(slots=True)
 class Progress:
-    """Where a session stands and what happened in it, by the lines of its journal that were taken (`take`).
+    """The progress of a session and its events, from the lines of its journal given to `take`.
 
     ``start`` is its first line: participant, session, seed, language and the rest. ``step`` is the index in the
     schedule of the step to continue at: the first that was not left behind. ``page`` (or form) or ``trial`` names
@@ -111,14 +111,14 @@ class Progress:
 
     @property
     def unconfirmed(self) -> dict[tuple[int, int], dict[str, Given]]:
-        """Of each attempt, by trial and attempt: the choices that no confirmation followed."""
+        """The choices without a confirmation, by trial and attempt."""
         found = dict(self._left_open)
         if self.trial is not None and (chosen := _chosen(self.answers)):
             found[self.trial, self.attempt] = chosen
         return found
 
     def take(self, line: Line) -> None:
-        """Follow one more line."""
+        """Process one more line."""
         at_s = line["t_s"]
         match line["event"]:
             case "session_started":
@@ -180,7 +180,7 @@ class Progress:
         self.t_s = max(self.t_s, at_s)
 
     def _go_to(self, page: str | None, trial: int | None) -> None:
-        """Go to a step, unless it is the one under way: then it is shown again."""
+        """Go to a step, unless it is the current one, which is then shown again."""
         if (self.page, self.trial) != (page, trial):
             if (self.page, self.trial) != (None, None):
                 self._leave()
@@ -201,7 +201,7 @@ class Progress:
         self.trial_since_s = self.trial_lasted_s = None
 
     def _start_trial(self, trial: int, attempt: int, at_s: float) -> None:
-        """Present a trial; one of before comes again where a whole block does."""
+        """Present a trial; an earlier one is repeated if its whole block is."""
         self._go_to(None, trial)
         self._drop_answers()
         self._forget(trial)
@@ -221,7 +221,7 @@ class Progress:
             self._reason = str(line["outcome"])
 
     def _note_repetition(self, line: Line) -> None:
-        """Keep why a trial of intervals is presented again."""
+        """Store why a trial of intervals is presented again."""
         trial = line["trial"]
         self.of_intervals = trial if is_of_intervals(line) else None
         if self.of_intervals is not None and line["attempt"] > 1 and self._reason != UNDELIVERED:
@@ -229,13 +229,13 @@ class Progress:
         self._reason = ""
 
     def _forget(self, trial: int) -> None:
-        """Forget what an earlier attempt of a trial left."""
+        """Clear the state of an earlier attempt of a trial."""
         self.answered.pop(trial, None)
         self.trial_answers.pop(trial, None)
         self.broken.pop(trial, None)
 
     def _resume(self, gap_s: float) -> None:
-        """Go on after a gap, which the session's clock counts as a pause."""
+        """Continue after a gap, which the session's clock counts as a pause."""
         self.resumed += 1
         self._reason = "program ended"
         self.paused, self.broke, self.trial_since_s, self.trial_lasted_s = False, "", None, None
@@ -254,7 +254,7 @@ class Progress:
 
 
 def progress(session_folder: Path) -> Progress:
-    """Return how far the session in ``session_folder`` went; a torn tail of its journal counts as never written.
+    """Return the progress of the session in ``session_folder``; an incomplete last line of its journal is ignored.
 
     Raises
     ------
@@ -266,7 +266,7 @@ def progress(session_folder: Path) -> Progress:
 
 
 def progress_of(lines: Sequence[Line]) -> Progress:
-    """Return how far a session went, from its journal's lines.
+    """Return the progress of a session from its journal's lines.
 
     Raises
     ------
@@ -304,12 +304,12 @@ def _timed(item: Mapping[str, Any]) -> TrialAnswer:
 
 
 def is_of_intervals(started: Mapping[str, Any]) -> bool:
-    """Return whether the line on a trial's beginning is of a trial of intervals: it says what they present."""
+    """Return whether the line of a trial's start is of a trial of intervals, whose contents it lists."""
     return "sealed" in started or "arrangement" in started
 
 
 def recordable(lines: Iterable[Line]) -> list[tuple[int, int, int | None]]:
-    """Return trial, attempt and interval of all that was recorded, or was to be; the interval is None in a trial."""
+    """Return trial, attempt and interval of all planned or existing recordings; the interval is None for a trial."""
     return [
         (line["trial"], line["attempt"], line.get("interval"))
         for line in lines
@@ -318,6 +318,6 @@ def recordable(lines: Iterable[Line]) -> list[tuple[int, int, int | None]]:
 
 
 def named(line: Mapping[str, Any]) -> str:
-    """Return the name of what a line is about: "trial 3, attempt 1", in a trial of intervals with the interval."""
+    """Return the subject of a line: "trial 3, attempt 1", in a trial of intervals with the interval."""
     interval = line.get("interval")
     return f"trial {line['trial']}, attempt {line['attempt']}" + ("" if interval is None else f", interval {interval}")

@@ -1,4 +1,4 @@
-"""What ran, for those who read the results later: everything but what the conditions are.
+"""The receipt, metadata of a session for readers of the results: everything except the conditions.
 
 The receipt holds the protocol without its liquids, its conditions and the blocks' lists of conditions (which are sealed
 in the key), the SHA-256 of the whole protocol file and of the sealed key, the seed and what it seeds, versions, device,
@@ -31,7 +31,7 @@ UNFINISHED = "unfinished"
 
 _LIBRARIES = ("numpy", "numba", "pydantic", "PySide6-Essentials", "pyqtgraph", "pyarrow")
 
-# What every receipt holds; the first of these lines are the journal's too, word for word.
+# Fields of every receipt; the first lines are also fields of the journal.
 FACTS = (
     "participant", "session", "study", "seed", "language", "operator", "simulated", "pilot", "recordings",
     "key_hash", "protocol_hash", "version",
@@ -103,7 +103,7 @@ def read(path: Path) -> dict[str, Any]:
     Raises
     ------
     StoreError
-        It is missing or no receipt.
+        It is missing or not a receipt.
     """
     try:
         receipt = parse_json(read_own(path, study_root(path)))
@@ -118,10 +118,10 @@ def read(path: Path) -> dict[str, Any]:
 
 
 def began_at(receipt: Mapping[str, Any]) -> str | None:
-    """Return when a session was begun by people, as ISO 8601; None where the receipt does not say.
+    """Return when a person began a session, as ISO 8601; None if the receipt does not contain it.
 
-    A pilot that is played from a later step began with steps that a simulated participant had answered: it was resumed
-    at once, at the time when it was played.
+    A pilot played from a later step begins with steps answered by a simulated participant, and is resumed at once, at
+    the time when it is played.
     """
     first = next(iter(receipt.get("resumed") or ()), None)
     skipped = isinstance(first, dict) and bool((receipt.get("screens") or {}).get("steps"))
@@ -134,7 +134,7 @@ def other_format(receipt: Mapping[str, Any], start: Mapping[str, Any]) -> bool:
 
 
 def _holds(name: str, value: object) -> bool:
-    """Return whether ``value`` is what a receipt's field called ``name`` holds."""
+    """Return whether ``value`` has the type of the receipt's field ``name``."""
     if name in (
         "versions",
         "device",

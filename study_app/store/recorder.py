@@ -1,9 +1,9 @@
-"""Recordings are written in the background: what happens at 1 kHz goes into a queue, a thread of its own to the disk.
+"""Recordings are written in the background: samples at 1 kHz are queued, and a separate thread writes them.
 
-Handing samples over never waits for the disk. Where the disk cannot keep up for two minutes, or takes nothing at all,
-samples are dropped and counted and the session goes on: answers are worth more than recordings. Whatever else fails
-loses that trial's recording alone, even where it ends the thread: the next trial starts another. `Recorder.lost` says
-so at once. In a rehearsal, where time waits for the program, handing over waits instead, and nothing is lost.
+Queueing never waits for the disk. If the disk is too slow for two minutes, or rejects all writes, samples are dropped
+and counted and the session continues: answers matter more than recordings. Any other failure loses only that trial's
+recording, even if it ends the thread: the next trial starts another. `Recorder.lost` reports it at once. In a
+rehearsal, in simulated time, queueing waits instead, and nothing is lost.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ if TYPE_CHECKING:
     from study_app.store.recording_writer import SamplesFile
     from study_app.video.frames import VideoFrame
 
-ROOM = 120_000  # samples that may wait: two minutes at 1 kHz, 37 MB
-ENOUGH = 5_000  # samples that are worth waking the thread for
+ROOM = 120_000  # capacity of the queue in samples: two minutes at 1 kHz, 37 MB
+ENOUGH = 5_000  # least number of samples for which the thread wakes
 PATIENCE_S = 30.0  # how long the end of a session waits for the disk
-LEAVING_S = 2.0  # how long a session that is left without an end does: nothing must hold up who ends the program
+LEAVING_S = 2.0  # the same without an end of the session: ending the program must not be delayed
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class Recorded:
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """A recording that could not be kept, and why."""
+    """A recording that could not be stored, and the reason."""
 
     trial: int
     attempt: int
@@ -80,7 +80,7 @@ class _End:
 
 
 class Recorder:
-    """Keeps the recordings of one session, a trial at a time: `start`, `append` and `frame`, `stop`.
+    """Writes the recordings of one session, one trial at a time: `start`, `append` and `frame`, `stop`.
 
     All but `close` return at once; use it from one thread.
 
@@ -89,16 +89,16 @@ class Recorder:
     folder : Path
         Where the files go; made when the first is written.
     facts : mapping
-        What every file says of itself. Nothing that tells a condition.
+        Metadata of every file, which must not reveal a condition.
     waits : bool
         Whether `append` waits for room instead of dropping: for rehearsals.
     room : int
-        How many samples may wait.
+        Capacity of the queue in samples.
 
     Attributes
     ----------
     thread : threading.Thread or None
-        What writes; None before the first trial, and after it ended by a failure.
+        The writing thread; None before the first trial, and after it ended by a failure.
     changed : threading.Condition
         Notified when a recording was kept or lost.
     """
@@ -126,10 +126,10 @@ class Recorder:
         self._dropped = 0
 
     def start(self, trial: int, attempt: int, rate_hz: float, interval: int | None = None) -> None:
-        """Begin the recording of a trial, or of one of its intervals; one that is under way is stopped first.
+        """Begin the recording of a trial, or of one of its intervals; stop a running one first.
 
-        Its first sample is best the one before the trial's first, of another scene: the force that the hand felt last
-        is what the trial's force moves from when it is computed again.
+        Its first sample should be the one before the trial's first, of another scene: a replay starts from the last
+        force on the hand.
         """
         self.stop()
         self._underway = trial, attempt, interval
@@ -145,7 +145,7 @@ class Recorder:
             self.changed.notify_all()
 
     def append(self, samples: Any) -> None:
-        """Hand over the next samples, in order (array of ``layout.SAMPLE``), which are not changed afterwards."""
+        """Queue the next samples, in order (array of ``layout.SAMPLE``), which must not be changed afterwards."""
         count = len(samples)
         if self._underway is None or count == 0:
             return
@@ -161,13 +161,13 @@ class Recorder:
                 self.changed.notify_all()
 
     def frame(self, painted_ns: int, sample_ns: int, video: VideoFrame | None = None) -> None:
-        """Keep that a frame was painted at one moment and showed another [ns, the servo's clock], with a ``video``."""
+        """Record the times when a frame was painted and that it shows [ns, the servo's clock], with a ``video``."""
         if self._underway is not None:
             seen = (-1, 0, -1) if video is None else (video.number, video.due_ns, _known(video.age_ns))
             self._frames.extend((painted_ns, sample_ns, *seen))
 
     def stop(self) -> None:
-        """End the recording under way, if any; `kept` will tell when it is on the disk."""
+        """End the running recording, if any; `kept` reports when it is on the disk."""
         if self._underway is None:
             return
         self._underway = None
@@ -177,23 +177,23 @@ class Recorder:
 
     @property
     def dropped(self) -> int:
-        """How many samples of the recording under way, or of the last one, were dropped."""
+        """Number of samples dropped from the running or last recording."""
         return self._dropped
 
     @property
     def lost(self) -> tuple[Lost, ...]:
-        """Every recording that could not be kept so far, known as soon as it is lost."""
+        """All recordings that could not be stored so far, updated as soon as one is lost."""
         with self.changed:
             return tuple(self._lost)
 
     def kept(self) -> tuple[Kept, ...]:
-        """Return what has become whole, or was lost, since the last call."""
+        """Return the recordings completed or lost since the last call."""
         with self.changed:
             found, self._kept = tuple(self._kept), []
         return found
 
     def settled(self) -> bool:
-        """End what is under way; return whether all is on the disk, or it took too long, without waiting for it.
+        """End the running recording; return without waiting whether all is on the disk, or the time limit has passed.
 
         Then `close` returns at once.
         """
@@ -209,7 +209,7 @@ class Recorder:
             self.changed.notify_all()
 
     def close(self, patience_s: float = PATIENCE_S) -> None:
-        """End what is under way and wait until all is on the disk, but not for ever; `kept` tells what became of it."""
+        """End the running recording and wait, for a limited time, until all is on the disk; `kept` reports it."""
         self._end(patience_s)
         if self.thread is not None:
             self.thread.join(max(0.0, min(patience_s, self._patient_until_s - time.monotonic())))
@@ -230,7 +230,7 @@ class Recorder:
             self._lose_all(f"its thread cannot be started: {error}")
 
     def _work(self) -> None:
-        """Write all that is handed over, in the recorder's thread; the next trial restarts it after a failure."""
+        """Write all queued data, in the recorder's thread; the next trial restarts it after a failure."""
         try:
             self._write()
         except BaseException as error:
@@ -282,7 +282,7 @@ class Recorder:
             shown = self._files.write_frames(frames_path, frames, facts)
             return Recorded(begin.trial, begin.attempt, file.finish(end.dropped), shown, end.dropped, begin.interval)
         except Exception as error:  # noqa: BLE001 - whatever it is, the next trial's recording is still to be written
-            with contextlib.suppress(Exception):  # what cannot be taken away either is named by a check of the folder
+            with contextlib.suppress(Exception):  # a check of the folder reports files that cannot be removed either
                 if file is not None:
                     file.abandon()
             with contextlib.suppress(Exception):
@@ -293,7 +293,7 @@ class Recorder:
             return Lost(begin.trial, begin.attempt, reason, begin.interval)
 
     def _make_folder(self) -> None:
-        """Create the folder, where it is missing, so that no power cut takes it with all that was journalled."""
+        """Create the folder if it is missing, and flush it so that it survives a power cut."""
         if not self._folder.is_dir():
             self._folder.mkdir()
             sync_folder(self._folder.parent)
@@ -313,7 +313,7 @@ class Recorder:
 
 
 class _Coming:
-    """What the queue still holds of the trial being written; ``end`` is its end, once that was met."""
+    """The queued samples of the trial being written; ``end`` is its end, once reached."""
 
     def __init__(self, take: Callable[[], Any]) -> None:
         self._take = take
@@ -335,7 +335,7 @@ class _Coming:
             yield np.concatenate(held)
 
     def skip(self) -> None:
-        """Pass over the rest of a trial that could not be kept."""
+        """Skip the rest of a trial that could not be stored."""
         while self._chunk() is not None:
             pass
 
@@ -373,13 +373,13 @@ def event_of(kept: Kept) -> tuple[str, dict[str, Any]]:
 
 
 def _keys(trial: int, attempt: int, interval: int | None) -> dict[str, int]:
-    """Return the fields that say what a recording is of."""
+    """Return the fields that identify the subject of a recording."""
     which = {"trial": trial, "attempt": attempt}
     return which if interval is None else {**which, "interval": interval}
 
 
 def hashes_of(lines: Sequence[Line]) -> dict[str, str]:
-    """Return path in the session's folder → SHA-256 of every recording that the journal tells of."""
+    """Return path in the session's folder → SHA-256 of every recording in the journal."""
     recorded = [line for line in lines if line["event"] == "recorded"]
     return {line["recording"]: line["sha256"] for line in recorded} | {
         line["recording_frames"]: line["frames_sha256"] for line in recorded

@@ -1,12 +1,12 @@
 """The files of a trial's recording: every sample of the servo, and every frame that was shown, as Parquet.
 
-Times, positions and velocities that a device measures are kept to the last bit, so that the trial can be computed again
-from them; velocities and forces, which then come out again, are rounded to steps far below what a device or a hand can
-tell, so that half an hour at 1 kHz takes 30 to 56 MB; a velocity that the device measures adds 43 MB at most. What was
-computed is proved by the CRC-32 of its exact numbers, one of every second.
+Times, positions and velocities measured by the device are stored exactly, so that the trial can be recomputed; computed
+velocities and forces are rounded to steps far below the resolution of device and hand, so that half an hour at 1 kHz
+takes 30 to 56 MB; a measured velocity adds 43 MB at most. A CRC-32 of the exact computed numbers of every second proves
+them.
 
-Positions, velocities and forces are in the frames of ``haptics.model.layout.SAMPLE``. Readers need no code of ours: any
-Parquet reader gives the columns, with unit and meaning in each column's metadata.
+Positions, velocities and forces are in the frames of ``haptics.model.layout.SAMPLE``. Any Parquet reader can read the
+columns, with unit and meaning in each column's metadata.
 """
 
 import zlib
@@ -47,7 +47,7 @@ ROUNDED_TO = {
 """Fields of ``layout.SAMPLE`` that are recorded rounded, and the step."""
 FRAME = np.dtype([(column.name, np.int64) for column in FRAMES])
 NO_VIDEO = {"video_frame": -1, "video_ns": 0, "video_age_ns": -1}
-"""What a frame without a video says of it."""
+"""Values of a frame without a video."""
 
 FACTS_KEY = b"liquid_study"
 AXES = ("x", "y", "z")
@@ -56,7 +56,7 @@ MEASURED = {
     **{f"orientation_{part}": ("orientation", i, MEASURED_ORIENTATION) for i, part in enumerate("wxyz")},
     "gripper_m": ("gripper_m", None, MEASURED_GRIPPER),
 }
-"""What a device may measure itself: field of ``layout.SAMPLE``, its component, and its bit."""
+"""Optional measurements of a device: field of ``layout.SAMPLE``, its component, and its bit."""
 _SINCE_2 = frozenset({"delay_ticks", *(f"undelivered_{axis}_n" for axis in AXES)})
 _SINCE_3 = frozenset({"measured", "device_time_ns", *MEASURED})
 _LACKING = {1: _SINCE_2 | _SINCE_3 | NO_VIDEO.keys(), 2: _SINCE_3 | NO_VIDEO.keys(), 3: NO_VIDEO.keys(), FORMAT: ()}
@@ -66,7 +66,7 @@ SHORT = frozenset({"buttons", "delay_ticks", "limiters", "measured", "scene", "s
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """A file that is whole on the disk."""
+    """A file that is complete on the disk."""
 
     path: Path
     rows: int
@@ -85,14 +85,13 @@ class Checks:
 def read_samples(path: Path) -> Any:
     """Return the samples (n,) as a recarray of ``SAMPLE``; ``busy_ns``, which is not recorded, is 0.
 
-    The first sample's force on the hand, from which the next one moves, is exact. Recordings of format 1 were made
-    where every device was taken to send what it was asked for, one tick late; until format 2 no device measured its
-    velocity.
+    The first sample's force on the hand, from which the next one moves, is exact. Recordings of format 1 assume that
+    every device sends the commanded force one tick late; until format 2 no device measured its velocity.
 
     Raises
     ------
     StoreError
-        It cannot be read, or is no recording of samples.
+        It cannot be read, or is not a recording of samples.
     """
     columns, facts = _read(path, "samples")
     samples = records(SAMPLE, len(columns["tick"]))
@@ -125,7 +124,7 @@ def read_frames(path: Path) -> Any:
     Raises
     ------
     StoreError
-        It cannot be read, or is no recording of frames.
+        It cannot be read, or is not a recording of frames.
     """
     columns, _ = _read(path, "frames")
     frames = records(FRAME, len(columns["painted_ns"]))
@@ -135,12 +134,12 @@ def read_frames(path: Path) -> Any:
 
 
 def read_facts(path: Path) -> dict[str, Any]:
-    """Return what the file says of itself, without reading its rows: facts, ``kind``, ``rows``.
+    """Return the file's metadata, without reading its rows: facts, ``kind``, ``rows``.
 
     Raises
     ------
     StoreError
-        It cannot be read, or is no recording of ours.
+        It cannot be read, or is not a recording of this program.
     """
     try:
         metadata = parquet.read_metadata(path)
@@ -173,7 +172,7 @@ def crcs(forces: NDArray[np.float64], rows: int) -> list[int]:
 
 
 def column_type(column: Column) -> pa.DataType:
-    """Return how a column is kept."""
+    """Return how a column is stored."""
     if column.kind == "flag":
         return pa.bool_()
     if column.kind == "integer":
@@ -238,7 +237,7 @@ def _facts(path: Path, metadata: Any) -> dict[str, Any]:
 
 
 def _check_facts_of_samples(facts: Mapping[str, Any], rows: int) -> None:
-    """Refuse facts that are no numbers where readers compute with them (KeyError, TypeError or ValueError)."""
+    """Reject facts that must be numbers and are not (KeyError, TypeError or ValueError)."""
     if rows and "first_device_force_n" not in facts:
         raise KeyError("first_device_force_n")
     checks = facts["crc32"]

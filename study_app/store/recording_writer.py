@@ -42,14 +42,14 @@ class SamplesFile:
     path : Path
         Where it is to be.
     facts : mapping
-        What the samples are of; kept in the file. Nothing that tells a condition.
+        Metadata of the samples, stored in the file; they must not reveal a condition.
     rate_hz : float
         Samples a second, nominally.
 
     Raises
     ------
     OSError
-        From every method: the disk does not take it.
+        From every method: the disk rejects the write.
     """
 
     def __init__(self, path: Path, facts: Mapping[str, Any], rate_hz: float) -> None:
@@ -79,7 +79,7 @@ class SamplesFile:
         return self._half.finish(facts, self.rows)
 
     def abandon(self) -> None:
-        """Take away what was written."""
+        """Remove what was written."""
         self._half.abandon()
 
 
@@ -89,7 +89,7 @@ def write_frames(path: Path, frames: NDArray[np.int64], facts: Mapping[str, Any]
     Raises
     ------
     OSError
-        The disk does not take it; nothing is left.
+        The disk rejects the write; nothing is left.
     """
     half = _Half(path, FRAMES)
     try:
@@ -110,7 +110,7 @@ def sample_columns(samples: Any) -> dict[str, NDArray[Any]]:
         "due_ns": samples["time_ns"] - samples["lateness_ns"],
         **{name: samples[name] for name in ("fresh", *sorted(SHORT), "device_time_ns")},
     }
-    with np.errstate(invalid="ignore", over="ignore"):  # a fault's numbers are kept as they are
+    with np.errstate(invalid="ignore", over="ignore"):  # values of a fault are stored unchanged
         device = _rounded(samples["device_force_n"], FORCE_STEP_N)
         undelivered = _rounded(samples["command_n"], FORCE_STEP_N) - device
         withheld = _rounded(samples["force_n"], FORCE_STEP_N) - device
@@ -170,7 +170,7 @@ class _Half:
         for end in (self._writer.close, self._file.close):
             try:
                 end()
-            except OSError:  # what it could not write is not wanted
+            except OSError:  # a file that could not be written is not needed
                 continue
         self._temporary.unlink(missing_ok=True)
 

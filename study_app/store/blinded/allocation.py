@@ -1,8 +1,8 @@
-"""Which group a participant is in: allocated once per participant, and sealed until the study is unblinded.
+"""The allocation of participants to groups: once per participant, and sealed until the study is unblinded.
 
 The participants of a folder have entries 1, 2 … in the order in which their first sessions began. An entry is claimed
-by creating ``blinding/allocated/NNN.json`` exclusively, so that of two programs each gets its own; it is never assigned
-again. The file has the entry, the participant, and, sealed, the group, which follows from entry and secret
+by creating ``blinding/allocated/NNN.json`` exclusively, so that two programs get different entries; it is never
+assigned again. The file has the entry, the participant, and, sealed, the group, which follows from entry and secret
 (`protocol.groups.allocation`).
 """
 
@@ -24,7 +24,7 @@ from study_app.store.journals.parsing import parse_json
 
 @dataclass(frozen=True, slots=True)
 class Allocation:
-    """A participant's entry and group; ``sealed`` is the group as journal and file have it."""
+    """A participant's entry and group; ``sealed`` is the group as stored in journal and file."""
 
     entry: int
     group: str = field(repr=False)
@@ -33,7 +33,7 @@ class Allocation:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """What the file of an entry holds; ``participant`` is empty where it was left before it was written."""
+    """The content of an entry's file; ``participant`` is empty if the program ended before it was written."""
 
     path: Path
     entry: int
@@ -107,7 +107,7 @@ def allocated(study: StudyFolder, key: Key, participant: str) -> Allocation | No
 
 
 def check_session(study: StudyFolder, protocol: Protocol, participant: str, session: int) -> None:
-    """Refuse a session that the participant does not have, as far as that is known; nothing is claimed.
+    """Reject a session that the participant does not have, as far as known; nothing is claimed.
 
     Raises
     ------
@@ -138,13 +138,13 @@ def session_protocol(study: StudyFolder, protocol: Protocol, participant: str, s
 
 
 def claims(study: StudyFolder) -> list[Claim]:
-    """Return what the files of all entries hold, in order."""
+    """Return the contents of all entries' files, in order."""
     paths = [path for path in study.allocated.glob("*.json") if path.stem.isdigit()]
     return [_claim(study, path) for path in sorted(paths, key=lambda path: int(path.stem))]
 
 
 def group_in(claim: Claim, key: Key) -> str | None:
-    """Return the group that the file of an entry has sealed; None where the file was changed."""
+    """Return the group sealed in an entry's file; None if the file was changed."""
     opened = open_text(_whose(claim.entry, claim.participant), claim.sealed, key, frozenset({"group"}))
     return None if opened is None else opened.get("group")
 
@@ -164,7 +164,7 @@ def entries_begun(study: StudyFolder) -> dict[str, int]:
 
 
 def _claim(study: StudyFolder, path: Path) -> Claim:
-    """Return what the file of an entry holds; nothing where it is damaged."""
+    """Return the content of an entry's file; nothing if it is damaged."""
     entry = int(path.stem)
     try:
         held = parse_json(read_own(path, study.path))

@@ -1,10 +1,10 @@
-"""Which code stands for which condition: drawn once per study, sealed, and opened only with a name and a reason.
+"""The key of codes to conditions: drawn once per study, sealed, and opened only with a name and a reason.
 
 ``blinding/key.sealed`` is base64 of a JSON object with the codes, the conditions' and liquids' tables and a 256-bit
-nonce. It is encoded, not encrypted: that stops accidental sight, and its SHA-256 in every receipt proves it unchanged;
-only its owner may read the file. The nonce keeps the hash from telling the key, however few keys there are, and
-encrypts what tells a condition in the journals (see ``sealing``). A real study's key comes from the operating system's
-randomness, a rehearsal's from its seed, and a folder holds one or the other.
+nonce. It is encoded, not encrypted: that prevents accidental reading, and its SHA-256 in every receipt proves that it
+is unchanged; only its owner may read the file. The nonce prevents guessing the key from the hash among few possible
+keys, and encrypts data in the journals that reveal a condition (see ``sealing``). A real study's key comes from the
+operating system's randomness, a rehearsal's from its seed, and a folder holds one or the other.
 """
 
 import base64
@@ -40,7 +40,7 @@ _OF_DESIGNS: Final = ("conditions", "standard", "stimulus", "standards", "method
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """The opened key. Never print, log or show what it holds before it was revealed.
+    """The opened key. Never print, log or show its content before it was revealed.
 
     ``codes`` is block → code → condition id, or track of a block with a design; ``tables`` holds the protocol's tables
     ``conditions`` and ``liquids``, of a study with designs also ``stimuli``, ``designs``, ``methods`` and
@@ -68,11 +68,11 @@ class Key:
             ) from None
 
     def delay_ms(self, block: str, code: str) -> float:
-        """Return the visual delay that was asked for [ms]."""
+        """Return the requested visual delay [ms]."""
         return float(self.tables["conditions"][self.condition(block, code)]["delay_ms"])
 
     def liquids(self, block: str, code: str) -> tuple[str, ...]:
-        """Return the ids of the liquids that were felt."""
+        """Return the ids of the liquids presented."""
         condition = self.tables["conditions"][self.condition(block, code)]
         return tuple(condition["liquids"]) if condition["liquid"] is None else (str(condition["liquid"]),)
 
@@ -88,9 +88,9 @@ def sealed_hash(folder: Path) -> str | None:
 def open_or_draw_key(
     folder: Path, protocol: Protocol, random: Callable[[], float] | None = None, files: Mapping[str, str] = NO_FILES
 ) -> Key:
-    """Return the study's key; draw and seal it where there is none.
+    """Return the study's key; draw and seal it if there is none.
 
-    Of two programs that start at once one draws, and the other reads what the first drew.
+    If two programs start at the same time, one draws the key and the other reads it.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def reveals(folder: Path) -> tuple[dict[str, str], ...]:
 
 
 def unreadable_reveals(folder: Path) -> tuple[tuple[int, bool], ...]:
-    """Return the numbers of the lines that record no reveal, and whether a power cut may have torn them."""
+    """Return the numbers of lines that are not reveals, and whether a power cut may have truncated them."""
     lines = [(number, line, record) for number, line, record in _reveal_lines(folder) if record is None]
     begins = b'{"at": "'
     return tuple((number, line[:8] == begins[: len(line)] and not line.endswith(b"}")) for number, line, _ in lines)
@@ -225,7 +225,7 @@ def _reveal_lines(folder: Path) -> Iterator[tuple[int, bytes, dict[str, str] | N
 
 
 def _is_reveal(record: object) -> bool:
-    """Return whether a line says when the key was opened, by whom, why, and which."""
+    """Return whether a line records when, by whom and why the key was opened, and which key."""
     return (
         _is_texts(record)
         and isinstance(record, dict)
@@ -298,8 +298,8 @@ def verified_key(study: StudyFolder) -> Key:
 def _published_hash(session: SessionFolder) -> str | None:
     """Return the key's hash that a session published.
 
-    In its receipt; where that cannot be read in its journal's first line, so that one damaged session stops no other;
-    None where neither can be.
+    It is read from the receipt, or else from the journal's first line, so that a damaged session does not block others;
+    None if neither is readable.
     """
     with contextlib.suppress(StoreError):
         return str(receipt.read(session.receipt)["key_hash"])
@@ -310,12 +310,12 @@ def _published_hash(session: SessionFolder) -> str | None:
 
 
 def read_key(folder: Path) -> Key:
-    """Open the key without looking whether it is the one the sessions ran under. Never print what it holds.
+    """Open the key without checking that it is the one the sessions ran under. Never print its content.
 
     Raises
     ------
     StoreError
-        It is missing or no key.
+        It is missing or not a key.
     """
     path = StudyFolder(folder).key
     sealed = read_own(path, folder)
@@ -361,7 +361,7 @@ def _is_texts(value: object) -> bool:
 
 def _refuse_if_lost(study: StudyFolder) -> None:
     under = [session for session in study.sessions() if is_there(session.receipt)]
-    if under and not is_there(study.key):  # asked again: another program may just have drawn it
+    if under and not is_there(study.key):  # checked again: another program may just have drawn it
         raise StoreError(
             f"{study.key} is missing, though {len(under)} sessions ran under it: restore it from a copy; without it no "
             "code can be translated"

@@ -1,6 +1,6 @@
 """The rule `catch`: sessions with too many incorrect answers to catch trials are excluded, once the key is open.
 
-Any earlier, the count would reveal which answers were correct.
+Before that, the count would reveal which answers were correct.
 """
 
 import contextlib
@@ -49,7 +49,7 @@ def exclude_inattentive(folder: Path) -> tuple[Exclusion, ...]:
 
 
 def _missed(session: SessionFolder, key: Key) -> Iterator[str]:
-    """Yield of each block with too many incorrect answers to catch trials how many there were."""
+    """Yield the number of incorrect answers to catch trials of each block with too many."""
     published = receipt.read(session.receipt)["protocol"]
     if not any("catch" in block for block in published["blocks"].values()):
         return

@@ -1,9 +1,9 @@
-"""The force model as a session resolved it: kept in its receipt, so that resume and replay do not resolve it again.
+"""The force model as resolved in a session: stored in its receipt, so that resume and replay do not resolve it again.
 
 A file may leave the choice of effects and laws to the program (``effects = "auto"``) and its estimator to the format's
 default; another version of the program may choose otherwise. The receipt's protocol names the estimator. Effects and
-laws of each liquid tell a condition: the receipt holds them as one sealed text, ``resolved``. Where a stimulus varies a
-liquid, the file names its effects, so they hold at every level.
+laws of each liquid reveal a condition: the receipt contains them as one sealed text, ``resolved``. Where a stimulus
+varies a liquid, the file names its effects, so they hold at every level.
 """
 
 from collections.abc import Mapping

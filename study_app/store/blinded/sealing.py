@@ -1,10 +1,10 @@
-"""What was measured of a trial and can tell its condition: unreadable in the journal until the study's key is opened.
+"""Measures of a trial that can reveal its condition: encrypted in the journal until the study's key is opened.
 
 A line ``trial_ended`` or ``interval_ended`` holds these columns, a line ``trial_started`` of a trial with a design what
 it presents, as one text, ``sealed``: in hexadecimal digits a tag, and their JSON
 encrypted with the nonce of the sealed key. The tag is the HMAC-SHA256 of session, trial and JSON; the JSON is combined
 with SHAKE-256 of nonce and tag by exclusive or. So equal numbers of two trials look different, and a changed or moved
-text is found (a synthetic initialisation vector as in RFC 5297, with the standard library's hashes). Spaces make all
+text is detected (a synthetic initialisation vector as in RFC 5297, with the standard library's hashes). Spaces make all
 texts equally long.
 """
 
@@ -45,7 +45,7 @@ def sealed(start: Mapping[str, Any], event: str, fields: dict[str, Any], key: Ke
 
 
 def seal(whose: Sequence[object], values: Mapping[str, Any], key: Key) -> str:
-    """Return values as a sealed text; ``whose`` says what they belong to, and is needed to open it."""
+    """Return values as a sealed text; ``whose`` identifies their owner, and is needed to open it."""
     said = json.dumps(plain(values), allow_nan=False, separators=(",", ":")).encode()
     said = said.ljust(-(-len(said) // _BLOCK_BYTES) * _BLOCK_BYTES)
     tag = _tag(whose, said, key)
@@ -53,7 +53,7 @@ def seal(whose: Sequence[object], values: Mapping[str, Any], key: Key) -> str:
 
 
 def open_text(whose: Sequence[object], text: str, key: Key, names: frozenset[str]) -> dict[str, Any] | None:
-    """Return what `seal` sealed, of these names; None where it was changed, or is of something else or another key."""
+    """Return the values of these names from `seal`; None if the text was changed, or has another owner or key."""
     try:
         content = bytes.fromhex(text)
     except ValueError:
@@ -64,7 +64,7 @@ def open_text(whose: Sequence[object], text: str, key: Key, names: frozenset[str
 
 
 def opened(lines: Iterable[Line], key: Key | None) -> list[Line]:
-    """Return a journal's lines with what is sealed in them; as they are without a ``key``.
+    """Return a journal's lines with their sealed values; unchanged without a ``key``.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def opened(lines: Iterable[Line], key: Key | None) -> list[Line]:
 
 
 def opened_key(folder: StudyFolder) -> Key | None:
-    """Return the study's key where it was opened, None while it is sealed.
+    """Return the study's key if it was opened, None while it is sealed.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def _opened(start: Line, line: Line, key: Key) -> Line:
 
 
 def _measured(said: bytes, names: frozenset[str]) -> dict[str, Any]:
-    """Return the columns in a text whose tag is right; none of what whoever holds the key forged."""
+    """Return the columns in a text with a valid tag, without any that a holder of the key has forged."""
     try:
         measured = parse_json(said)
     except ValueError:
@@ -112,7 +112,7 @@ def _measured(said: bytes, names: frozenset[str]) -> dict[str, Any]:
 
 
 def _whose(start: Mapping[str, Any], line: Mapping[str, Any]) -> list[object]:
-    """Return what a line's sealed text belongs to: an attempt at a trial, or a participant's entry."""
+    """Return the owner of a line's sealed text: an attempt at a trial, or a participant's entry."""
     if "entry" in line:
         return ["allocated", line["entry"], start["participant"]]
     whose = [start["participant"], start["session"], line["trial"], line["attempt"]]

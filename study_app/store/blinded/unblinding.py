@@ -1,6 +1,6 @@
 """Opening a study: the reveal is recorded, and what was sealed appears in tables, their checksums and the description.
 
-If the program ends in between, the journals hold everything, and opening the study again finishes it.
+If the program ends meanwhile, the journals contain everything, and opening the study again completes it.
 """
 
 import contextlib
@@ -36,7 +36,7 @@ class Unblinded:
     codes : mapping
         Block → code → condition id.
     left : tuple of str
-        Of each table left as it was why, and what to do.
+        For each table left unchanged the reason and the remedy.
     excluded : tuple of Exclusion
         Sessions that the rule `catch` excluded.
     """
@@ -49,7 +49,7 @@ class Unblinded:
 def unblind(folder: Path, by: str, reason: str) -> Unblinded:
     """Open a study's key, record who did so and why, and write the sealed columns into its tables.
 
-    A table that is not what its journal gives is left alone, as is a session that runs or cannot be read.
+    A table that differs from its journal is not changed, nor is a session that runs or cannot be read.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def unblind(folder: Path, by: str, reason: str) -> Unblinded:
 
 
 def _open_tables(study: StudyFolder, session: SessionFolder, key: Key) -> list[str]:
-    """Write a session's tables with what was sealed; return what is wrong with those that are left as they are."""
+    """Write a session's tables with the sealed columns; return the reasons for tables left unchanged."""
     if not is_there(session.journal):
         return []
     lines = journal.read(session.journal)
@@ -88,7 +88,7 @@ def _open_tables(study: StudyFolder, session: SessionFolder, key: Key) -> list[s
 
 
 def _rewrite(place: Place, lines: list[Line], key: Key) -> list[str]:
-    """Write the sealed columns; a table of an earlier version goes on without columns that it did not know."""
+    """Write the sealed columns; a table of an earlier version stays without columns unknown to it."""
     left: list[str] = []
     ours: dict[str, tuple[bytes, bytes]] = {}
     before, after = (dict(table_files(place, lines, one)) for one in (None, key))
@@ -116,7 +116,7 @@ def _open_study(study: StudyFolder) -> None:
     if name is not None:
         write_participants(study, name, whole=True)
     for session in study.sessions():
-        with contextlib.suppress(StoreError, KeyError, TypeError, ValueError):  # another receipt will do
+        with contextlib.suppress(StoreError, KeyError, TypeError, ValueError):  # another receipt is used instead
             protocol = receipt.read(session.receipt)["protocol"]
             head, number = StudyHead.model_validate(protocol["study"]), protocol.get("format", 1)
             write_description(study, head, number, intervals=has_intervals(protocol))

@@ -1,4 +1,4 @@
-"""The protocol of a session, from its receipt and the study's key: the receipt lacks what the key holds."""
+"""The protocol of a session, combined from its receipt and the study's key."""
 
 from collections.abc import Mapping
 from typing import Any, Final
@@ -11,7 +11,7 @@ _OF_RECEIPT: Final = ("codes", "slots", "order", "compares")
 
 
 def whole_protocol(published: Mapping[str, Any], key: Key) -> Protocol:
-    """Return the protocol of a receipt with what the key keeps of it.
+    """Return the protocol of a receipt completed from the key.
 
     Raises
     ------

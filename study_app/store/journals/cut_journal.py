@@ -1,4 +1,4 @@
-"""Whether other files of a session tell more than its journal: then it has lost lines, and nothing is made from it."""
+"""Detects a journal that has lost lines, because other files of its session contain more: it is not used."""
 
 import csv
 import io
@@ -22,12 +22,12 @@ RESTORE = "restore the journal from a copy"
 
 
 def refuse_if_cut(place: Place, lines: Sequence[Line]) -> None:
-    """Refuse a journal that tells this version less than the session's other files may: they would be replaced.
+    """Reject a journal with less information than the session's other files, which would be replaced.
 
     Raises
     ------
     StoreError
-        Names the file that tells more, or an event of another version; or one of them cannot be read.
+        Names the file that contains more, or an event of another version; or one of them cannot be read.
     """
     for name in unknown_events(lines):
         raise StoreError(
@@ -39,10 +39,10 @@ def refuse_if_cut(place: Place, lines: Sequence[Line]) -> None:
 
 
 def beyond(place: Place, lines: Sequence[Line]) -> Iterator[tuple[Path, str]]:
-    """Yield each of receipt, checksums and tables that tells more than the journal, and what.
+    """Yield each of receipt, checksums and tables that contains more than the journal, with a description.
 
-    A session that has ended has a whole journal. After a power cut the trials table may tell of one trial more, since
-    nothing waits until the disk has the line of a trial's start; answers are waited for.
+    A session that has ended has a complete journal. After a power cut the trials table may have one more trial, since
+    the line of a trial's start is not flushed at once; answers are.
 
     Raises
     ------
@@ -71,7 +71,7 @@ def beyond(place: Place, lines: Sequence[Line]) -> Iterator[tuple[Path, str]]:
 
 
 def _ended_or_recorded(place: Place, lines: Sequence[Line]) -> Iterator[tuple[Path, str]]:
-    """Yield the study's fingerprints and the recordings that tell more than a journal without an end."""
+    """Yield the study's fingerprints and the recordings that contain more than a journal without an end."""
     folder, study = place.folder, place.study_folder
     if lines[-1]["event"] == "session_ended":
         return
@@ -89,7 +89,7 @@ def _recordings(folder: SessionFolder) -> Iterator[Path]:
 
 
 def _rows(path: Path, root: Path) -> int:
-    """Return how many rows a table has; none where it is no table, which is made again without a loss."""
+    """Return the number of rows of a table; 0 if it is not a table, which is made again without a loss."""
     try:
         text = read_own(path, root).decode("utf-8", "replace")
         names, *rows = list(csv.reader(io.StringIO(text, newline=""))) or [[]]

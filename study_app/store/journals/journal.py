@@ -1,12 +1,12 @@
-"""The truth about a session: one event per line, and every answer on the disk before anything follows from it.
+"""The journal, the primary record of a session: one event per line, each answer on the disk before its effects.
 
-Every line is a JSON object that explains itself: ``n`` counts from 1 without a gap, ``event`` is its name, ``t_s`` the
-seconds since the session's clock origin, ``at`` the same moment for people, ``previous`` the SHA-256 of all bytes of
+Every line is a self-describing JSON object: ``n`` counts from 1 without a gap, ``event`` is its name, ``t_s`` the
+seconds since the session's clock origin, ``at`` the same moment as wall time, ``previous`` the SHA-256 of all bytes of
 the file before the line. All tables are derived from these lines alone. Journals of format 1 have no ``previous``;
-where one was resumed by a later version, its lines have it from ``session_resumed`` on. A line is whole when its
-newline is on the disk; a program killed while writing leaves at most one torn tail without a newline, which readers
-leave out and count; anything else that is no line is damage. Lines that are not waited for are flushed in the
-background, in order: a power cut may take the last of them, but none that was waited for and none before it.
+if a later version resumed one, its lines have it from ``session_resumed`` on. A line is complete when its newline is on
+the disk; a program killed while writing leaves at most one incomplete line at the end, which readers skip and count;
+any other invalid line is damage. Lines not waited for are flushed in the background, in order: a power cut may lose the
+last of them, but none that was waited for and none before it.
 """
 
 import hashlib
@@ -34,13 +34,13 @@ _OWN = ("n", "at", "previous")
 
 @dataclass(frozen=True, slots=True)
 class Contents:
-    """What a journal holds: its whole lines, where they end, and what is wrong after them.
+    """The contents of a journal: its complete lines, where they end, and any damage after them.
 
     ``torn_bytes`` counts what follows the last newline: the torn tail of a program that was killed while writing.
     ``damage`` is the sentence about anything worse (a broken line, a number missing or doubled, a field of another type
     than its event has, a line before which others stand than when it was written), else None. Every line of ``lines``
     has the fields of its event, each of its kind, and was not changed since the next was written. ``hash`` is the
-    SHA-256 of the whole lines, to go on with.
+    SHA-256 of the complete lines, with which the next line continues.
     """
 
     lines: list[Line]
@@ -51,7 +51,7 @@ class Contents:
 
 
 def count_events(path: Path, *kinds: str) -> tuple[int, ...]:
-    """Return how many lines of a journal have each kind of event, without parsing it; 0 where it cannot be read."""
+    """Return the number of lines of each kind of event in a journal, without parsing it; 0 if it cannot be read."""
     try:
         content = path.read_bytes()
     except OSError:
@@ -60,7 +60,7 @@ def count_events(path: Path, *kinds: str) -> tuple[int, ...]:
 
 
 def read(path: Path) -> list[Line]:
-    """Return the whole lines of the journal, in order; a torn tail is left out (`scan` reports it).
+    """Return the complete lines of the journal, in order, without an incomplete one at the end (`scan` reports it).
 
     Raises
     ------
@@ -71,7 +71,7 @@ def read(path: Path) -> list[Line]:
 
 
 def whole(path: Path) -> Contents:
-    """Read the journal to its last whole line; what follows it is a torn tail and nothing worse.
+    """Read the journal to its last complete line; at most an incomplete line follows it.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def whole(path: Path) -> Contents:
 
 
 def scan(path: Path) -> Contents:
-    """Read the journal to its last whole line, check each against its event and what precedes it; report the rest.
+    """Read the journal to its last complete line, check each against its event and the lines before; report the rest.
 
     Raises
     ------
@@ -121,16 +121,16 @@ def scan(path: Path) -> Contents:
 
 
 def _unknown(line: Line, version: Any) -> str | None:
-    """Return that a line of this program's version has an event which this version does not have, or None."""
+    """Return a message if a line claims this program's version but has an event unknown to it, else None."""
     if version != study_app.__version__ or line["event"] in EVENT_NAMES:
         return None
     return f"has an event {shortened(line['event'])}, which version {version} does not write"
 
 
 def _break(line: Line, before: str, *, chained: bool) -> str | None:
-    """Return how a line fails to go on after the lines before it, whose SHA-256 is ``before``, or None.
+    """Return how a line contradicts the lines before it, whose SHA-256 is ``before``, or None.
 
-    ``chained`` says whether the line before has ``previous``: then this one must have it. The first line of a journal
+    ``chained`` tells whether the line before has ``previous``: then this one must have it. The first line of a journal
     has it since format 2; a journal of format 1 gets it where it was resumed by a later version.
     """
     first, hash_before = line["n"] == 1, line.get("previous")
@@ -167,13 +167,13 @@ def line_of(
 
 
 def line_bytes(line: Line) -> bytes:
-    """Return a line as it stands in the file, newline and all."""
+    """Return a line as in the file, with its newline."""
     text = json.dumps(line, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.encode("utf-8", "backslashreplace") + b"\n"
 
 
 def plain(value: Any) -> Any:
-    """Return ``value`` as JSON has it: numpy numbers plain, tuples as lists, numbers that are none as None."""
+    """Return ``value`` for JSON: numpy numbers as plain ones, tuples as lists, non-finite numbers as None."""
     if isinstance(value, dict):
         return {str(name): plain(item) for name, item in value.items()}
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""The journal's dictionary: every event, what it says, and its fields besides ``n``, ``event``, ``t_s`` and ``at``."""
+"""The journal's dictionary: every event, its meaning, and its fields besides ``n``, ``event``, ``t_s`` and ``at``."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -9,10 +9,10 @@ from typing import Any
 from study_app.store.journals.parsing import PARTICIPANT_ID, RECORDING_NAME, STUDY_NAME
 from study_app.store.tables.columns import DELIVERED, TRIALS, VIDEO
 
-SHOWN = 200  # characters of a bad value that a message repeats
+SHOWN = 200  # characters of a bad value shown in messages
 
 CAUSE_WITHHELD = "the session was stopped"
-"""What `broke` says where a device or a video failed in a study with videos: the cause would tell the condition."""
+"""Text of `broke` for a failed device or video in a study with videos: the cause would reveal the condition."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +128,7 @@ _BY_NAME = {event.name: event for event in EVENTS}
 EVENT_NAMES = frozenset(_BY_NAME)
 
 _MOST_SECONDS = 1e9  # of a session's clock
-_MOST = 10**30  # no whole number that the program writes is greater
+_MOST = 10**30  # greatest integer that the program writes
 
 
 def _is_text(value: object) -> bool:
@@ -242,14 +242,14 @@ _KIND_OF: dict[str, tuple[str, bool]] = {
     }.items()
     for name in names.split()
 }
-"""What a field of that name holds, in any event that this version knows, and whether it may be null."""
+"""The type of a field of that name, in any event that this version knows, and whether it may be null."""
 
 
 def problem(line: Mapping[str, Any]) -> str | None:
-    """Return what is wrong with a line of a journal, or None.
+    """Return the error in a line of a journal, or None.
 
-    A line lacks no field of its event, and every field that the dictionary knows is of its kind, in events of another
-    version, too.
+    A line must have all fields of its event, and every field in the dictionary must be of its kind, also in events of
+    another version.
     """
     event = line.get("event")
     if not isinstance(event, str):
@@ -271,18 +271,18 @@ def _field(held: Mapping[str, Any], name: str) -> str:
 
 
 def shortened(value: object) -> str:
-    """Return ``value`` as a message repeats it."""
+    """Return ``value`` as messages show it."""
     shown = repr(value)
     return shown if len(shown) <= SHOWN else f"{shown[:SHOWN]}…"
 
 
 def unknown_events(lines: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield the names of events that the dictionary does not know, each once."""
+    """Yield the names of events that are not in the dictionary, each once."""
     yield from {line["event"]: None for line in lines if line["event"] not in EVENT_NAMES}
 
 
 def holds(name: str, value: object) -> bool:
-    """Return whether ``value`` is what a field called ``name`` holds; an unknown field may hold anything."""
+    """Return whether ``value`` has the type of the field ``name``; an unknown field may have any."""
     if name not in _KIND_OF:
         return True
     kind, may_be_null = _KIND_OF[name]

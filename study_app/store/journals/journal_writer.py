@@ -24,9 +24,9 @@ RETRY_S = 1.0
 class Journal:
     """An open journal: one thread appends, and another flushes the lines that are not waited for.
 
-    After a failed write or flush the lines that are not known to be on the disk are written again before the next line,
-    which waits for the disk: the system may have dropped what it could not flush. The background thread repeats a
-    failed flush every `RETRY_S`; until it succeeds, `check_flushed` raises.
+    After a failed write or flush the lines that may not be on the disk are written again before the next line, which
+    waits for the disk: the system may have dropped data that it could not flush. The background thread repeats a failed
+    flush every `RETRY_S`; until it succeeds, `check_flushed` raises.
     """
 
     def __init__(self, path: Path, file: BinaryIO, clock: SessionClock) -> None:
@@ -38,11 +38,11 @@ class Journal:
         self._hash = hashlib.sha256()  # of all lines
         self._unflushed = bytearray()  # the last bytes of the file, not known to be on the disk
         self._torn = False
-        self.flushing = threading.RLock()  # one flush at a time: the system reports a failure to one of two alone
+        self.flushing = threading.RLock()  # one flush at a time: of two, the system reports a failure to only one
         self._changed = threading.Condition()
         self._thread: threading.Thread | None = None
         self._due = False
-        self._failed: OSError | None = None  # why the newest flush in the background failed
+        self._failed: OSError | None = None  # why the last flush in the background failed
         self._closing = False
 
     @classmethod
@@ -67,7 +67,8 @@ class Journal:
     def reopen(cls, path: Path, contents: Contents, clock: SessionClock) -> Journal:
         """Open the file to go on after the last whole line of ``contents``, which `scan` has just read.
 
-        A torn tail is cut off by writing the whole lines anew, in one step, and kept next to the journal.
+        An incomplete line at the end is removed by rewriting the complete lines in one step, and stored next to the
+        journal.
 
         Raises
         ------
@@ -93,7 +94,7 @@ class Journal:
         return journal
 
     def append(self, event: str, *, t_s: float | None = None, waits: bool = True, **fields: Any) -> Line:
-        """Write one line and wait for the disk; return the line as a reader will see it.
+        """Write one line and wait for the disk; return the line as readers get it.
 
         Without ``waits`` it returns when the system has the line, and the line is flushed in the background.
         ``t_s`` is when it happened, by default now. Infinite and undefined numbers become null, numpy numbers plain.
@@ -128,23 +129,23 @@ class Journal:
         return line
 
     def check_flushed(self) -> None:
-        """Raise if lines that were not waited for could not be flushed, and still are not on the disk.
+        """Raise if lines that were not waited for could not be flushed, and are still not on the disk.
 
         Raises
         ------
         StoreError
-            Says why the newest flush in the background failed.
+            Gives the reason why the last flush in the background failed.
         """
         if (failed := self._failed) is not None:
             raise cannot_write(self.path, failed)
 
     @property
     def closed(self) -> bool:
-        """Whether it takes no more lines."""
+        """Whether it accepts no more lines."""
         return self.file.closed
 
     def close(self) -> None:
-        """Flush what is not on the disk yet, and close the file.
+        """Flush lines not yet on the disk, and close the file.
 
         Raises
         ------
@@ -174,7 +175,7 @@ class Journal:
         self.close()
 
     def _refuse_if_replaced(self) -> None:
-        """Refuse to write into a file that is no longer found under the journal's name."""
+        """Refuse to write into a file that no longer has the journal's name."""
         try:
             there = os.path.samestat(self.path.stat(), os.fstat(self.file.fileno()))
         except FileNotFoundError:
@@ -203,7 +204,7 @@ class Journal:
         return failed
 
     def _flush_or_take_back(self, content: bytes) -> None:
-        """Wait until the line just written is on the disk; where it cannot be, take it back."""
+        """Wait until the line just written is on the disk; remove it if that fails."""
         with self.flushing:
             try:
                 self._flush()
@@ -243,7 +244,7 @@ class Journal:
             self._changed.notify_all()
 
     def _flush_behind(self) -> None:
-        """Flush whenever a line was written that is not waited for, and after a failure: the journal's own thread."""
+        """Flush lines that are not waited for, and again after a failure; runs in the journal's thread."""
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._due or self._closing, RETRY_S if self._failed else None)
@@ -256,7 +257,7 @@ class Journal:
                 self._failed = error
 
     def _take_back(self) -> None:
-        """Cut off what an interrupted write may have left, and write again what may not be on the disk."""
+        """Remove the remains of an interrupted write, and write again the lines that may not be on the disk."""
         self.file.truncate(self._size)
         self.file.seek(self._size - len(self._unflushed))
         write_whole(self.file, bytes(self._unflushed))
@@ -264,6 +265,6 @@ class Journal:
 
 
 def _unused_beside(path: Path) -> Path:
-    """Return the name of the next file that keeps what is cut off the journal at ``path``."""
+    """Return the name of the next file for text removed from the end of the journal at ``path``."""
     names = (path.with_name(f"{path.stem}-torn-{number}.txt") for number in count(1))
     return next(name for name in names if not name.exists())

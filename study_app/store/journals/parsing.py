@@ -1,4 +1,4 @@
-"""JSON, and names in it, of files that anyone may have changed."""
+"""Parsing of JSON, and of names in it, in files that users may have changed."""
 
 import json
 import re
@@ -9,12 +9,12 @@ STUDY_NAME = re.compile(r"[a-z][a-z0-9]{0,39}")  # as in a protocol
 PARTICIPANT_ID = re.compile(r"[A-Za-z0-9]{1,32}")
 RECORDING_NAME = re.compile(r"recordings/trial-[0-9]{3,}(_attempt-[0-9]+)?(_interval-[0-9]+)?(_frames)?\.parquet")
 
-_MOST_LEVELS = 64  # whoever walks through a value may do so recursively
+_MOST_LEVELS = 64  # so that code may process a value recursively
 _TOO_DEEP = "it is nested too deeply"
 
 
 def check_study_name(name: object) -> str:
-    """Return the name of a study that a file of the results tells, if a protocol can have it.
+    """Return the name of a study in a file of the results, if a protocol can have it.
 
     Raises
     ------
@@ -27,12 +27,12 @@ def check_study_name(name: object) -> str:
 
 
 def parse_json(content: bytes | str) -> Any:
-    """Return the value that ``content`` holds.
+    """Return the value in ``content``.
 
     Raises
     ------
     ValueError
-        It is no JSON: NaN and Infinity are not, nor is what is nested too deeply to be read.
+        It is not JSON, which excludes NaN and Infinity, or is nested too deeply.
     """
     try:
         value = json.loads(content, parse_constant=_refuse)
