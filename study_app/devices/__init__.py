@@ -1,1 +1,1 @@
-"""Haptic devices, input devices and simulated devices: a driver each, behind one contract."""
+"""Haptic devices, input devices and simulated devices: one driver each, with a common interface."""

@@ -1,6 +1,6 @@
-"""What can be used on this computer: every way to every device, and why one cannot be used.
+"""The connections to devices that this computer offers, or why one cannot be used.
 
-Looks, and opens nothing. Loads no compiler, and drivers only as far as looking needs them.
+It probes without opening a device. It loads no compiler, and drivers only as far as probing needs them.
 """
 
 from study_app.devices.descriptor import NOT_AVAILABLE, Backend, DeviceDescriptor
@@ -8,7 +8,7 @@ from study_app.devices.registry import ENTRY_POINTS, discover
 
 
 def backends() -> list[Backend]:
-    """Return what every device's probe finds, the default device first, then what could not be loaded."""
+    """Return the results of all devices' probes, the default device first, then those that could not be loaded."""
     discovery = discover()
     found = [backend for device in discovery.devices for backend in _probed(device)]
     return found + [

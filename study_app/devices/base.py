@@ -1,4 +1,4 @@
-"""What every device is to the servo: two C functions, their memory, a workspace and a force limit."""
+"""The interface of a device to the servo: two C functions, their memory, a workspace and a force limit."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from study_app.haptics.kernels.c_functions import Driver
 
 
 class Device(Driver, Protocol):
-    """Something that can be felt with.
+    """A haptic, input or simulated device.
 
     Opened before a servo uses it and closed after the servo has stopped; in between only the servo calls ``read`` and
     ``write``. Positions and forces are in the hand frame (x right, y up, z toward the participant), SI.
-    ``workspace_m`` are the half extents of where it reaches, about the origin [m].
+    ``workspace_m`` are the half extents of its workspace, about the origin [m].
     """
 
     workspace_m: tuple[float, float, float]
 
     def open(self) -> None:
-        """Make it ready; raise ``DeviceNotFound`` where there is none."""
+        """Prepare the device; raise ``DeviceNotFound`` if there is none."""
         ...
 
     def close(self) -> None:
@@ -27,7 +27,7 @@ class Device(Driver, Protocol):
         ...
 
     def describe(self) -> dict[str, Any]:
-        """Return what a receipt should record of it: names and numbers, nothing of this machine's folders."""
+        """Return its record for a receipt: names and numbers, no folders of this machine."""
         ...
 
     def __enter__(self) -> Self:

@@ -1,7 +1,7 @@
 """The gate between a driver's read and write, which the servo calls, and the thread that opens and closes the device.
 
 An exchange's record has the fields of ``GATE``. A call uses the connection between `enter` and `leave` only. `let_go`
-refuses further calls and waits for the one under way; a call that outlasts it ends the force before it leaves.
+rejects further calls and waits for a running one; a call that outlasts it ends the force before it returns.
 """
 
 import time
@@ -14,13 +14,13 @@ from study_app.haptics.kernels.c_functions import fence, full_fence
 from study_app.haptics.kernels.compiled import kernel
 
 RUNS, LET_GO, FINISHED = range(3)
-"""Values of ``ended``: open; let go of by the program, or not open; and then ended by the call that outlasted it."""
+"""Values of ``ended``: open; closed by the program, or not open; closed, and ended by a call that outlasted it."""
 FIRST_CAUSE: Final = 3
-"""A driver's own causes begin here: why it ended the exchange itself."""
+"""First value of a driver's own causes for ending the exchange."""
 LEAVE_S: Final = 0.5  # a read or a write takes a few milliseconds at most
 
 GATE: Final[list[tuple[Any, ...]]] = [
-    ("ended", np.int64),  # RUNS, or why no call is let in
+    ("ended", np.int64),  # RUNS, or why calls are rejected
     ("inside", np.int64),  # 1 while a read or write runs, which may use the connection
     ("sent_n", np.float64, (3,)),  # the force that acts since the last command [N, hand frame]
 ]
@@ -39,7 +39,7 @@ def enter(device: Any) -> bool:
 
 @kernel
 def outlasted(device: Any) -> bool:
-    """Return whether the device was let go of during this call, which then has to end the force before it leaves."""
+    """Return whether the device was closed during this call, which then must end the force before it returns."""
     if device.ended != LET_GO:
         return False
     device.ended = FINISHED
@@ -48,19 +48,19 @@ def outlasted(device: Any) -> bool:
 
 @kernel
 def leave(device: Any) -> None:
-    """Say that the connection is no longer used."""
+    """Mark the connection as no longer in use."""
     fence()
     device.inside = 0
 
 
 def check_left(exchange: Any, name: str) -> None:
-    """Raise ``DeviceError`` where a call that outlasted `let_go` has not returned yet: its memory must stay."""
+    """Raise ``DeviceError`` if a call that outlasted `let_go` has not returned yet: its memory must stay."""
     if exchange.inside:
         raise DeviceError(f"a call to the device '{name}' does not return: turn it off, and start this program again")
 
 
 def let_go(exchange: Any) -> bool:
-    """Let no further call in and wait for the one under way; return whether none is left."""
+    """Reject further calls and wait for a running one; return whether none is left."""
     if exchange.ended == RUNS:
         exchange.ended = LET_GO
     patience = time.monotonic() + LEAVE_S

@@ -1,6 +1,6 @@
-"""What a device says of itself, as a value: its descriptor.
+"""The descriptor of a device, as a value.
 
-Loads neither compiler nor driver; what `DeviceDescriptor.open`, ``probe`` and ``doctor`` call does.
+Loads neither compiler nor driver; only `DeviceDescriptor.open`, ``probe`` and ``doctor`` do.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from study_app.devices.doctor_report import Finding, Report
 
 Kind: TypeAlias = Literal["felt", "seen", "simulated"]
-"""Its force is felt; the liquid is seen, not felt; no participant uses it."""
+"""With force; visual only, without force; not used by participants."""
 
 Icon: TypeAlias = Literal["device", "mouse", "fast_forward"]
 
@@ -35,10 +35,10 @@ Opened = TypeVar("Opened", bound="Device")
 
 @dataclass(frozen=True, slots=True)
 class Backend:
-    """One way to a device, as it was found.
+    """One connection to a device, as found by its probe.
 
-    ``name`` is for ``--device``, ``by`` the library, ``state`` one of the words above or "connected: ...". ``can`` says
-    what it can and cannot do, ``why`` why it cannot be used now ("" where it can).
+    ``name`` is for ``--device``, ``by`` the library, ``state`` one of the words above or "connected: ...". ``can``
+    describes its capabilities, ``why`` why it cannot be used now ("" if it can).
     """
 
     name: str
@@ -50,11 +50,11 @@ class Backend:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeviceOption:
-    """A value that a device can be given when it is opened.
+    """An option for opening a device.
 
     ``name`` is that of the command-line option, ``title`` its label, ``help`` the line of ``--help``. ``about``,
-    ``hint`` and ``placeholder`` are what windows say of it. ``file_filter`` is that of a file dialog, "" where the
-    value is not the path of a file. Without ``in_windows`` only commands take it.
+    ``hint`` and ``placeholder`` are texts of windows. ``file_filter`` is that of a file dialog, "" if the value is not
+    a file's path. Without ``in_windows`` only commands have it.
     """
 
     name: str
@@ -69,17 +69,16 @@ class DeviceOption:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OpenRequest:
-    """What a device is opened with; None is the device's own default.
+    """Settings for opening a device; None is the device's default.
 
     Attributes
     ----------
-    argument : what follows the colon of its name, "" where nothing does
-    workspace_m : half extents of where it shall reach [m]
-    force_limit_n : the greatest force it may be asked for [N]
-    random : where the tremor of a device that moves by itself is drawn from
-    progress : is given what to do while it is opened, a line at a time
-    cancelled : is asked whether to give up opening it
-    options : values of its options, by name
+    argument : the part of its name after the colon, "" without one
+    workspace_m : half extents of the required workspace [m]
+    force_limit_n : the greatest force that may be commanded [N]
+    random : random numbers for the tremor of a simulated device
+    progress : receives instructions while it is opened, one line at a time
+    cancelled : returns whether to stop opening it options : values of its options, by name
     """
 
     argument: str = ""
@@ -92,7 +91,7 @@ class OpenRequest:
 
     @property
     def limits(self) -> dict[str, Any]:
-        """Workspace and force limit as keyword arguments, where they are given."""
+        """Workspace and force limit as keyword arguments, if given."""
         given = {"workspace_m": self.workspace_m, "force_limit_n": self.force_limit_n}
         return {name: value for name, value in given.items() if value is not None}
 
@@ -101,8 +100,8 @@ class OpenRequest:
 class Doctor:
     """Examines a device.
 
-    ``findings()`` returns what is tested, before anything was. ``examine(name, options=, faults=, progress=)`` returns
-    a `Report`; ``faults`` are those that an emulated device shall have.
+    ``findings()`` returns the list of tests before any was run. ``examine(name, options=, faults=, progress=)`` returns
+    a `Report`; ``faults`` are those of an emulated device.
     """
 
     findings: Callable[[], tuple[Finding, ...]]
@@ -125,24 +124,19 @@ def doctor_at(findings: str, examine: str) -> Doctor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeviceDescriptor:
-    """A device, as everything but its driver knows it.
+    """The properties of a device that the program uses outside its driver.
 
     Attributes
     ----------
     name : for ``--device``, receipts and folders: small letters, digits and hyphens
-    title : what people read
-    icon : of the theme
-    kind : whether its force is felt, the liquid is seen only, or no participant uses it
-    degrees_of_freedom : of the motion it measures
-    open : returns the device, open
-    probe : returns every way to it as found, without opening it
-    argument : what may follow its name and a colon, such as "SERIAL"; "" where nothing may
-    argument_required : its name alone does not open it
-    moves_by_itself : the program moves its handle; it has a hand that takes orders, and can be rehearsed on
-    pointer : the window's pointer moves it; it then has ``point_to`` and ``press``
-    motion_shows_force : its recorded position shows the force, so that motion is hidden while a study is blinded
-    options : what it can be given when it is opened
-    doctor : what examines it; None where nothing does
+    title : displayed name icon : of the theme kind : with force, visual only, or not used by participants
+    degrees_of_freedom : of the motion it measures open : returns the device, open probe : returns all connections to
+    it, without opening it
+    argument : permitted text after its name and a colon, such as "SERIAL"; "" if none argument_required : its name
+    alone does not open it moves_by_itself : the program moves its handle by a simulated hand; rehearsals may use it
+    pointer : the window's pointer moves it; it then has ``point_to`` and ``press`` motion_shows_force : its recorded
+    position shows the force, so that motion is hidden while a study is blinded options : its options when it is opened
+    doctor : its diagnosis; None without one
     """
 
     name: str
@@ -179,7 +173,7 @@ class DeviceDescriptor:
 
     @property
     def label(self) -> str:
-        """The title, and how it differs from a device that is felt."""
+        """The title, with its difference from a device with force."""
         if self.moves_by_itself:
             return f"{self.title} (simulated)"
         return f"{self.title} (visual only)" if self.kind == "seen" else self.title

@@ -1,4 +1,4 @@
-"""The result of a device's diagnosis: what was tested, and what was found."""
+"""The result of a device's diagnosis: tests and findings."""
 
 from dataclasses import dataclass
 from textwrap import fill
@@ -16,11 +16,11 @@ NOTHING_WRONG: Final = "No problem was found."
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One mode of failure: ``number`` in the list, and whether it is there.
+    """One failure mode: its ``number`` in the list, and whether it is present.
 
-    ``tested`` says what holds where it is not, ``symptom`` what a user sees where it is.
-    ``cause``, ``cure`` and ``known_by`` are of every mode; ``paste`` is what a terminal here takes, "" where nothing.
-    ``says_itself`` where the failure's own sentence says cause and cure better.
+    ``tested`` describes the state without it, ``symptom`` its sign for the user. Every mode has ``cause``, ``cure`` and
+    ``known_by``; ``paste`` is a terminal command of this system, "" if none. ``says_itself``: the failure's own message
+    has better cause and cure.
     """
 
     number: int
@@ -36,13 +36,13 @@ class Finding:
 
     @property
     def words(self) -> str:
-        """The symptom where it was found, else what is tested."""
+        """The symptom if it was found, else the tested state."""
         return self.symptom if self.state == "found" else self.tested
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What was ``seen``, in words; all ``findings`` in their order; the driver's own ``failure`` (None: it went on)."""
+    """Observations (``seen``) in words; all ``findings`` in order; the driver's ``failure`` (None: there was none)."""
 
     seen: tuple[str, ...]
     findings: tuple[Finding, ...]
@@ -50,27 +50,27 @@ class Report:
 
     @property
     def found(self) -> tuple[Finding, ...]:
-        """What is wrong."""
+        """The failures found."""
         return tuple(finding for finding in self.findings if finding.state == "found")
 
     @property
     def in_order(self) -> tuple[Finding, ...]:
-        """Every finding: what is wrong first, then what could not be looked at."""
+        """All findings: failures first, then those that could not be checked."""
         return tuple(sorted(self.findings, key=lambda finding: ORDER.index(finding.state)))
 
     @property
     def unseen(self) -> tuple[Finding, ...]:
-        """What could not be looked at."""
+        """The findings that could not be checked."""
         return tuple(finding for finding in self.findings if finding.state == "not checked")
 
     @property
     def well(self) -> bool:
-        """Whether nothing wrong was found."""
+        """Whether no failure was found."""
         return not self.found and self.failure is None
 
     @property
     def conclusion(self) -> str:
-        """What it comes to, in a sentence."""
+        """The summary, in a sentence."""
         if not self.well:
             return f"Found: {len(self.found)}."
         if self.unseen:
@@ -79,7 +79,7 @@ class Report:
 
 
 def lines(found: Report) -> list[str]:
-    """Return a report as text of 100 columns; what is to be pasted stands in one line."""
+    """Return a report as text of 100 columns; commands to paste are on one line."""
     lines = ["", *(f"seen: {words}" for words in found.seen), ""]
     for finding in found.in_order:
         word = "FOUND" if finding.state == "found" else finding.state

@@ -25,7 +25,7 @@ class Examined(Device, Protocol):
 
     @property
     def failure_mode(self) -> str | None:
-        """The id of what ended it in its table; None: nothing did."""
+        """The id of the failure that ended it in its table; None: there was none."""
         ...
 
 
@@ -47,10 +47,10 @@ def examine_by_table(
     ----------
     device : closed
     table : whose last mode is "rate"
-    in_words : returns what is worth reading of the device and its new positions per second
+    in_words : returns a description of the device and its new positions per second
     running : the first mode that appears only while it runs
-    progress : is given what to do, a line at a time
-    seconds : how long it is run
+    progress : receives instructions, one line at a time
+    seconds : duration of the run
     """
     try:
         device.open()
@@ -95,5 +95,5 @@ def run_at_rest(device: Device, seconds: float) -> tuple[Any, str | None]:
 
 
 def fresh_rate_hz(samples: Any) -> float:
-    """Return how many new positions per second samples at 1 kHz have."""
+    """Return the number of new positions per second in samples at 1 kHz."""
     return float(samples["fresh"].sum()) / max(len(samples), 1) * 1000.0

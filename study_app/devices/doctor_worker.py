@@ -1,7 +1,7 @@
 """The worker process that examines a device.
 
-Ended early, the process leaves by way of the driver, which sends packets of zero force; if it does not leave, it is
-killed, and the driver's own guard sends them.
+If ended early, the process closes the driver, which sends packets of zero force; if it does not end, it is killed, and
+the driver's guard sends them.
 """
 
 import signal
@@ -40,7 +40,7 @@ def start_examination(
 
 
 def carry_out(examination: Examination, send: Send, _stop: Stop) -> Report:
-    """Examine a device, and return what was found.
+    """Examine a device, and return the report.
 
     Raises
     ------
@@ -53,5 +53,5 @@ def carry_out(examination: Examination, send: Send, _stop: Stop) -> Report:
 
 
 def _leave(_number: int, _frame: object) -> NoReturn:
-    """Leave as an exception does, through every ``with``: the device is closed on the way."""
+    """Exit by an exception through every ``with`` block, which closes the device."""
     sys.exit(0)

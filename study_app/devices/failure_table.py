@@ -1,4 +1,4 @@
-"""What can go wrong with a device, as data: what is tested, the symptom, cause and cure. Loads no compiler."""
+"""Failure modes of a device, as data: tested state, symptom, cause and cure. Loads no compiler."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from study_app.errors import DeviceError, DeviceNotFound
 
 @dataclass(frozen=True, slots=True)
 class FailureMode:
-    """A way to fail: what holds where it does not, what a user sees where it does, cause, cure, and its sign."""
+    """A failure mode: the state without it, its symptom for the user, cause, cure, and how it is detected."""
 
     id: str
     tested: str
@@ -20,7 +20,7 @@ class FailureMode:
 
 
 class DeviceFailure(DeviceError):
-    """Something keeps a device from being used; ``mode`` is the id of its `FailureMode`."""
+    """A device cannot be used; ``mode`` is the id of its `FailureMode`."""
 
     def __init__(self, mode: str, message: str) -> None:
         self.mode = mode
@@ -28,7 +28,7 @@ class DeviceFailure(DeviceError):
 
 
 class DeviceFailureNotFound(DeviceFailure, DeviceNotFound):
-    """There is none, or nothing that could find it."""
+    """There is no device, or no software that could find it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +64,8 @@ class FailureTable:
 
         Parameters
         ----------
-        found : id of the mode that was found, None where none was
-        passed : ids of those that were tested and not found; others count as not checked
+        found : id of the mode that was found, None if none was passed : ids of those that were tested and not found;
+        others count as not checked
         """
         fine = set(passed)
 

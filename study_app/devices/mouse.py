@@ -1,8 +1,8 @@
-"""The mouse as a haptic device: what cannot be felt is seen.
+"""The mouse as a device: the liquid is seen instead of felt.
 
-The pointer draws a simulated handle along by a spring and a damper, and the liquid's force acts on that handle: it
-falls behind the pointer by force / stiffness, and goes on after the pointer has stopped, as the liquid commands. In
-free space it follows smoothly, 20 ms behind (two low-passes of 10 ms, which make one motion of a pointer's steps).
+A spring and a damper connect a simulated handle to the pointer, and the liquid's force acts on that handle: it lags
+behind the pointer by force / stiffness, and continues after the pointer has stopped, as the liquid moves it. In free
+space it follows smoothly, 20 ms behind (two low-passes of 10 ms, which smooth the pointer's steps).
 """
 
 from study_app.devices.simulated.hand import POINT
@@ -16,12 +16,12 @@ LAG_S = 0.010
 
 
 class PointedDevice(SimulatedDevice):
-    """A handle that hangs on a pointer; who moves the pointer is the subclass's affair.
+    """A handle connected to a pointer; the subclass moves the pointer.
 
     Parameters
     ----------
-    workspace_m : half extents of where the handle reaches [m]
-    force_limit_n : the greatest force it may be asked for [N]
+    workspace_m : half extents of the handle's workspace [m]
+    force_limit_n : the greatest force that may be commanded [N]
     """
 
     def __init__(
@@ -32,11 +32,11 @@ class PointedDevice(SimulatedDevice):
         self.state.hand.lag_s = LAG_S
 
     def point_to(self, x_m: float, y_m: float, z_m: float) -> None:
-        """Say where the pointer is [m, hand frame]; a place outside the workspace counts as its border."""
+        """Set the pointer's place [m, hand frame]; a place outside the workspace counts as its border."""
         self._post(POINT, target_m=self._inside(x_m, y_m, z_m))
 
 
 class MouseDevice(PointedDevice):
-    """The built-in default: a pointer and its buttons, and no hardware; a window says where the pointer is."""
+    """The built-in default: a pointer and its buttons without hardware; a window sets the pointer."""
 
     name = "mouse"

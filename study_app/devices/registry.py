@@ -97,7 +97,7 @@ def descriptor_of(name: str) -> DeviceDescriptor:
 
 
 def title_of(name: str) -> str:
-    """Return what people read for a device; for one that is not known, its name."""
+    """Return the displayed name of a device; for an unknown one, its name."""
     kind = name.partition(":")[0]
     return next((device.title for device in discover().devices if device.name == kind), name)
 
@@ -127,14 +127,14 @@ def open_device(name: str, **request: Any) -> Device:
 
 
 def doctor_of(name: str) -> Doctor:
-    """Return what examines a device.
+    """Return the diagnosis of a device.
 
     Raises
     ------
     DeviceNotFound
         No device has this name.
     DeviceError
-        Nothing examines it.
+        It has no diagnosis.
     """
     doctor = descriptor_of(name).doctor
     if doctor is None:
@@ -146,7 +146,7 @@ def doctor_of(name: str) -> Doctor:
 
 
 def check_options(name: str, options: Iterable[str]) -> None:
-    """Refuse options that a device does not take.
+    """Reject options that a device does not have.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Device and servo, opened together at rest and let go of in the order of safety: the one place that does so."""
+"""Device and servo, opened together at rest and closed in a safe order; only this module does so."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Rig:
 
     @property
     def described(self) -> dict[str, Any]:
-        """What the receipt says of device and servo."""
+        """The record of device and servo for the receipt."""
         return self.device.describe() | self.servo.describe()
 
     def reconnect(self) -> dict[str, Any]:
@@ -49,7 +49,7 @@ class Rig:
         return self.described
 
     def stop(self) -> None:
-        """Zero force, then let go of the device."""
+        """Send zero force, then close the device."""
         try:
             self.servo.stop()
         finally:
@@ -66,15 +66,15 @@ class Rig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RigSettings:
-    """What device and servo are opened for.
+    """The settings for opening device and servo.
 
     Attributes
     ----------
-    workspace_m : whole extents of where the hand reaches [m]
-    force_limit_n : the greatest force the device may be asked for [N]
-    rate_hz : ticks a second
-    elements : the most wake elements that a scene may call for
-    random : where the tremor of a device that moves by itself is drawn from
+    workspace_m : full extents of the hand's workspace [m]
+    force_limit_n : the greatest force that may be commanded [N]
+    rate_hz : ticks per second
+    elements : the greatest number of wake elements of a scene
+    random : random numbers for the tremor of a simulated device
     options : values of the device's options, by name
     """
 
@@ -113,13 +113,13 @@ def open_rig(
     Parameters
     ----------
     clock : default: the system's; on a virtual one the servo is not started, but advanced by its user
-    progress : is given what a device asks for while it is opened, a line at a time
-    cancelled : is asked whether to give up opening it
+    progress : receives the device's requests while it is opened, one line at a time
+    cancelled : returns whether to stop opening it
 
     Raises
     ------
     StudyError
-        It cannot be opened; then nothing of it is left open.
+        It cannot be opened; then nothing is left open.
     """
     from study_app.haptics.runtime.servo import Servo  # noqa: PLC0415 - the compiler: only once it is needed
 

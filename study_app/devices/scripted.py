@@ -1,4 +1,4 @@
-"""A device that a simulated person moves: along a given motion, or reaching as people do, with tremor and encoders."""
+"""A device moved by a simulated hand: along a given motion or in human-like reaches, with tremor and encoders."""
 
 from random import Random
 from typing import Any
@@ -32,11 +32,11 @@ class ScriptedDevice(SimulatedDevice):
 
     Parameters
     ----------
-    random : where frequencies and phases of the tremor are drawn from; None: always the same ones
-    workspace_m : half extents of where the handle reaches [m]
-    force_limit_n : the greatest force it may be asked for [N]
-    tremor_m : amplitude of each of the tremor's three waves an axis [m]; 0: a hand of stone
-    quantum_m : one count of the encoders [m]; 0: exact
+    random : random numbers for frequencies and phases of the tremor; None: always the same ones
+    workspace_m : half extents of the handle's workspace [m]
+    force_limit_n : the greatest force that may be commanded [N]
+    tremor_m : amplitude of each of the tremor's three waves per axis [m]; 0: no tremor quantum_m : one count of the
+    encoders [m]; 0: exact
     """
 
     name = "scripted"

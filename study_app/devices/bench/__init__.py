@@ -1,1 +1,1 @@
-"""Measuring a device: a fixed protocol of forces, what the handle did under them, and a report."""
+"""Measuring a device: a fixed protocol of forces, the handle's response, and a report."""

@@ -1,9 +1,9 @@
 """The forces of a bench protocol, computed between servo and device in the servo's own loop.
 
-The servo presents no liquid; `BenchDriver` stands between it and the device, and adds a force to its zero: a spring to
-a place, a constant push, a chirp, a damper. A write that no reading came before is zero: all ways out of the servo end
-with one. The force ends at once where the handle oscillates or moves too far, where its stop button is pressed, and
-where device or host are silent; then it stays zero until the next excitation.
+The servo presents no liquid; `BenchDriver` lies between it and the device, and adds an excitation force: a spring to a
+place, a constant push, a chirp, a damper. A write without a reading before it is zero, and so is the last write of a
+servo. The force ends at once if the handle oscillates or moves too far, if its stop button is pressed, or if device or
+host do not respond; then it stays zero until the next excitation.
 """
 
 import math
@@ -42,7 +42,7 @@ EWMA: Final = 0.1
 PACE_MPS: Final = 0.03
 PUSH_NPS: Final = 2.0
 SILENT_TICKS: Final = 20
-SLOW_S: Final = 8e-3  # a first-order filter of 20 Hz: what is above counts as oscillation
+SLOW_S: Final = 8e-3  # a first-order filter of 20 Hz: faster motion counts as oscillation
 SHAKE_S: Final = 0.1
 
 EXCITATION = np.dtype(
@@ -53,32 +53,32 @@ EXCITATION = np.dtype(
         ("write", np.intp),
         # written by the host
         ("armed", np.int64),  # 1: forces are sent
-        ("alive_ns", np.int64),  # until then the host has said that it lives, on the servo's clock
+        ("alive_ns", np.int64),  # the host's latest report, on the servo's clock
         ("limit_n", np.float64),
         ("stiffness_npm", np.float64),
         ("damping_nspm", np.float64),  # of the spring
-        ("integral_per_s", np.float64),  # by how much a second the spring takes over what holds it off
+        ("integral_per_s", np.float64),  # rate at which the spring's integral compensates its deflection
         ("centre_m", np.float64, (3,)),
         ("push_n", np.float64, (3,)),
         ("axis", np.int64),  # of the chirp
         ("wave_n", np.float64),
         ("from_hz", np.float64),
         ("hz_per_s", np.float64),
-        ("rise_nspm_per_s", np.float64),  # how fast the damper grows
+        ("rise_nspm_per_s", np.float64),  # growth rate of the damper
         ("most_nspm", np.float64),
         ("shake_limit_n", np.float64),  # the greatest effective force of the damper above 20 Hz; 0: any
-        ("reach_m", np.float64),  # how far it may move from where it was; 0: anywhere
+        ("reach_m", np.float64),  # greatest distance from its initial place; 0: unlimited
         # of the loop
-        ("ended", np.int64),  # RUNNING, or why it ended
+        ("ended", np.int64),  # RUNNING, or the reason of the end
         ("started", np.int64),
         ("pending", np.int64),  # 1 between a reading and its write
         ("silent", np.int64),  # readings without a usable new position in a row
         ("now_ns", np.int64),
         ("new_ns", np.int64),  # when the last new position was read
         ("position_m", np.float64, (3,)),
-        ("from_m", np.float64, (3,)),  # where it was when this excitation began
+        ("from_m", np.float64, (3,)),  # its place when this excitation began
         ("velocity_mps", np.float64, (3,)),
-        ("aim_m", np.float64, (3,)),  # of the spring, on its way to the centre
+        ("aim_m", np.float64, (3,)),  # target of the spring, moving to the centre
         ("bias_n", np.float64, (3,)),
         ("pushed_n", np.float64, (3,)),
         ("wave_s", np.float64),
@@ -98,7 +98,7 @@ _inner_read, _inner_write = call_at(READ), call_at(WRITE)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Excitation:
-    """What acts on the handle.
+    """The excitation of the handle.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class Excitation:
     axis, wave_n, from_hz, hz_per_s : the chirp; -1: none
     rise_nspm_per_s, most_nspm : the damper
     shake_limit_n : the greatest effective force of the damper above 20 Hz; 0: any
-    reach_m : how far the handle may move from where it was; 0: anywhere
+    reach_m : greatest distance of the handle from its initial place; 0: unlimited
     """
 
     stiffness_npm: float = 0.0
@@ -148,11 +148,11 @@ class BenchDriver:
 
     @property
     def failure(self) -> str | None:
-        """Why the device behind it ended, if it says so."""
+        """Why the inner device ended, if it reports it."""
         return self._inner.failure
 
     def excite(self, what: Excitation) -> None:
-        """Let this act from the next reading on; a spring begins where the handle is, and keeps what it holds up."""
+        """Apply this from the next reading on; a spring begins at the handle's place, and keeps its integral."""
         state = self.state
         state.armed = 0
         held = state.stiffness_npm > 0.0 and what.stiffness_npm > 0.0 and state.ended == RUNNING
@@ -204,7 +204,7 @@ def _write(context: int, command: int) -> int:
     bench.pending = 0
     copy(asked.force_n, asked.sent_n)
     answer: int = _inner_write(bench.write, bench.context, command)
-    clear(asked.force_n)  # what the servo asked for: it then records what was sent instead
+    clear(asked.force_n)  # the servo's command: it then records the force sent instead
     return answer
 
 
@@ -217,7 +217,7 @@ def _is_usable(bench: Any, position_m: Any, now_ns: int) -> bool:
 
 @kernel
 def _see(bench: Any, position_m: Any, now_ns: int) -> None:
-    """Take a new position into the velocity."""
+    """Update the velocity with a new position."""
     interval_s = (now_ns - bench.new_ns) * 1e-9
     weight = 1.0 - (1.0 - EWMA) ** (interval_s * 1e3)
     for axis in range(3):
@@ -234,7 +234,7 @@ def _see(bench: Any, position_m: Any, now_ns: int) -> None:
 
 @kernel
 def _judge(bench: Any, buttons: int) -> None:
-    """End the excitation where something is wrong."""
+    """End the excitation in case of a fault."""
     if bench.ended != RUNNING or bench.armed == 0:
         return
     if buttons & BUTTON_STOP:

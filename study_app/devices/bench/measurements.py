@@ -1,4 +1,4 @@
-"""What the samples of a bench say: regularity, noise, mass and friction, delay, gain of the force."""
+"""Analysis of a bench's samples: regularity, noise, mass and friction, delay, gain of the force."""
 
 import math
 from collections.abc import Sequence
@@ -14,9 +14,9 @@ Floats = NDArray[np.float64]
 
 GRAVITY_MPS2: Final = 9.80665
 SIGMA_S: Final = 4e-3
-"""Width of the Gaussian that positions and forces are smoothed with alike: 40 Hz pass by half."""
+"""Width of the Gaussian that smooths positions and forces: its gain at 40 Hz is one half."""
 SLOW_MPS: Final = 1e-3
-"""Speed at which friction is taken as three quarters of what it is in motion."""
+"""Speed at which the model's friction is three quarters of that in motion."""
 MOST_DELAY_S: Final = 8e-3
 _STEP_S: Final = 0.1e-3
 _NEAR: Final = 10
@@ -24,7 +24,7 @@ _REACH: Final = 5  # widths of the Gaussian on either side
 
 
 class Regularity(NamedTuple):
-    """How regularly the loop ran with the device: see `regularity`."""
+    """The loop's timing with the device: see `regularity`."""
 
     ticks: int
     lateness_ms: tuple[float, float, float]
@@ -44,7 +44,7 @@ class Noise(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """What an axis is to a force: mass [kg], damping [N·s/m], Coulomb friction [N], delay [ms], variance explained."""
+    """The dynamics of an axis: mass [kg], damping [N·s/m], Coulomb friction [N], delay [ms], variance explained."""
 
     mass_kg: float
     damping_nspm: float
@@ -63,7 +63,7 @@ class Gain(NamedTuple):
 
 
 def regularity(samples: Any, rate_hz: float) -> Regularity:
-    """Return how regularly the loop ran.
+    """Return the loop's timing.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def noise(samples: Any) -> Noise:
     -------
     Noise
         Standard deviation and range of each axis about a straight line [µm], standard deviation of the EWMA velocity
-        (weight 0.1) over three axes [mm/s], and how far the handle moved from first to last [µm].
+        (weight 0.1) over three axes [mm/s], and the handle's displacement from first to last [µm].
     """
     t_s, position_m = _new(samples)
     line = np.column_stack([np.ones_like(t_s), t_s - t_s.mean()])
@@ -127,9 +127,9 @@ def noise(samples: Any) -> Noise:
 def motion_under_force(stretches: Sequence[Any], axis: int, rate_hz: float) -> Motion:
     """Fit F(t − d) = m a + b v + f sgn v + k x + c to the forces that were sent along an axis.
 
-    Positions, forces and sgn v are smoothed by the same Gaussian, whose derivatives give v and a; so smoothing favours
-    no term. The delay d is the one of the least residual. Stretches of different force distinguish friction from delay:
-    the phase that friction causes falls with the speed, that of a delay does not.
+    Positions, forces and sgn v are smoothed by the same Gaussian, whose derivatives give v and a; so smoothing biases
+    no term. The delay d minimises the residual. Segments with different forces distinguish friction from delay: the
+    phase lag of friction falls with the speed, that of a delay does not.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def motion_under_force(stretches: Sequence[Any], axis: int, rate_hz: float) -> M
 
 
 class _Prepared(NamedTuple):
-    """A stretch for the fit: the smoothed terms, and the forces that were sent, with the middle of their time."""
+    """A segment for the fit: the smoothed terms, and the sent forces with the middle of their time."""
 
     terms: Floats
     sent_s: Floats
@@ -172,7 +172,7 @@ class _Prepared(NamedTuple):
     bell: Floats
 
     def force_n(self, delay_s: float) -> Floats:
-        """Return the smoothed force, as it acts so much later than it is written."""
+        """Return the smoothed force with a delay from its writing to its effect."""
         force_n = np.convolve(np.interp(self.grid_s - delay_s, self.sent_s, self.sent_n), self.bell, "valid")
         reach = len(self.bell) // 2
         return force_n[reach : len(force_n) - reach]
@@ -194,7 +194,7 @@ def _prepared(samples: Any, axis: int, step_s: float) -> _Prepared:
 
 
 def gain_of(sent_n: Sequence[float], shown_g: Sequence[float]) -> Gain:
-    """Return the straight line through what a scale showed [g] over the forces that were sent [N], two or more."""
+    """Return the straight line through a scale's readings [g] over two or more sent forces [N]."""
     asked, shown_n = np.asarray(sent_n, float), np.asarray(shown_g, float) * 1e-3 * GRAVITY_MPS2
     line = np.column_stack([asked, np.ones_like(asked)])
     (slope, offset_n), *_ = np.linalg.lstsq(line, shown_n, rcond=None)

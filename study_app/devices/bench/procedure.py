@@ -21,8 +21,8 @@ from study_app.errors import DeviceError
 from study_app.haptics.runtime.clocks.clock import Clock
 
 Ask = Callable[[str, str], Callable[[], str | None]]
-"""(what is asked for: "let-go", "scale", "grams", "damping"; the words) -> a function that returns None until the
-operator has answered, then the answer."""
+"""(the request: "let-go", "scale", "grams", "damping"; its text) -> a function that returns None until the operator has
+answered, then the answer."""
 
 AXES: Final = "xyz"
 SPRING_NPM: Final = 100.0
@@ -34,7 +34,7 @@ FROM_HZ: Final = 1.5
 TO_HZ: Final = 25.0
 REACH_M: Final = 0.045
 SLIP_M: Final = 0.03
-"""A handle that moves by more while it pushes on a scale has slipped off."""
+"""Greatest motion of a handle that pushes on a scale: beyond it, it has slipped off."""
 MOST_NSPM: Final = 150.0
 SHAKE_N: Final = 0.35
 """Effective force of the damper above 20 Hz that counts as oscillation. [choice]"""
@@ -48,15 +48,13 @@ _PATIENCE_S: Final = 600.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Durations:
-    """How long each part lasts [s]; the default takes ten minutes with the operator's answers.
+    """The duration of each part [s]; by default ten minutes in total with the operator's answers.
 
     Attributes
     ----------
     rest_s : at rest, without force
-    come_s : until the spring holds the handle in the middle
-    wave_s : force on each axis for mass and friction
-    push_s : until the force on the scale is steady
-    damping_s : until the damper has grown to `MOST_NSPM`, on each axis
+    come_s : for the spring to bring the handle to the middle wave_s : force on each axis for mass and friction push_s :
+    until the force on the scale is steady damping_s : until the damper has grown to `MOST_NSPM`, on each axis
     """
 
     rest_s: float = 120.0
@@ -76,16 +74,12 @@ class StableDamping:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What a bench found; None where it was not measured.
+    """The results of a bench; None for those not measured.
 
     Attributes
     ----------
-    device : what the device says of itself
-    regularity, noise : at rest
-    motions : of the axes x, y, z
-    gain : of the force downward; None without a scale
-    damping : of the axes x, y, z
-    overruns : deadlines that the servo passed over, in all
+    device : the device's own description regularity, noise : at rest motions : of the axes x, y, z gain : of the force
+    downward; None without a scale damping : of the axes x, y, z overruns : number of deadlines that the servo skipped
     """
 
     device: dict[str, Any]
@@ -98,7 +92,7 @@ class Found:
 
     @property
     def fits(self) -> bool:
-        """Whether mass, damping and friction explain how the handle moved: it was not touched and met no stop."""
+        """Whether mass, damping and friction explain the handle's motion: it was not touched and reached no stop."""
         return all(one.explained >= LEAST_EXPLAINED and one.mass_kg > 0.0 for one in self.motions)
 
 
@@ -110,19 +104,19 @@ def run_bench(
     durations: Durations | None = None,
     clock: Clock | None = None,
 ) -> Found:
-    """Measure an open device; every way out ends with zero force.
+    """Measure an open device; it always ends with zero force.
 
     Parameters
     ----------
     progress : callable
-        Is given what happens, a line at a time.
+        Receives the progress, one line at a time.
     clock : Clock, optional
         Default: the system's.
 
     Raises
     ------
     DeviceError
-        The device was lost, or did what ends a measurement.
+        The device was lost, or ended the measurement.
     """
     lasts = durations or Durations()
     with Stand(device, clock) as stand:
@@ -151,7 +145,7 @@ def _held(**more: Any) -> Excitation:
 
 
 def _motion(stand: Stand, axis: int, lasts: Durations, progress: Callable[[str], object]) -> Motion:
-    """Bring the handle to the middle, move it by a chirp, and fit what it did."""
+    """Bring the handle to the middle, move it by a chirp, and fit its response."""
     stand.excite(_held())
     stand.run(lasts.come_s)
     most_n = min(WAVE_N, stand.limit_n / 2)
@@ -167,7 +161,7 @@ def _motion(stand: Stand, axis: int, lasts: Durations, progress: Callable[[str],
 
 
 def _damping(stand: Stand, axis: int, lasts: Durations, ask: Ask, progress: Callable[[str], object]) -> StableDamping:
-    """Draw the handle to and fro while the damper grows, until it oscillates, is ended, or reaches its greatest."""
+    """Move the handle back and forth while the damper grows, until it oscillates, is stopped or is greatest."""
     stand.excite(_held())
     stand.run(lasts.come_s)
     progress(f"Stable damping along {AXES[axis]}: up to {MOST_NSPM:g} N·s/m in {lasts.damping_s:g} s.")
@@ -195,7 +189,7 @@ def _damping(stand: Stand, axis: int, lasts: Durations, ask: Ask, progress: Call
 
 
 def _gain(stand: Stand, lasts: Durations, ask: Ask, progress: Callable[[str], object]) -> Gain | None:
-    """Push down on a scale, and ask what it shows."""
+    """Push down on a scale, and ask for its reading."""
     words = (
         "Rest the handle on a kitchen scale, near the middle of its range, and set the scale to zero; none: type 'no'."
     )

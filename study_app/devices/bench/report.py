@@ -1,4 +1,4 @@
-"""The report of a bench, for people and for programs: Markdown and JSON without anything of this computer's folders."""
+"""The report of a bench as Markdown and as JSON, without folders of this computer."""
 
 import json
 import platform
@@ -22,7 +22,7 @@ _ENDED: Final = {
 
 
 def as_json(found: Found, day: str) -> str:
-    """Return what was found as JSON text; ``day`` is the date of the bench, such as 2026-11-21."""
+    """Return the results as JSON text; ``day`` is the date of the bench, such as 2026-11-21."""
     document = {
         "format": FORMAT,
         "kind": "devices bench",
@@ -40,7 +40,7 @@ def as_markdown(found: Found, day: str) -> str:
 
 
 def kept(found: Found, day: str) -> dict[str, Any]:
-    """Return what this machine's settings keep of a bench, for `store.workstation.DeviceBench`."""
+    """Return the results of a bench for this machine's settings (`store.workstation.DeviceBench`)."""
     own = ("mass_kg", "damping_nspm", "friction_n", "delay_ms")
     return {
         "name": found.device["name"],
@@ -108,7 +108,7 @@ def _system() -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value with what JSON does not know replaced: numpy's numbers, NaN."""
+    """Return a value with replacements for types unknown to JSON: numpy's numbers, NaN."""
     if isinstance(value, dict):
         return {str(name): _plain(one) for name, one in value.items()}
     if hasattr(value, "_asdict"):

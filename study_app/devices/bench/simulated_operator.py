@@ -1,4 +1,4 @@
-"""Answers of a device's own simulated hand to what a bench asks the operator for."""
+"""Answers of a device's simulated hand to a bench's requests to the operator."""
 
 from collections.abc import Callable
 from typing import Any
@@ -8,7 +8,7 @@ from study_app.devices.bench.procedure import Ask
 
 
 def asks_hand(device: Any, progress: Callable[[str], object]) -> Ask:
-    """Return what asks the hand of a device that moves by itself: it lets go, or is the scale.
+    """Return the function that asks the hand of a simulated device: it releases the handle, or acts as the scale.
 
     The hand is the device's ``hand``, or the device itself: with ``held`` and the motors' ``force_n``.
     """

@@ -15,7 +15,7 @@ from study_app.haptics.runtime.servo import Servo
 
 RATE_HZ: Final = 1000.0
 GREATEST_N: Final = 4.0
-"""No excitation is stronger, even where the device permits more."""
+"""Greatest force of an excitation, even if the device permits more."""
 _LOOK_S: Final = 0.02
 _ALIVE_NS: Final = 500_000_000
 
@@ -26,7 +26,7 @@ class Stand:
     Parameters
     ----------
     device : opened
-    clock : default: the system's; on a virtual one time passes as fast as it is computed
+    clock : default: the system's; a virtual one runs as fast as the computation
     """
 
     def __init__(self, device: Device, clock: Clock | None = None) -> None:
@@ -39,12 +39,12 @@ class Stand:
 
     @property
     def position_m(self) -> Any:
-        """Where the handle is (3,) [m, hand frame]."""
+        """The place of the handle (3,) [m, hand frame]."""
         return self._driver.state.position_m.copy()
 
     @property
     def damper_nspm(self) -> float:
-        """How much the damper has grown."""
+        """The present damping of the damper."""
         return float(self._driver.state.damper_nspm)
 
     @property
@@ -54,23 +54,23 @@ class Stand:
 
     @property
     def overruns(self) -> int:
-        """How many deadlines the servo passed over."""
+        """The number of deadlines that the servo skipped."""
         return self._servo.overruns
 
     def excite(self, what: Excitation) -> None:
-        """Let this act from the next tick on."""
+        """Apply this from the next tick on."""
         self._live()
         self._driver.excite(what)
 
     def run(
         self, seconds: float, *, answered: Callable[[], str | None] | None = None, may_end: bool = False
     ) -> tuple[Any, str | None]:
-        """Let time pass; return the samples of that time and what was answered before it was over, if anything.
+        """Wait; return the samples of that time and the operator's answer during it, if any.
 
         Parameters
         ----------
-        answered : returns what the operator typed, None while nothing was
-        may_end : whether an excitation may end by itself; then this returns at once
+        answered : returns the operator's input, None without one may_end : whether an excitation may end by itself;
+        then this returns at once
 
         Raises
         ------

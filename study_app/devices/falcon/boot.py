@@ -1,7 +1,7 @@
-"""From a Falcon that was just switched on to one that answers: ping, speed, upload with its echo, first reply.
+"""Boot of a Falcon after power-up: ping, speed, upload with its echo, first reply.
 
-What each step waits for is read as a stream, whatever packets the bridge makes of it. A step that fails ends the
-attempt; the next one begins with the bridge opened anew, which is how it succeeds for those who have a Falcon.
+Each step reads its answer as a stream, independent of the bridge's packets. A step that fails ends the attempt; the
+next one begins with reopening the bridge, which succeeds according to owners of a Falcon.
 """
 
 from collections.abc import Callable
@@ -34,7 +34,7 @@ class BootFailure(FalconFailure):
     """The firmware could not be loaded.
 
     ``step`` is where the last attempt ended: "ping", "autobaud", "echo" or "start"; ``attempt`` its number; ``reason``
-    what was seen there, ``silent`` whether that was nothing at all.
+    the observation there, ``silent`` whether there was no answer.
     """
 
     def __init__(self, step: str, attempt: int, reason: str, *, silent: bool) -> None:
@@ -50,7 +50,7 @@ class BootFailure(FalconFailure):
 
 
 class _Ended(Exception):
-    """A step of an attempt did not come to its end."""
+    """A step of an attempt did not complete."""
 
     def __init__(self, step: str, reason: str, *, silent: bool = False) -> None:
         self.step = step
@@ -72,7 +72,7 @@ class _Line:
         self._parser, self._status = records(PARSER, 1), records(STATUS, 1)
 
     def until(self, complete: Callable[[bytes], bool], timeout_s: float, came: bytes = b"") -> bytes:
-        """Return ``came`` and what came after it, until that is complete or the time is out."""
+        """Return ``came`` and the bytes after it, until they are complete or the time is out."""
         ends_s = self._transport.now_s() + timeout_s
         while not complete(came) and (left_s := ends_s - self._transport.now_s()) > 0.0:
             came += self._memory[: self._read(left_s)].tobytes()
@@ -99,7 +99,7 @@ class _Line:
 
 
 def configure(transport: Transport) -> None:
-    """Set the bridge as a Falcon that runs needs it, and forget what is in it."""
+    """Configure the bridge for a running Falcon, and clear its buffers."""
     _purge(transport)
     transport.control(constants.REQUEST_LATENCY, constants.LATENCY_RUN_MS)
     _set_line(transport, constants.BAUD_1500000)
@@ -107,7 +107,7 @@ def configure(transport: Transport) -> None:
 
 
 def set_event_character(transport: Transport, on: bool) -> None:
-    """Let the bridge send what it has as soon as a packet's last byte is in, or only when its timer runs out."""
+    """Let the bridge send its data as soon as it has a packet's last byte, or only when its timer expires."""
     transport.control(constants.REQUEST_EVENT_CHARACTER, constants.STOP | (constants.EVENT_ENABLED if on else 0))
 
 
@@ -136,14 +136,14 @@ def _round_trip_s(transport: Transport) -> float:
 def boot(
     transport: Transport, firmware: bytes, *, attempts: int = ATTEMPTS, progress: Callable[[str], object] | None = None
 ) -> Firmware:
-    """Load ``firmware`` and see it run; return what it is.
+    """Load ``firmware`` and check that it runs; return its description.
 
     Parameters
     ----------
     transport : the Falcon's bridge; each attempt but the first opens it anew
     firmware : the bytes of its file
-    attempts : how many there are at most
-    progress : is given a line about each attempt that failed
+    attempts : their greatest number
+    progress : receives a line about each failed attempt
 
     Raises
     ------
@@ -209,7 +209,7 @@ def _time(transport: Transport) -> None:
 
 
 def _upload(transport: Transport, firmware: bytes) -> None:
-    """Send the firmware in pieces, and hear each come back as it went."""
+    """Send the firmware in pieces, and check the echo of each."""
     line = _Line(transport)
     for at in range(0, len(firmware), constants.CHUNK):
         chunk = firmware[at : at + constants.CHUNK]
@@ -244,6 +244,6 @@ def _set_line(transport: Transport, divisor: int) -> None:
 
 
 def _purge(transport: Transport) -> None:
-    """Forget what waits in the bridge, both ways."""
+    """Clear the bridge's buffers in both directions."""
     transport.control(constants.REQUEST_RESET, constants.PURGE_RX)
     transport.control(constants.REQUEST_RESET, constants.PURGE_TX)

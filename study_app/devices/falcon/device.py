@@ -28,23 +28,23 @@ from study_app.haptics.model.layout import new_command, new_reading
 
 FORCE_LIMIT_N: Final = 8.0
 
-_FARTHEST = 1700  # counts, a little more than is known to be used
+_FARTHEST = 1700  # counts, slightly more than are used in practice
 _CLOSED = BulkCalls(0, 0)
 
 
 class FalconDevice(Device):
-    """A Novint Falcon, or what answers like one, behind a bridge.
+    """A Novint Falcon, or an emulated one, behind a bridge.
 
     Parameters
     ----------
-    bridge : what ``transport.open_transport`` takes
+    bridge : the argument of ``transport.open_transport``
     firmware : file of its program, which it needs after it was switched on
-    workspace_m : half extents of where the grip shall reach [m]
-    force_limit_n : the greatest force it may be asked for [N]
-    geometry : published measures, where a calibration names no others
-    progress : is given what to do while it is opened, a line at a time
-    cancelled : is asked while it is homed whether to give up
-    patience_s : how long homing may take [s]
+    workspace_m : half extents of the grip's required workspace [m]
+    force_limit_n : the greatest force that may be commanded [N]
+    geometry : published dimensions, unless a calibration names others
+    progress : receives instructions while it is opened, one line at a time
+    cancelled : returns during homing whether to stop
+    patience_s : time limit of homing [s]
     """
 
     name = "falcon"
@@ -89,7 +89,7 @@ class FalconDevice(Device):
         self.read, self.write = exchange_functions()
 
     def open(self) -> None:
-        """Open the bridge, load the program if need be, and home it, telling what to do; then it is guarded.
+        """Open the bridge, load the program if needed, and home it with instructions; then start its guard.
 
         Raises
         ------
@@ -139,7 +139,7 @@ class FalconDevice(Device):
         try:
             quieted = quieted or quiet(transport) > 0
             self.falcon.sent_n = 0.0 if quieted else self.falcon.sent_n
-        finally:  # an interrupt ends neither its being let go of nor its guard's duty
+        finally:  # an interrupt prevents neither its release nor its guard
             try:
                 transport.close()
             finally:
@@ -154,7 +154,7 @@ class FalconDevice(Device):
 
     @property
     def counters(self) -> dict[str, int]:
-        """How many ticks, packets and errors there were since it was homed: see ``exchange.FALCON``."""
+        """Numbers of ticks, packets and errors since it was homed: see ``exchange.FALCON``."""
         return {name: int(self.falcon[name]) for name in COUNTERS}
 
     @property
@@ -170,7 +170,7 @@ class FalconDevice(Device):
             )
 
     def describe(self) -> dict[str, Any]:
-        """Return what the receipt says of it."""
+        """Return its record for the receipt."""
         used = self._calibration
         return {
             "name": self.name,
@@ -202,7 +202,7 @@ class FalconDevice(Device):
                 )
 
     def _run_program(self, transport: Transport) -> str:
-        """See to it that its program runs; return which one."""
+        """Load its program if it does not run; return which one runs."""
         boot.configure(transport)
         if boot.is_running(transport):
             return "already running"
@@ -221,7 +221,7 @@ class FalconDevice(Device):
         return boot.boot(transport, program, progress=self._progress).sha256
 
     def _hasten(self, transport: Transport) -> dict[str, Any]:
-        """Measure the round trip with the bridge's event character and without, and keep the quicker way."""
+        """Measure the round trip with and without the bridge's event character, and use the faster setting."""
         boot.set_event_character(transport, on=False)
         plain_s = boot.measure_round_trip(transport)
         boot.set_event_character(transport, on=True)
@@ -236,7 +236,7 @@ class FalconDevice(Device):
         }
 
     def _calibrate(self, serial: str | None) -> None:
-        """Use what was measured of this Falcon; nothing of another that was open before."""
+        """Use the calibration of this Falcon, not that of another opened before."""
         self._calibration = used = calibration.load(serial) if serial else None
         self._geometry = self._published if used is None else geometry_named(used.geometry)
         gain = calibration.UNCALIBRATED_UNITS_PER_NM if used is None else used.units_per_nm
@@ -256,14 +256,14 @@ class FalconDevice(Device):
         self.falcon.unguarded = 1
 
     def _begin_anew(self) -> None:
-        """Let the force come in over half a second from the next tick on, and count from there."""
+        """Fade the force in over half a second from the next tick on, and reset the counters."""
         self.falcon.share = 0.0
         self.falcon.started = 0
         for name in COUNTERS:
             self.falcon[name] = 0
 
     def _tick(self) -> None:
-        """Take a tick without force."""
+        """Run a tick without force."""
         transport = self.transport
         assert transport is not None  # noqa: S101 - it is being opened
         now_ns = round(1e9 * transport.now_s())

@@ -1,7 +1,7 @@
-"""The Falcon's driver in front of an emulated Falcon, whose grip a simulated hand holds.
+"""The Falcon's driver with an emulated Falcon, whose grip a simulated hand holds.
 
-All of the driver is the real one, down to pyusb and the C function; the emulator is behind it as the bus is. Once it
-is open, the emulator's time is that of the servo's ticks, so that it runs as fast as a rehearsal does.
+The driver is the real one, including pyusb and the C function; the emulator replaces the USB bus. Once it is open, the
+emulator's time is that of the servo's ticks, so that it runs as fast as a rehearsal.
 """
 
 from collections.abc import Callable
@@ -16,21 +16,20 @@ from study_app.devices.falcon.mechanics.geometry import WORKSPACE_M
 from study_app.devices.falcon.transport.transport import Transport
 from study_app.devices.falcon.transport.usb import PyUsbTransport
 
-_STILL_TICKS = 10  # between two strokes of homing it moves again sooner
+_STILL_TICKS = 10  # longer than the pause between two strokes of homing
 
 
 class EmulatedFalcon(FalconDevice):
-    """A Falcon of numbers; ``hand`` takes the orders of whoever simulates a participant.
+    """An emulated Falcon; ``hand`` takes the orders of a simulated participant.
 
     Parameters
     ----------
-    random : where the hand's tremor and the emulator's faults are drawn from; None: always the same ones
+    random : random numbers for the hand's tremor and the emulator's faults; None: always the same ones
     firmware : file to load into it; without one its program runs already
-    workspace_m : half extents of where the grip shall reach, and can be sent [m]
-    force_limit_n : the greatest force it may be asked for [N]
-    progress : is given what to do while it is opened
-    emulator : another than a new one
-    options : of ``FalconDevice``
+    workspace_m : half extents of the grip's workspace [m]
+    force_limit_n : the greatest force that may be commanded [N]
+    progress : receives instructions while it is opened
+    emulator : an existing one to use options : of ``FalconDevice``
     """
 
     guarded = False  # it ends with the program
@@ -58,7 +57,7 @@ class EmulatedFalcon(FalconDevice):
         self._backend = EmulatedBackend(self.hand)
 
     def open(self) -> None:
-        """Open it, and wait until the hand that homed it has brought the grip to the middle."""
+        """Open it, and wait until the hand has moved the grip to the middle after homing."""
         super().open()
         still = 0
         while still < _STILL_TICKS:
@@ -68,7 +67,7 @@ class EmulatedFalcon(FalconDevice):
         self._backend.follow_clock(self.context)  # FALCON begins with the time of the tick
 
     def close(self) -> None:
-        """Send zero torque several times and let go of it; a second call does nothing."""
+        """Send zero torque several times and close it; a second call does nothing."""
         self._backend.follow_clock(0)
         super().close()
 
@@ -79,5 +78,5 @@ class EmulatedFalcon(FalconDevice):
 def new_emulator(
     random: Random | None, firmware: str | Path | None, workspace_m: tuple[float, float, float]
 ) -> Emulator:
-    """Return an emulator as it is after power-up, its program running unless it is to be loaded."""
+    """Return an emulator after power-up, with its program running unless it is to be loaded."""
     return Emulator(random, running=firmware is None, workspace_m=workspace_m)

@@ -1,9 +1,9 @@
-"""The Falcon's tick, compiled: take the reply to the packet before, say where the grip is, send the next torques.
+"""The Falcon's compiled tick: read the reply to the last packet, return the grip's position, send the next torques.
 
-The device answers each packet with one, so `_read` collects what the packet of the tick before asked for, and `_write`
-sends the force as soon as it is known; a position is one tick old. Several replies at once: the newest counts. None:
-nothing new, and what came last is never given twice. Force passes a gate: all arms homed, the grip pulled out once, and
-then half a second from none to all. Which replies are believed: see ``replies``.
+The device answers each packet with one, so `_read` collects the reply to the last tick's packet, and `_write` sends the
+force as soon as it is known; a position is one tick old. Of several replies the newest counts; without one there is no
+new position, and none is returned twice. Force is enabled after all arms are homed and the grip was pulled out once,
+and then fades in over half a second. ``replies`` decides which replies are accepted.
 """
 
 from functools import cache
@@ -48,16 +48,16 @@ from study_app.haptics.model.layout import COMMAND, READING, records
 from study_app.haptics.model.slope_limits import SLEW_S, slew_limit_n
 
 LEAST_MASS_KG: Final = 0.1
-"""The least mass at the grip in any direction [kg]: arms and platform of a device of this size weigh about as much.
-Nobody published a measured value; the limits of the loop are held for 30 to 250 g."""
+"""The least effective mass at the grip in any direction [kg], about that of arms and platform of this size. Nobody
+published a measured value; the limits of the loop are held for 30 to 250 g."""
 RAMP_S: Final = 0.5
 SMOOTHING_S: Final = 2e-3
 """Time constant of the grip's velocity, which separates a braking force from a driving one."""
 BRIDGE_LOST: Final = FIRST_CAUSE
 LONGEST_GAP_NS: Final = 20_000_000
-"""A reply that waited longer for the loop to look is too old to be given."""
-_BEYOND = 2  # so many positions in a row show an out-stroke: one may be of a packet whose homed bits were garbled
-_READS = 2  # a tick asks the bridge at most so often: one answer may be nothing but status bytes
+"""Greatest waiting time of a reply before the loop reads it: older ones are not used."""
+_BEYOND = 2  # positions in a row that show an out-stroke: a single one may be from a corrupted packet
+_READS = 2  # most reads of the bridge per tick: an answer may contain only status bytes
 _TIMEOUT_MS = 1
 _DATA = 4 * USB_PACKET
 
@@ -69,7 +69,7 @@ FALCON = np.dtype(
         ("mechanism", MECHANISM),
         ("centre_m", np.float64),  # z of the hand's origin in the Falcon's frame
         ("started", np.int64),  # 1 after the first tick
-        *GATE,  # its force: as the grip was at the last command
+        *GATE,  # its force: at the grip's place at the last command
         # the stream
         ("data", np.uint8, (_DATA,)),
         ("packet", np.uint8, (PACKET,)),
@@ -77,43 +77,43 @@ FALCON = np.dtype(
         ("parser", PARSER),
         ("status", STATUS),
         # the pose, in the Falcon's frame
-        ("seen_rad", np.float64, (3,)),  # what the last encoders say
+        ("seen_rad", np.float64, (3,)),  # from the last encoder counts
         ("theta", np.float64, (3,)),  # of the last pose
         ("position_m", np.float64, (3,)),
         ("rates", np.float64, (3, 3)),
-        ("posed_ns", np.int64),  # time of the last pose; 0: none since the stream began anew
+        ("posed_ns", np.int64),  # time of the last pose; 0: none since the stream was reset
         ("previous_m", np.float64, (3,)),  # the pose before
         ("velocity_mps", np.float64, (3,)),
         ("tick_s", np.float64),  # how long the last one was
-        ("slew_n_per_s", np.float64),  # how fast a force grows that does not brake the grip
+        ("slew_n_per_s", np.float64),  # growth rate of a force that does not brake the grip
         ("force_n", np.float64, (3,)),  # as it passed the gate
         ("held_n", np.float64, (3,)),  # force of the motors by the command before
         ("torque_nm", np.float64, (3,)),
         ("units", np.int64, (3,)),  # the last torque command
-        # the motion of the arms, to tell garbled encoders
-        ("tracked", np.int64),  # 1 once encoders were believed
+        # the motion of the arms, to detect corrupted encoder counts
+        ("tracked", np.int64),  # 1 once encoder counts were accepted
         ("apart", np.int64),  # ticks since then
-        ("counts", np.int64, (3,)),  # as last believed
+        ("counts", np.int64, (3,)),  # as last accepted
         ("pace", np.float64, (3,)),  # counts a tick
-        ("doubted", np.int64, (3,)),  # as last not believed,
-        ("doubted_at", np.int64),  # so many ticks after the last believed
+        ("doubted", np.int64, (3,)),  # as last rejected,
+        ("doubted_at", np.int64),  # ticks since the last accepted ones
         ("doubts", np.int64),  # in a row
         # the gate
         ("homed", np.int64),  # 1 while all arms are
-        ("unhomed", np.int64),  # packets in a row that said otherwise
+        ("unhomed", np.int64),  # packets in a row that report otherwise
         ("beyond", np.int64),  # positions in a row at the end of the out-stroke
         ("pulled_out", np.int64),  # 1 after it
         ("share", np.float64),  # of the force that passes
-        ("unguarded", np.int64),  # 1: its guard has died: nothing passes, and it is given up
-        ("buttons", np.int64),  # as two packets in a row said
-        ("seen_buttons", np.int64),  # as the last one said
-        # who owes whom
-        ("asked", np.int64),  # packets sent since the last look
+        ("unguarded", np.int64),  # 1: its guard has died: no force passes, and the exchange ends
+        ("buttons", np.int64),  # as in two packets in a row
+        ("seen_buttons", np.int64),  # as in the last one
+        # replies owed
+        ("asked", np.int64),  # packets sent since the last read
         ("owed", np.int64),  # replies that did not come so far
         ("delay", np.int64),  # reads after which a packet's reply comes, as measured
-        ("measured", np.int64),  # what a measurement found that waits for another one to say the same
-        ("testing", np.int64),  # packets left out so far to measure it; 0: no measurement
-        ("astray", np.int64),  # reads in a row after which more or less was owed than the delay explains
+        ("measured", np.int64),  # result of a measurement to be confirmed by another one
+        ("testing", np.int64),  # packets omitted so far to measure it; 0: no measurement
+        ("astray", np.int64),  # reads in a row with more or fewer replies owed than the delay explains
         ("unsure", np.int64),  # 1: the delay has to be measured
         ("retest", np.int64),  # ticks until it may be
         # counters
@@ -121,7 +121,7 @@ FALCON = np.dtype(
         ("fresh", np.int64),  # ticks that gave a position
         ("missing", np.int64),  # ticks without a reply
         ("late", np.int64),  # ticks whose reply was too old, or may have been
-        ("refused", np.int64),  # ticks whose reply was no pose of a homed Falcon, or is doubted
+        ("refused", np.int64),  # ticks whose reply was not a pose of a homed Falcon, or is in doubt
         ("requests", np.int64),  # packets sent
         ("replies", np.int64),  # packets received
         ("written_off", np.int64),  # replies that were given up
@@ -217,7 +217,7 @@ def finish(falcon: Any, context: int) -> None:
 
 @kernel
 def _take_reply(falcon: Any, context: int, now_ns: int, out: Any) -> int:
-    """Receive what the Falcon answered; put a new position into the reading ``out``."""
+    """Receive the Falcon's replies; write a new position into the reading ``out``."""
     elapsed_ns = now_ns - falcon.now_ns
     falcon.now_ns = now_ns
     falcon.tick_s = elapsed_ns * 1e-9
@@ -261,7 +261,7 @@ def _send_force(falcon: Any, context: int, force_n: Any) -> int:
 
 @kernel
 def _send_packet(falcon: Any, context: int) -> None:
-    """Send ``force_n`` or, to measure the delay, leave the motors as they are; ``sent_n`` is then what they got."""
+    """Send ``force_n`` or, to measure the delay, keep the motors' force; ``sent_n`` is the force actually sent."""
     before = falcon.units[0], falcon.units[1], falcon.units[2]
     push(falcon)
     waits = falcon.testing > 0 and may_wait(falcon)
@@ -283,7 +283,7 @@ def _lights(falcon: Any) -> int:
 
 @kernel
 def _receive(falcon: Any, context: int) -> Any:
-    """Read what the bridge has; return how many packets that was."""
+    """Read the bridge's bytes; return the number of packets."""
     packets = 0
     for _ in range(_READS):
         falcon.transferred = 0
@@ -314,7 +314,7 @@ def _receive(falcon: Any, context: int) -> Any:
 
 @kernel
 def _locate(falcon: Any) -> bool:
-    """Find the grip; return whether it is anywhere a Falcon's grip can be."""
+    """Compute the grip's position; return whether it is possible for a Falcon."""
     angles(falcon.mechanism, falcon.status.encoders, falcon.seen_rad)
     if forward(falcon.mechanism, falcon.seen_rad, falcon.position_m) != REACHED:
         return False
@@ -325,7 +325,7 @@ def _locate(falcon: Any) -> bool:
 
 @kernel
 def _follow(falcon: Any) -> None:
-    """Take the new pose into the grip's velocity."""
+    """Update the grip's velocity with the new pose."""
     interval_s = (falcon.now_ns - falcon.posed_ns) * 1e-9
     known, weight = falcon.posed_ns != 0, interval_s / (interval_s + SMOOTHING_S)
     for axis in range(3):
@@ -348,7 +348,7 @@ def _open_gate(falcon: Any, elapsed_s: float) -> None:
 
 @kernel
 def _send(falcon: Any, context: int) -> bool:
-    """Send ``packet``; return whether all of it went out, so that the motors know it."""
+    """Send ``packet``; return whether it was sent completely."""
     falcon.transferred = 0
     code = _transfer(
         falcon.transfer,

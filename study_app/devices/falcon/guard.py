@@ -1,8 +1,8 @@
-"""Zero torque when the program dies: a small process that outlives it.
+"""The guard: a small process that sends zero torque if the program dies.
 
-The last torque may persist in a Falcon that hears no more. So a child waits on a pipe from the program; if the pipe
-ends without ``WORD``, the program is gone, whatever ended it, and the child opens the Falcon and sends quiet packets.
-They keep the homing flag, and nothing of the bridge is set: what runs and is homed stays so. Run as
+A Falcon without further packets may keep its last torque. So a child process waits on a pipe from the program; if the
+pipe ends without ``WORD``, the program has died, and the child opens the Falcon and sends packets of zero torque. They
+keep the homing flag, and the bridge's settings are unchanged, so that the Falcon stays loaded and homed. Run as
 ``python -m study_app.devices.falcon.guard NAME``, NAME being one of ``transport.open_transport``.
 """
 
@@ -25,7 +25,7 @@ WORD: Final = b"done\n"
 READY: Final = b"ready\n"
 PACKETS: Final = 10
 PATIENCE_S: Final = 10.0
-"""How long the guard tries to open the Falcon: the system takes a moment to take it from a program that died."""
+"""Time in which the guard tries to open the Falcon: the system needs a moment to release it from a dead program."""
 
 _RETRY_S = 0.02
 _BETWEEN_S = 0.002
@@ -37,13 +37,13 @@ class Guard:
     """The guard of the Falcon that ``open_transport(name)`` opens.
 
     It can act when the program has died, not while it is suspended: from its start until it is dismissed Ctrl-Z does
-    nothing. As a context manager it starts on entry and stands down on exit; if an exception is on its way out, it does
-    not stand down, but sends its packets as soon as the Falcon is closed.
+    nothing. As a context manager it starts on entry and is dismissed on exit; after an exception it is not dismissed,
+    but sends its packets as soon as the Falcon is closed.
 
     Parameters
     ----------
     name : of the Falcon
-    died : is called, in a thread of its own, should the guard end before it is dismissed: then no force may be sent
+    died : called in a separate thread if the guard ends before it is dismissed: then no force may be sent
     """
 
     def __init__(self, name: str, died: Callable[[], object] | None = None) -> None:
@@ -64,7 +64,7 @@ class Guard:
         if self.child is not None:
             return
         command = [sys.executable, "-P", "-m", __spec__.name, self._name]  # -P: no modules of the present folder
-        # In a session, or console, of its own: what ends the program with its terminal does not end its guard.
+        # In a separate session or console: closing the program's terminal does not end its guard.
         child = subprocess.Popen(  # noqa: S603 - our own module, and no shell
             command,
             stdin=subprocess.PIPE,
@@ -87,11 +87,11 @@ class Guard:
 
     @property
     def watching(self) -> bool:
-        """Whether it was started, and is alive."""
+        """Whether it was started and still runs."""
         return self.child is not None and self.child.poll() is None
 
     def _listen(self, child: subprocess.Popen[bytes], said: IO[bytes]) -> None:
-        said.read()  # it says no more; so this ends when the guard does
+        said.read()  # it sends no more data; so this returns when the guard ends
         if self.child is child and self._died is not None:
             self._died()
 
@@ -100,7 +100,7 @@ class Guard:
         self._end(WORD)
 
     def release(self) -> None:
-        """Let it send its packets, once the Falcon is closed; wait until it has."""
+        """Let it send its packets after the Falcon is closed; wait for the end."""
         self._end(b"")
 
     def leave(self) -> None:
@@ -119,7 +119,7 @@ class Guard:
     def recall(self) -> None:
         """End the process that `leave` left behind: the program has opened the Falcon again, with another guard.
 
-        Otherwise it would try for the rest of its patience to open a Falcon that is in use, and call it dangerous.
+        Otherwise it would try until its time limit to open a Falcon that is in use, and report a danger.
         """
         left, self._left = self._left, None
         if left is not None:
@@ -170,7 +170,7 @@ def _close(child: subprocess.Popen[bytes]) -> None:
 
 
 def quiet(transport: Transport) -> int:
-    """Send ``PACKETS`` quiet packets; return how many went out."""
+    """Send ``PACKETS`` packets of zero torque; return the number sent."""
     sent = 0
     for _ in range(PACKETS):
         with suppress(DeviceError):
@@ -181,7 +181,7 @@ def quiet(transport: Transport) -> int:
 
 
 def open_patiently(name: str) -> Transport:
-    """Return the opened Falcon, tried again for ``PATIENCE_S``; then what prevents it is raised."""
+    """Return the opened Falcon, with attempts for ``PATIENCE_S``; then raise the error."""
     ends_s = time.monotonic() + PATIENCE_S
     while True:
         try:
@@ -193,7 +193,7 @@ def open_patiently(name: str) -> Transport:
 
 
 def watch(name: str) -> int:
-    """Wait for the end of the standard input; without ``WORD`` in it, quieten the Falcon. Return an exit code."""
+    """Wait for the end of the standard input; without ``WORD`` in it, send zero torque. Return an exit code."""
     for number in ("SIGINT", "SIGTERM", "SIGHUP"):
         if hasattr(signal, number):
             signal.signal(getattr(signal, number), signal.SIG_IGN)  # it ends when the program has ended

@@ -1,7 +1,7 @@
-"""Homing: the grip out, in, and out again, with words for whoever holds it, and why it did not come to an end.
+"""Homing: the grip is moved out, in, and out again, with instructions, and the reason if it does not complete.
 
-Arms find their index on the way in; before that the encoders count from anywhere, so no force is sent. The out-stroke
-after it shows that positions are right, and that the hand is where the device wants it when the force comes in.
+Arms find their index on the way in; before that the encoder counts have no known origin, so no force is sent. The
+following out-stroke confirms the positions, and that the hand is at the required place when the force fades in.
 """
 
 from collections.abc import Callable
@@ -13,8 +13,8 @@ from study_app.devices.falcon.failures import FalconFailure
 from study_app.devices.falcon.wire.replies import ALL_HOMED
 
 PATIENCE_S: Final = 120.0
-ADVICES: Final = 6  # so often, in that time, advice is given
-MOVED: Final = 60  # counts of an arm that show that somebody moves the grip: two degrees
+ADVICES: Final = 6  # number of advice lines in that time
+MOVED: Final = 60  # counts of an arm that show motion of the grip: two degrees
 
 STROKES: Final = "Homing (red light): pull the grip of the Falcon all the way out, then push it all the way in."
 PULL_OUT: Final = "Homed (blue light): now pull the grip all the way out once more."
@@ -29,7 +29,7 @@ _SEEN: Final = {
 
 
 class NotHomed(FalconFailure):
-    """Homing did not come to an end; ``kind`` is a key of what can have been seen."""
+    """Homing did not complete; ``kind`` is the key of the observation."""
 
     def __init__(self, kind: str) -> None:
         self.kind = kind
@@ -49,9 +49,8 @@ def home(
     Parameters
     ----------
     falcon : record of ``exchange.FALCON``
-    tick : takes one tick of it, and lets a millisecond pass
-    now_s : the time [s]
-    progress : is given what to do, a line at a time
+    tick : runs one tick of it, and waits a millisecond now_s : the time [s] progress : is given what to do, a line at a
+    time
 
     Raises
     ------
@@ -82,7 +81,7 @@ def _follow(falcon: Any, lowest: list[int], highest: list[int]) -> None:
     counts = [int(count) for count in falcon.status.encoders]
     if falcon.status.count <= 1:
         lowest[:], highest[:] = counts, counts
-    elif falcon.status.homed != ALL_HOMED:  # the origin jumps where an arm is homed: that is no motion
+    elif falcon.status.homed != ALL_HOMED:  # the origin jumps when an arm is homed: that is not motion
         lowest[:] = map(min, lowest, counts)
         highest[:] = map(max, highest, counts)
 

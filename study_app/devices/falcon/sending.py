@@ -1,9 +1,9 @@
-"""From the servo's force to motor units, and back to the newtons that the motors then give.
+"""Converts the servo's force to motor units, and these back to the force that the motors exert.
 
-The servo limits how fast its force changes, and goes past that limit where its passivity controller lets go or brakes.
-So does the driver: after packets that were not sent, or for a caller without such a limit, a force grows by no more
-than the servo's slew limit in a tick; all that lowers it, and all that takes energy from the moving grip, passes at
-once. All of this works on the exchange's record (``exchange.FALCON``), in the Falcon's frame.
+The servo limits the change of its force, except when its passivity controller reduces force or adds damping. So does
+the driver: after packets that were not sent, or for a caller without such a limit, a force grows by at most the servo's
+slew limit per tick; reductions, and forces that take energy from the moving grip, pass at once. The functions work on
+the exchange's record (``exchange.FALCON``), in the Falcon's frame.
 """
 
 import math
@@ -15,11 +15,11 @@ from study_app.haptics.kernels.passivity import SURE_MPS
 from study_app.haptics.kernels.vector import dot, square, square_distance
 
 MOST_WAITING_N: Final = 0.5
-"""A measurement of the delay may hold back a force that differs by no more from what the motors give."""
+"""Greatest difference between a force and the motors' present force at which a delay measurement may omit it."""
 
 SHORTEST_TICK_S: Final = 1e-3
 LONGEST_TICK_S: Final = 4e-3
-"""A force grows within a tick by no more than in this time, however late the tick is."""
+"""Time that limits the growth of a force in a tick, even if the tick is late."""
 
 
 @kernel
@@ -37,14 +37,14 @@ def push(falcon: Any) -> None:
 
 @kernel
 def may_wait(falcon: Any) -> bool:
-    """Return whether the motors may go on as they are for a tick: they give about what is wanted, and that is not 0."""
+    """Return whether the motors may keep their force for a tick: it is close to the wanted one, and not 0."""
     near: bool = square_distance(falcon.sent_n, falcon.held_n) <= MOST_WAITING_N * MOST_WAITING_N
     return near and (square(falcon.sent_n) > 0.0 or square(falcon.held_n) == 0.0)
 
 
 @kernel
 def _motor_force(falcon: Any, force_n: Any) -> None:
-    """Write into ``force_n`` (3,) [N] what ``units`` make at the grip: ``F = J^T tau``; 0 where they are 0."""
+    """Write the force of ``units`` at the grip into ``force_n`` (3,) [N]: ``F = J^T tau``; 0 if they are 0."""
     units = falcon.units
     for axis in range(3):
         force_n[axis] = 0.0
@@ -69,7 +69,7 @@ def _choose_units(falcon: Any) -> None:
 
 @kernel
 def limit_growth(falcon: Any) -> None:
-    """Shorten what of the force is new and does not brake the grip to the servo's slew limit.
+    """Limit the part of the force that is new and does not brake the grip to the servo's slew limit.
 
     New is the way from the nearest force that is a share (0 to 1) of the one held, so that a force that turns round
     falls at once and grows by steps. A grip slower than ``SURE_MPS`` may be a count of an encoder, and is not braked.

@@ -1,11 +1,11 @@
-"""The Inverse3's tick, compiled: take the replies to the commands before, give the newest position, send the force.
+"""The Inverse3's compiled tick: read the replies to earlier commands, return the newest position, send the force.
 
 The service answers each message with one state and pushes nothing (docs.haply.co 3.5.x, "WebSocket Protocol", core
 rule), so `_write` sends the force and asks for the state that `_read` finds at the next tick. Neither waits: the socket
-does not block. A reply that is older than `LONGEST_GAP_NS` counts as none, and where replies stay out the servo ends
-the force after 50 ms. Any other fault ends the stream at once: zero force is sent, then a close frame, then
-nothing. Commands are applied once and forgotten, and a device without commands returns to idle ("Control Commands"), so
-silence is what ends the force where this program ends or hangs.
+does not block. A reply older than `LONGEST_GAP_NS` is ignored, and without replies the servo ends the force after 50
+ms. Any other fault ends the stream at once: zero force is sent, then a close frame, then nothing. Commands are applied
+once and forgotten, and a device without commands returns to idle ("Control Commands"), so the force ends without
+further commands if this program ends or hangs.
 """
 
 from functools import cache
@@ -69,8 +69,8 @@ MOST_WEAKER: Final = 60
 INBOX: Final = 1 << 16
 _OUTBOX = 512
 _TEXT = 384
-_LOG = 64  # commands whose time is kept, more than ever wait
-_RECEIVES = 8  # a tick asks the socket at most so often
+_LOG = 64  # commands whose time is stored, more than can wait
+_RECEIVES = 8  # most reads of the socket per tick
 _NORM_SLACK = 1.001
 
 CLOSED, BROKE_PROTOCOL, NOT_A_STATE, DEVICE_GONE, NO_POSITION, BAD_NUMBER, NOT_READY, UNCALIBRATED, TOO_LONG = range(
@@ -98,7 +98,7 @@ INVERSE3 = np.dtype(
         ("out_size", np.int64),  # of the frame in it
         ("out_sent", np.int64),  # how much of that went
         ("key", np.uint64, (1,)),  # of the masking keys' generator
-        # who owes whom
+        # replies owed
         ("sent", np.int64),  # commands
         ("answered", np.int64),  # replies
         ("sent_ns", np.int64, (_LOG,)),
@@ -365,7 +365,7 @@ def _answer_ping(device: Any, context: int, at: int, length: int) -> None:
 
 @kernel
 def _end(device: Any, context: int, why: int) -> int:
-    """End the stream: zero force, a close frame, and silence."""
+    """End the stream: send zero force and a close frame, then nothing."""
     if why != CLOSED:
         finish(device, context)
     clear(device.sent_n)  # silence ends a force that could not be taken back

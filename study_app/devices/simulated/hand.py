@@ -1,11 +1,11 @@
-"""Where a simulated hand wants the handle at a moment: at the pointer, along a motion, on a reach, or where it is.
+"""The target of a simulated hand at a time: at the pointer, along a motion, on a reach, or at its present place.
 
 Orders come from any thread, one at a time, through a seqlock: the writer makes the serial odd, writes, makes it even;
-the reader, inside the servo, takes an order only when it is whole, else leaves it for the next tick; so neither ever
-waits for the other.
+the reader, inside the servo, reads an order only when it is complete, else at the next tick; so neither ever waits for
+the other.
 
-Everything is made of sums, products, divisions and square roots, which IEEE 754 rounds alike everywhere; so a scripted
-hand moves to the same bit on every machine.
+It only uses sums, products, divisions and square roots, which IEEE 754 rounds alike everywhere; so a scripted hand
+moves identically on every machine.
 """
 
 import math
@@ -19,8 +19,8 @@ from study_app.haptics.kernels.plant import move
 
 STAY, POINT, HOLD, REACH, FOLLOW = range(5)
 
-WAVES = 3  # tremor: so many waves an axis
-LONGEST_STEP_S = 0.05  # a loop that stood still for longer must not spend longer still on catching up
+WAVES = 3  # tremor: waves per axis
+LONGEST_STEP_S = 0.05  # longest time computed after a pause of the loop
 
 ORDER = np.dtype(
     [
@@ -47,9 +47,9 @@ HAND = np.dtype(
         ("moving", np.int64),  # 1 while an order is not yet fulfilled
         ("lag_s", np.float64),  # of POINT: time constant of each of two low-passes that smooth the pointer
         ("smooth_m", np.float64, (3,)),  # of POINT: after the first low-pass
-        ("aim_m", np.float64, (3,)),  # where the hand means to be
+        ("aim_m", np.float64, (3,)),  # the hand's target
         ("place_m", np.float64, (3,)),  # where it is: aim and tremor
-        ("was_m", np.float64, (3,)),  # where it was the time before
+        ("was_m", np.float64, (3,)),  # its previous place
         ("tremor_m", np.float64),  # amplitude of each wave
         ("tremor_hz", np.float64, (3, WAVES)),
         ("tremor_turn", np.float64, (3, WAVES)),  # phase at time 0, in turns
@@ -60,7 +60,7 @@ HAND = np.dtype(
 _row_at = record_at(MOTION_ROW)
 _ROW_BYTES = MOTION_ROW.itemsize
 
-REACH_START_S = 0.3  # a reach takes this long and
+REACH_START_S = 0.3  # a reach takes this time and
 REACH_PACE_MPS = 0.25  # its distance at this pace: 60 mm in 0.54 s with a peak of 0.21 m/s
 
 
@@ -112,7 +112,7 @@ def _take_order(hand: Any, now_ns: int) -> None:
     fence()
     hand.order = hand.posted
     fence()
-    if hand.serial != serial:  # overwritten meanwhile: the next tick takes the newer one
+    if hand.serial != serial:  # overwritten meanwhile: the next tick reads the newer one
         hand.order.kind = STAY
         return
     hand.taken = serial
@@ -167,7 +167,7 @@ def _follow(hand: Any, since_s: float) -> None:
 
 @kernel
 def tremor(hand: Any, axis: int, time_s: float) -> Any:
-    """Return how far physiological tremor (8 to 12 Hz) takes the hand from its aim along ``axis`` [m]."""
+    """Return the displacement by physiological tremor (8 to 12 Hz) along ``axis`` [m]."""
     offset = 0.0
     for k in range(WAVES):
         turn = hand.tremor_hz[axis, k] * time_s + hand.tremor_turn[axis, k]

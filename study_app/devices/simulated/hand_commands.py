@@ -20,7 +20,7 @@ class HandOrders:
     Parameters
     ----------
     state : record with the fields ``hand`` (``hand.HAND``), ``handle`` (``plant.HANDLE``) and ``buttons``
-    workspace_m : half extents of where the hand can be sent [m]; a place outside counts as its border
+    workspace_m : half extents of the hand's range of motion [m]; a place outside counts as its border
     """
 
     def __init__(self, state: Any, workspace_m: tuple[float, float, float]) -> None:
@@ -45,11 +45,11 @@ class HandOrders:
         return float(x), float(y), float(z)
 
     def press(self, buttons: int) -> None:
-        """Hold down exactly these buttons: button 1 is bit 0."""
+        """Press exactly these buttons: button 1 is bit 0."""
         self.state.buttons = buttons
 
     def release(self) -> None:
-        """Let go of every button."""
+        """Release all buttons."""
         self.state.buttons = 0
 
     def hold(self, x_m: float, y_m: float, z_m: float) -> None:
@@ -83,7 +83,7 @@ class HandOrders:
             )
         motion = records(MOTION_ROW, times.size)
         motion.t_s, motion.position_m = times, places
-        # The servo may still read the motion before: it lives on until several newer ones have come.
+        # The servo may still read the last motion, which is kept until several newer ones were given.
         self._motions = [*self._motions[1 - _KEPT_MOTIONS :], motion]
         self._post(FOLLOW, rows=int(motion.ctypes.data), count=times.size)
 
@@ -103,7 +103,7 @@ class HandOrders:
 
     @property
     def aim_m(self) -> tuple[float, float, float]:
-        """Where the hand (or the pointer) means to be now [m, hand frame]."""
+        """The present target of the hand or pointer [m, hand frame]."""
         x, y, z = self.state.hand.aim_m
         return float(x), float(y), float(z)
 
@@ -136,6 +136,6 @@ class HandOrders:
 
 
 def hand_of(device: object) -> HandOrders | None:
-    """Return what takes orders to the simulated hand at ``device``: itself, or its ``hand``; None: a person's own."""
+    """Return the interface to the simulated hand of ``device``: itself, or its ``hand``; None: a person holds it."""
     hand = device if isinstance(device, HandOrders) else getattr(device, "hand", None)
     return hand if isinstance(hand, HandOrders) else None

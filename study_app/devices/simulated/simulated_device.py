@@ -1,6 +1,7 @@
-"""A device made of ``haptics.kernels.plant`` and a hand: all that the mouse and the scripted device share.
+"""A device made of ``haptics.kernels.plant`` and a hand: the common part of mouse and scripted device.
 
-Its read steps hand and handle to the time given, inside the servo's loop; its write holds the force for the next step.
+Its read advances hand and handle to the given time, inside the servo's loop; its write stores the force for the next
+step.
 """
 
 from functools import cache
@@ -31,8 +32,8 @@ SIMULATED = np.dtype(
         ("last_ns", np.int64),  # time of the last read
         ("started", np.int64),  # 1 after the first read
         ("buttons", np.int64),
-        ("unplugged", np.int64),  # 1: answers no more
-        ("measures_velocity", np.int64),  # 1: says the handle's velocity with every sample
+        ("unplugged", np.int64),  # 1: does not respond
+        ("measures_velocity", np.int64),  # 1: reports the handle's velocity with every sample
     ],
     align=True,
 )
@@ -43,7 +44,7 @@ _command_at = record_at(COMMAND)
 
 
 class SimulatedDevice(HandOrders, Device):
-    """A handle that somebody moves; ``name``, hand and numbers come from the subclass.
+    """A handle moved by a hand; the subclass defines ``name``, hand and parameters.
 
     Parameters
     ----------
@@ -65,25 +66,25 @@ class SimulatedDevice(HandOrders, Device):
 
     @property
     def dynamics(self) -> Dynamics:
-        """The handle's own numbers; its delay as it is at 1 kHz."""
+        """The handle's dynamics, with its delay at 1 kHz."""
         handle = self.state.handle
         lag_s = 0.0 if self.state.measures_velocity else None
         return Dynamics(1e-3 * float(handle.delay), float(handle.quantum_m), float(handle.mass_kg), lag_s)
 
     def measure_velocity(self) -> None:
-        """Say the handle's velocity with every sample, as devices with tachometers do."""
+        """Report the handle's velocity with every sample, like devices with tachometers."""
         self.state.measures_velocity = 1
 
     def unplug(self) -> None:
-        """Answer no more, as a device whose cable was pulled."""
+        """Stop responding, like a disconnected device."""
         self.state.unplugged = 1
 
     def open(self) -> None:
-        """Plug it in."""
+        """Connect it again."""
         self.state.unplugged = 0
 
     def close(self) -> None:
-        """Take the force off the handle."""
+        """Set the force on the handle to zero."""
         let_go(self.state.handle)
 
     def describe(self) -> dict[str, Any]:

@@ -1,7 +1,7 @@
-"""A Falcon looked over: found, opened, its program run, homed, and run for some seconds without force.
+"""Diagnosis of a Falcon: find it, open it, run its program, home it, and run it for some seconds without force.
 
-Everything is done by the driver that a session uses, so what fails there fails here; `examine` returns what was seen,
-and ``failure_modes`` what that shows.
+It uses the driver of sessions, so that the same failures appear; `examine` returns the observations, which
+``failure_modes`` interprets.
 """
 
 import sys
@@ -31,14 +31,14 @@ from study_app.haptics.runtime.telemetry import timing
 SECONDS: Final = 3.0
 EMULATED_PATIENCE_S: Final = 5.0
 MOVE: Final = "Hold the grip and move it a little …"
-_STILL_M = 5e-6  # a third of the least that one count of an encoder makes
+_STILL_M = 5e-6  # a third of the least effect of one encoder count
 _BEGIN = 100  # samples until positions are those of the grip
-_CHUNK_S = 0.25  # the telemetry keeps less than all that is looked at
+_CHUNK_S = 0.25  # the telemetry stores less than is examined
 
 
 @dataclass(frozen=True, slots=True)
 class Examined:
-    """What was seen: ``facts``, what the driver said when it gave up (None: it did not), and ``seen``, in words."""
+    """The observations: ``facts``, the driver's failure (None: there was none), and ``seen``, in words."""
 
     facts: Facts
     failure: str | None
@@ -48,7 +48,7 @@ class Examined:
 def examine_device(
     name: str, *, options: Mapping[str, str | Path], faults: Sequence[str] = (), progress: Callable[[str], object]
 ) -> Report:
-    """Look a Falcon over as its `Doctor` does; see `examine`."""
+    """Examine a Falcon for its `Doctor`; see `examine`."""
     firmware = options.get("firmware")
     found = examine(name, firmware=None if firmware is None else Path(firmware), faults=faults, progress=progress)
     return Report(found.seen, findings_of(found.facts), found.failure)
@@ -63,15 +63,15 @@ def examine(
     seconds: float = SECONDS,
     emulator: Emulator | None = None,
 ) -> Examined:
-    """Look a Falcon over.
+    """Examine a Falcon.
 
     Parameters
     ----------
     name : "falcon", "falcon:SERIAL", "falcon-emulated" or "falcon-socket:PATH"
     firmware : file of its program
     faults : of an emulated one, as ``Emulator.take`` takes them
-    progress : is given what to do, a line at a time
-    seconds : how long it is run
+    progress : receives instructions, one line at a time
+    seconds : duration of the run
     emulator : the emulated one; None: a new one
 
     Raises
@@ -116,7 +116,7 @@ def _device(
 
 
 def _looked_for() -> Facts:
-    """Return what the lists of devices show, without opening one."""
+    """Return what the system's lists of devices show, without opening one."""
     import libusb_package  # noqa: PLC0415 - only for a real one
 
     backend = libusb_package.get_libusb1_backend()
@@ -137,7 +137,7 @@ def ftdi_sees(library: Any = None) -> bool | None:
 
 
 def _opened(device: FalconDevice) -> Facts:
-    """Return what was seen until it was homed."""
+    """Return the observations until it was homed."""
     found = device.describe()
     if "firmware" not in found:
         return Facts()
@@ -150,7 +150,7 @@ def _opened(device: FalconDevice) -> Facts:
 
 
 def _ran(device: FalconDevice, seconds: float) -> tuple[Facts, str | None]:
-    """Run it at rest, and return what was seen, and the servo's fault, if it stopped itself."""
+    """Run it at rest, and return the observations, and the servo's fault, if it stopped itself."""
     emulated = isinstance(device, EmulatedFalcon)
     clock = VirtualClock() if emulated else None
     kept: list[Any] = []
@@ -184,13 +184,13 @@ def _ran(device: FalconDevice, seconds: float) -> tuple[Facts, str | None]:
 
 
 def _merged(facts: Facts, newer: Facts) -> Facts:
-    """Return all that was seen; what was seen later counts."""
+    """Return all observations; later ones override earlier ones."""
     seen = {field.name: getattr(newer, field.name) for field in fields(Facts) if getattr(newer, field.name) is not None}
     return replace(facts, **seen)
 
 
 def _words(device: FalconDevice, facts: Facts) -> tuple[str, ...]:
-    """Return what is worth reading of what was seen."""
+    """Return the main observations in words."""
     found = device.describe()
     words = []
     if facts.usb == OPEN:

@@ -1,6 +1,6 @@
-"""What an examination of a Falcon shows, as values to be printed or drawn: every mode of failure, found or not.
+"""The result of a Falcon's examination, for display: every failure mode, found or not.
 
-Loads neither the compiler nor a driver, and goes from one process to another as it is.
+Loads neither the compiler nor a driver, and can be passed between processes.
 """
 
 from typing import Final
@@ -13,7 +13,7 @@ _NOTHING_SEEN: Final = Facts()
 
 
 def findings_of(facts: Facts = _NOTHING_SEEN) -> tuple[Finding, ...]:
-    """Return every mode in its order, as facts show it."""
+    """Return every mode in its order, with the verdict of the facts."""
     return tuple(_finding(number, mode, facts) for number, mode in enumerate(MODES, start=1))
 
 
@@ -29,5 +29,5 @@ def _finding(number: int, mode: Mode, facts: Facts) -> Finding:
         mode.cure(facts.platform),
         mode.detected,
         mode.paste if facts.platform == "linux" else "",
-        says_itself=mode.id == "firmware-file" and facts.program == "refused",  # the refusal says it all
+        says_itself=mode.id == "firmware-file" and facts.program == "refused",  # the refusal contains everything
     )

@@ -1,4 +1,4 @@
-"""Weights held by the Falcon: it keeps its grip at a place against what pulls, and what its motors needed is noted.
+"""Weighing by the Falcon: it holds its grip at a place against a load, and the motor units are recorded.
 
 At each place the grip comes to rest once from above and once from below, with nothing on it and with a load, so that
 friction and the grip's own weight are separated from the load. `calibration.fit` computes motor units per newton from
@@ -28,7 +28,7 @@ PLACES_M: Final = (
 )
 GRAVITY_MPS2: Final = 9.80665
 LEAST_N, MOST_N = 1.0, 6.0
-"""Loads that are heavy enough to measure, and that the motors hold in addition to the grip's own weight."""
+"""Range of loads that can be measured, and held in addition to the grip's own weight."""
 
 _STIFFNESS_NPM = 600.0
 _DAMPING_NSPM = 8.0
@@ -43,13 +43,13 @@ _BLIND_TICKS = 20
 _WEIGHED_TICKS = 300
 
 Ask = Callable[[str, str], Callable[[], str | None]]
-"""(what is asked for: "let-go", "hang", "pull", "reading" or "take-off"; the words) -> a function that returns None
-until the operator has answered, then the answer."""
+"""(the request: "let-go", "hang", "pull", "reading" or "take-off"; its text) -> a function that returns None until the
+operator has answered, then the answer."""
 
 
 @dataclass(frozen=True, slots=True)
 class Notes:
-    """What was weighed, a row a rest: encoder counts, force on the grip [N] and motor units, each (n, 3)."""
+    """The measurements, one row per rest: encoder counts, force on the grip [N] and motor units, each (n, 3)."""
 
     counts: Any
     forces_n: Any
@@ -62,7 +62,7 @@ class Grip:
     Parameters
     ----------
     device : open and homed
-    virtual : whether time is counted in ticks, not on the clock
+    virtual : whether time is counted in ticks instead of read from the clock
     """
 
     def __init__(self, device: FalconDevice, *, virtual: bool = False) -> None:
@@ -83,11 +83,11 @@ class Grip:
 
     @property
     def place_m(self) -> Any:
-        """Where it is (3,) [m, hand frame]."""
+        """Its place (3,) [m, hand frame]."""
         return self._place_m.copy()
 
     def tick(self) -> None:
-        """Read where it is and push it toward its target; without news for 20 ticks, with no force."""
+        """Read its place and push it toward its target; without a new position for 20 ticks, send no force."""
         if self._virtual:
             self._now_ns += round(1e9 * _TICK_S)
             elapsed_s = _TICK_S
@@ -122,13 +122,13 @@ class Grip:
         return force_n * min(1.0, self._device.force_limit_n / size) if size else force_n
 
     def wait(self, answered: Callable[[], str | None]) -> str:
-        """Keep it where it is until there is an answer; return that."""
+        """Hold it in place until there is an answer; return the answer."""
         while (answer := answered()) is None:
             self.tick()
         return answer
 
     def come(self, place_m: Any) -> None:
-        """Bring it to a place slowly, and wait until it rests there, pulled down by its load as it may be.
+        """Move it slowly to a place, and wait until it rests there, possibly displaced by its load.
 
         Raises
         ------
@@ -163,7 +163,7 @@ class Grip:
 
 
 def hang(grip: Grip, weight_n: float, ask: Ask) -> Notes:
-    """Hold nothing at all places, then a weight of ``weight_n`` newtons; return the notes."""
+    """Measure without load at all places, then with a weight of ``weight_n`` newtons; return the measurements."""
     if not LEAST_N <= weight_n <= MOST_N:
         raise DeviceError(
             f"a weight of {1000 * weight_n / GRAVITY_MPS2:.0f} g is {weight_n:.2f} N: take one of "
@@ -192,7 +192,7 @@ def _round(grip: Grip, load_n: float) -> list[tuple[Any, float, Any]]:
 
 
 def pull(grip: Grip, ask: Ask) -> Notes:
-    """Hold nothing and then an operator's pull with a scale, at each place; return the notes."""
+    """Measure without load and then with an operator's pull on a scale, at each place; return the measurements."""
     notes: list[tuple[Any, float, Any]] = []
     grip.wait(ask("let-go", "Let go of the grip; it will hold itself and move slowly. Keep clear of it."))
     for number, place in enumerate(PLACES_M, start=1):
@@ -209,7 +209,7 @@ def pull(grip: Grip, ask: Ask) -> Notes:
 
 
 def _read_scale(grip: Grip, ask: Ask) -> float:
-    """Return what the scale showed [N], asking until it is a weight."""
+    """Return the scale's reading [N], asking until it is a valid weight."""
     words = "What did the scale show, in grams?"
     while True:
         reading = grip.wait(ask("reading", words))

@@ -1,8 +1,8 @@
-"""The emulated Falcon's three arms: angles from a pose, and the force that torques make there.
+"""The emulated Falcon's three arms: angles from a pose, and the force of torques at it.
 
-Made otherwise than ``kinematics`` on purpose, so that a mistake in either shows. An arm's angle is the one at which its
-rod, drawn as a vector in space, is as long as it is, found by search; and the force follows from virtual work,
-``F . dp = sum tau_i dtheta_i``, with the angles' changes taken by moving the grip a little.
+Its method differs from ``kinematics`` on purpose, to reveal errors in either. A search finds the angle of an arm at
+which its rod, as a vector, has the correct length; the force follows from virtual work, ``F . dp = sum tau_i
+dtheta_i``, with the changes of the angles from small displacements of the grip.
 """
 
 import math
@@ -28,7 +28,7 @@ ARMS = np.dtype(
         ("zero_rad", np.float64, (3,)),  # where each encoder counts 0
         ("units_per_nm", np.float64),  # motor units that make an arm torque of 1 N m; a positive unit pulls inward
         ("centre_m", np.float64),  # the hand's origin, in front of the base
-        ("angle_rad", np.float64, (3,)),  # as last found
+        ("angle_rad", np.float64, (3,)),  # last result
         ("force_n", np.float64, (3,)),  # of the motors on the grip, as last found
     ],
     align=True,
@@ -55,7 +55,7 @@ _HALVINGS = 60
 
 
 def set_arms(arms: Any, geometry: Geometry, units_per_nm: float, arm_offset_rad: tuple[float, float, float]) -> None:
-    """Build the arms of a Falcon that was assembled with these offsets of its encoders' zeros [rad]."""
+    """Return the arms of a Falcon with these offsets of its encoders' zeros [rad]."""
     arms.arm_m, arms.rod_m, arms.ends_m = geometry.arm_m, geometry.rod_m, geometry.ends_m
     arms.base_m, arms.platform_m, arms.aside_m = geometry.base_m, geometry.platform_m, geometry.aside_m
     arms.rad_per_count, arms.units_per_nm = geometry.rad_per_count, units_per_nm
@@ -75,7 +75,7 @@ def bend(arms: Any, hand_m: Any) -> None:
 
 @kernel
 def stop(arms: Any, handle: Any) -> None:
-    """Keep a ``plant.HANDLE`` where the arms reach, and bend them: it stays before their stops, on its way outward."""
+    """Keep a ``plant.HANDLE`` within the arms' reach, and set their angles: outward it stops before the arms' stops."""
     bend(arms, handle.position_m)
     if _reached(arms, handle.position_m):
         return
@@ -102,7 +102,7 @@ def _put(handle: Any, x: float, y: float, z: float) -> None:
 
 @kernel
 def _reached(arms: Any, hand_m: Any) -> bool:
-    """Tell whether the arms, as bent, hold the grip there, and none is stretched."""
+    """Return whether the arms' angles match the grip's place, and no arm is stretched."""
     x, y, z = hand_m[0], hand_m[1], hand_m[2] + arms.centre_m
     held = 0
     for i in range(3):
@@ -114,7 +114,7 @@ def _reached(arms: Any, hand_m: Any) -> bool:
 
 @kernel
 def _per_rad(arms: Any, arm: int, x: float, y: float, z: float) -> float:
-    """Return by how much the rod of ``arm`` gets too long for a turn of the arm [m/rad]."""
+    """Return the change of the rod's excess length per rotation of ``arm`` [m/rad]."""
     at, turn = arms.angle_rad[arm], _STEP_RAD
     longer: float = _stretch(arms, arm, at + turn, x, y, z) - _stretch(arms, arm, at - turn, x, y, z)
     return longer / (2.0 * turn)
@@ -122,16 +122,17 @@ def _per_rad(arms: Any, arm: int, x: float, y: float, z: float) -> float:
 
 @kernel
 def count(arms: Any, arm: int) -> int:
-    """Return the encoder's count from its zero, for the angle as last found."""
+    """Return the encoder's count from its zero, for the last angle."""
     counted: int = math.floor((arms.angle_rad[arm] - arms.zero_rad[arm]) / arms.rad_per_count + 0.5)
     return counted
 
 
 @kernel
 def strain(arms: Any, torque: Any, hand_m: Any) -> None:
-    """Put into ``arms.force_n`` what motor torques (3,) [units] make, the grip at ``hand_m`` where it was bent.
+    """Set ``arms.force_n`` from motor torques (3,) [units], with the grip at ``hand_m`` of the last angles.
 
-    A step of the grip changes the rod's length, a turn of the arm must change it back: so many radians a metre.
+    A step of the grip changes the rod's length, a rotation of the arm must compensate it: their ratio in radians per
+    metre.
     """
     x, y, z = hand_m[0], hand_m[1], hand_m[2] + arms.centre_m
     d = _STEP_M
@@ -150,7 +151,7 @@ def strain(arms: Any, torque: Any, hand_m: Any) -> None:
 
 @kernel
 def saturate(arms: Any) -> None:
-    """Reduce ``arms.force_n`` to the most that the motors give."""
+    """Limit ``arms.force_n`` to the greatest force of the motors."""
     size_n = norm(arms.force_n)
     if size_n > MOST_FORCE_N:
         for axis in range(3):
@@ -159,7 +160,7 @@ def saturate(arms: Any) -> None:
 
 @kernel
 def _stretch(arms: Any, arm: int, angle: float, x: float, y: float, z: float) -> float:
-    """Return by how much the rod of ``arm`` would be too long, were the arm at ``angle`` and the grip at (x, y, z)."""
+    """Return the excess length of the rod of ``arm`` with the arm at ``angle`` and the grip at (x, y, z)."""
     ax, ay = arms.along[arm, 0], arms.along[arm, 1]
     cx, cy = arms.across[arm, 0], arms.across[arm, 1]
     out = arms.base_m + arms.arm_m * math.cos(angle)
@@ -177,7 +178,7 @@ def _stretch(arms: Any, arm: int, angle: float, x: float, y: float, z: float) ->
 
 @kernel
 def _angle(arms: Any, arm: int, x: float, y: float, z: float, near: float) -> float:
-    """Return the angle of ``arm``, its elbow outside; out of reach, the one that points there."""
+    """Return the angle of ``arm``, with its elbow outside; out of reach, the angle toward the place."""
     ax, ay = arms.along[arm, 0], arms.along[arm, 1]
     toward = math.atan2(z, x * ax + y * ay + arms.platform_m - arms.base_m)
     # The nearer the arm points to the platform the shorter the rod: one such angle on either side, outside is below.

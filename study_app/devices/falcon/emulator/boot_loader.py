@@ -1,8 +1,8 @@
 """The emulated Falcon's processor before it has a program: pinged at 9600 baud, timed by an 'A', loaded byte by byte.
 
 It knows the boot stream of TI's loader (SPRUI33): little-endian words, the key 0x08AA, eight reserved words, the entry
-point, then blocks of (count, destination, words) until a count of 0, whereupon the program runs. What it cannot
-understand it meets with silence, until it is pinged anew.
+point, then blocks of (count, destination, words) until a count of 0, after which the program runs. After invalid data
+it does not answer until it is pinged again.
 """
 
 from typing import Any, Final
@@ -15,7 +15,7 @@ from study_app.devices.falcon.wire import constants
 from study_app.haptics.kernels.compiled import kernel
 
 WAITING, RESET, PINGED, LOADING, STUCK, RUNNING = range(6)
-"""Has power; was reset by DTR; answered a ping; knows the speed; understood nothing; has its program."""
+"""States: powered; reset by DTR; ping answered; speed known; data invalid; program loaded."""
 
 LOADER = np.dtype(
     [
@@ -40,7 +40,7 @@ _GLUED_BYTES = (0x00, 0x0D)
 
 @kernel
 def reset(loader: Any) -> None:
-    """Forget the program."""
+    """Clear the program."""
     loader.state = RESET
     loader.matched = 0
     loader.loaded = 0
@@ -50,7 +50,7 @@ def reset(loader: Any) -> None:
 
 @kernel
 def load(loader: Any, bridge: Any, faults: Any, value: int, divisor: int, at_ns: int) -> None:
-    """Hear a byte that came at ``at_ns``, over the line at this speed."""
+    """Receive a byte that came at ``at_ns``, over the line at this speed."""
     if loader.state == RESET:
         if divisor == constants.BAUD_9600:
             _hear_ping(loader, bridge, faults, value, at_ns)
@@ -95,7 +95,7 @@ def _hear_ping(loader: Any, bridge: Any, faults: Any, value: int, at_ns: int) ->
 
 @kernel
 def _take(loader: Any, value: int) -> None:
-    """Take a byte of the stream; the last one starts the program."""
+    """Process a byte of the stream; the last one starts the program."""
     loader.loaded += 1
     if loader.loaded % 2 == 1:
         loader.low = value

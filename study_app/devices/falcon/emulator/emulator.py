@@ -1,8 +1,8 @@
 """An emulated Falcon: the USB bridge, the boot loader, the program it runs, its arms, and the hand that holds the grip.
 
-In front of it is one C function of the signature of ``libusb_bulk_transfer`` (``bulk``), whose handle is the address of
-the emulator's memory, and the bridge's control requests. Everything happens in emulated time (``ftdi``) and
-depends on nothing but its commands and the ``random`` it was made with.
+Its interface is one C function with the signature of ``libusb_bulk_transfer`` (``bulk``), whose handle is the address
+of the emulator's memory, and the bridge's control requests. Everything happens in emulated time (``ftdi_bridge``) and
+depends only on its commands and on ``random``.
 """
 
 from collections.abc import Callable
@@ -39,7 +39,7 @@ from study_app.haptics.kernels.compiled import entry_of
 from study_app.haptics.model.layout import records
 
 STOPS_M = (0.055, 0.055, 0.050)
-"""Half extents of the housing about the hand's origin: beyond any place a hand is sent to."""
+"""Half extents of the housing about the hand's origin, larger than the hand's range of motion."""
 UNITS_PER_NM = 6616.0
 """Motor units for an arm torque of 1 N m: Martin & Hillier 2009; others measured 10 000."""
 ALL_HOMED = 0b111
@@ -49,19 +49,16 @@ class Emulator(HandOrders):
     """An emulated Falcon, its mains adapter plugged in.
 
     Orders go to the hand at the grip, in the frame of the hand; while homing is on and it has nothing else to do, the
-    hand pulls the grip out, pushes it in, out again, and returns to the middle. Properties tell what was when the
-    emulated time last went on.
+    hand pulls the grip out, pushes it in, out again, and returns to the middle. Properties give the state at the last
+    step of emulated time.
 
     Parameters
     ----------
-    random : where tremor and faults are drawn from; None: always the same ones
-    geometry : its measures, or the name of published ones
-    running : whether its program is loaded already
-    serial : of its bridge
-    workspace_m : half extents of where the hand can be sent [m]
-    tremor_m : amplitude of the tremor's waves [m]; 0: a hand of stone
-    units_per_nm : motor units for an arm torque of 1 N m
-    arm_offset_rad : by how much each arm's encoder was assembled off its zero
+    random : random numbers for tremor and faults; None: always the same ones
+    geometry : its dimensions, or the name of published ones running : whether its program is loaded already serial : of
+    its bridge workspace_m : half extents of where the hand can be sent [m] tremor_m : amplitude of the tremor's waves
+    [m]; 0: no tremor units_per_nm : motor units for an arm torque of 1 N m arm_offset_rad : by how much each arm's
+    encoder was assembled off its zero
     """
 
     def __init__(
@@ -97,7 +94,7 @@ class Emulator(HandOrders):
         if running:
             run_program(self.state)
 
-    # The bridge, as a host sees it.
+    # The bridge's interface to a host.
 
     def control(self, request: int, value: int) -> int:
         """Carry out a control request of the bridge; return 0 or a libusb error. ``recorded`` keeps them all."""
@@ -116,9 +113,9 @@ class Emulator(HandOrders):
         return code, memory[:moved].tobytes()
 
     def poll(self, size: int) -> tuple[int, bytes]:
-        """Go on with a transfer in without waiting; return 0 or a libusb error, and the bytes that came by now.
+        """Continue a transfer in without waiting; return 0 or a libusb error, and the bytes received so far.
 
-        ``ERROR_TIMEOUT`` means that it is not over: before ``next_event_ns`` nothing more comes.
+        ``ERROR_TIMEOUT`` means that it is not complete: nothing more arrives before ``next_event_ns``.
         """
         memory, moved = np.zeros(max(size, 1), np.uint8), records(INT, 1)[0]
         code = int(poll(self.state, memory.ctypes.data, size, moved))
@@ -137,11 +134,11 @@ class Emulator(HandOrders):
         return int(code), int(moved[0])
 
     def calls(self) -> BulkCalls:
-        """Return the bridge as compiled code sees it; the emulator must outlive it."""
+        """Return the bridge's interface for compiled code; the emulator must outlive it."""
         return BulkCalls(self._address, int(bulk().address))
 
     def compile(self) -> None:
-        """Compile, or load from the cache, all that it runs later; this is run on another emulator."""
+        """Compile all functions that run later, or load them from the cache, by running another emulator."""
         spare = Emulator(geometry=self.geometry, running=True)
         spare.control(constants.REQUEST_LATENCY, constants.LATENCY_RUN_MS)
         spare.write(constants.quiet_packet(), 1)
@@ -152,7 +149,7 @@ class Emulator(HandOrders):
         spare.power(False)
 
     def claimed(self) -> None:
-        """Hear that a program has taken the bridge: whoever holds the grip is ready to home it."""
+        """Note that a program has claimed the bridge: the hand is ready to home the grip."""
         self.state.run.stroke_due = 1
 
     # Time.
@@ -164,7 +161,7 @@ class Emulator(HandOrders):
 
     @property
     def now_ns(self) -> int:
-        """How far its time has come [ns]."""
+        """Its present time [ns]."""
         return int(self._now_ns[0])
 
     def pause(self, seconds: float) -> None:
@@ -176,13 +173,13 @@ class Emulator(HandOrders):
         return entry_of(let_pass, self.state, 0)
 
     def look(self) -> None:
-        """Let it come up to the present of its clock: hear what has arrived, move for a while at most."""
+        """Advance it to the present time of its clock: process bytes that have arrived, move for a limited time."""
         look(self.state)
 
-    # What it is and does.
+    # State and faults.
 
     def power(self, on: bool) -> None:
-        """Plug its mains adapter in, or pull it: then its program is lost and its arms are limp."""
+        """Connect or disconnect its mains adapter: without it, its program is lost and its motors are off."""
         supply(self.state, 1 if on else 0)
 
     def take(self, fault: str) -> None:
@@ -204,7 +201,7 @@ class Emulator(HandOrders):
 
     @property
     def loaded(self) -> int:
-        """Bytes of firmware it took since it was last reset."""
+        """Bytes of firmware received since it was last reset."""
         return int(self.state.loader.loaded)
 
     @property
@@ -230,22 +227,22 @@ class Emulator(HandOrders):
 
     @property
     def highest_unhomed_torque(self) -> int:
-        """The greatest of them while an arm was not homed."""
+        """The largest torque command while an arm was not homed."""
         return int(self.state.run.highest_unhomed)
 
     @property
     def excessive(self) -> int:
-        """Packets with a torque beyond what the motors take."""
+        """Packets with a torque beyond the range of the motors."""
         return int(self.state.run.excessive)
 
     @property
     def packets(self) -> int:
-        """Well-formed packets it heard."""
+        """Well-formed packets received."""
         return int(self.state.run.packets)
 
     @property
     def refused(self) -> int:
-        """Bytes it heard that belong to no packet."""
+        """Bytes received that belong to no packet."""
         return int(self.state.run.refused)
 
     @property
@@ -263,7 +260,7 @@ class Emulator(HandOrders):
 
     @property
     def weight_n(self) -> float:
-        """Of what hangs on the grip [N]."""
+        """The weight of the load on the grip [N]."""
         return float(self.state.weight_n)
 
     @weight_n.setter

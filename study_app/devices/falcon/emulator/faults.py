@@ -1,4 +1,4 @@
-"""What can go wrong with an emulated Falcon, on purpose: by chance, so many times, or as long as it is switched on."""
+"""Faults of an emulated Falcon: by chance, a number of times, or while switched on."""
 
 from random import Random
 from typing import Any, Final
@@ -9,8 +9,9 @@ from study_app.errors import DeviceError
 from study_app.haptics.kernels.compiled import kernel
 
 CHANCES: Final = ("drop", "truncate", "corrupt", "duplicate", "delay", "stall", "echo", "glued", "echo_prefix")
-"""A reply lost, cut to 14 bytes, with a wrong byte, sent twice or late; a device that hears nothing for a while; a byte
-of firmware echoed wrongly; more bytes behind the answer to a ping, in the same USB packet; 13 41 as the echo of 'A'."""
+"""A reply lost, cut to 14 bytes, with a wrong byte, sent twice or late; a device that receives nothing for some time; a
+byte of firmware echoed wrongly; more bytes behind the answer to a ping, in the same USB packet; 13 41 as the echo of
+'A'."""
 DROP, TRUNCATE, CORRUPT, DUPLICATE, DELAY, STALL, ECHO, GLUED, ECHO_PREFIX = range(len(CHANCES))
 
 SWITCHES: Final = (
@@ -19,7 +20,7 @@ SWITCHES: Final = (
     "not_supported",  # cannot be opened: another driver has it
     "busy",  # cannot be claimed: another program has it
     "kernel_driver",  # cannot be claimed until the kernel's driver is detached
-    "kernel_driver_stays",  # which it does not let happen
+    "kernel_driver_stays",  # which it does not permit
     "frozen",  # encoders stand still, homing too
     "never_homes",  # no arm finds its index
     "forgets",  # the origin of the encoders is lost when the homing flag drops
@@ -28,12 +29,12 @@ SWITCHES: Final = (
 )
 
 POWER_OFF: Final = "power-off"
-"""On a command line: its mains adapter is pulled, which is the emulator's affair."""
+"""On a command line: its mains adapter is disconnected, which the emulator handles."""
 
 FAULTS = np.dtype(
     [
-        ("chance", np.float64, (len(CHANCES),)),  # each time that it can happen
-        ("due", np.int64, (len(CHANCES),)),  # so many times, before chance is asked
+        ("chance", np.float64, (len(CHANCES),)),  # probability at each opportunity
+        ("due", np.int64, (len(CHANCES),)),  # number of occurrences before chance decides
         ("happened", np.int64, (len(CHANCES),)),
         ("delay_ns", np.int64),
         ("stall_ns", np.int64),
@@ -59,7 +60,7 @@ def draw(faults: Any) -> float:
 
 @kernel
 def strikes(faults: Any, kind: int) -> bool:
-    """Tell whether this fault happens now."""
+    """Return whether this fault happens now."""
     if faults.due[kind] > 0:
         faults.due[kind] -= 1
     elif not (faults.chance[kind] > 0.0 and draw(faults) < faults.chance[kind]):
@@ -82,17 +83,17 @@ class Faults:
         state.delay_ns, state.stall_ns = 3_000_000, 20_000_000
 
     def chance(self, name: str, chance: float) -> None:
-        """Let it happen with this probability each time that it can; 0: never."""
+        """Let it happen with this probability at each opportunity; 0: never."""
         if not 0.0 <= chance <= 1.0:
             raise DeviceError(f"the chance of fault '{name}' must be 0 to 1, not {chance}")
         self._state.chance[_place(name)] = chance
 
     def once(self, name: str, times: int = 1) -> None:
-        """Let it happen at the next ticks, so many times."""
+        """Let it happen at the next ``times`` opportunities."""
         self._state.due[_place(name)] = times
 
     def happened(self, name: str) -> int:
-        """Return how often it happened so far."""
+        """Return the number of occurrences so far."""
         return int(self._state.happened[_place(name)])
 
     def on(self, name: str, on: bool = True) -> None:
@@ -108,18 +109,18 @@ class Faults:
         self.on(name, False)
 
     def is_on(self, name: str) -> bool:
-        """Tell whether it is switched on."""
+        """Return whether it is switched on."""
         return bool(self._state[_switch(name)])
 
     def last(self, *, delay_s: float | None = None, stall_s: float | None = None) -> None:
-        """Say how late a delayed reply is and how long a stall lasts [s]; 0 s of stall are one packet."""
+        """Set the delay of a late reply and the duration of a stall [s]; a stall of 0 s is one packet."""
         if delay_s is not None:
             self._state.delay_ns = round(delay_s * 1e9)
         if stall_s is not None:
             self._state.stall_ns = round(stall_s * 1e9)
 
     def ignore_pings(self, count: int) -> None:
-        """Leave so many pings of the boot loader without an answer."""
+        """Leave the next ``pings`` of the boot loader without an answer."""
         self._state.ignored_pings = count
 
     def take(self, word: str) -> None:

@@ -1,7 +1,7 @@
-"""The emulated Falcon at work: packets in, torques out, and a handle in somebody's hand that both of them move.
+"""The running program of the emulated Falcon: packets in, torques out, and a handle moved by motors and hand.
 
-What is invented, because it is not published: mass, friction and hand (those of the scripted device), where the arms'
-indices are, how fast it answers, that a torque stays until the next packet, and that one beyond the range is cut off.
+Assumed, because not published: mass, friction and hand (those of the scripted device), the places of the arms' indices,
+the response time, that a torque persists until the next packet, and that one beyond the range is clipped.
 """
 
 import math
@@ -26,7 +26,7 @@ RUN = np.dtype(
         ("packets", np.int64),  # well-formed ones so far
         ("refused", np.int64),  # bytes that belong to none
         ("torque", np.int64, (3,)),  # as last sent [units]
-        ("acting", np.float64, (3,)),  # as the motors give it
+        ("acting", np.float64, (3,)),  # as exerted by the motors
         ("highest", np.int64),  # the greatest torque ever sent
         ("highest_unhomed", np.int64),  # while an arm was not homed
         ("excessive", np.int64),  # packets with a torque beyond the range: faults of a driver
@@ -36,26 +36,26 @@ RUN = np.dtype(
         ("origin", np.int64, (3,)),  # true count where each encoder shows 0
         ("shown", np.int64, (3,)),  # counts as last sent
         ("before_rad", np.float64, (3,)),  # angles at the packet before
-        ("stalled_ns", np.int64),  # hears nothing until
+        ("stalled_ns", np.int64),  # receives nothing until
         ("stroke", np.int64),  # of homing, by an emulated hand with no other orders: STROKES[stroke - 1]
         ("stroke_due", np.int64),  # STROKE_NOW, STROKE_ASKED: when lights or arms ask for it, or 0: not
     ],
     align=True,
 )
 
-INDEX_RAD: Final = 0.0  # arms are at their index here: further in than anything in use
-ANSWER_NS: Final = 20_000  # from the end of a packet to the begin of its reply
+INDEX_RAD: Final = 0.0  # arms are at their index here: further in than any place in use
+ANSWER_NS: Final = 20_000  # from the end of a packet to the start of its reply
 
 STROKES_M: Final = (0.047, -0.045, 0.047, 0.0)  # along z: out, in, out, and to the middle
 _STROKE_NS: Final = 500_000_000
 _STEP_NS: Final = 2_000_000  # longest step with the same force
-LONGEST_NS: Final = 50_000_000  # who was not looked at for longer has moved for so long only
+LONGEST_NS: Final = 50_000_000  # longest motion computed after a time without access
 _NIBBLES: Final = 4
 
 
 @kernel
 def work(e: Any, value: int, divisor: int, at_ns: int) -> None:
-    """Hear a byte of a packet that came at ``at_ns``, over the line at this speed."""
+    """Receive a byte of a packet that came at ``at_ns``, over the line at this speed."""
     run = e.run
     if divisor != constants.BAUD_1500000 or at_ns < run.stalled_ns:
         run.held = 0
@@ -100,7 +100,7 @@ def _well_formed(heard: Any) -> bool:
 
 @kernel
 def _obey(e: Any, at_ns: int) -> None:
-    """Live on until the packet came, then do what it says."""
+    """Advance to the arrival of the packet, then execute it."""
     run = e.run
     live(e, at_ns, LONGEST_NS)
     flags = int(run.heard[13]) - constants.ZERO
@@ -135,7 +135,7 @@ def _obey(e: Any, at_ns: int) -> None:
 
 @kernel
 def _find_indices(e: Any) -> None:
-    """Give an arm its true zero at the moment it passes its index, while homing is on."""
+    """Set an arm's true zero when it passes its index, while homing is on."""
     run = e.run
     for arm in range(3):
         before, now = run.before_rad[arm] - INDEX_RAD, e.arms.angle_rad[arm] - INDEX_RAD
@@ -201,7 +201,7 @@ def live(e: Any, now_ns: int, longest_ns: int) -> None:
 
 @kernel
 def _load(e: Any) -> None:
-    """Put the force of the motors on the handle, and what hangs on it."""
+    """Apply the force of the motors and of the load to the handle."""
     if e.run.acting[0] == 0.0 and e.run.acting[1] == 0.0 and e.run.acting[2] == 0.0:
         push(e.handle, 0.0, -e.weight_n, 0.0)
         return
@@ -216,7 +216,7 @@ def _load(e: Any) -> None:
 def _stroke(e: Any, now_ns: int) -> None:
     """Pull out, push in, pull out and go to the middle, if homing needs it and no other command is active.
 
-    And again, as a person would, whenever an arm is not homed or the blue light asks to pull out.
+    Repeat it, like a person, whenever an arm is not homed or the blue light requests a pull.
     """
     run, hand = e.run, e.hand
     if hand.serial != hand.taken:

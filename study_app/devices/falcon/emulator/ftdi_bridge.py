@@ -1,12 +1,12 @@
 """The emulated USB bridge: an FT232R between the host's transfers and the bytes on the Falcon's line.
 
-Bytes lie in two rings with the moment each arrives: ``out`` on the way to the device, ``back`` on the way from it. A
-transfer is a small simulation in emulated time: it goes on to the moment it ends and never waits. The chip hands over
-what it has (two status bytes first) when 62 bytes are there, when the event character has come (but not as the
-first byte), or when the latency timer runs out, then also nothing; so FTDI AN232B-04.
+Two rings store bytes with their arrival times: ``out`` toward the device, ``back`` from it. A transfer is a small
+simulation in emulated time: it runs to its end and never waits. The chip returns its bytes (two status bytes first)
+when it has 62 bytes, after the event character (not as the first byte), or when the latency timer expires, then even
+without bytes (FTDI AN232B-04).
 
-Time is what stands at the address ``clock``, and goes ahead of it by no more than a transfer's time-out; without a
-clock it is the emulator's own, which every transfer moves.
+Time is read at the address ``clock``, and exceeds it by at most a transfer's time-out; without a clock it is the
+emulator's own, which every transfer advances.
 """
 
 from typing import Any, Final
@@ -24,18 +24,18 @@ BACK_BUFFER: Final = 256  # and from it
 
 BRIDGE = np.dtype(
     [
-        ("now_ns", np.int64),  # how far it has come
+        ("now_ns", np.int64),  # present time
         ("clock", np.intp),  # address of an int64 [ns]; 0: its own time
         ("joined", np.int64),  # 1 once its time is that clock's
         ("divisor", np.int64),
         ("latency_ns", np.int64),
         ("event", np.int64),  # event character; -1: off
         ("dtr", np.int64),
-        ("sent_ns", np.int64),  # when the last packet went to the host: since then the latency timer runs
+        ("sent_ns", np.int64),  # time of the last packet to the host, which restarted the latency timer
         ("lost", np.int64),  # bytes that found a buffer full
         ("out", np.uint8, (OUT_RING,)),
         ("out_ns", np.int64, (OUT_RING,)),  # arrival at the device
-        ("out_divisor", np.int64, (OUT_RING,)),  # how fast each goes over the line
+        ("out_divisor", np.int64, (OUT_RING,)),  # duration of each on the line
         ("out_first", np.int64),  # bytes out_first ... out_last - 1 of all are still on their way
         ("out_last", np.int64),
         ("out_free_ns", np.int64),  # the line is busy until
@@ -53,16 +53,16 @@ WORD = np.dtype([("value", np.int64)])
 byte_at = record_at(BYTE)
 _word_at = record_at(WORD)
 
-USB_NS: Final = 30_000  # a transfer takes so long by itself, in the emulator's own time
+USB_NS: Final = 30_000  # least duration of a transfer, in the emulator's own time
 ENDLESS_NS: Final = 3_600_000_000_000
-_BACK_NS: Final = 1_000_000_000  # a clock so far behind is another one, or the same begun anew
+_BACK_NS: Final = 1_000_000_000  # a clock this far behind is another one, or was reset
 _STATUS = (0x01, 0x60)  # modem status, line status: ready and empty
 _EIGHTHS = (0, 4, 2, 1)  # of a divisor, by its two highest bits
 
 
 @kernel
 def power_up(bridge: Any) -> None:
-    """Make the bridge as it is when its cable was plugged in: 9600 baud, 16 ms, nothing in its buffers."""
+    """Reset the bridge to its state after connection: 9600 baud, 16 ms, empty buffers."""
     bridge.divisor, bridge.latency_ns, bridge.event = constants.BAUD_9600, 16_000_000, -1
     bridge.dtr = 0
     bridge.out_first, bridge.back_first = bridge.out_last, bridge.back_last
@@ -71,7 +71,7 @@ def power_up(bridge: Any) -> None:
 
 @kernel
 def begin(bridge: Any) -> int:
-    """Begin a transfer; return by how much the clock jumped meanwhile, which every other moment has to follow [ns]."""
+    """Begin a transfer; return the jump of the clock meanwhile, by which all other times must be shifted [ns]."""
     if bridge.clock == 0:
         bridge.now_ns += USB_NS
         return 0
@@ -85,7 +85,7 @@ def begin(bridge: Any) -> int:
 
 @kernel
 def end_of(bridge: Any, timeout_ns: int) -> int:
-    """Return when a transfer that began now has to give up [ns]."""
+    """Return the time-out of a transfer that begins now [ns]."""
     lasting = timeout_ns if timeout_ns > 0 else ENDLESS_NS
     if bridge.clock == 0:
         return int(bridge.now_ns + lasting)
@@ -94,7 +94,7 @@ def end_of(bridge: Any, timeout_ns: int) -> int:
 
 @kernel
 def shift_bridge(bridge: Any, jump_ns: int) -> None:
-    """Let every moment be so much later."""
+    """Shift all times by a duration."""
     bridge.now_ns += jump_ns
     bridge.sent_ns += jump_ns
     bridge.out_free_ns += jump_ns
@@ -107,7 +107,7 @@ def shift_bridge(bridge: Any, jump_ns: int) -> None:
 
 @kernel
 def byte_ns(divisor: int) -> int:
-    """Return how long ten bits take at 3 MHz over this divisor [ns]; 0 and 1 stand for 1 and 1.5."""
+    """Return the duration of ten bits at 3 MHz over this divisor [ns]; 0 and 1 mean 1 and 1.5."""
     eighths = 8 * (divisor & 0x3FFF) + _EIGHTHS[(divisor >> 14) & 3]
     if divisor == 0:
         eighths = 8
@@ -118,7 +118,7 @@ def byte_ns(divisor: int) -> int:
 
 @kernel
 def send(bridge: Any, value: int, end_ns: int) -> bool:
-    """Take a byte for the device, when there is room; return False where there is none until ``end_ns``."""
+    """Queue a byte for the device when there is room; return False if there is none until ``end_ns``."""
     lasting = byte_ns(bridge.divisor)
     arrival = max(bridge.out_free_ns, bridge.now_ns) + lasting
     room_ns = arrival - OUT_BUFFER * lasting
@@ -164,7 +164,7 @@ def hand_over_ns(bridge: Any) -> int:
 
 @kernel
 def hand_over(bridge: Any, data: int, noise: int) -> int:
-    """Write the packet of now to the address ``data``; return its length, status bytes counted."""
+    """Write the present packet to the address ``data``; return its length, including status bytes."""
     byte_at(data).value = _STATUS[0] ^ (noise & 0xF0)
     byte_at(data + 1).value = _STATUS[1] ^ ((noise >> 8) & 0xFF)
     length = constants.STATUS_BYTES
@@ -178,7 +178,7 @@ def hand_over(bridge: Any, data: int, noise: int) -> int:
 
 @kernel
 def arrived(bridge: Any) -> int:
-    """Tell whether the chip holds a byte for the host."""
+    """Return whether the chip has a byte for the host."""
     if bridge.back_first == bridge.back_last:
         return 0
     return 1 if bridge.back_ns[bridge.back_first % BACK_RING] <= bridge.now_ns else 0
@@ -186,7 +186,7 @@ def arrived(bridge: Any) -> int:
 
 @kernel
 def overflow(bridge: Any) -> None:
-    """Lose what came while the chip's buffer was full: all that arrived, but for the oldest."""
+    """Drop bytes that arrived while the chip's buffer was full: all except the oldest."""
     held = 0
     for k in range(bridge.back_first, bridge.back_last):
         if bridge.back_ns[k % BACK_RING] <= bridge.now_ns:
@@ -203,7 +203,7 @@ def overflow(bridge: Any) -> None:
 
 @kernel
 def control(bridge: Any, request: int, value: int) -> None:
-    """Carry out a request of the host; those without an effect on bytes are taken and forgotten."""
+    """Carry out a request of the host; ignore those without an effect on bytes."""
     if request == constants.REQUEST_RESET:
         if value in (constants.RESET_ALL, constants.PURGE_RX):
             _purge_back(bridge)
@@ -228,7 +228,7 @@ def _purge_back(bridge: Any) -> None:
 
 @kernel
 def _purge_out(bridge: Any) -> None:
-    """Forget what has not begun to leave."""
+    """Clear bytes whose transfer has not begun."""
     while bridge.out_last > bridge.out_first:
         newest = (bridge.out_last - 1) % OUT_RING
         if bridge.out_ns[newest] - byte_ns(bridge.out_divisor[newest]) <= bridge.now_ns:

@@ -1,6 +1,6 @@
-"""The emulated Falcon's memory, and what a host can do with it: transfers, control requests, time, and the mains.
+"""The emulated Falcon's memory and its interface to a host: transfers, control requests, time, and mains power.
 
-A transfer goes on in emulated time from byte to byte that reaches the device, until it is done or its time is out.
+A transfer advances emulated time from byte to byte at the device, until it is complete or its time is out.
 """
 
 from functools import cache
@@ -32,8 +32,8 @@ EMULATOR = np.dtype(
         ("hand", HAND),
         ("powered", np.int64),  # 1 while the mains adapter is on
         ("buttons", np.int64),  # bits 0 to 3, as the grip reports them
-        ("moved_ns", np.int64),  # up to when hand and handle have moved
-        ("weight_n", np.float64),  # of what hangs on the grip
+        ("moved_ns", np.int64),  # time of the last motion of hand and handle
+        ("weight_n", np.float64),  # of the load on the grip
     ],
     align=True,
 )
@@ -66,7 +66,7 @@ def _bulk(handle: int, endpoint: int, data: int, length: int, transferred: int, 
 
 @kernel
 def _begin(e: Any) -> None:
-    """Begin a transfer now; where the clock is another than before, everything moves over to its time."""
+    """Begin a transfer now; if the clock was changed, shift all times to it."""
     jump_ns = ftdi_bridge.begin(e.bridge)
     if jump_ns != 0:
         ftdi_bridge.shift_bridge(e.bridge, jump_ns)
@@ -98,7 +98,7 @@ def _bulk_in(e: Any, data: int, length: int, moved: Any, end_ns: int) -> int:
         due_ns = ftdi_bridge.hand_over_ns(bridge)
         if bridge.out_first < bridge.out_last:
             heard_ns = bridge.out_ns[bridge.out_first % OUT_RING]
-            if heard_ns <= min(due_ns, end_ns):  # what it makes the device say may be due sooner
+            if heard_ns <= min(due_ns, end_ns):  # the device's answer to it may be due sooner
                 _advance(e, heard_ns)
                 continue
         if due_ns > end_ns:
@@ -119,9 +119,9 @@ def _bulk_in(e: Any, data: int, length: int, moved: Any, end_ns: int) -> int:
 
 @kernel
 def poll(e: Any, data: int, length: int, moved: Any) -> int:
-    """Transfer in what the chip hands over up to now, to address ``data``; ``moved`` is a record of ``INT``.
+    """Transfer in the chip's bytes up to now, to address ``data``; ``moved`` is a record of ``INT``.
 
-    Returns ``ERROR_TIMEOUT`` while the transfer is not over; then the rest of it is asked for later.
+    Returns ``ERROR_TIMEOUT`` while the transfer is not complete; the rest is requested later.
     """
     moved.value = 0
     if e.faults.unplugged:
@@ -153,7 +153,7 @@ def _arrived_of(bridge: Any, waiting: int) -> int:
 
 @kernel
 def _advance(e: Any, to_ns: int) -> None:
-    """Let the device hear what arrives up to ``to_ns``."""
+    """Let the device process the bytes that arrive up to ``to_ns``."""
     bridge = e.bridge
     while bridge.out_first < bridge.out_last:
         place = bridge.out_first % OUT_RING
@@ -212,7 +212,7 @@ def control(e: Any, request: int, value: int) -> int:
 
 @kernel
 def supply(e: Any, on: int) -> None:
-    """Give it mains power, or take it away, and its program with it."""
+    """Turn its mains power on or off; without power its program is lost."""
     if e.powered == on:
         return
     e.powered = on
@@ -223,7 +223,7 @@ def supply(e: Any, on: int) -> None:
 
 @kernel
 def let_pass(e: Any, lasting_ns: int) -> None:
-    """Let so much time pass, all of which hand and handle live through."""
+    """Advance the time, including the motion of hand and handle."""
     _begin(e)
     end_ns = ftdi_bridge.end_of(e.bridge, lasting_ns)
     _advance(e, end_ns)
@@ -232,20 +232,20 @@ def let_pass(e: Any, lasting_ns: int) -> None:
 
 @kernel
 def look(e: Any) -> None:
-    """Come up to the present of the clock."""
+    """Advance to the clock's present time."""
     _begin(e)
     live(e, e.bridge.now_ns, LONGEST_NS)
 
 
 @kernel
 def settle(e: Any) -> None:
-    """Be as just plugged in: arms where the grip is, no program."""
+    """Reset to the state after connection: arms at the grip's place, no program."""
     bend(e.arms, e.handle.position_m)
     e.loader.state = WAITING
 
 
 @kernel
 def feel(e: Any) -> None:
-    """Put into ``arms.force_n`` what the motors make now."""
+    """Set ``arms.force_n`` to the motors' present force."""
     strain(e.arms, e.run.acting, e.handle.position_m)
     saturate(e.arms)

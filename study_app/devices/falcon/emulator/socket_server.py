@@ -1,8 +1,8 @@
-"""An emulated Falcon served in real time on a Unix socket, as ``framing`` says.
+"""An emulated Falcon served in real time on a Unix socket, by the protocol of ``socket_frames``.
 
-So other programs, another driver or our own guard, can be put in front of it. Emulated time is the machine's. A
-transfer out is computed at once up to where it ends, and its answer is held back until that moment has come; a transfer
-in goes on from event to event of the bridge, so that it may be pending while others are carried out.
+So other programs, such as another driver or the guard, can use it. Emulated time is the machine's. A transfer out is
+computed at once to its end, and its answer is delayed until then; a transfer in advances from event to event of the
+bridge, so that it may be pending while others are carried out.
 """
 
 import math
@@ -94,7 +94,7 @@ class EmulatorServer:
         return len(self._clients)
 
     def serve(self, progress: Callable[[], None] | None = None, every_s: float = 1.0) -> None:
-        """Answer until `stop`; call ``progress`` now and then. Leaves nothing at the path, however it ends."""
+        """Answer until `stop`; call ``progress`` at intervals. The path is removed in any case."""
         told_s = time.monotonic()
         try:
             while True:
@@ -120,7 +120,7 @@ class EmulatorServer:
             self._close()
 
     def stop(self) -> None:
-        """Let `serve` end; from any thread or a signal's handler."""
+        """End `serve`; may be called from any thread or a signal handler."""
         with suppress(OSError):  # it has ended already
             self._bell.send(b".")
 
@@ -142,7 +142,7 @@ class EmulatorServer:
             self._thread.join()
 
     def _wait(self) -> set[socket.socket]:
-        """Return who has something to say, at the latest when a pending request may go on."""
+        """Return the clients with input, at the latest when a pending request may continue."""
         listening = [client.connection for client in self._clients.values() if len(client.pending) < _MOST_PENDING]
         due_ns = min(
             (self._due_ns(request) for client in self._clients.values() for request in client.pending), default=math.inf
@@ -171,7 +171,7 @@ class EmulatorServer:
         client.asked += more
 
     def _dismiss(self, client: _Client) -> None:
-        """Let a client go; its last torque command stays."""
+        """Disconnect a client; its last torque command stays."""
         self._clients.pop(client.connection, None)
         client.connection.close()
         if self._owner is client:
@@ -200,7 +200,7 @@ class EmulatorServer:
                 in_order = False
 
     def _go_on(self, client: _Client, request: _Request) -> None:
-        """Carry out a request as far as it goes by now; once it is over, give it its answer."""
+        """Carry out a request as far as possible now; set its answer when it is complete."""
         code, data = self._carry_out(client, request)
         if request.kind == BULK_IN:
             request.data += data
@@ -233,7 +233,7 @@ class EmulatorServer:
         return (constants.ERROR_NOT_FOUND if kind in {BULK_OUT, BULK_IN} else constants.ERROR_NOT_SUPPORTED), b""
 
     def _claim(self, client: _Client) -> int:
-        """Give the one interface to who asks first; return 0 or why a client cannot have it."""
+        """Assign the interface to the first client; return 0 or the error of another client."""
         if self._owner is client:
             return constants.ERROR_NO_DEVICE if self.emulator.faults.is_on("unplugged") else constants.SUCCESS
         for fault, code in _REFUSALS.items():
@@ -258,7 +258,7 @@ class EmulatorServer:
 
 
 def _take_request(asked: bytearray) -> _Request | None:
-    """Take the next request out of what a client has sent; None where it is not whole yet."""
+    """Return the next request from a client's input; None if it is incomplete."""
     if len(asked) < REQUEST.size:
         return None
     kind, at, value, length, timeout_ms = REQUEST.unpack_from(asked)

@@ -1,4 +1,4 @@
-"""Emulated Falcons as a backend of pyusb: its ``find``, ``write``, ``read`` and ``ctrl_transfer`` go to them unchanged.
+"""Emulated Falcons as a backend of pyusb, with its ``find``, ``write``, ``read`` and ``ctrl_transfer``.
 
 The descriptors are those of an FT232R with the Falcon's ids: one configuration, one interface of the vendor's class,
 two bulk endpoints. Refusals raise what pyusb's own backend of libusb would raise.
@@ -97,16 +97,16 @@ def _check(code: int) -> None:
 
 
 class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
-    """A bus with these Falcons on it, and nothing else; the first one's time is its time."""
+    """A bus with only these Falcons; its time is that of the first one."""
 
     def __init__(self, *emulators: Emulator) -> None:
         self.emulators = emulators
         self._claims: dict[int, _Handle] = {}
 
-    # What our own transport asks of a backend that is not libusb.
+    # The part of the interface that this program's transport needs besides pyusb.
 
     def c_calls(self, handle: _Handle) -> BulkCalls:
-        """Return an opened Falcon as compiled code sees it."""
+        """Return an opened Falcon's interface for compiled code."""
         return handle.emulator.calls()
 
     def now_s(self) -> float:
@@ -123,7 +123,7 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
         for emulator in self.emulators:
             emulator.follow_clock(address)
 
-    # What pyusb asks.
+    # The interface of pyusb.
 
     def enumerate_devices(self) -> Iterator[Emulator]:
         """Yield the Falcons whose cable is in."""
@@ -160,7 +160,7 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
         )
 
     def get_parent(self, dev: Emulator) -> None:
-        """Return no hub: it is in the machine's own port."""
+        """Return no hub: it is connected directly."""
 
     def open_device(self, dev: Emulator) -> _Handle:
         """Open a Falcon."""
@@ -188,7 +188,7 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
         return _CONFIGURATION_VALUE
 
     def claim_interface(self, dev_handle: _Handle, intf: int) -> None:
-        """Take the Falcon for oneself."""
+        """Claim the Falcon."""
         emulator = self._reach(dev_handle)
         if intf != 0:
             _check(constants.ERROR_NOT_FOUND)
@@ -199,17 +199,17 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
         emulator.claimed()
 
     def release_interface(self, dev_handle: _Handle, intf: int) -> None:
-        """Give it back."""
+        """Release it."""
         emulator = self._reach(dev_handle)
         if self._claims.pop(id(emulator), None) is None:
             _check(constants.ERROR_NOT_FOUND)
 
     def is_kernel_driver_active(self, dev_handle: _Handle, intf: int) -> bool:
-        """Tell whether the kernel's own driver has it."""
+        """Return whether the kernel's driver is attached."""
         return self._reach(dev_handle).faults.is_on("kernel_driver")
 
     def detach_kernel_driver(self, dev_handle: _Handle, intf: int) -> None:
-        """Take it from the kernel's own driver."""
+        """Detach the kernel's driver."""
         faults = self._reach(dev_handle).faults
         if faults.is_on("kernel_driver_stays"):
             _check(constants.ERROR_ACCESS)
@@ -240,7 +240,7 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
         data: Any,
         timeout: int,
     ) -> int:
-        """Carry out a request of the bridge, or tell a string."""
+        """Carry out a request of the bridge, or return a string descriptor."""
         emulator = self._reach(dev_handle)
         if bmRequestType == constants.REQUEST_TYPE:
             _check(emulator.control(bRequest, wValue))
@@ -256,7 +256,7 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
         _check(self._reach(dev_handle).control(constants.REQUEST_RESET, constants.RESET_ALL))
 
     def clear_halt(self, dev_handle: _Handle, ep: int) -> None:
-        """Go on after a stall of an endpoint, which never happens."""
+        """Continue after a stall of an endpoint, which never happens."""
         self._reach(dev_handle)
 
     def _reach(self, handle: _Handle) -> Emulator:

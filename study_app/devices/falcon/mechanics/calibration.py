@@ -1,8 +1,8 @@
-"""What was measured of one Falcon with a weight or a scale: motor units per newton metre, and its arms' offset.
+"""Calibration of one Falcon with a weight or a scale: motor units per newton metre, and its arms' offset.
 
-Two published gains differ by half, so a force in newtons is known only of a device that was calibrated. Until then the
-gain that gives the weaker forces is used, and the receipt says that none was. A calibration is kept by the device's
-serial number among the user's settings, not with results.
+Two published gains differ by half, so a force in newtons is known only for a calibrated device. Without calibration the
+gain with the weaker forces is used, and the receipt states it. A calibration is kept by the device's serial number
+among the user's settings, not with results.
 """
 
 import json
@@ -20,11 +20,11 @@ from study_app.errors import DeviceError
 from study_app.user_folder import FOLDER_VARIABLE, user_folder
 
 UNCALIBRATED_UNITS_PER_NM: Final = 6616.0
-"""Martin & Hillier 2009, at second hand; libnifalcon's 10 000 would be felt half as strong again."""
+"""Martin & Hillier 2009, quoted from another source; with libnifalcon's 10 000 forces would be half as strong again."""
 
 LEAST_POSES: Final = 5
 MOST_RESIDUAL_N: Final = 0.5
-"""Weights that leave more unexplained do not fit together."""
+"""Greatest residual of consistent weights."""
 _GAINS: Final = (1000.0, 100_000.0)  # no Falcon's is outside
 _OFFSETS_RAD: Final = math.radians(15)  # nor its arms' offset
 _STEPS: Final = 20
@@ -32,7 +32,7 @@ _STEPS: Final = 20
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """What `fit` found; ``measured`` is the day, ``residual_n`` the root mean square of what it leaves unexplained."""
+    """The result of `fit`; ``measured`` is the day, ``residual_n`` the root mean square of the residual."""
 
     geometry: str
     units_per_nm: float
@@ -68,7 +68,7 @@ def fit(geometry: Geometry, poses: Any, forces_n: Any, units: Any, *, measured: 
     Raises
     ------
     DeviceError
-        There are fewer than five poses, they pull alike, or what they tell is no Falcon's.
+        There are fewer than five poses, the forces are all alike, or the result is impossible for a Falcon.
     """
     counts, pulled_n, held = (np.asarray(given, np.float64) for given in (poses, forces_n, units))
     if counts.shape != pulled_n.shape or counts.shape != held.shape or counts.ndim != 2 or counts.shape[1:] != (3,):
@@ -102,7 +102,7 @@ def fit(geometry: Geometry, poses: Any, forces_n: Any, units: Any, *, measured: 
 
 
 def left_over(found: Calibration, poses: Any, forces_n: Any, units: Any) -> Any:
-    """Return what ``found`` leaves unexplained of the forces it was fitted to, (n, 3) [N]; arguments as of `fit`."""
+    """Return the residual forces (n, 3) [N] of ``found``; arguments as for `fit`."""
     counts, pulled_n, held = (np.asarray(given, np.float64) for given in (poses, forces_n, units))
     return _solve(geometry_named(found.geometry), found.arm_offset_rad, counts, pulled_n, held)[1].reshape(-1, 3)
 
@@ -126,13 +126,13 @@ def _solve(geometry: Geometry, offset_rad: float, counts: Any, pulled_n: Any, he
 
 
 def calibration_file(serial: str) -> Path:
-    """Return where the calibration of the Falcon with this serial number is, or would be."""
+    """Return the path of the calibration of the Falcon with this serial number, which may not exist."""
     name = "".join(letter if letter.isalnum() and letter.isascii() else "-" for letter in serial)
     return user_folder() / f"falcon-{name or 'unnamed'}.json"
 
 
 def save(serial: str, calibration: Calibration) -> Path:
-    """Keep the calibration of the Falcon with this serial number; return where.
+    """Store the calibration of the Falcon with this serial number; return its path.
 
     Raises
     ------
@@ -159,7 +159,7 @@ def load(serial: str) -> Calibration | None:
     Raises
     ------
     DeviceError
-        There is one, and it cannot be understood.
+        There is one, and it is invalid.
     """
     file = calibration_file(serial)
     try:

@@ -1,4 +1,4 @@
-"""Where the grip is for three arm angles, and which torques push it with a force: compiled, in the Falcon's frame.
+"""Kinematics and statics: the grip's position from three arm angles, and torques from a force; in the Falcon's frame.
 
 For arm i at azimuth phi, with u, v, w as in ``geometry.Geometry`` and ``L = ends + sqrt(rod^2 - v^2)``::
 
@@ -7,7 +7,7 @@ For arm i at azimuth phi, with u, v, w as in ``geometry.Geometry`` and ``L = end
 Inverse: ``theta = atan2(w, u) - arccos((u^2 + w^2 + a^2 - L^2) / (2 a sqrt(u^2 + w^2)))``, the branch with the elbow
 outside. Forward: Newton's method on the three g for p, from the position before. Statics, by virtual work: with
 ``J = d theta / d p = -(dg/dp) / (dg/d theta)`` the arm torques tau that hold the force F obey ``J^T tau = F``. The
-derivation is our own: the Jacobian that is in wide use has a wrong column for z.
+Jacobian was derived for this program: the widely used one has a wrong column for z.
 """
 
 import math
@@ -25,7 +25,7 @@ MECHANISM = np.dtype(
         ("arm_m", np.float64),
         ("rod_m", np.float64),
         ("ends_m", np.float64),
-        ("base_m", np.float64),  # base less platform: what matters of the two
+        ("base_m", np.float64),  # base minus platform: only their difference matters
         ("aside_m", np.float64),
         ("cos", np.float64, (3,)),  # of the arms' azimuths
         ("sin", np.float64, (3,)),
@@ -38,10 +38,10 @@ MECHANISM = np.dtype(
 
 REACHED: Final = 0
 OUTSIDE: Final = 1
-"""No such pose: not within reach, or in the mirror image that the mechanism cannot fold into."""
+"""No such pose: out of reach, or in the mirror image that the mechanism cannot reach."""
 
 START_M: Final = (0.0, 0.0, 0.12)
-"""Where `forward` finds every pose of the workspace from."""
+"""Start position from which `forward` finds every pose of the workspace."""
 
 _STEPS = 30
 _LEAST_ROD_M = 1e-6  # what is seen of a rod that lies across its arm
@@ -64,7 +64,7 @@ def new_mechanism(geometry: Geometry, units_per_nm: float, arm_offset_rad: float
 
 @kernel
 def angles(mechanism: Any, counts: Any, theta: Any) -> None:
-    """Write into ``theta`` (3,) [rad] what ``counts`` (3,) of the encoders say."""
+    """Write the angles of encoder ``counts`` (3,) into ``theta`` (3,) [rad]."""
     for i in range(3):
         theta[i] = counts[i] * mechanism.rad_per_count + mechanism.zero_rad
 
@@ -90,7 +90,7 @@ def inverse(mechanism: Any, position_m: Any, theta: Any) -> int:
 
 @kernel
 def forward(mechanism: Any, theta: Any, position_m: Any) -> int:
-    """Move ``position_m`` (3,) [m] to where angles ``theta`` (3,) [rad] put the grip, looking around where it is.
+    """Set ``position_m`` (3,) [m] to the grip's position at angles ``theta`` (3,) [rad], starting from its value.
 
     Returns ``REACHED``; or ``OUTSIDE``, and the position is as it was.
     """
@@ -127,14 +127,14 @@ def _newton(mechanism: Any, theta: Any, x: float, y: float, z: float) -> tuple[f
         if step < _ENOUGH_M:
             folded = turn0 < 0.0 and turn1 < 0.0 and turn2 < 0.0
             return x, y, z, REACHED if folded else OUTSIDE
-        if not step < 1.0:  # far away, or not a number: some rod does not reach
+        if not step < 1.0:  # far away, or NaN: a rod does not reach
             break
     return x, y, z, OUTSIDE
 
 
 @kernel
 def jacobian(mechanism: Any, theta: Any, position_m: Any, rates: Any) -> None:
-    """Write into ``rates`` (3, 3) [rad/m] how arm i (row) turns when the grip moves along x, y, z (column)."""
+    """Write the rotation of arm i (row) per motion of the grip along x, y, z (column) into ``rates`` (3, 3) [rad/m]."""
     p = (position_m[0], position_m[1], position_m[2])
     for i in range(3):
         _g, along_x, along_y, along_z, turn = _constraint(mechanism, i, math.cos(theta[i]), math.sin(theta[i]), p)
@@ -144,7 +144,7 @@ def jacobian(mechanism: Any, theta: Any, position_m: Any, rates: Any) -> None:
 
 
 def count_at(mechanism: Any, z_m: float) -> float:
-    """Return the longest way of the grip that one count of the encoders stands for, on the axis at ``z_m`` [m]."""
+    """Return the longest motion of the grip within one encoder count, on the axis at ``z_m`` [m]."""
     theta, rates, position_m = np.zeros(3), np.zeros((3, 3)), np.array([0.0, 0.0, z_m])
     inverse(mechanism, position_m, theta)
     jacobian(mechanism, theta, position_m, rates)
@@ -172,10 +172,10 @@ def torques(rates: Any, force_n: Any, torque_nm: Any) -> None:
 
 @kernel
 def motor_units(mechanism: Any, torque_nm: Any, units: Any) -> int:
-    """Write into ``units`` (3,) what to tell the motors; return 1 where they cannot give so much, else 0.
+    """Write the motor commands into ``units`` (3,); return 1 if they exceed the motors' range, else 0.
 
-    Too great a demand is shortened by one factor for all three, so that the force keeps its direction. Torques that are
-    not finite give none at all.
+    Too large commands are reduced by one factor for all three, so that the force keeps its direction. Torques that are
+    not finite give zero.
     """
     most = 0.0
     for i in range(3):
@@ -207,7 +207,7 @@ def _across(mechanism: Any, arm: int, p: Any) -> Any:
 def _constraint(mechanism: Any, arm: int, cos: float, sin: float, p: Any) -> Any:
     """Return g of an arm whose angle has this cosine and sine, its slopes along x, y, z and along the angle.
 
-    Farther aside than the rod is long there is no such arm: the slope along the angle is 0 then, which no pose has.
+    If the lateral offset exceeds the rod there is no such arm: the slope along the angle is then 0, unlike in any pose.
     """
     u, v, w = _along(mechanism, arm, p), _across(mechanism, arm, p), p[2]
     a = mechanism.arm_m

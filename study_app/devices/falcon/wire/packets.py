@@ -1,9 +1,9 @@
-"""Sixteen bytes each way: torques and lights out, encoders and buttons in, out of a stream that may have lost some.
+"""Packets of sixteen bytes each way: torques and lights out, encoders and buttons in; the stream may lose bytes.
 
 A number is four bytes, a nibble each, the least significant first, with ``ZERO`` added; a packet is ``START``, three
-such numbers, a byte of flags or status, a byte of unknown meaning, ``STOP`` (``wire``). There is no check sum, so the
-parser believes a packet only if every byte of it is where it may be, keeps what may be the begin of the next, and
-gives each packet once.
+such numbers, a byte of flags or status, a byte of unknown meaning, ``STOP`` (``wire``). There is no checksum, so the
+parser accepts a packet only if every byte of it is permitted at its place, keeps a possible start of the next, and
+returns each packet once.
 """
 
 from typing import Any
@@ -29,8 +29,8 @@ STATUS_BITS = 7
 
 PARSER = np.dtype(
     [
-        ("tail", np.uint8, (PACKET,)),  # the begin of a packet whose end has not come yet
-        ("held", np.int64),  # how many bytes of it
+        ("tail", np.uint8, (PACKET,)),  # the start of an incomplete packet
+        ("held", np.int64),  # its number of bytes
         ("packets", np.int64),  # whole valid packets so far
         ("skipped", np.int64),  # bytes so far that belonged to none
     ],
@@ -68,7 +68,7 @@ def number(data: Any, at: int) -> Any:
 def pack(torques: Any, flags: int, out: Any) -> None:
     """Write the packet of ``torques`` (3,) and ``flags`` into ``out`` (16,) bytes.
 
-    A torque beyond ``MOST_TORQUE`` is held to it: nothing that is sent ever wraps into its opposite.
+    A torque beyond ``MOST_TORQUE`` is clipped, so that it never overflows into the opposite sign.
     """
     out[0] = START
     for arm in range(3):
@@ -94,7 +94,7 @@ def strip(data: Any, length: int, out: Any) -> int:
 
 @kernel
 def feed(parser: Any, data: Any, length: int, status: Any) -> Any:
-    """Take ``length`` more bytes of the stream; return how many whole valid packets ended in them.
+    """Process ``length`` more bytes of the stream; return the number of valid packets that ended in them.
 
     The newest of them goes into ``status``, which stays as it was where there is none.
 
@@ -116,7 +116,7 @@ def feed(parser: Any, data: Any, length: int, status: Any) -> Any:
 
 @kernel
 def _take(parser: Any, byte: Any) -> None:
-    """Append ``byte`` to the tail, after dropping what of the tail it shows to be no begin of a packet."""
+    """Append ``byte`` to the tail, after dropping the part of the tail that cannot be the start of a packet."""
     while not _fits(parser.held, byte):
         if parser.held == 0:
             parser.skipped += 1

@@ -1,16 +1,16 @@
-"""How late the replies of a Falcon are, and which of them count: recent ones that a hand can have made.
+"""The delay of a Falcon's replies, and which of them are accepted: recent ones that are plausible for a hand.
 
-A reply cannot be matched to its packet, so replies that are always late look like punctual ones after a loss. So the
-delay is measured: when for ``SLOWER_READS`` reads more is owed than the delay explains, or for ``FASTER_READS`` less,
-nothing is sent until a read brings no reply; so many reads later than their packets the replies come. What is then
-still owed is lost. A longer delay is believed at once, a shorter one when two measurements in a row say so, for a lost
-reply looks like a shorter one. Where the force changes too fast for a measurement, the delay is believed to be what the
-owed replies explain. Positions later than ``MOST_DELAY`` are not given, nor those of a time when more than
-``MOST_OWED`` replies are owed beyond the delay.
+A reply cannot be matched to its packet, so replies with a constant delay look like punctual ones after a loss. So the
+delay is measured: when for ``SLOWER_READS`` reads more replies are owed than the delay explains, or for
+``FASTER_READS`` fewer, no packet is sent until a read has no reply; the number of these reads is the delay. Replies
+still owed then are lost. A longer delay is adopted at once, a shorter one after two measurements in a row, since a lost
+reply looks like a shorter one. If the force changes too fast for a measurement, the delay is set to explain the owed
+replies. Positions later than ``MOST_DELAY`` are not used, nor those read while more than ``MOST_OWED`` replies are owed
+beyond the delay.
 
-There is no check sum, so a byte that was garbled into another that may stand there passes the parser. What a hand does
-not do, a leap of an arm away from its motion, therefore needs a second reply that says so; likewise buttons, the end of
-the out-stroke and arms no longer homed. All of this works on the exchange's record (``exchange.FALCON``).
+There is no checksum, so a byte corrupted into a permitted one passes the parser. An implausible jump of an arm
+therefore needs a second reply that confirms it; likewise buttons, the end of the out-stroke and arms no longer homed.
+The functions work on the exchange's record (``exchange.FALCON``).
 """
 
 from typing import Any, Final
@@ -26,16 +26,16 @@ RETEST_TICKS: Final = 30
 """For at least this many ticks after a measurement the motors receive a new command in every tick."""
 ALL_HOMED: Final = 0b111
 BELIEVED: Final = 3
-"""So many packets in a row must say that an arm is no longer homed: one may have been garbled."""
+"""Number of packets in a row that must report that an arm is no longer homed: a single one may be corrupted."""
 
 LEAP: Final = 24.0
-"""Counts by which an arm may miss where its motion would have taken it: 0.7 to 1.4 mm of the grip within a tick."""
-DOUBTS: Final = 2  # so many replies in a row may be doubted
+"""Greatest deviation of an arm from its predicted motion [counts]: 0.7 to 1.4 mm of the grip within a tick."""
+DOUBTS: Final = 2  # greatest number of doubted replies in a row
 
 
 @kernel
 def settle(falcon: Any, packets: int, gap: bool) -> bool:
-    """Keep account of what is owed and of the delay; return whether what came is recent enough to be given."""
+    """Update the owed replies and the delay; return whether the received reply is recent enough."""
     owed = falcon.owed + falcon.asked - packets
     falcon.asked = 0
     falcon.surplus += max(-owed, 0)
@@ -50,14 +50,14 @@ def settle(falcon: Any, packets: int, gap: bool) -> bool:
         return False
     if falcon.testing > 0:
         _measure_delay(falcon, packets)
-    elif packets > 0:  # silence says nothing about what is on its way
+    elif packets > 0:  # no reply gives no information about pending ones
         _look_for_change(falcon)
     return bool(falcon.delay <= MOST_DELAY and _few_owed(falcon))
 
 
 @kernel
 def _look_for_change(falcon: Any) -> None:
-    """Begin a measurement where more, or for a long time less, is owed than the delay explains."""
+    """Begin a measurement if more, or for a long time fewer, replies are owed than the delay explains."""
     more, less = falcon.owed > falcon.delay - 1, falcon.owed < falcon.delay - 1
     falcon.astray = falcon.astray + 1 if more or less else max(falcon.astray - 1, 0)
     due = falcon.unsure != 0 or falcon.delay > MOST_DELAY or falcon.astray >= (SLOWER_READS if more else FASTER_READS)
@@ -69,13 +69,13 @@ def _look_for_change(falcon: Any) -> None:
 
 @kernel
 def _few_owed(falcon: Any) -> bool:
-    """Return whether so few replies are owed beyond the delay that what comes is recent, whatever became of them."""
+    """Return whether few enough replies are owed beyond the delay that any received one is recent."""
     return bool(falcon.owed < falcon.delay + MOST_OWED)
 
 
 @kernel
 def _measure_delay(falcon: Any, packets: int) -> None:
-    """Wait for a read without a reply: nothing that was sent before the measurement is on its way any more."""
+    """Wait for a read without a reply: then no reply to an earlier packet is pending."""
     found = falcon.testing
     if packets > 0 and found <= MOST_DELAY:
         falcon.testing += 1
@@ -93,7 +93,7 @@ def _measure_delay(falcon: Any, packets: int) -> None:
 
 @kernel
 def give_up_measurement(falcon: Any) -> None:
-    """Send after all, and for some ticks whatever comes; believe what of the delay has shown so far."""
+    """Cancel the measurement and send for some ticks; adopt the delay as far as measured."""
     falcon.delay = max(falcon.delay, falcon.testing)
     falcon.testing = 0
     falcon.retest = MOST_DELAY
@@ -137,7 +137,7 @@ def believe(falcon: Any) -> bool:
 
 @kernel
 def trust(falcon: Any) -> bool:
-    """Return whether the encoders go on as the arms moved, or say again what was doubted before."""
+    """Return whether the encoder counts continue the arms' motion, or confirm counts doubted before."""
     counts = falcon.status.encoders
     astray, repeated = False, falcon.doubts > 0
     for i in range(3):
