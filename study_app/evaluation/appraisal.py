@@ -1,11 +1,11 @@
-"""What is found of a scene that was appraised: what it costs, and how true it is."""
+"""The results of a scene's appraisal: its computation time and its accuracy."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class EffectCost:
-    """What an effect takes of a tick [ns]; None where it is not there, and why."""
+    """The time of an effect per tick [ns]; None with the reason if it is absent."""
 
     effect: str
     ns: float | None
@@ -14,7 +14,7 @@ class EffectCost:
 
 @dataclass(frozen=True, slots=True)
 class Costs:
-    """What a scene takes: a tick of it, one of a scene without liquids, and each effect [ns]."""
+    """The time of a scene per tick, of a scene without liquids, and of each effect [ns]."""
 
     tick_ns: float
     rest_ns: float
@@ -23,12 +23,12 @@ class Costs:
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """How far a scene is from the exact definition (``evaluation.reference_model``), along programmed paths.
+    """The errors of a scene against the exact definition (``evaluation.reference_model``), along programmed paths.
 
     ``wake`` is the largest difference as a share of Σ|e|/S, ``force_n`` that of the forces [N]; None where there is no
-    reference. ``lag_s`` is how late the velocity filter is on a motion that speeds up evenly. ``left_out`` are effects
-    that were not compared. ``withheld`` is the share of the force that safety withholds in the stroke that was asked
-    about (``evaluation.appraisal_measurement``), None without one.
+    reference. ``lag_s`` is the lag of the velocity filter under constant acceleration. ``left_out`` are effects that
+    were not compared. ``withheld`` is the share of the force that safety withholds in the requested stroke
+    (``evaluation.appraisal_measurement``), None without one.
     """
 
     wake: float | None

@@ -1,4 +1,4 @@
-"""What a scene of one liquid costs and how true it is: short enough to be asked for while somebody feels it."""
+"""Measures computation time and accuracy of a scene with one liquid, fast enough for use while it is presented."""
 
 import math
 from typing import Final
@@ -29,7 +29,7 @@ LASTS_S: Final = 2.0
 
 
 def costs(scene: Scene, *, batches: int = BATCHES) -> Costs:
-    """Measure what a scene of one liquid costs."""
+    """Measure the computation time of a scene with one liquid."""
     found = measure(scene, batches=batches)
     liquid = resolve(scene).liquids[0]
     asked = scene.liquids[0].effects != "auto"
@@ -46,7 +46,7 @@ def costs(scene: Scene, *, batches: int = BATCHES) -> Costs:
 
 
 def errors(scene: Scene) -> Errors:
-    """Return how far a scene of one liquid is from the definition: its drag and its wake, everywhere."""
+    """Return the errors of a scene with one liquid against the definition: its drag and wake, everywhere."""
     scene = resolve(scene)
     liquid = scene.liquids[0]
     kept = tuple(effect for effect in liquid.effects if effect in _COMPARED)
@@ -63,13 +63,13 @@ def errors(scene: Scene) -> Errors:
 
 
 def lag_s(scene: Scene) -> float:
-    """Return how late a scene's velocity is [s], while the body speeds up evenly: (v − v_filtered)/a."""
+    """Return the lag of a scene's velocity [s] under constant acceleration: (v − v_filtered)/a."""
     t_s = np.arange(round(_RAMP_S * scene.rate_hz) + 1) / scene.rate_hz
     rest = np.zeros_like(t_s)
     motion = Motion(t_s, np.column_stack([0.5 * RAMP_MPS2 * t_s**2, rest, rest]))
     still = scene.model_copy(update={"liquids": (), "knee": Knee(law="none"), "origin_m": (0.0, 0.0, 0.0)})
     seen = simulate(still, motion)
-    last = len(t_s) // 4  # of the end, where the filter has long settled
+    last = len(t_s) // 4  # of the end, at which the filter has settled
     return float(np.mean(RAMP_MPS2 * t_s[-last:] - seen["vx_mps"][-last:])) / RAMP_MPS2
 
 
@@ -89,7 +89,7 @@ def withheld_share(scene: Scene, stroke: Stroke, dynamics: Dynamics) -> float:
     """Return Σ|F_a - F_b| / Σ|F_a| along a stroke that is imposed on the position, from rest; 0 without a force.
 
     The stroke is centred on the device's origin, and the loop is that of a device of these ``dynamics``.
-    F_a is the force after slope limit and norm clamp, F_b what passivity controller and slew limit leave of it.
+    F_a is the force after slope limit and norm clamp, F_b the force after passivity controller and slew limit.
     """
     t_s = np.arange(round(LASTS_S * scene.rate_hz)) / scene.rate_hz
     along_m = scene.scale * stroke.amplitude_m * np.cos(2.0 * math.pi * stroke.frequency_hz * t_s)

@@ -1,4 +1,4 @@
-"""The worker process that measures what scenes cost and how true they are.
+"""The worker process that measures computation time and accuracy of scenes.
 
 It has the lowest priority of the computer, so that it takes no time from a servo.
 """
@@ -16,7 +16,7 @@ from study_app.workers.server import Send, Stop
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """A scene to appraise, and a stroke in it on a device of these dynamics, if that is asked about."""
+    """A scene to appraise, and optionally a stroke in it on a device of these dynamics."""
 
     scene: Scene
     stroke: Stroke | None = None
@@ -27,12 +27,12 @@ AppraisalClient: TypeAlias = WorkerClient[Question, Costs | Errors | None]
 
 
 def start_appraisal_worker() -> AppraisalClient:
-    """Start a worker process for questions; a question that another one follows is given up."""
+    """Start a worker process for questions; a new question cancels the last one."""
     return WorkerClient("study_app.evaluation.appraisal_worker:appraise", name="appraisal", background=True)
 
 
 def appraise(question: Question, send: Send, stop: Stop) -> Errors | None:
-    """Tell the `Costs` of a scene, then return its `Errors`; None where another question waits.
+    """Send the `Costs` of a scene, then return its `Errors`; None if another question waits.
 
     Raises
     ------

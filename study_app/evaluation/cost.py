@@ -1,4 +1,4 @@
-"""What a scene costs: nanoseconds a tick by the servo's own code, and how many of them each effect takes."""
+"""The computation time of a scene: nanoseconds per tick of the servo's own code, in total and of each effect."""
 
 import statistics
 import time
@@ -25,7 +25,7 @@ WARM_UP: Final = 10_000
 
 
 class Cost(NamedTuple):
-    """Medians over batches of 1,000 ticks [ns a tick]: the scene, the scene without liquids, and each effect.
+    """Medians over batches of 1,000 ticks [ns per tick]: the scene, the scene without liquids, and each effect.
 
     An effect's cost is what it adds to its liquid without effects, or with the one that it acts through.
     """
@@ -36,7 +36,7 @@ class Cost(NamedTuple):
 
 
 def measure(scene: Scene, *, batches: int = BATCHES) -> Cost:
-    """Measure a scene and its variants, batch about batch, so that what else the machine does strikes all alike."""
+    """Measure a scene and its variants in alternating batches, so that other load on the machine affects all alike."""
     scene = resolve(scene)
     rest = scene.model_copy(update={"liquids": ()})
     pairs = _pairs(scene)
@@ -50,7 +50,7 @@ def measure(scene: Scene, *, batches: int = BATCHES) -> Cost:
 
 
 def report(scene: Scene, *, batches: int = BATCHES) -> str:
-    """Return which effects a scene calls for, why, and what each costs, as text."""
+    """Return the effects of a scene, with reasons and computation times, as text."""
     cost = measure(scene, batches=batches)
     percent = 100 * cost.scene_ns * 1e-9 * scene.rate_hz
     whole = f"one tick: {cost.scene_ns:.0f} ns, {percent:.2f} % of the tick period"
@@ -67,7 +67,7 @@ def hand(ticks: int = WARM_UP) -> Floats:
 
 
 class Bench:
-    """One scene on the bench: its memory, and the cost of every batch so far."""
+    """One measured scene: its memory, and the time of every batch so far."""
 
     def __init__(self, scene: Scene, dynamics: Dynamics = UNKNOWN) -> None:
         self._model, self._sample = pack(scene, dynamics=dynamics), records(SAMPLE, 1)
@@ -78,27 +78,27 @@ class Bench:
         self.run(WARM_UP)
 
     def batch(self) -> None:
-        """Take a batch of ticks and keep its cost."""
+        """Run a batch of ticks and store its time."""
         began = time.perf_counter_ns()
         self.run(BATCH)
         self.costs_ns.append((time.perf_counter_ns() - began) / BATCH)
 
     def run(self, ticks: int) -> None:
-        """Take so many ticks."""
+        """Run ``ticks`` ticks."""
         _take(self._model, self._safety[0], self._sample[0], self._positions_m, self._ticks, ticks)
         self._ticks += ticks
 
 
 @kernel
 def _take(model: Any, safety: Record, sample: Record, positions_m: Any, start: int, ticks: int) -> None:
-    """Take ``ticks`` samples, one a millisecond."""
+    """Process ``ticks`` samples, one per millisecond."""
     row = start % len(positions_m)
     for k in range(start, start + ticks):
         sample.time_ns = k * 1_000_000
         sample.fresh = 1
         for axis in range(3):
             sample.position_m[axis] = positions_m[row, axis]
-        row = row + 1 if row + 1 < len(positions_m) else 0  # a division would cost as much as a third of a tick
+        row = row + 1 if row + 1 < len(positions_m) else 0  # a division would take a third of a tick
         tick(model, safety, sample)
 
 

@@ -1,7 +1,7 @@
-"""What to expect of a scene's choice of effects: its cost a tick, and how wrong its force is while a hand strokes.
+"""The expected result of a scene's choice of effects: its time per tick, and its force error during strokes of a hand.
 
-The hand strokes to and fro with the greatest speed and acceleration of the scene's motion, read in whole counts of an
-encoder, through the scene's own velocity estimator. The force is that of the effects, before safety limits it.
+The hand makes back-and-forth strokes with the greatest speed and acceleration of the scene's motion, quantised to
+encoder counts, with the scene's velocity estimator. The force is that of the effects, before the safety layer.
 """
 
 import math
@@ -26,14 +26,14 @@ from study_app.haptics.model.scene import Effect, Everywhere, Scene
 from study_app.haptics.runtime.offline import simulate
 
 SETTLED: Final = 2 / 3
-"""After this share of the strokes the flow has forgotten how they began."""
+"""After this share of the strokes the flow no longer depends on their start."""
 
 
 class Expected(NamedTuple):
-    """What a scene's choice costs a tick, and the RMS error of its force, as a share of the true force's RMS and in N.
+    """The time of a scene's choice per tick, and the RMS error of its force, relative to the reference's RMS and in N.
 
-    ``known_velocity_share`` is the same with velocities known exactly: what is left is that of effects and laws.
-    ``against`` says what the truth is made of.
+    ``known_velocity_share`` is the same with exact velocities: the error of effects and laws alone. ``against``
+    describes the reference.
     """
 
     cost_ns: float
@@ -65,7 +65,7 @@ def _errors(scene: Scene) -> tuple[float, float, float, str]:
 
 
 def _of_one(scene: Scene, index: int) -> tuple[float, float, float, str]:
-    """Return the errors of one liquid, as if it were alone, everywhere and without a flow of its own."""
+    """Return the errors of one liquid, as if it were the only one, everywhere and without a current."""
     liquid = scene.liquids[index].model_copy(update={"region": Everywhere(), "current": None})
     named: tuple[Effect, ...] = () if liquid.effects == "auto" else liquid.effects
     kept = tuple(it for it in named if it not in {"current", "surface"})
@@ -95,7 +95,7 @@ def _of_one(scene: Scene, index: int) -> tuple[float, float, float, str]:
 
 
 def _error(scene: Scene, motion: Motion, truth: Truth, *, counted: bool) -> Error:
-    """Return how wrong the scene is, from encoder counts or from velocities known exactly."""
+    """Return the errors of the scene, from encoder counts or from exact velocities."""
     if counted and scene.velocity.kind != "given":
         step_m = COUNT_M * scene.scale
         motion = Motion(motion.t_s, np.rint(motion.position_m / step_m) * step_m)
@@ -104,10 +104,10 @@ def _error(scene: Scene, motion: Motion, truth: Truth, *, counted: bool) -> Erro
 
 
 def physical_n(scene: Scene, speed_mps: float, rate_per_s: float, t_s: Floats) -> Floats:
-    """Return the force (n, 3) [N] on a ball that strokes along x, v = speed · sin ωt, as well as it is known.
+    """Return the best-known force (n, 3) [N] on a ball in strokes along x, v = speed · sin ωt.
 
-    Steady drag by experiment, −½ρV dv/dt of the added mass, −6πµR (R/δ)(v + (dv/dt)/ω) of the history, which creeping
-    flow has exactly (Landau & Lifshitz §24) and faster flow at most, and what buoyancy and weight leave.
+    Steady drag by experiment, −½ρV dv/dt of the added mass, −6πµR (R/δ)(v + (dv/dt)/ω) of the history, which is exact
+    in creeping flow (Landau & Lifshitz §24) and an upper bound in faster flow, and net buoyancy.
     """
     liquid, radius_m = scene.liquids[0], scene.body.diameter_m / 2
     mu, rho, volume_m3 = liquid.viscosity_pa_s or math.nan, liquid.density_kg_m3, scene.body.volume_m3
@@ -139,12 +139,12 @@ def _non_newtonian_n(scene: Scene, motion: Motion, speed_mps: float, rate_per_s:
 
 
 def _lift_n(scene: Scene) -> float:
-    """Return what buoyancy and weight leave, upward [N]."""
+    """Return net buoyancy, upward [N]."""
     return (scene.liquids[0].density_kg_m3 - scene.body.density_kg_m3) * scene.body.volume_m3 * GRAVITY_MPS2
 
 
 def _defined_n(scene: Scene, motion: Motion) -> Floats:
-    """Return drag and wake by the letter, (n, 3) [N]."""
+    """Return drag and wake by the literal definition, (n, 3) [N]."""
     liquid = scene.liquids[0]
     if "drag" not in liquid.effects:
         return np.zeros_like(motion.position_m)

@@ -13,13 +13,13 @@ RELATIVE: Final = 0.05
 FELT_N: Final = 0.05
 """The accuracy target: max(5 % of the force, 0.05 N), below the smallest difference of force that people feel, 7 %."""
 ROUNDING: Final = 1e-9
-"""Errors below this share of the force are rounding, and count as equal."""
+"""Errors below this share of the force are rounding errors, and count as equal."""
 
 
 class Error(NamedTuple):
-    """How wrong a force is: root mean square and greatest [N], as shares of the same of the truth, and direction.
+    """The errors of a force: root mean square and greatest [N], relative to those of the reference, and direction.
 
-    ``direction_deg`` is the root mean square angle where the true force is felt, or else where it is not near zero.
+    ``direction_deg`` is the root mean square angle where the reference is perceptible, or else not near zero.
     """
 
     rms_n: float
@@ -31,7 +31,7 @@ class Error(NamedTuple):
 
 
 def error_of(forces_n: Sequence[Floats], truth: Truth) -> Error:
-    """Return how wrong forces are, one (n, 3) array for each case of the truth."""
+    """Return the errors of forces, one (n, 3) array for each case of the reference."""
     true_n = np.concatenate([case.force_n[case.counted] for case in truth.cases])
     felt_n = np.concatenate([force[case.counted] for force, case in zip(forces_n, truth.cases, strict=True)])
     sizes_n = np.linalg.norm(true_n, axis=1)

@@ -15,10 +15,10 @@ STRETCHES: Final = 3
 
 
 def stir(scale: float, rate_hz: float) -> Motion:
-    """Return a hand that stirs: 1.5 circles of 30 mm in 3 s, a rest, the same back, a rest, and forth again.
+    """Return a stirring hand: 1.5 circles of 30 mm in 3 s, a rest, the same backward, a rest, and forward again.
 
-    Each stretch begins and ends softly (minimum jerk, Flash & Hogan 1985) and rises and falls a little: up to 0.18 m/s
-    at the hand. In the scene, so ``scale`` times as large.
+    Each segment has minimum jerk (Flash & Hogan 1985) with a small vertical motion: up to 0.18 m/s at the hand. In the
+    scene, it is ``scale`` times as large.
     """
     each_s = STIRRING_S + REST_S
     t_s = np.arange(round(STRETCHES * each_s * rate_hz) + 1) / rate_hz
@@ -34,14 +34,14 @@ def stir(scale: float, rate_hz: float) -> Motion:
 
 
 def stroke(speed_mps: float, rate_per_s: float, cycles: int, rate_hz: float) -> Motion:
-    """Return strokes to and fro along x, v = speed · sin ωt with ω = ``rate_per_s``."""
+    """Return back-and-forth strokes along x, v = speed · sin ωt with ω = ``rate_per_s``."""
     t_s = np.arange(round(cycles * 2 * math.pi / rate_per_s * rate_hz) + 1) / rate_hz
     way_m = speed_mps / rate_per_s * (1 - np.cos(rate_per_s * t_s))
     return along_x(t_s, way_m, speed_mps * np.sin(rate_per_s * t_s))
 
 
 def with_velocity(motion: Motion) -> Motion:
-    """Return the motion with its velocities; where it brings none, those of central differences."""
+    """Return the motion with its velocities; without any, with those of central differences."""
     if motion.velocity_mps is not None or len(motion.t_s) < 2:
         return motion
     return Motion(motion.t_s, motion.position_m, np.gradient(motion.position_m, motion.t_s, axis=0))

@@ -1,4 +1,4 @@
-"""Intervals in recordings: the scenes that they presented, and what they delivered, compared with the journal."""
+"""Intervals in recordings: the scenes presented, and the delivered levels, compared with the journal."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ TOLERANCE: Final = 1e-9
 
 
 def scene_presented(protocol: Protocol, key: Key, started: Line, link_seed: int) -> Scene:
-    """Return what was presented: a condition, or an interval of a trial whose sealed line is opened.
+    """Return the presented scene: of a condition, or of an interval of a trial whose sealed line is opened.
 
     ``link_seed`` is that of jitter and loss of the force.
     """
@@ -77,9 +77,9 @@ def places_of(samples: Any, steps: Sequence[Step]) -> list[tuple[int, Scene]]:
 
 
 def interval_samples(samples: Any, duration_s: float) -> Any:
-    """Return the samples of an interval's task from those of its recording, which begins before it and ends after it.
+    """Return the samples of an interval's task from its recording, which begins before it and ends after it.
 
-    ``duration_s`` is how long the task took, as the journal has it.
+    ``duration_s`` is the duration of the task in the journal.
     """
     own = samples[samples["scene"] == samples["scene"][-1]]
     believed = own[own["limiters"] & LIMITER_GLITCH == 0]
@@ -90,7 +90,7 @@ def interval_samples(samples: Any, duration_s: float) -> Any:
 def delivered_again(
     protocol: Protocol, presented: Stimulated, started: Mapping[str, Any], samples: Any, ended: Mapping[str, Any]
 ) -> Delivered:
-    """Return what an interval delivered, by the samples of its recording.
+    """Return the delivered values of an interval, from the samples of its recording.
 
     ``started`` and ``ended`` are the opened lines on the beginning of the trial, with the ``interval``, and on the
     interval's end.
@@ -102,7 +102,7 @@ def delivered_again(
 
 
 def different(found: Delivered, ended: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the columns in which the journal differs from what was computed again; nothing where it has none."""
+    """Yield the columns in which the journal differs from the recomputed values; none if it lacks them."""
     for name, value in found.columns.items():
         if name in ended and not _same(value, ended[name]):
             yield name

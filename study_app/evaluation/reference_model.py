@@ -1,8 +1,8 @@
-"""The force model by the letter of its definition: slow, plain, and what the product must equal.
+"""The force model by its literal definition: slow, simple, and the reference for the program.
 
-Every element of the wake is kept in a list and decays by itself; segments are summed anew each tick. Written from the
-definition, not from ``haptics.kernels.effects``, which it shares no code with. `exact_wakes` says the same without the
-rounding of long sums.
+Every element of the wake is stored in a list and decays separately; segments are summed again each tick. It follows the
+definition and shares no code with ``haptics.kernels.effects``. `exact_wakes` is the same without the rounding errors of
+long sums.
 """
 
 import math
@@ -16,7 +16,7 @@ from study_app.haptics.model.scene import Ewma, Knee, Scene
 
 
 class Response(NamedTuple):
-    """What the definition says about each row of a motion, (n, 3) but for the last."""
+    """The results of the definition for each row of a motion, (n, 3) except the last."""
 
     velocity_mps: Floats
     wake_mps: Floats
@@ -156,17 +156,17 @@ def exact_wakes(
     decay: float,
     resolution_m: float,
 ) -> Any:
-    """Return what `wakes` returns, but for its rounding: nothing is carried on from tick to tick.
+    """Return the result of `wakes` without its rounding errors: no sum continues from tick to tick.
 
-    Which ticks store an element, and in which segment, is settled first. Then every tick sums its N elements anew, each
-    by the λ^age of its own age, with the rounding errors of the sums made good (Neumaier 1974).
+    First the ticks that store an element, and its segment, are determined. Then every tick sums its N elements again,
+    each times the λ^age of its age, with compensation of rounding errors (Neumaier 1974).
     """
     ticks = len(h_mps)
     wake_mps, size_mps = np.zeros((ticks, 3)), np.zeros(ticks)
     taken, segment, arc = np.zeros(ticks, np.int64), np.zeros(ticks, np.int64), np.zeros(ticks)
     speed_mps, clock_s = np.zeros(ticks), np.cumsum(interval_s)
     stored, current, arc_m = 0, 0, 0.0
-    before = np.zeros(ticks, np.int64)  # how many elements were stored when a tick's drag asked
+    before = np.zeros(ticks, np.int64)  # number of elements stored before a tick's drag
     for k in range(ticks):
         before[k] = stored
         speed_mps[k] = _size(h_mps[k])
@@ -237,7 +237,7 @@ def local_wakes(
     reach_m: float,
     spreading_m2ps: float,
 ) -> Any:
-    """Return v_wake (n, 3) of a local wake whose every element keeps its own place and age, however many there are.
+    """Return v_wake (n, 3) of a local wake in which every element keeps its own place and age, in any number.
 
     v_tail = (1/S) Σ_j (σ_0/σ_j)³ exp(−r_j²/2σ_j²) λ^age_j e_j over the newest N elements, zero ones included, with
     σ_j² = σ_0² + 2ν age_j; then the response to the fill, whose mean speed is weighted likewise.
@@ -311,7 +311,7 @@ def _breaks(
 
 @workings
 def _gain(fill: float, exponent: float) -> float:
-    """Return what the response to a fill makes of the tail."""
+    """Return the factor of the tail by the response to a fill."""
     return float(fill ** (exponent - 1.0) if exponent >= 1.0 else (fill**2 + 0.05**2) ** ((exponent - 1.0) / 2.0))
 
 

@@ -1,8 +1,8 @@
-"""What models of a liquid are measured against: motions with the force that belongs to them.
+"""References for models of a liquid: motions with their forces.
 
-Two kinds, kept apart. *Numerical*: the definition of the model itself, summed without rounding errors. *Physical*: what
-a real sphere meets, as far as that is known: measured steady drag and the exact forces of creeping flow. None of it
-shares code with ``haptics.kernels.effects``.
+There are two kinds. *Numerical*: the definition of the model itself, summed without rounding errors. *Physical*: the
+known forces on a real sphere: measured steady drag and the exact forces of creeping flow. None shares code with
+``haptics.kernels.effects``.
 """
 
 import math
@@ -66,10 +66,10 @@ class Case:
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """A truth by its name on tables and figures; ``source`` says where it is from.
+    """A reference by its name on tables and figures, with its ``source``.
 
-    ``computing_s`` is what a fluid solver took for a second of the motion, with the machine it ran on; else None.
-    ``left_out`` are the constants of unsteady drag that were fitted without this truth; None where it is in no fit.
+    ``computing_s`` is the time of a fluid solver per second of the motion, with its machine; else None. ``left_out``
+    are the constants of unsteady drag that were fitted without this truth; None where it is in no fit.
     """
 
     name: str
@@ -81,7 +81,7 @@ class Truth:
 
 
 def definition(scene: Scene, motion: Motion) -> Truth:
-    """Return drag and wake of the scene's liquid by the letter, for a motion with its velocities."""
+    """Return drag and wake of the scene's liquid by the literal definition, for a motion with its velocities."""
     force_n = respond(scene, motion, exact=True).force_n
     source = "exact definition of the wake: full length, full rate, float64, exact sums"
     return Truth("definition", source, (Case(motion, force_n, np.ones(len(force_n), bool)),))
@@ -132,7 +132,7 @@ def _above_oseen() -> float:
 
 
 def oscillation(scene: Scene) -> Truth:
-    """Return the force on a sphere that oscillates in creeping flow, once the flow has forgotten how it began.
+    """Return the force on a sphere that oscillates in creeping flow, after the transient of its start.
 
     Landau & Lifshitz, Fluid Mechanics, §24: F = −6πµR(1 + R/δ) u − 3πR²√(2µρ/ω)(1 + 2R/9δ) du/dt, δ = √(2µ/ρω).
     The frequency is that of a stroke with the greatest speed and acceleration of the scene.
@@ -171,7 +171,7 @@ def start(scene: Scene) -> Truth:
 
 
 def creeping_mps(scene: Scene) -> float:
-    """Return a speed [m/s] at which the flow creeps: Re = 0.01."""
+    """Return a speed [m/s] of creeping flow: Re = 0.01."""
     liquid = scene.liquids[0]
     return CREEPING_REYNOLDS * (liquid.viscosity_pa_s or math.nan) / (liquid.density_kg_m3 * scene.body.diameter_m)
 

@@ -1,12 +1,13 @@
-"""Every force of a session once more: from the recorded times and places, by the tick that sent them.
+"""Recomputes every force of a session from the recorded times and places, by the tick that sent them.
 
-The recordings keep the CRC-32 of each second of exact forces; here the forces are computed again and compared with
-that. The same version of the program on the same kind of processor gives the same bits; seconds that differ are named.
-What each interval of a trial delivered is computed from its recording again, too, and compared with the journal.
-The key is opened in memory alone, and nothing of it is printed: whoever replays a session stays blind.
+The recordings contain the CRC-32 of each second of exact forces; here the forces are recomputed and compared with it.
+The same version of the program on the same kind of processor gives the same bits; seconds that differ are named. The
+delivered values of each interval are also recomputed from its recording and compared with the journal.
+
+The key is opened only in memory, and not printed: the user who replays a session stays blind.
 
 A recording begins shortly before its trial, so that the force it begins with is known; one that follows another without
-a pause goes on from where that one was. What cannot be computed again is named: a proof says what it is not about.
+a pause continues from its end. Parts that cannot be recomputed are listed, since they are not proved.
 """
 
 import time
@@ -56,12 +57,12 @@ _FLOAT32 = 2.0**-23  # of the greater ones, a column's own precision
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """What a replay found.
+    """The result of a replay.
 
-    ``recordings`` were computed again, ``seconds`` of them compared. ``differences`` has a sentence for each recording
-    whose forces came out otherwise, ``missing`` one for each that the journal names and that is missing,
-    ``uncompared`` one for each that could not be computed again, or not to its end. ``lasted_s`` is how long the hand
-    moved, ``computed_s`` how long its forces took again; ``took_s`` adds reading the files and loading the code.
+    ``recordings`` were recomputed, ``seconds`` of them compared. ``differences`` has a sentence for each recording with
+    different forces, ``missing`` one for each missing recording of the journal, ``uncompared`` one for each that could
+    not be recomputed, or not to its end. ``lasted_s`` is the duration of the motion, ``computed_s`` that of the
+    recomputation; ``took_s`` includes reading the files and loading the code.
     """
 
     recordings: int
@@ -75,12 +76,12 @@ class Replayed:
 
     @property
     def proved(self) -> bool:
-        """Whether something was compared, all of it is the same, and nothing is missing that was recorded."""
+        """Whether data were compared, all are equal, and no recording is missing."""
         return self.seconds > 0 and not self.differences and not self.missing
 
 
 def replay(session_folder: Path) -> Replayed:
-    """Compute every recorded force of a session again, and compare.
+    """Recompute every recorded force of a session, and compare.
 
     Raises
     ------

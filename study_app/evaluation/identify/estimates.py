@@ -1,8 +1,8 @@
 """The result of a least-squares fit: values, confidence intervals, correlations, warnings.
 
-Intervals are those of linear regression at the solution, by Student's t. Residuals follow one another, so as many of n
-count as independent as n (1 − ρ)/(1 + ρ), with ρ their correlation from one row to the next (Bayley & Hammersley 1946,
-J. R. Stat. Soc. Suppl. 8:184, for a first-order process).
+Intervals are those of linear regression at the solution, by Student's t. Residuals are correlated, so n of them count
+as n (1 − ρ)/(1 + ρ) independent ones, with ρ their correlation from one row to the next (Bayley & Hammersley 1946, J.
+R. Stat. Soc. Suppl. 8:184, for a first-order process).
 """
 
 import math
@@ -27,11 +27,11 @@ _SINGULAR: Final = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Estimates:
-    """The fitted parameters of a liquid, by the names they were asked for.
+    """The fitted parameters of a liquid, by their requested names.
 
     ``values`` and ``intervals`` (95 %, within what is permitted). ``correlation`` (p, p) is that of the estimates, nan
-    where a parameter does nothing, ``following`` that of residuals from row to row. ``distinguishable`` is whether
-    every parameter acts, and no two of them alike. ``scene`` has the values in it, and its effects named.
+    where a parameter does nothing, ``following`` that of residuals from row to row. ``distinguishable`` tells whether
+    every parameter has an effect, and no two have the same. ``scene`` has the values in it, and its effects named.
     """
 
     scene: Scene
@@ -51,14 +51,14 @@ class Estimates:
         return (f"{value}" if it.whole else f"{value:.5g}"), "anything" if anything else f"{lower:.5g} … {upper:.5g}"
 
     def summary(self) -> str:
-        """Return how much was measured, and how near the fit comes."""
+        """Return the amount of data, and the residual of the fit."""
         raise NotImplementedError
 
 
 def estimate(problem: Problem, liquid_id: str, names: Sequence[str], size: float) -> tuple[Floats, dict[str, Any]]:
     """Return the z of the least squares, and the fields of `Estimates` there.
 
-    ``size`` is the length of the vector of what was measured, as the misfit is counted.
+    ``size`` is the length of the vector of measurements, in the units of the misfit.
     """
     z, ended = solve(problem)
     residual, slopes = -problem.misfit(z).reshape(-1, problem.columns), problem.slopes_of_u(z)
@@ -87,7 +87,7 @@ def estimate(problem: Problem, liquid_id: str, names: Sequence[str], size: float
 
 
 def _acts(u: Floats, slopes: Floats, problem: Problem, size: float) -> NDArray[np.bool_]:
-    """Return which parameters change what was measured at all, (p,)."""
+    """Return which parameters affect the measured quantity, (p,)."""
     spans = [
         1.0 if coordinate(it).relative is False else max(abs(at), 0.01)
         for it, at in zip(problem.parameters, u, strict=True)
@@ -153,7 +153,7 @@ def _of_pairs(
 def _of_the_parameters(
     problem: Problem, z: Floats, acts: NDArray[np.bool_], half: Floats, paired: Collection[int]
 ) -> Iterator[str]:
-    """Yield what is not to be relied on in single parameters."""
+    """Yield warnings about unreliable single parameters."""
     values = problem.values(z)
     for k, it in enumerate(problem.parameters):
         near = 1e-6 * max(1.0, abs(z[k]))
@@ -171,7 +171,7 @@ def _of_the_parameters(
 
 
 def _edge(problem: Problem, k: int, z: Floats) -> str:
-    """Return why the range ends there, where the model alone does not say it."""
+    """Return why the range ends there, if the model alone does not determine it."""
     it = problem.parameters[k]
     if it.field in NO_LESS_THAN and z[k] - problem.least[k] < problem.most[k] - z[k]:
         return f" (no less than {NO_LESS_THAN[it.field]})"

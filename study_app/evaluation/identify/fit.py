@@ -1,6 +1,6 @@
 """Parameters of a liquid from measured motion and force: least squares through the servo's own tick.
 
-The sum over rows and axes of (measured − simulated force)² is made least within the ranges that the scene's models
+The sum over rows and axes of (measured − simulated force)² is minimised within the ranges that the scene's models
 permit (``search``); ``estimates`` computes confidence intervals and warnings.
 """
 
@@ -22,15 +22,15 @@ from study_app.haptics.model.scene import Scene
 
 FOLLOWING: Final = 0.1
 CHANCE: Final = 5.0
-"""Residuals count as following one another from this correlation on, and this many deviations from what noise has."""
+"""Residuals count as correlated above this correlation, and above this many standard deviations of noise."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Fit(Estimates):
-    """What a fit to a force found.
+    """The result of a fit to a force.
 
     At the measured times ``measured_n``, ``fitted_n`` and ``residual_n`` (n, 3), measured − fitted; ``axes`` are those
-    that count.
+    in use.
     """
 
     motion: Motion
@@ -55,7 +55,7 @@ class Fit(Estimates):
         return self.rms_n / _rms(self.measured_n)
 
     def summary(self) -> str:
-        """Return how much was measured, and how near the fit comes."""
+        """Return the amount of data, and the residual of the fit."""
         lasted_s = self.motion.t_s[-1] - self.motion.t_s[0]
         left = f"residual {self.rms_n:.3g} N RMS, {100 * self.share:.1f} % of the force"
         return f"{len(self.motion.t_s)} rows over {lasted_s:.3g} s; {left}"
@@ -65,8 +65,8 @@ def fit(scene: Scene, liquid_id: str, names: Sequence[str], motion: Motion, forc
     """Return the values of the parameters ``names`` with which `simulate` comes closest to a measured force.
 
     ``force_n`` is the liquid's on the body, (n, 3) or along x (n,), at the times of the motion, which may have another
-    rate than the scene. A motion with velocities is followed with them, one without through the scene's estimator. The
-    search begins at the scene's values; where it says ``effects = "auto"``, with the effects chosen for those.
+    rate than the scene. Velocities of the motion are used if given, else those of the scene's estimator. The search
+    begins at the scene's values; with ``effects = "auto"``, with the effects chosen for these.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def fit(scene: Scene, liquid_id: str, names: Sequence[str], motion: Motion, forc
 
 
 def _of_the_residuals(residual_n: Floats, force_n: Floats) -> Iterator[str]:
-    """Yield what the residuals say against the model: noise does not remember."""
+    """Yield warnings of correlated residuals, which speak against the model: noise is uncorrelated."""
     rho = following(residual_n)
     if rho > max(FOLLOWING, CHANCE / math.sqrt(residual_n.size)):
         share = _rms(residual_n) / _rms(force_n)

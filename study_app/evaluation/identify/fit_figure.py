@@ -1,4 +1,4 @@
-"""A fit as a picture: the force measured and fitted, what is left of it over time, and over speed."""
+"""A fit as a figure: the force measured and fitted, and the residual over time and over speed."""
 
 import textwrap
 from typing import Any, Final
@@ -82,7 +82,7 @@ def _axes(found: Fit) -> list[tuple[int, str]]:
 
 
 def _force(axes: Axes, found: Fit) -> None:
-    """Draw each axis of the force, the measured one as a broad band behind."""
+    """Draw each axis of the force, the measured one as a wide line behind."""
     t_s = found.motion.t_s
     _time_axis(axes, found)
     axes.set_title("Force on the ball [N]", pad=6)
@@ -94,7 +94,7 @@ def _force(axes: Axes, found: Fit) -> None:
 
 
 def _residual(axes: Axes, found: Fit) -> None:
-    """Draw each axis of the residual as dots: a line through noise would fill the plot."""
+    """Draw each axis of the residual as dots, since a line through noise would fill the plot."""
     _time_axis(axes, found)
     axes.set_title("Measured − fitted [N]", pad=6)
     axes.set_xlabel("Time [s]", loc="right", labelpad=1)
@@ -122,7 +122,7 @@ def _along(axes: Axes, found: Fit) -> None:
 
 
 def _medians(speed_mps: Floats, along_n: Floats) -> Floats:
-    """Return middle speed and median residual, (k, 2), of equal stretches of speed that hold enough rows."""
+    """Return middle speed and median residual, (k, 2), of equal intervals of speed with enough rows."""
     if len(speed_mps) == 0:
         return np.empty((0, 2))
     edges = np.linspace(speed_mps.min(), speed_mps.max(), BINS + 1)

@@ -1,7 +1,7 @@
 """Parameters of a non-Newtonian liquid from a rheometer's flow curve: shear stress over shear rate.
 
-The sum of (fitted/measured stress − 1)² is made least, since flow curves span decades and a rheometer's error is a
-share of the stress. The curve is `study_app.haptics.model.laws.rheology.stress_pa`, that of steady shear.
+The sum of (fitted/measured stress − 1)² is minimised, since flow curves span decades and a rheometer's error is
+relative to the stress. The curve is `study_app.haptics.model.laws.rheology.stress_pa`, that of steady shear.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ TABLE: Final = "non_newtonian"
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class CurveFit(Estimates):
-    """What a fit to a flow curve found: ``fitted_pa`` (n,) at the measured shear rates."""
+    """The result of a fit to a flow curve: ``fitted_pa`` (n,) at the measured shear rates."""
 
     curve: FlowCurve
     fitted_pa: Floats
@@ -36,7 +36,7 @@ class CurveFit(Estimates):
         return float(np.sqrt(np.mean((self.fitted_pa / self.curve.stress_pa - 1) ** 2)))
 
     def summary(self) -> str:
-        """Return how much was measured, and how near the fit comes."""
+        """Return the amount of data, and the residual of the fit."""
         rates = self.curve.rate_per_s
         said = f"{len(rates)} shear rates from {rates.min():.3g} to {rates.max():.3g} per s"
         return f"{said}; residual {100 * self.share:.1f} % of the stress, RMS"

@@ -1,4 +1,4 @@
-"""A fitted flow curve as a picture: shear stress over shear rate, and what is left of it."""
+"""A fitted flow curve as a figure: shear stress over shear rate, and the residual."""
 
 import textwrap
 from typing import Final

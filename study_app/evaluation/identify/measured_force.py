@@ -1,4 +1,4 @@
-"""Measured motion and force, or a flow curve, from a file; a measured motion as one that `simulate` can follow."""
+"""Reads measured motion and force, or a flow curve, from a file; prepares the motion for `simulate`."""
 
 import csv
 import math
@@ -59,7 +59,7 @@ def read(path: Path) -> Measured | FlowCurve:
     Raises
     ------
     StudyError
-        The file cannot be read or used; the first thing wrong with it in one line.
+        The file cannot be read or used; with its first error in one line.
     """
     try:
         refuse_device(path)
@@ -132,8 +132,8 @@ def along_a_line(t_s: Floats, velocity_mps: Floats, force_n: Floats) -> Measured
 def centred(motion: Motion) -> Motion:
     """Return the motion with velocities (n, 3): slopes of parabolas through the places 12.5 ms to both sides.
 
-    A measured force follows the motion itself, not the filter of a device: these do not lag. A motion that has
-    velocities stays as it is. [choice] 25 ms: a tenth of the period of the fastest strokes, 4 Hz.
+    A measured force depends on the motion itself, not on a device's filter: these velocities have no lag. A motion that
+    has velocities stays as it is. [choice] 25 ms: a tenth of the period of the fastest strokes, 4 Hz.
 
     Raises
     ------
@@ -153,7 +153,7 @@ def centred(motion: Motion) -> Motion:
 
 
 def at_rate(motion: Motion, rate_hz: float) -> Motion:
-    """Return the motion with a row for every tick; one that already has them, give or take half a tick, as it is.
+    """Return the motion with a row for every tick; unchanged if it has them within half a tick.
 
     Between the rows of a slower or uneven measurement places follow cubic splines, velocities straight lines.
 

@@ -15,18 +15,18 @@ from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.scene import Liquid, Scene
 
 THRESHOLDS: Final = tuple(name for effect in EFFECTS for name in effect.thresholds)
-"""These decide for or against: the force does not change with them, or jumps."""
+"""Thresholds: the force does not change with them, or jumps."""
 NO_LESS_THAN: Final = {"scaling": "length", "thickened_viscosity_pa_s": "zero_shear_viscosity_pa_s"}
-"""Fields that their model does not permit to be less than another of the same table."""
+"""Fields that must not be less than another of the same table."""
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """One number of a scene.
 
-    ``name`` is what it was asked for by, ``table`` and ``field`` where it is: "liquid", "body" or an effect's table.
-    ``least`` and ``most`` are what its model permits, ``least`` itself not where ``above``, and what those of
-    `NO_LESS_THAN` that are not fitted leave. ``whole`` numbers count.
+    ``name`` is its requested name, ``table`` and ``field`` its place: "liquid", "body" or an effect's table. ``least``
+    and ``most`` are what its model permits, ``least`` itself not where ``above``, and what those of `NO_LESS_THAN` that
+    are not fitted leave. ``whole`` numbers count.
     """
 
     name: str
@@ -62,7 +62,7 @@ def find(scene: Scene, liquid_id: str, names: Sequence[str]) -> tuple[Parameter,
 
 
 def _narrowed(it: Parameter, table: BaseModel, fitted: Sequence[Parameter]) -> Parameter:
-    """Return a parameter within what the fields of `NO_LESS_THAN` that are not fitted leave."""
+    """Return a parameter with its range limited by the fixed fields of `NO_LESS_THAN`."""
     fields = {one.field for one in fitted if one.table == it.table}
     for greater, less in NO_LESS_THAN.items():
         if it.field == greater and less not in fields:
@@ -102,7 +102,7 @@ def _liquid(scene: Scene, liquid_id: str) -> Liquid:
 
 
 def _tables(scene: Scene, liquid: Liquid) -> Iterator[tuple[str, BaseModel]]:
-    """Yield the tables that say something about the force, in the order in which a plain name is looked for."""
+    """Yield the tables that affect the force, in the order in which a plain name is looked up."""
     yield "liquid", liquid
     for effect in EFFECTS:
         if effect.model is not None and effect.name in liquid.effects:
@@ -111,7 +111,7 @@ def _tables(scene: Scene, liquid: Liquid) -> Iterator[tuple[str, BaseModel]]:
 
 
 def _closed(scene: Scene, effect: Effect, table: BaseModel) -> BaseModel:
-    """Return a table with what follows from the scene where it leaves a parameter open."""
+    """Return a table with unset parameters computed from the scene."""
     found = {name: of(scene) for name, of in effect.open_values.items() if getattr(table, name) is None}
     return table.model_copy(update=found)
 

@@ -1,4 +1,4 @@
-"""What a fit leaves behind: a report, a preset that other commands take, the residuals as a table, and a figure."""
+"""The files of a fit: a report, a preset for other commands, the residuals as a table, and a figure."""
 
 import hashlib
 from pathlib import Path
@@ -65,7 +65,7 @@ def write(found: Fit | CurveFit, to: Path, source: Path) -> tuple[Path, ...]:
 
 
 def residuals(found: Fit) -> Table:
-    """Return times, measured and fitted forces and what is left, a row a measured moment."""
+    """Return times, measured and fitted forces and residuals, one row per measurement."""
     table = np.recarray(len(found.motion.t_s), [(name, np.float64) for name in ("t_s", *COLUMNS)])
     table["t_s"] = found.motion.t_s
     values = np.column_stack([found.measured_n, found.fitted_n, found.residual_n])
@@ -75,7 +75,7 @@ def residuals(found: Fit) -> Table:
 
 
 def curve_residuals(found: CurveFit) -> Table:
-    """Return shear rates, measured and fitted stresses and what is left, a row a shear rate."""
+    """Return shear rates, measured and fitted stresses and residuals, one row per shear rate."""
     columns = (found.curve.rate_per_s, found.curve.stress_pa, found.fitted_pa, found.curve.stress_pa - found.fitted_pa)
     names = (*FLOW_CURVE, "fitted_pa", "residual_pa")
     table = np.recarray(len(found.fitted_pa), [(name, np.float64) for name in names])
@@ -99,7 +99,7 @@ def preset(found: Estimates, source: Path) -> str:
 
 
 def _place(it: Parameter, found: Estimates) -> tuple[str, ...]:
-    """Return where a parameter stands in a scene file."""
+    """Return the place of a parameter in a scene file."""
     if it.table == "body":
         return "scene", "body", it.field
     return "liquids", found.liquid_id, *(() if it.table == "liquid" else (it.table,)), it.field

@@ -1,9 +1,9 @@
 """The search for a liquid's parameters: the force along a measured motion as a function of a few numbers.
 
-Positive parameters are searched by their logarithm, a wake's decay by its rate; two of which one may not be less than
-the other (`NO_LESS_THAN`), by the lesser and their ratio, which is never below 1. A length counts elements, so the
-force is known at whole lengths alone: between them it is interpolated; the search begins at several lengths, and what
-it finds is rounded, and the others are fitted once more.
+Positive parameters are searched by their logarithm, a wake's decay by its rate; pairs of which one must not be less
+than the other (`NO_LESS_THAN`), by the lesser and their ratio, at least 1. A length counts elements, so the force is
+only defined at integer lengths and interpolated between them; the search begins at several lengths, the result is
+rounded, and the other parameters are fitted again.
 """
 
 import math
@@ -28,7 +28,7 @@ _STARTS: Final = 6
 _AROUND: Final = (0.5, 0.7, 1.4, 2.0)
 _ROUNDS: Final = 4
 _BETTER: Final = 1e-4
-_TRIAL: Final = 4  # steps from each start, before the best go on
+_TRIAL: Final = 4  # steps from each start, before the best continue
 _MOST: Final = 100
 _STEP: Final = 1e-4
 _LENGTH_STEP: Final = 1e-2
@@ -36,7 +36,7 @@ _ROUNDING: Final = 1e-12  # of exp(log(N)), so that S = N stays so
 
 
 class Coordinate(NamedTuple):
-    """How a parameter is searched: by a number u that grows or falls with its value; ``step`` for its derivative."""
+    """How a parameter is searched: by a monotonic function u of its value; ``step`` for its derivative."""
 
     to_u: Callable[[float], float]
     to_value: Callable[[float], float]
@@ -72,12 +72,12 @@ def u_range(parameter: Parameter) -> tuple[float, float]:
 
 
 class Problem:
-    """A scene, the parameters that are searched, and what was measured.
+    """A scene, the parameters that are searched, and the measurements.
 
-    z (p,) are the numbers of the search: u, but for the greater of two in `NO_LESS_THAN` there the logarithm of their
-    ratio. ``least`` and ``most`` (p,) are its range, ``start`` the scene's own values in it. ``compared``,
-    ``varied`` and ``more`` are words for warnings; ``alike`` is the correlation of two estimates from which their
-    parameters count as not distinguishable.
+    z (p,) are the variables of the search: u, or for the greater of two in `NO_LESS_THAN` the logarithm of their ratio.
+    ``least`` and ``most`` (p,) are its range, ``start`` the scene's own values in it. ``compared``, ``varied`` and
+    ``more`` are words for warnings; ``alike`` is the correlation of two estimates from which their parameters count as
+    not distinguishable.
     """
 
     alike: ClassVar[float]
@@ -99,7 +99,7 @@ class Problem:
 
     @property
     def columns(self) -> int:
-        """How many values a measured row has."""
+        """The number of values per measured row."""
         return 1
 
     def misfit(self, z: Floats) -> Floats:
@@ -107,7 +107,7 @@ class Problem:
         raise NotImplementedError
 
     def values(self, z: Floats) -> list[float]:
-        """Return the parameters' values, each in its range; a length not rounded."""
+        """Return the parameters' values, each in its range, without rounding a length."""
         values = [it.to_value(float(u)) for it, u in zip(self._coordinates, self.u(z), strict=True)]
         values = [round(it) if abs(it - round(it)) < _ROUNDING * abs(it) else it for it in values]
         return [min(max(value, it.least), it.most) for value, it in zip(values, self.parameters, strict=True)]
@@ -178,7 +178,7 @@ class Problem:
 class ForceProblem(Problem):
     """The force along a measured motion.
 
-    ``axes`` are those of the force that count: measured or predicted to be other than zero.
+    ``axes`` are the axes of the force in use: measured or predicted to be nonzero.
 
     Raises
     ------
@@ -205,7 +205,7 @@ class ForceProblem(Problem):
 
     @property
     def columns(self) -> int:
-        """How many axes count."""
+        """The number of axes in use."""
         return len(self.axes)
 
     def force_n(self, z: Floats) -> Floats:
@@ -218,7 +218,7 @@ class ForceProblem(Problem):
         return force_n if share == 0 else (1 - share) * force_n + share * self._simulated(above)
 
     def misfit(self, z: Floats) -> Floats:
-        """Return simulated − measured force on the axes that count, (m,)."""
+        """Return simulated − measured force on the axes in use, (m,)."""
         misfit: Floats = (self.force_n(z) - self.measured.force_n)[:, self.axes].ravel()
         return misfit
 
@@ -230,7 +230,7 @@ class ForceProblem(Problem):
         return np.column_stack([np.interp(self.measured.motion.t_s, self._motion.t_s, it) for it in columns])
 
     def _neighbours(self, values: list[float], k: int) -> tuple[list[float], list[float], float]:
-        """Return the values with the whole lengths to both sides, and how far between them the length is, 0 … 1."""
+        """Return the values with the integer lengths on both sides, and the length's position between them, 0 … 1."""
         longest = self._longest(values, k)
         below = min(max(1.0, math.floor(values[k] / self._spacing + 1e-9) * self._spacing), longest)
         above = min(below + self._spacing, longest)
@@ -248,7 +248,7 @@ class ForceProblem(Problem):
 
 
 def solve(problem: Problem) -> tuple[Floats, bool]:
-    """Return the z of the least squares, its length whole, and whether the search came to an end."""
+    """Return the z of the least squares with an integer length, and whether the search converged."""
     everything = np.ones(len(problem.start), bool)
     best = _search(problem, problem.start if problem.length is None else _begin(problem, problem.length), everything)
     z = problem.rounded(best.x)
@@ -259,7 +259,7 @@ def solve(problem: Problem) -> tuple[Floats, bool]:
 
 
 def _begin(problem: Problem, k: int) -> Floats:
-    """Return a z near the least squares, looked for at lengths all over the range, then about the best of them."""
+    """Return a z near the least squares, searched at lengths over the whole range, then around the best."""
     shortest = min(math.log(_SHORTEST_START), problem.most[k])
     lengths = np.linspace(shortest, problem.most[k], _STARTS)
     best = _best(problem, [problem.start, *(problem.moved(problem.start, k, length) for length in lengths)])
@@ -279,7 +279,7 @@ def _best(problem: Problem, starts: Sequence[Floats]) -> Any:
 
 
 def _search(problem: Problem, start: Floats, free: NDArray[np.bool_], most: int = _MOST) -> Any:
-    """Return scipy's result with the whole z as ``x``; what is not free stays."""
+    """Return scipy's result with the complete z as ``x``, including its fixed values."""
 
     def whole(part: Floats) -> Floats:
         z = np.array(start, float)
