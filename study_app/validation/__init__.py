@@ -1,1 +1,1 @@
-"""Evidence for the program: accuracy, solver, soak, stability, timing, report rates. Commands alone import it."""
+"""Evidence for the program: accuracy, solver, soak, stability, timing, report rates. Only commands import it."""

@@ -1,4 +1,4 @@
-"""The computer on which something was measured, in words."""
+"""A description of the computer on which times were measured."""
 
 import os
 import platform
@@ -9,7 +9,7 @@ import numpy as np
 
 
 def machine() -> str:
-    """Return what the times are of: processor, cores, system, versions."""
+    """Return the environment of the times: processor, cores, system, versions."""
     name = platform.processor() or platform.machine()
     cpus = Path("/proc/cpuinfo")
     if cpus.exists():

@@ -33,10 +33,10 @@ LABEL_PT: Final = 8.2
 COLUMN_NS: Final = 5e3
 SOLVER_HIGH: Final = 0.38
 SLANT_PT: Final = 4.0
-"""By so much a decade of time puts a label higher: hairlines from the left then pass below the points to the right."""
+"""Rise of labels per decade of time, so that hairlines from the left pass below the points to the right."""
 
 ROUNDED: Final = 1e-5
-"""Errors below this share of the force go into the strip."""
+"""Errors below this share of the force are drawn in the strip."""
 
 LOOKS: Final[dict[str, dict[str, Any]]] = {
     "tick": {"marker": "o", "facecolor": "#0b65a3"},
@@ -50,7 +50,7 @@ LOOKS: Final[dict[str, dict[str, Any]]] = {
 
 @style.own_settings(style.PLOT_SETTINGS)
 def draw(found: Accuracy) -> Figure:
-    """Draw what was found: a panel for each kind of truth there is, the key to the signs below."""
+    """Draw the results: a panel for each kind of reference, the legend below."""
     kinds: tuple[Kind, ...] = ("numerical", "physical")
     panels = [_Panel(found, kind) for kind in kinds if found.of(kind)]
     key = textwrap.wrap(_KEY + " ".join(f"{note[0].upper()}{note[1:]}." for note in found.notes), LETTERS)
@@ -87,7 +87,7 @@ def _span(found: Accuracy) -> tuple[float, float]:
 
 
 class _Panel:
-    """All rungs against one kind of truth."""
+    """All candidates against one kind of reference."""
 
     def __init__(self, found: Accuracy, kind: Kind) -> None:
         rows = found.of(kind)
@@ -151,7 +151,7 @@ class _Panel:
             axes.plot(times, errors, color=style.ZERO, linewidth=1.2, zorder=2)
 
     def _main(self, axes: Axes) -> None:
-        """Draw the points that err, their labels in a column to the right or next to them, and the target."""
+        """Draw the points with errors, their labels in a column to the right or next to them, and the target."""
         shown = [row for row in self._points.values() if row.error.rms >= ROUNDED]
         target = 100 * min(row.error.target for row in self._rows)
         lows = [100 * row.error.rms for row in self._rows if row.error.rms >= ROUNDED]
@@ -178,7 +178,7 @@ class _Panel:
             axes.annotate("fluid solver", foot, (-2, 3), rotation=90, ha="right", va="bottom", **offset)
 
     def _rounding(self, axes: Axes, main: Axes) -> None:
-        """Draw the points whose errors are rounding."""
+        """Draw the points with rounding errors only."""
         errors = [max(100 * row.error.rms, 1e-15) for row in self._strip]
         axes.set_ylim(10.0 ** (np.floor(np.log10(min(errors))) - 4), 100 * ROUNDED * 10)
         axes.yaxis.set_major_locator(FixedLocator([1e-12, 1e-8, 1e-4]))
@@ -192,7 +192,7 @@ class _Panel:
             it.plot([-0.012, 0.012], [edge - 0.01, edge + 0.01], **slash)
 
     def _beside(self, row: Row) -> dict[str, Any]:
-        """Return where a point of the strip has its label: the chosen below, others in turn above and below."""
+        """Return the place of a label in the strip: that of the chosen below, others alternately above and below."""
         lists = sorted((it for it in self._strip if not it.chosen and it.error.rms < ROUNDING), key=_time)
         if row.chosen:
             return {"xytext": (0, -6), "textcoords": "offset points", "ha": "center", "va": "top"}

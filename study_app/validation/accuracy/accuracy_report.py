@@ -1,4 +1,4 @@
-"""The findings of ``accuracy`` as files: CSV for machines, Markdown and a figure for people."""
+"""The results of ``accuracy`` as files: CSV, Markdown and a figure."""
 
 import math
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ def _values(row: Row) -> tuple[str | float, ...]:
 
 
 def csv_text(found: Accuracy) -> str:
-    """Return the table for machines: CSV, named `COLUMNS`."""
+    """Return the table as CSV, with the columns `COLUMNS`."""
     rows = ([f"{it:.6g}" if isinstance(it, float) else it for it in _values(row)] for row in found.rows)
     return csv_text_of([COLUMNS, *rows])
 
@@ -53,7 +53,7 @@ def write(found: Accuracy, to: Path) -> tuple[Path, ...]:
 
 
 def markdown(found: Accuracy) -> str:
-    """Return the tables for people, with where each truth is from."""
+    """Return the tables as Markdown, with the source of each reference."""
     parts = [f"Machine: {found.machine}.", f"Motion: {found.motion}.", _WHAT]
     parts += [f"**{truth.name}**: {truth.source}." for truth in found.truths]
     parts += [f"Note: {note}." for note in found.notes]
@@ -100,7 +100,7 @@ def _markdown_table(rows: Sequence[Row]) -> str:
 
 
 def _count(value: float) -> str:
-    """Return a number to three digits, thousands set apart."""
+    """Return a number to three digits, with separated thousands."""
     if not math.isfinite(value):
         return "–"
     digits = 0 if value == 0 else 2 - math.floor(math.log10(abs(value)))
@@ -108,7 +108,7 @@ def _count(value: float) -> str:
 
 
 def _digits(value: float) -> str:
-    """Return a number to two digits, the smallest in powers of ten."""
+    """Return a number to two digits, small ones as powers of ten."""
     if not math.isfinite(value):
         return "–"
     if value != 0 and abs(value) < 1e-4:

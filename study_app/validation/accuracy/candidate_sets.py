@@ -1,4 +1,4 @@
-"""Which rungs are compared: from what costs most to what costs least, and from what is truest to what is cheapest."""
+"""The candidates to compare: from the most to the least expensive, and from the most accurate to the cheapest."""
 
 import numpy as np
 
@@ -43,14 +43,14 @@ _INITIALS: dict[Law, str] = {
 
 
 def drag_and_wake(scene: Scene) -> Scene:
-    """Return the scene's first liquid everywhere, with its law of drag and its wake alone, if it calls for that one."""
+    """Return the scene's first liquid everywhere, with only its law of drag and its wake, if selected."""
     liquid = resolve(scene).liquids[0]
     effects = ("drag", "wake") if "wake" in liquid.effects else ("drag",)
     return _only(scene, liquid.model_copy(update={"effects": effects}))
 
 
 def numerical(scene: Scene) -> tuple[tuple[Rung, ...], Rung]:
-    """Return the ways to compute one and the same definition, or less of it; and the one that runs in the program.
+    """Return implementations of one definition, or of parts of it; and the one used in the program.
 
     ``scene`` is of one liquid, by `drag_and_wake`. What is about the wake is left out where there is none.
     """
@@ -73,7 +73,7 @@ def numerical(scene: Scene) -> tuple[tuple[Rung, ...], Rung]:
 
 
 def _lists(exact: Scene) -> list[Rung]:
-    """Return what else a wake could be: lists, shorter or coarser ones, none."""
+    """Return alternatives to the wake: lists, shorter or coarser ones, none."""
     length = exact.liquids[0].wake.length
     half, quarter = max(1, length // 2), max(1, length // 4)
     rungs: list[Rung] = [
@@ -94,14 +94,14 @@ def _lists(exact: Scene) -> list[Rung]:
 
 
 def _estimators(scene: Scene) -> tuple[Estimator, ...]:
-    """Return one of each kind, the scene's own as it is."""
+    """Return one of each kind, the scene's own unchanged."""
     own = scene.velocity
     kinds: tuple[Estimator, ...] = (Ewma(), Line(), Foaw(), Raw())
     return tuple(own if not isinstance(own, Given) and own.kind == it.kind else it for it in kinds)
 
 
 def physical(scene: Scene) -> tuple[tuple[Rung, ...], Rung]:
-    """Return models of a liquid with a viscosity, each a little truer; and the one that the gate would choose."""
+    """Return models of a liquid with a viscosity, in order of accuracy; and the one that the gate would choose."""
     exact = given(_only(scene, scene.liquids[0]))
     rungs: list[Rung] = [LinearRung("linear viscosity", "linear viscosity", "law", exact)]
     rungs += [
@@ -125,7 +125,7 @@ def physical(scene: Scene) -> tuple[tuple[Rung, ...], Rung]:
 
 
 def _carrying(exact: Scene, law: Law, carried: tuple[Effect, ...]) -> Rung:
-    """Return drag with what of added mass and history comes on top."""
+    """Return drag with added mass and history as applicable."""
     words = [_WORDS[it] for it in carried]
     of = with_effects(exact, "drag", *carried, law=law)
     return TickRung(" + ".join([_PLAIN[law], *words]), " + ".join([_INITIALS[law], *words]), "effects", of)

@@ -1,4 +1,4 @@
-"""The rungs of the ladders: ways to get a force from a motion, each of which can be measured for error and for time.
+"""The candidates: methods to compute a force from a motion, each measured for error and time.
 
 A rung takes ticks, one after another: `Rung.forces` takes a whole motion at once, `Rung.begin` and `Rung.take` let the
 ticks be timed in batches. Compiled rungs all run the servo's own tick, door and safety included, so that what differs
@@ -31,7 +31,7 @@ from study_app.haptics.runtime.pack import Model, pack
 from study_app.validation.accuracy.naive_wake import NumpyTail, PlainTail, list_follow, list_wake, new_list
 
 UNLIMITED: Final = DampingLimits(1e9, 1e9)
-"""Forces are compared as the model gives them: no slope limit, which no table has for the slowest rungs."""
+"""Forces are compared without slope limit, which the table lacks for the slowest candidates."""
 Family: TypeAlias = Literal["tick", "list", "rate", "estimator", "law", "effects"]
 
 
@@ -54,7 +54,7 @@ class Rung(ABC):
     BATCH: ClassVar[int] = 1000
 
     def begin(self, motion: Motion) -> None:
-        """Forget everything and be ready for the ticks of a motion that brings its velocities."""
+        """Reset, and prepare for the ticks of a motion with velocities."""
         rows = slice(None, None, self.every)
         self._t_ns = np.rint(motion.t_s[rows] * 1e9).astype(np.int64)
         self._place_m = motion.position_m[rows]
@@ -68,12 +68,12 @@ class Rung(ABC):
 
     @property
     def ticks(self) -> int:
-        """How many ticks the motion has for this rung."""
+        """The number of ticks of the motion for this candidate."""
         return len(self._t_ns)
 
     @property
     def rate_hz(self) -> float:
-        """Ticks a second of the motion."""
+        """Ticks per second of the motion."""
         return self.scene.rate_hz
 
     def forces(self, motion: Motion) -> Floats:
@@ -83,25 +83,25 @@ class Rung(ABC):
         return np.repeat(self.force_n, self.every, axis=0)[: len(motion.t_s)]
 
     def forces_against(self, truth: Truth) -> list[Floats]:
-        """Return the forces along the motions of a truth, each (n, 3) [N]."""
+        """Return the forces along the motions of a reference, each (n, 3) [N]."""
         return [self.forces(case.motion) for case in truth.cases]
 
     @abstractmethod
     def _begin(self) -> None:
-        """Allocate what a run needs."""
+        """Allocate the memory of a run."""
 
     @abstractmethod
     def take(self, start: int, stop: int) -> None:
-        """Take these ticks and fill their rows of ``force_n``."""
+        """Run these ticks and set their rows of ``force_n``."""
 
     @property
     @abstractmethod
     def memory_bytes(self) -> int:
-        """What the model keeps from tick to tick."""
+        """The size of the model's state between ticks."""
 
 
 class TickRung(Rung):
-    """The program itself: the scene by the servo's own tick."""
+    """The program itself: the scene computed by the servo's tick."""
 
     def _begin(self) -> None:
         self._model, self._safety, self._sample = _packed(self.scene), new_safety(), records(SAMPLE, 1)
@@ -183,7 +183,7 @@ class ListRung(Rung):
 
 @dataclass(eq=False)
 class InterpretedRung(Rung):
-    """The wake as a list without the compiler, with numpy or in plain Python; no door, no safety."""
+    """The wake as a list without the compiler, with numpy or in plain Python; no sample validation, no safety layer."""
 
     tail: type[NumpyTail] | type[PlainTail] = PlainTail
 
@@ -214,13 +214,13 @@ def _packed(scene: Scene) -> Model:
 
 
 def given(scene: Scene) -> Scene:
-    """Return the scene with the velocity as the motion brings it."""
+    """Return the scene with the velocity given with the motion."""
     return scene.model_copy(update={"velocity": Given()})
 
 
 @kernel
 def _tick(model: Any, safety: Record, sample: Record, motion: Any, k: int) -> None:
-    """Take one tick of a motion."""
+    """Run one tick of a motion."""
     t_ns, hand_m, velocity_mps = motion
     state = model.state[0]
     sample.time_ns = t_ns[k]

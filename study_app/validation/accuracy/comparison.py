@@ -1,4 +1,4 @@
-"""What accuracy costs in time: every rung against its truth, and all of them against the clock in one run."""
+"""Accuracy against computation time: every candidate against its reference, and all timed in one run."""
 
 import math
 import statistics
@@ -28,22 +28,22 @@ ALIKE: Final = 1.05
 """Times within this factor count as equal."""
 
 FINE_S: Final = 1e-6
-"""Batches take some 100 µs and more: a clock this fine can tell them apart."""
+"""Required resolution of the clock: batches take 100 µs and more."""
 
 REPEATS: Final = 5
 BATCHES: Final = 40
 ALLOWANCE_S: Final = 0.8
-"""What a rung may take of one repeat; one that is slower gives fewer batches, at least one."""
+"""Time limit of a candidate per repeat; a slower one runs fewer batches, at least one."""
 
 
 def _clock() -> Callable[[], int]:
-    """Return a clock [ns] that stands still while other programs run, or where it is too coarse one that does not."""
+    """Return a clock [ns] that stops while other programs run, or if that is too coarse, one that does not."""
     fine = time.get_clock_info("thread_time").resolution <= FINE_S
     return time.thread_time_ns if fine else time.perf_counter_ns
 
 
 class Time(NamedTuple):
-    """Nanoseconds of computing a tick: median and 99th percentile of batches of 1,000 ticks, medians over repeats."""
+    """Computation time per tick [ns]: median and 99th percentile of batches of 1,000 ticks, medians over repeats."""
 
     median_ns: float
     p99_ns: float
@@ -52,7 +52,7 @@ class Time(NamedTuple):
 
 @dataclass(frozen=True)
 class Row:
-    """One rung against one truth."""
+    """One candidate against one reference."""
 
     kind: Kind
     liquid: str
@@ -66,13 +66,13 @@ class Row:
 
     @property
     def ns_per_ms(self) -> float:
-        """Computing time a millisecond of motion [ns]: at 1 kHz, that of a tick."""
+        """Computation time per millisecond of motion [ns]: at 1 kHz, that of a tick."""
         return self.time.median_ns * self.rung.rate_hz / 1000
 
 
 @dataclass(frozen=True)
 class Accuracy:
-    """All that was found: rows, where the truths are from, what was left out and why, the machine and the motion."""
+    """All results: rows, sources of the references, omissions with reasons, the machine and the motion."""
 
     rows: tuple[Row, ...]
     truths: tuple[Truth, ...]
@@ -81,7 +81,7 @@ class Accuracy:
     motion: str
 
     def of(self, kind: Kind) -> tuple[Row, ...]:
-        """Return the rows against one kind of truth."""
+        """Return the rows against one kind of reference."""
         return tuple(row for row in self.rows if row.kind == kind)
 
 
@@ -97,7 +97,7 @@ def accuracy(
     allowance_s: float = ALLOWANCE_S,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Accuracy:
-    """Measure the ladder of one scene against its definition, and that of another against physics.
+    """Measure the candidates of one scene against its definition, and those of another against physics.
 
     ``motion`` is at the scenes' rate; it is what the definition is followed along, and what all rungs are timed along.
 
@@ -167,7 +167,7 @@ def _rows(
 
 
 class _Bench:
-    """One rung along the motion, again and again, its memory filled before the clock runs."""
+    """One candidate along the motion, repeatedly, with its memory filled before the timing."""
 
     def __init__(self, rung: Rung, motion: Motion) -> None:
         self._rung, self._motion, self._clock_ns = rung, motion, _clock()
@@ -175,7 +175,7 @@ class _Bench:
         self.forget()
 
     def forget(self) -> None:
-        """Begin a new repeat: costs a tick [ns] of its batches, and what has passed meanwhile [s]."""
+        """Begin a new repeat: times per tick [ns] of its batches, and the elapsed time [s]."""
         self.costs_ns: list[float] = []
         self.passed_s = 0.0
 
@@ -192,7 +192,7 @@ class _Bench:
         return min(self._rung.BATCH, self._rung.ticks)
 
     def batch(self) -> None:
-        """Take one batch and note its cost."""
+        """Run one batch and store its time."""
         if self._at + self._size > self._rung.ticks:
             self._begin()
         began_s, began = time.perf_counter(), self._clock_ns()
@@ -203,7 +203,7 @@ class _Bench:
 
 
 def race(rungs: Sequence[Rung], motion: Motion, repeats: int, batches: int, allowance_s: float) -> dict[Rung, Time]:
-    """Return the times of all rungs, taken batch about batch, so that a slower spell of the machine strikes all alike.
+    """Return the times of all candidates, in alternating batches, so that slow phases of the machine affect all alike.
 
     What other programs take is not counted: it would strike a batch of 10 ms each time, and one of 100 µs hardly ever.
     """
@@ -229,7 +229,7 @@ def race(rungs: Sequence[Rung], motion: Motion, repeats: int, batches: int, allo
 
 
 def worst(rows: Sequence[Row]) -> dict[Rung, Row]:
-    """Return each rung's row against the truth it misses most."""
+    """Return each candidate's row against the reference with its greatest error."""
     found: dict[Rung, Row] = {}
     for row in rows:
         if row.rung not in found or row.error.rms > found[row.rung].error.rms:
@@ -238,7 +238,7 @@ def worst(rows: Sequence[Row]) -> dict[Rung, Row]:
 
 
 def front(points: dict[Rung, Row]) -> tuple[Rung, ...]:
-    """Return the rungs that nothing beats in both time and error, cheapest first.
+    """Return the Pareto-optimal candidates in time and error, cheapest first.
 
     Rounding errors count as equal, and so do times that differ by less than clocks and neighbours can tell.
     """

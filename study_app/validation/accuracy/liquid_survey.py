@@ -1,4 +1,4 @@
-"""Accuracy of the force of each liquid, up to which speed, and what a tick costs; and how far drag laws differ."""
+"""Accuracy of the force of each liquid, its range of speed, the time per tick, and differences between drag laws."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -20,7 +20,7 @@ from study_app.validation.cfd.solver_truths import solver_truths
 from study_app.validation.cfd.stored_flows import held_out, stored, training
 
 NO_REFERENCE_REYNOLDS: Final = 1000.0
-"""Above, no solution or measurement of an unsteady motion is known to this program."""
+"""Greatest Reynolds number with a solution or measurement of an unsteady motion in this program."""
 FILE: Final = "liquids.md"
 REYNOLDS: Final = (1.0, 10.0, 100.0, 200.0, 1e3, 3e3, 1e4, 3e4, 1e5)
 
@@ -116,7 +116,7 @@ def _surveyed(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) ->
 
 
 def spread(reynolds: float) -> float:
-    """Return by what share of their mean the published laws of steady drag differ at most."""
+    """Return the greatest difference of the published laws of steady drag, relative to their mean."""
     ratios = [law(reynolds) for law in PUBLISHED.values()]
     return (max(ratios) - min(ratios)) * len(ratios) / sum(ratios)
 

@@ -1,4 +1,4 @@
-"""The wake as a list that is gone through every tick, as one would first write it: compiled, numpy, Python.
+"""The wake as a list that is processed entirely at every tick, the naive implementation: compiled, numpy, Python.
 
 They are alternatives to ``haptics.kernels.effects.wake`` whose computation time grows with the length of the
 list. Each keeps the elements in a ring and answers two questions a tick: `wake` and, after the force, `follow`.
@@ -67,7 +67,7 @@ def list_wake(wake: Record, tail: Record, element: Any, segment: Any) -> None:
 def list_follow(
     wake: Record, tail: Record, element: Any, arc: Any, segment: Any, h: Any, place_m: Any, interval_s: float
 ) -> None:
-    """Let every element decay, and store the tick's velocity where the rules ask for it."""
+    """Let every element decay, and store the tick's velocity if the rules require it."""
     keep = math.exp(wake.log_decay_per_s * interval_s)
     rows = len(segment)
     for row in range(tail.held):
@@ -178,7 +178,7 @@ class PlainTail:
 
     @property
     def memory_bytes(self) -> int:
-        """Size of a full list: a row is a tuple of five, four of them numbers of their own."""
+        """Size of a full list: a row is a tuple of five, of which four are number objects."""
         row = (0.0, 0.0, 0.0, 0.0, 0)
         return sys.getsizeof([row] * self._length) + self._length * (sys.getsizeof(row) + 4 * sys.getsizeof(0.0))
 
@@ -235,5 +235,5 @@ class PlainTail:
 
 
 def _response(fill: float, exponent: float) -> float:
-    """Return what the tail is multiplied by at a fill, as the definition has it."""
+    """Return the factor of the tail at a fill, by the definition."""
     return float(fill ** (exponent - 1) if exponent >= 1 else (fill**2 + 0.05**2) ** ((exponent - 1) / 2))

@@ -1,4 +1,4 @@
-"""What is solved: a ball in liquids of a shipped protocol, that starts and stops, and motions to fit a law to."""
+"""The solved cases: a ball in liquids of a shipped protocol that starts and stops, and motions for fitting a law."""
 
 import math
 from collections.abc import Sequence
@@ -101,7 +101,7 @@ class Case:
 
 
 def cases() -> tuple[Case, ...]:
-    """Return each liquid at the greatest speed its protocol reckons with, in the scene and, as at scale 1, the hand."""
+    """Return each liquid at the greatest speed of its protocol, in the scene and, as at scale 1, of the hand."""
     found = []
     for liquid_id in LIQUIDS:
         scene = load_scene(shipped_file(PROTOCOL), liquid_id)

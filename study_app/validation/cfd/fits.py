@@ -1,4 +1,4 @@
-"""Which model of the ball's force comes nearest to the fluid solver's, with which parameters, and what stays wrong.
+"""Fits of models to the fluid solver's force on the ball: the best parameters and the remaining errors.
 
 Every model is fitted to every motion by ``identify.fit``; what it found is then tried on the same liquid at the other
 speed, where nothing is fitted any more: a parameter of a liquid must not change with the hand.
@@ -61,7 +61,7 @@ _START: Final = {"length": 300, "scaling": 1000.0}
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """One model on one motion, at the scene's rate: its parameters, and how far it is from the solver.
+    """One model on one motion, at the scene's rate: its parameters, and its error against the solver.
 
     ``force_n`` (n,) along the motion; ``rms_n`` and ``worst_n`` the error, ``share`` the first of the RMS force,
     ``within`` the share of time in which it meets the accuracy target. ``push`` is the momentum that the liquid gives
@@ -95,7 +95,7 @@ def fit_all(tables: Sequence[Table], progress: Callable[[str], None] = lambda _:
 
 
 def fit_one(model: Model, table: Table) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return the parameters with which the model comes nearest to the table, and the warnings of the fit."""
+    """Return the parameters of the best fit of the model to the table, and the warnings of the fit."""
     if not model.free:
         return {}, ()
     motion, force_n = even(table)
@@ -110,7 +110,7 @@ def judge(
     others: Sequence[Table] = (),
     warnings: tuple[str, ...] = (),
 ) -> Fitted:
-    """Return how far a model with these parameters is from the table, and from others of the liquid."""
+    """Return the errors of a model with these parameters against the table, and against others of the liquid."""
     motion, solved_n = even(table)
     force_n = force_along(model, table.case, values, motion)
     error_n = np.abs(force_n - solved_n)

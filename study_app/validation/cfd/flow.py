@@ -31,7 +31,7 @@ _EDGE: Final = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """How far the mesh goes ahead of, behind and aside of the ball, and how long its edges are, in diameters.
+    """Extent of the mesh ahead of, behind and beside the ball, and lengths of its edges, in diameters.
 
     ``ball`` is the longest edge on the ball, ``near`` within two diameters of it and five behind; there the wake has
     four times that, the rest of the liquid ``far``. For a ball that goes back and forth, ``symmetric``, it is ahead as
@@ -198,7 +198,7 @@ class Flow:
         return self._ng.y * ((u * grad(u)[0] + w * grad(u)[1]) * v + (u * grad(w)[0] + w * grad(w)[1]) * z)
 
     def _stokes(self, viscosity: float) -> Any:
-        """Return what viscosity and pressure do, and that nothing is compressed."""
+        """Return the terms of viscosity, pressure and incompressibility."""
         (u, w, p), (v, z, q), r = self._trial, self._test, self._ng.y
         du, dw, dv, dz = (self._ng.grad(it) for it in (u, w, v, z))
         strain = 2 * du[0] * dv[0] + 2 * dw[1] * dz[1] + (du[1] + dw[0]) * (dv[1] + dz[0])

@@ -1,4 +1,4 @@
-"""The solver's force and what models make of it as a figure: one column of a page, readable in grey."""
+"""The forces of the solver and of models as a figure: one column of a page, readable in grey."""
 
 from collections.abc import Sequence
 from typing import Any, Final

@@ -24,7 +24,7 @@ from study_app.validation.cfd.stored_flows import LEFT_OUT, LEFT_OUT_FILE, Table
 STEP: Final = 0.005
 """Interval between the rows that are compared [D/U]."""
 BEGIN: Final = Constants(c_m=0.5, c_y=1.0, c_z=2.0, c_s=1.0, beta=1.0, r_0=5.0)
-"""Where the search begins: the orders of magnitude."""
+"""Initial values of the search: orders of magnitude."""
 
 
 @dataclass(frozen=True, eq=False)

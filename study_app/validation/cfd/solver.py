@@ -1,4 +1,4 @@
-"""Solve every case, check what comes out, and store it: about 20 minutes of one core's time, with the extra ``cfd``.
+"""Solves, checks and stores every case: about 20 minutes of one core's time, with the extra ``cfd``.
 
 Every motion is solved three times: as it is; on a coarser grid with steps twice as long; and without convection, where
 the exact force is known. A solution that misses one of the two by more than is permitted is not stored.

@@ -1,4 +1,4 @@
-"""The solved flows as truths that models of a liquid are measured against."""
+"""The solved flows as references for models of a liquid."""
 
 import math
 from importlib.resources.abc import Traversable
@@ -12,7 +12,7 @@ from study_app.validation.cfd import stored_flows
 
 
 def solver_truths(scene: Scene, folder: Traversable | None = None) -> tuple[Truth, ...]:
-    """Return what the fluid solver found for the scene's liquid and body, at the scene's rate; often nothing.
+    """Return the fluid solver's results for the scene's liquid and body, at the scene's rate; often none.
 
     Raises
     ------

@@ -126,7 +126,7 @@ def judge_applied(applied: AppliedCase) -> AppliedVerdict:
 
 
 def report(verdicts: Sequence[AppliedVerdict]) -> str:
-    """Return what was found, in words."""
+    """Return the results as text."""
     stable = [it for it in verdicts if it.stable_before]
     identified = sum(it.identified for it in stable)
     lines = [
@@ -188,7 +188,7 @@ class _Follower:
         return self._estimator.estimate
 
     def apply(self, bench: Bench, part: Any, dynamics: Any, now_s: float) -> None:
-        """Take the ticks of a frame, and set what application sets next."""
+        """Process the ticks of a frame, and set the values that application sets next."""
         self._estimator.take(self._measured(part))
         found = self._estimator.estimate if self._way == "estimated" else self._turning(now_s, dynamics)
         for value in stepped(self._scene, found, dynamics, FORCE_LIMIT_N, FRAME_S).values():
@@ -238,7 +238,7 @@ def _fast_n(trace: Any, case: Case) -> Floats:
 
 
 def _swing_mps(trace: Any, case: Case) -> float:
-    """Return the least swing [m/s] over the last 0.4 s if it does not tire."""
+    """Return the least oscillation [m/s] over the last 0.4 s if it does not decay."""
     rows = np.searchsorted(trace.t_s, np.linspace(LASTS_S - 0.4, LASTS_S, 5))
     found = [
         fast_part(trace.velocity_mps, case.rate_hz, SLOW_HZ, first, last) for first, last in itertools.pairwise(rows)

@@ -1,4 +1,4 @@
-"""A program of its own that reads bytes of a file descriptor and says when, by ``python -m``.
+"""A separate program (``python -m``) that reads bytes of a file descriptor and reports their times.
 
 It prints "ready", reads the file descriptor until its other end is closed, and prints each byte with the time on the
 servo's clock [ns], as JSON.

@@ -1,4 +1,4 @@
-"""What outlets cost the servo: its lateness with and without them, a quarter second at a time."""
+"""The effect of outlets on the servo: its lateness with and without them, in alternating quarter seconds."""
 
 import threading
 import time
@@ -36,7 +36,7 @@ class Ratio:
 
     @property
     def verdict(self) -> str:
-        """What that comes to, in a word or two."""
+        """The verdict in a word or two."""
         if self.high <= MOST_RATIO:
             return "met"
         return "missed" if self.low > MOST_RATIO else "undecided: measure for longer"

@@ -1,4 +1,4 @@
-"""A program of its own that receives both streams as a recorder does, by ``python -m``.
+"""A separate program (``python -m``) that receives both streams like a recorder.
 
 It prints "ready" once both streams are open, receives until its input ends, and then prints what it found as JSON: the
 samples (count, SHA-256 of their channels, longest gap between their times), and of each marker its text, its time on
@@ -21,7 +21,7 @@ from study_app.outlets.streaming import MARKERS, SAMPLES, library
 FOUND_WITHIN_S: Final = 30.0
 LOOK_S: Final = 0.002
 QUIET_S: Final = 1.0
-"""All is received where nothing has arrived for so long after the input ended."""
+"""Time without data after the end of the input, after which all is received."""
 
 
 def opened(lsl: Any, name: str) -> Any:
@@ -41,7 +41,7 @@ def _await_end(ending: threading.Event) -> None:
 
 
 def listen() -> dict[str, Any]:
-    """Receive both streams until the input ends; return what came."""
+    """Receive both streams until the input ends; return the received data."""
     lsl, clock = library(), SystemClock()
     markers, samples = opened(lsl, MARKERS), opened(lsl, SAMPLES)
     correction_s = markers.time_correction(FOUND_WITHIN_S)

@@ -98,7 +98,7 @@ class MeasuredStream(SampleStream):
         super().push(channels, times_s)
 
     def close(self) -> None:
-        """Send what is left, and end the stream."""
+        """Send the remaining samples, and end the stream."""
         self.running.set()
         super().close()
 

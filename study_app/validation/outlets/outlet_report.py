@@ -1,4 +1,4 @@
-"""What was found of outlets, as text."""
+"""The results of outlet measurements, as text."""
 
 from collections.abc import Iterator, Sequence
 
@@ -12,12 +12,12 @@ from study_app.validation.outlets.trigger_delays import TriggerDelays
 
 
 def stream_text(found: Streamed, ratios: Sequence[Ratio]) -> str:
-    """Return what was found of the streams of the Lab Streaming Layer."""
+    """Return the results for the streams of the Lab Streaming Layer."""
     return "\n".join((*_streams(found), *_ratios(ratios))) + "\n"
 
 
 def trigger_text(found: TriggerDelays) -> str:
-    """Return what was found of a port."""
+    """Return the results for a port."""
     return "\n".join(_triggers(found)) + "\n"
 
 

@@ -1,4 +1,4 @@
-"""What arrives of a session's streams in another process: how right the markers' times are, and what is lost."""
+"""Reception of a session's streams in another process: accuracy of the markers' times, and losses."""
 
 import json
 import threading
@@ -45,7 +45,7 @@ class Streamed:
 
     @property
     def met(self) -> bool:
-        """Whether nothing was lost and the markers' times are right."""
+        """Whether nothing was lost and the markers' times are accurate."""
         return self.samples_lost == self.markers_lost == 0 and self.intact and self.error_p99_ms <= MOST_ERROR_MS
 
 

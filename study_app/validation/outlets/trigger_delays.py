@@ -1,4 +1,4 @@
-"""How long it takes from an event to its byte on a port."""
+"""The delay from an event to its byte on a port."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class VirtualPort:
 def measure(
     port: str, seconds: float, *, ending: threading.Event, progress: Callable[[str], object] = lambda _line: None
 ) -> TriggerDelays:
-    """Send twenty events a second to a port, or to a virtual one, and return how long they took.
+    """Send twenty events per second to a port, or to a virtual one, and return their delays.
 
     Parameters
     ----------

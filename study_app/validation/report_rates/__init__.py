@@ -1,1 +1,1 @@
-"""How often the report's verdicts are wrong: simulated studies through the report's own tests."""
+"""Error rates of the report's verdicts: simulated studies evaluated by the report's own tests."""

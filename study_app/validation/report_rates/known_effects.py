@@ -28,7 +28,7 @@ LEVELS: Final = np.array([-2.0, -1.2, -0.4, 0.4, 1.2, 2.0])
 
 LEANING: Final = 0.7
 SLOPE: Final = 0.3
-"""Standard deviations of people: of their leaning, and of how strongly an effect reaches them."""
+"""Standard deviations between people: of their response bias, and of their sensitivity to an effect."""
 
 TRUTH: Final = 4000
 """The true differences of means are those of so many simulated people."""
@@ -36,7 +36,7 @@ TRUTH: Final = 4000
 
 @dataclass(frozen=True)
 class Simulated:
-    """What is simulated: the blocks as the report knows them, and the plan for the answer model."""
+    """The simulated design: the blocks as in the report, and the plan for the answer model."""
 
     plan: Plan
     blocks: tuple[Block, ...]
@@ -88,7 +88,7 @@ def answers(
 
 
 def _opined(block: Block, opinions: Opinions, extent: Extent) -> Array:
-    """Return the answer model's answers; settings that are alike are thought of alike."""
+    """Return the answer model's answers; equal settings have equal effects."""
     if extent == "empty":
         return opinions.answers(0.0)
     thought = opinions.thought.copy()

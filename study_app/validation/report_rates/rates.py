@@ -1,4 +1,4 @@
-"""Rates of simulated studies: how they are counted, when one holds, and their tables (Markdown, CSV)."""
+"""Rates of simulated studies: counting, comparison with limits, and tables (Markdown, CSV)."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ALLOWED: Final[dict[Limit, tuple[float, float, float, float]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """So many ``hits`` of so many simulated studies ``of`` one cell."""
+    """Number of ``hits`` among the simulated studies ``of`` one cell."""
 
     cell: str
     participants: int

@@ -1,4 +1,4 @@
-"""All cells by an executor: batches of every cell alternate, so that any part of them is a smaller whole."""
+"""Simulates all cells by an executor: batches of the cells alternate, so that partial results are balanced."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor

@@ -1,4 +1,4 @@
-"""One batch of simulated studies through the report's own tests, and what is wrong in their verdicts."""
+"""One batch of simulated studies evaluated by the report's own tests, and the errors of their verdicts."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -50,7 +50,7 @@ CLAIMED: Final = "the first page claims something"
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """Studies of one kind: who answers, how much differs in truth, and how many take part."""
+    """Studies of one kind: model of the answers, true effects, and number of participants."""
 
     generator: Generator
     extent: Extent
@@ -63,7 +63,7 @@ class Cell:
 
 
 def truth(simulation: Simulated, cell: Cell) -> Truth:
-    """Return what is true in the studies of a cell, which does not depend on their size."""
+    """Return the true effects in the studies of a cell, which do not depend on their size."""
     return true_differences(simulation, cell.generator, cell.extent)
 
 

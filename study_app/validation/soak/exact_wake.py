@@ -1,4 +1,4 @@
-"""A wake stored element by element, to be summed exactly now and then and compared with the servo's running sums.
+"""A wake stored element by element, summed exactly at intervals and compared with the servo's running sums.
 
 The servo keeps sums and takes from them what falls off. Here nothing is ever summed in passing: from the samples in
 telemetry alone, by the definition, each stored velocity is kept as it was, with its segment and the time it was stored;
@@ -56,7 +56,7 @@ _ENTRY = np.dtype(
 
 
 def wake_of(scene: Scene) -> Wake | None:
-    """Return the wake that can be written down: of the one liquid, everywhere, without a current; else None."""
+    """Return the wake that can be stored: that of a single liquid, everywhere, without a current; else None."""
     if len(scene.liquids) != 1:
         return None
     liquid: Liquid = scene.liquids[0]
