@@ -1,4 +1,4 @@
-"""Beginning a session: its place on the disk is claimed once, and what must be there before the first trial written."""
+"""Beginning a session: its folder is claimed once, and all files required before the first trial are written."""
 
 import contextlib
 import shutil
@@ -35,7 +35,7 @@ from study_app.store.tables.study_description import check_study, write_descript
 
 @dataclass(frozen=True, slots=True)
 class SessionStart:
-    """What a session begins with, as its first line and its receipt keep it.
+    """The initial data of a session, stored in its first line and its receipt.
 
     Parameters
     ----------
@@ -89,10 +89,10 @@ class SessionStart:
 def begin(
     results: Path, protocol: Protocol, source: bytes, start: SessionStart, *, clock: SessionClock | None = None
 ) -> SessionStore:
-    """Claim a session in the study folder ``results`` and write everything that must be there before the first trial.
+    """Claim a session in the study folder ``results`` and write all files required before the first trial.
 
-    The folder is created exclusively: of two programs that want one id, one gets it. A folder that a program claimed
-    which was ended before it wrote a line is taken over. On any failure the claimed folder is taken away again.
+    The folder is created exclusively: of two programs that want one id, one gets it. A folder claimed by a program that
+    ended before it wrote a line is taken over. On any failure the claimed folder is removed.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ def surroundings(
 
 
 def make_folder(path: Path) -> None:
-    """Create the study's folder, which several programs may share, and let no power cut take it or one above it."""
+    """Create the study's folder, which several programs may share, and flush it and its parents to the disk."""
     path = path.absolute()
     missing = [level for level in (path, *path.parents) if not is_there(level)]
     try:
@@ -243,7 +243,7 @@ def make_folder(path: Path) -> None:
 
 
 def _claim(place: Place) -> Opening:
-    """Create the session's folder, which must not have been begun, open in this program from the first moment on."""
+    """Create the session's folder, which must not have been begun, locked for this program from the start."""
     path = place.folder.path
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -260,7 +260,7 @@ def _claim(place: Place) -> Opening:
 
 
 def _sync_above(path: Path) -> None:
-    """Let no power cut take the session's folder, or one above it."""
+    """Flush the session's folder and its parents to the disk."""
     try:
         for above in (path.parent, path.parent.parent, path.parent.parent.parent):
             sync_folder(above)

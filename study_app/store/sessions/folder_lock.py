@@ -1,8 +1,8 @@
-"""Who has a folder open: a marker in it while a program writes there, so that no second one does.
+"""Folder locks: a marker in a folder while a program writes there, so that no other program does.
 
-Every opening has a marker of its own name, which says machine, process and when that process began; so a marker that a
-killed program left differs from a living one's, and can be removed without touching a newer one. A program puts its
-marker first and then looks for others: of two that come at once none or one goes on, never both.
+Every opening has a marker with a unique name, which contains machine, process and start of the process; so the marker
+of a killed program differs from that of a running one, and can be removed without affecting a newer one. A program
+writes its marker first and then searches for others: of two simultaneous programs at most one continues.
 """
 
 import contextlib
@@ -21,7 +21,7 @@ from study_app.store.atomic import cannot_write, create_folder, is_there, sync_f
 from study_app.store.journals.parsing import parse_json
 
 _MARKER = re.compile(r"\.open-[0-9a-f]{8}\.json")
-SAME_S = 0.05  # processes of one number that began within this are the same one
+SAME_S = 0.05  # processes of one number that began within this time are the same one
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ def open_alone(folder: Path) -> Opening:
 
 
 def create_opened(folder: Path) -> Opening | None:
-    """Create ``folder``, open in this program from the first moment on; None where there is one that holds something.
+    """Create ``folder``, locked for this program from the start; None if it exists and is not empty.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def create_opened(folder: Path) -> Opening | None:
 
 
 def markers(folder: Path) -> tuple[Path, ...]:
-    """Return the markers in ``folder``, of living programs or not."""
+    """Return the markers in ``folder``, of running and ended programs."""
     return tuple(sorted(path for path in folder.glob(".open-*.json") if _MARKER.fullmatch(path.name)))
 
 
@@ -95,7 +95,7 @@ def is_open(folder: Path) -> bool:
 
 
 def refuse_if_open(folder: Path) -> None:
-    """Refuse a folder that a program, perhaps this one, has open; nothing is changed.
+    """Reject a folder that a program, perhaps this one, has open; nothing is changed.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def _is_open(marker: Path, holder: dict[str, Any]) -> StoreError:
 
 
 def _holder(marker: Path) -> dict[str, Any]:
-    """Return what the marker says; nothing where it is gone meanwhile."""
+    """Return the content of the marker; nothing if it was removed meanwhile."""
     try:
         holder = parse_json(marker.read_bytes())
     except FileNotFoundError:
@@ -144,7 +144,7 @@ def _this_program() -> dict[str, Any]:
 
 
 def _lives(holder: dict[str, Any]) -> bool:
-    """Return whether the program that wrote a marker may still run; of another machine's nothing is known."""
+    """Return whether the program that wrote a marker may still run; always true for another machine."""
     if holder.get("gone"):
         return False
     if holder.get("host") != platform.node() or not isinstance(holder.get("pid"), int):
@@ -152,7 +152,7 @@ def _lives(holder: dict[str, Any]) -> bool:
     try:
         began = process_began(holder["pid"])
         return began is not None and abs(began - float(holder["began"])) < SAME_S
-    except (PermissionError, KeyError, TypeError, ValueError):  # it runs; whether it is the same is not known
+    except (PermissionError, KeyError, TypeError, ValueError):  # it runs, but may be another process
         return True
 
 

@@ -1,6 +1,7 @@
 """A session that is open: appended to while it runs, closed with a status.
 
-While it runs it is open in one program alone. The journal is the truth; tables, receipt and checksums follow from it.
+While it runs only one program has it open. The journal is the primary record; tables, receipt and checksums derive from
+it.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ BEGINNINGS = ("session_started", "session_resumed")
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a session's files go: the study's folder, the session's in it, and the study's name."""
+    """The place of a session's files: the study's folder, the session's in it, and the study's name."""
 
     study_folder: StudyFolder
     folder: SessionFolder
@@ -44,13 +45,13 @@ class Place:
 
 
 class SessionStore:
-    """The open session: ``append`` adds to its journal, tables follow the journal, ``finish`` says how it ended.
+    """The open session: ``append`` adds to its journal, tables follow the journal, ``finish`` sets its status.
 
-    ``journal`` is where events go, ``opening`` what keeps other programs out until it is released;
-    ``key`` translates codes while the session runs; ``clock`` is the one the journal is stamped from; ``recorder``
-    takes the trials' samples and frames, or is None in a session without recordings; ``behind`` is why the tables on
-    disk are older than the journal, or None; ``fingerprint`` is empty until the session has ended. Made by `begin`; by
-    ``resume.reopen`` from ``lines`` written before.
+    ``journal`` receives events, ``opening`` locks the folder until it is released; ``key`` translates codes while the
+    session runs; ``clock`` gives the journal's times; ``recorder`` records the trials' samples and frames, or is None
+    in a session without recordings; ``behind`` is why the tables on disk are older than the journal, or None;
+    ``fingerprint`` is empty until the session has ended. Made by `begin`; by ``resume.reopen`` from ``lines`` written
+    before.
     """
 
     def __init__(
@@ -79,7 +80,7 @@ class SessionStore:
         self._over = False
         self._ended_s: float | None = None
         self.outlets: Outlets | None = None
-        self._marked: Marker | None = None  # of the line that the disk did not accept
+        self._marked: Marker | None = None  # of the line that could not be written
         self._outlets_lost: set[str] = set()  # that are journalled
 
     @property
@@ -109,9 +110,9 @@ class SessionStore:
         self._mark(began["event"], began["t_s"], began)
 
     def append(self, event: str, *, t_s: float | None = None, waits: bool = True, **fields: Any) -> None:
-        """Put an event into the journal; with ``waits`` it is on the disk when this returns, else soon after.
+        """Add an event to the journal; with ``waits`` it is on the disk when this returns, else soon after.
 
-        ``t_s`` is when it happened [s since the clock's origin], by default now. What tells a condition is sealed.
+        ``t_s`` is its time [s since the clock's origin], by default now. Fields that reveal a condition are sealed.
 
         Raises
         ------
@@ -126,7 +127,7 @@ class SessionStore:
         self._marked = None
 
     def _mark(self, event: str, t_s: float, fields: Mapping[str, Any]) -> None:
-        """Send the marker of an event, before the disk is waited for; once, however often its line is tried again."""
+        """Send the marker of an event, before waiting for the disk; only once, even if its line is written again."""
         if self.outlets is None:
             return
         marker = marker_of(event, t_s, self.clock.origin_ns, fields)
@@ -135,7 +136,7 @@ class SessionStore:
             self._marked = marker
 
     def check_flushed(self) -> None:
-        """Raise if lines that were not waited for could not be flushed, and still are not on the disk.
+        """Raise if lines that were not waited for could not be flushed, and are still not on the disk.
 
         Raises
         ------
@@ -147,11 +148,11 @@ class SessionStore:
     def write_tables(self) -> None:
         """Bring the session's tables up to date with its journal.
 
-        While the session runs only rows that changed are written, and nothing waits until the disk has them, for the
-        participant waits for the next page; at its end the tables are written as wholes and flushed. A table that
-        cannot be written now (open in another program, no space) stops no session: nothing is lost, since tables are
-        made from the journal. ``behind`` says why, and the next call tries again. What became of recordings since the
-        last call is journalled first.
+        While the session runs only changed rows are written, without a flush, since the participant waits for the next
+        page; at its end the tables are rewritten and flushed. A table that cannot be written now (open in another
+        program, no space) does not stop the session: nothing is lost, since tables are made from the journal.
+        ``behind`` gives the reason, and the next call tries again. Results of recordings since the last call are
+        journalled first.
         """
         try:
             self._keep_recordings()
@@ -167,7 +168,7 @@ class SessionStore:
         Raises
         ------
         StoreError
-            One of them could not be written; what was journalled before is safe. Called again, it goes on from there.
+            One of them could not be written; earlier journal lines are safe. Called again, it continues from there.
         """
         if self._over or not self.journal.closed:
             if self.recorder is not None:
@@ -192,7 +193,7 @@ class SessionStore:
         self._over = True
 
     def close(self) -> None:
-        """Let go of the session without an end; it stays unfinished.
+        """Close the session without an end; it stays unfinished.
 
         Raises
         ------
@@ -203,7 +204,7 @@ class SessionStore:
         if self.recorder is not None:
             self.recorder.close(LEAVING_S)
         if not self.journal.closed:
-            with contextlib.suppress(StoreError):  # `reopen` finds the files that no line tells of
+            with contextlib.suppress(StoreError):  # `reopen` finds the files without a line in the journal
                 self._keep_recordings()
                 if self._outlets_lost:
                     self._write_receipt()
@@ -213,7 +214,7 @@ class SessionStore:
             self.opening.release()
 
     def note_resumed(self, what: Mapping[str, Any]) -> None:
-        """Add to the receipt what the session goes on with.
+        """Add the data of the resumption to the receipt.
 
         Raises
         ------
@@ -224,7 +225,7 @@ class SessionStore:
         self._write_receipt()
 
     def _write_receipt(self) -> None:
-        """Write the receipt, with why outlets failed: of samples the last count, where the journal has the first."""
+        """Write the receipt, with the failures of outlets: the last count of lost samples, not the journal's first."""
         if self.outlets is not None and (lost := self.outlets.lost):
             since = (self._receipt, *self._receipt.get("resumed", ()))[-1]
             since["outlets_lost"] = dict(lost)
@@ -240,7 +241,7 @@ class SessionStore:
         self.fingerprint = found
 
     def _keep_recordings(self) -> None:
-        """Journal what became of recordings: which files they are, or why there are none; and which outlets failed."""
+        """Journal the results of recordings, their files or why there are none; and failures of outlets."""
         if self.recorder is not None:
             self._kept += self.recorder.kept()
         while self._kept:

@@ -16,7 +16,7 @@ _NUMBERED = re.compile(r"P([0-9]+)")
 
 
 def check_participant(participant: str, *, pilot: bool = False) -> None:
-    """Refuse an id that file names or analysts cannot take.
+    """Reject an id that is unsuitable for file names or analyses.
 
     Raises
     ------
@@ -59,9 +59,9 @@ class UsedIds:
         return f"P{max((int(match[1]) for match in matches if match), default=0) + 1:03d}"
 
     def check_unused(self, participant: str, number: int) -> None:
-        """Refuse a session that exists, or an id that differs from a used one in nothing but capitals.
+        """Reject a session that exists, or an id that differs from a used one only in capitals.
 
-        A session that was claimed by a program that is gone, and never begun, can be begun.
+        A session that was claimed by an ended program, and never begun, can be begun.
 
         Raises
         ------
@@ -107,7 +107,7 @@ def check_unused(folder: StudyFolder, participant: str, number: int) -> None:
 
 
 def refuse_never_begun(session: SessionFolder) -> None:
-    """Refuse to go on with a session that was claimed and never begun.
+    """Refuse to resume a session that was claimed and never begun.
 
     Raises
     ------

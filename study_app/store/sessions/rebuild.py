@@ -1,4 +1,4 @@
-"""All that follows from a session's journal, made again from it."""
+"""Recreates the files derived from a session's journal."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,10 +21,10 @@ from study_app.store.verification.fingerprints import fingerprint, listed, note_
 
 @dataclass(frozen=True, slots=True)
 class Rebuilt:
-    """What `rebuild` did.
+    """The result of `rebuild`.
 
-    ``rewritten`` were missing or other than the journal says, ``swept`` were half-written by a program that was killed;
-    ``torn_bytes`` at the journal's end are a line that was never finished, and were left alone.
+    ``rewritten`` files were missing or differed from the journal, ``swept`` were temporary files of a killed program;
+    ``torn_bytes`` at the journal's end are an incomplete line, and were not changed.
     """
 
     rewritten: tuple[Path, ...]
@@ -33,11 +33,11 @@ class Rebuilt:
 
 
 def rebuild(session_folder: Path) -> Rebuilt:
-    """Make again what follows from a session's journal.
+    """Recreate the files derived from a session's journal.
 
     These are its tables, the study's table of participants, the receipt's status and the checksums and fingerprint of a
-    finished session. Files that hold what they should are left as they are. That checksums or fingerprint were made
-    again is noted for good in ``rebuilt.txt``: they prove nothing of what happened before.
+    finished session. Correct files are not changed. Recreated checksums or fingerprints are noted permanently in
+    ``rebuilt.txt``: they prove nothing about earlier changes.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def _renew(path: Path, content: bytes) -> bool:
 
 
 def _renew_receipt(folder: SessionFolder, lines: list[Line]) -> list[Path]:
-    """Give the receipt the end that the journal tells of; a receipt that is missing cannot be made again."""
+    """Set the receipt's end from the journal; a missing receipt cannot be recreated."""
     last = lines[-1]
     if last["event"] != "session_ended" or not is_there(folder.receipt):
         return []

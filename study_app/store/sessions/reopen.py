@@ -1,4 +1,4 @@
-"""Going on with a session whose program had ended: the journal is opened where it stopped, and says so."""
+"""Resuming a session whose program has ended: the journal is continued, with a line for the resumption."""
 
 import contextlib
 import json
@@ -38,7 +38,7 @@ from study_app.store.tables.study_description import write_description
 
 SHOWN_DIFFERENCES = 6
 MOST_GAP_S = 366 * 86400.0
-"""A wall clock that tells of a longer gap was wrong before it, or is now."""
+"""Greatest plausible gap: beyond it the wall clock was or is wrong."""
 
 
 def reopen(
@@ -55,11 +55,11 @@ def reopen(
     now_ns: Callable[[], int] = time.monotonic_ns,
     now: datetime | None = None,
 ) -> SessionStore:
-    """Open an unfinished session to go on with it; ``progress.progress_of(store.lines)`` says where.
+    """Open an unfinished session to resume it; ``progress.progress_of(store.lines)`` gives its progress.
 
-    A torn tail of the journal is moved to a file of its own, half-written files are taken away, and
-    ``session_resumed`` is journalled with the gap since the last line (null where the wall clock was set back or
-    is wrong by years). The session's clock goes on from there, so that its times never go back.
+    An incomplete line at the journal's end is moved to a separate file, temporary files are removed, and
+    ``session_resumed`` is journalled with the gap since the last line (null if the wall clock was set back or is wrong
+    by years). The session's clock continues from there, so that its times never decrease.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def reopen(
     source : bytes
         The protocol's file as it is; its hash must be the one the session began with.
     operator : str
-        Who goes on with the session.
+        The operator who resumes the session.
     device : mapping
         Description for the receipt.
     screens : mapping
@@ -82,7 +82,7 @@ def reopen(
     video : mapping, optional
         Description of camera and footage for the receipt; None in a study without a video.
     now_ns : callable
-        The monotonic clock [ns] to go on with: the servo's.
+        The monotonic clock [ns] to continue with: the servo's.
     now : datetime, optional
         Wall time with its zone; by default the system's.
 
@@ -131,7 +131,7 @@ def reopen(
 
 
 def check_can_go_on(session_folder: Path, protocol: Protocol, source: bytes) -> None:
-    """Refuse what `reopen` would refuse, before anything is made ready for it; nothing is touched.
+    """Raise the errors of `reopen` before any preparation; nothing is changed.
 
     Raises
     ------
@@ -155,14 +155,14 @@ def sealed_source(session_folder: Path, source: bytes) -> bytes:
     study_folder, _ = locate(session_folder)
     try:
         files = read_key(study_folder.path).files
-    except StoreError:  # `reopen` says so
+    except StoreError:  # `reopen` reports it
         return source
     return bundled(unbundled(source)[0], files.get, hashes_in(source)) if files else source
 
 
 @dataclass(frozen=True, slots=True)
 class _Left:
-    """What an interrupted session left that can go on."""
+    """The data of an interrupted session that can be resumed."""
 
     place: Place
     contents: Contents
@@ -172,7 +172,7 @@ class _Left:
 
 
 def _left(study_folder: StudyFolder, folder: SessionFolder, protocol: Protocol, source: bytes) -> _Left:
-    """Read what an interrupted session left; refuse what cannot go on with this protocol."""
+    """Read the data of an interrupted session; reject one that cannot be resumed with this protocol."""
     contents = journal.whole(folder.journal)
     start = _unfinished(folder, contents.lines)
     place = Place(study_folder, folder, start["study"])
@@ -186,7 +186,7 @@ def _left(study_folder: StudyFolder, folder: SessionFolder, protocol: Protocol, 
 
 
 def _unfinished(folder: SessionFolder, lines: list[Line]) -> Line:
-    """Return the first line of a session that can go on."""
+    """Return the first line of a session that can be resumed."""
     if not lines:
         raise StoreError(
             f"{folder.journal} has no line: the program ended before the session began; use a new session number"
@@ -201,7 +201,7 @@ def _unfinished(folder: SessionFolder, lines: list[Line]) -> Line:
 
 
 def _same_protocol(place: Place, first: Mapping[str, Any], start: Line, protocol: Protocol, source: bytes) -> None:
-    """Refuse a protocol whose file is not the one the session began with, and say what differs."""
+    """Reject a protocol whose file is not the one the session began with, with the differences."""
     if protocol_hash(source) == start["protocol_hash"]:
         return
     found = list(differences(first["protocol"], json.loads(json.dumps(receipt.without_conditions(protocol)))))
@@ -218,7 +218,7 @@ def _same_protocol(place: Place, first: Mapping[str, Any], start: Line, protocol
 
 
 def _go_on(lines: list[Line], now_ns: Callable[[], int], now: datetime | None) -> tuple[float | None, SessionClock]:
-    """Return the gap since the last line, if it is known [s], and the clock that goes on after it."""
+    """Return the gap since the last line, if known [s], and the clock that continues after it."""
     now = now if now is not None else datetime.now().astimezone()
     gap_s = (now - datetime.fromisoformat(lines[-1]["at"])).total_seconds()
     known = 0 <= gap_s <= MOST_GAP_S
@@ -234,7 +234,7 @@ def _sweep(folder: SessionFolder) -> None:
 
 
 def _recordings_found(folder: SessionFolder, lines: list[Line]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the lines about recordings that the ended program did not write: whole after all, or lost."""
+    """Yield the lines about recordings that the ended program did not write: complete or lost."""
     from study_app.store import recording_files as recording  # noqa: PLC0415 - loads the Parquet library, where there are recordings
 
     events = ("recorded", "recording_lost")

@@ -1,8 +1,8 @@
-"""Sessions of simulated answers, each written whole when it is over.
+"""Sessions of simulated answers, each written completely at its end.
 
-That an answer is on the disk before anything follows from it protects what people said. Simulated answers can be
-simulated again from their seed, so nothing here waits for the disk: a session is there with all its files, or not at
-all, and a power cut may take the last ones. The files are those that a session leaves which was held.
+Answers of people are flushed to the disk before they have effects. Simulated answers can be repeated from their seed,
+so nothing here waits for the disk: a session is stored with all its files, or not at all, and a power cut may lose the
+last ones. The files are those of a real session.
 """
 
 from __future__ import annotations
@@ -103,11 +103,11 @@ class SimulatedStudy:
         self._receipt = plain(receipt)
 
     def begin(self, participant: str, clock: SessionClock) -> SimulatedSession:
-        """Return the session of a participant, of which nothing is on the disk before it is finished."""
+        """Return the session of a participant, which is not on the disk before it is finished."""
         return SimulatedSession(self, participant, clock)
 
     def keep(self, session: SimulatedSession) -> None:
-        """Put a finished session in its place.
+        """Store a finished session.
 
         Raises
         ------
@@ -136,7 +136,7 @@ class SimulatedStudy:
         self._rows[path] = session_tables.participant(opened(lines, key))
 
     def __enter__(self) -> Self:
-        """Describe the study, so that its folder is known for what it is from the first session on."""
+        """Write the study's description, which identifies its folder from the first session on."""
         self._opening = open_alone(self.folder.path)
         write_description(
             self.folder, self.protocol.study, self.protocol.format, intervals=bool(self.protocol.design_questions)
@@ -189,7 +189,7 @@ class SimulatedSession:
         """Do nothing: tables are written with the rest."""
 
     def finish(self, status: str, reason: str = "") -> None:
-        """Write the session, all of it.
+        """Write the whole session.
 
         Raises
         ------

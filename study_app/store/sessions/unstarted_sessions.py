@@ -1,7 +1,7 @@
-"""Sessions that were claimed and never begun: their program was ended before the journal's first line.
+"""Sessions that were claimed and never begun: their program ended before the journal's first line.
 
-Nothing happened in them, so their number is free again. Who takes one over has it open first, as every other folder.
-A program that is ended while it claims a session, or lets go of it, leaves a hidden folder next to it.
+They contain no data, so their number is free again. A program that takes one over locks it first, like every other
+folder. A program that ends while it claims or releases a session leaves a hidden folder next to it.
 """
 
 import contextlib

@@ -37,12 +37,12 @@ from study_app.store.withdrawals.tombstones import describe_session
 
 MAX_SITE_LENGTH: Final = 16
 LEFT_BEHIND: Final = shutil.ignore_patterns(".open-*.json", ".*.tmp")
-"""What programs leave in a folder while they have it open, or when they are killed."""
+"""Files that programs leave in a folder while they have it open, or when they are killed."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Source:
-    """What is known of a folder that is, or is to be, a site of a merged study.
+    """The data of a folder that is, or is to be, a site of a merged study.
 
     ``protocol_hash`` is empty and ``pilot`` None where all participants withdrew; ``begun`` are the sessions' folders
     by the SHA-256 of their journals' first lines. ``state`` is what changes when a file does, from before the reading.
@@ -133,7 +133,7 @@ def _check_places(given: Mapping[str, Path], to: Path, merged: Merged | None) ->
 
 
 def _source(name: str, path: Path) -> _Source:
-    """Read what must agree between sites."""
+    """Read the data that must agree between sites."""
     study = StudyFolder(path)
     described = described_study(study)
     if described is None:
@@ -169,7 +169,7 @@ def _source(name: str, path: Path) -> _Source:
 
 
 def _check_alike(sources: tuple[_Source, ...], protocol_hash: str) -> None:
-    """Refuse sites of other protocols, and rehearsals or pilots next to participants."""
+    """Reject sites of other protocols, and rehearsals or pilots mixed with participants."""
     first = next((one for one in sources if one.protocol_hash), sources[0])
     for other in sources:
         if other.study != first.study or other.protocol_hash not in ("", protocol_hash):
@@ -190,7 +190,7 @@ def _kind(source: _Source) -> str:
 
 
 def _check_sessions(sources: tuple[_Source, ...]) -> None:
-    """Refuse a session that is in two sites: it would count twice."""
+    """Reject a session that is in two sites: it would count twice."""
     seen: dict[str, Path] = {}
     for one in sources:
         for begun, path in one.begun.items():
@@ -202,7 +202,7 @@ def _check_sessions(sources: tuple[_Source, ...]) -> None:
 
 
 def _create(merged: Merged, sources: tuple[_Source, ...]) -> None:
-    """Make the folder, whole or not at all."""
+    """Create the folder atomically."""
     target = merged.path.absolute()
     half = temporary_path(target)
     try:
@@ -274,7 +274,7 @@ def _copy(source: _Source, to: Path) -> None:
 
 
 def _state(path: Path) -> list[tuple[Path, int, int]]:
-    """Return what changes when a file in a folder does."""
+    """Return a state that changes when a file in a folder does."""
     found = [(one, one.lstat()) for one in paths_in(path)]
     return [(one, held.st_size, held.st_mtime_ns) for one, held in found if not one.is_dir()]
 

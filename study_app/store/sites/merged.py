@@ -1,4 +1,4 @@
-"""A merged study's folder: which sites it holds, and which participant of which site an ID names.
+"""A merged study's folder: its sites, and the lookup of a participant's site by ID.
 
 ::
 
@@ -125,7 +125,7 @@ def _is_site(site: Site) -> bool:
 
 
 def _refuse_links(merged: Merged) -> None:
-    """Refuse a folder of a site that lies elsewhere: it would be read as if it were the copy."""
+    """Reject a folder of a site that lies elsewhere: it would be read as if it were the copy."""
     for folder in map(merged.folder, merged.names):
         if not (real := _real(folder)).is_relative_to(_real(merged.path)):
             raise StoreError(

@@ -1,4 +1,4 @@
-"""Whether a merged study is what its sites are: every site by itself, and what must agree between them."""
+"""Verification of a merged study: every site separately, and the data that must agree between them."""
 
 import contextlib
 from collections.abc import Iterable
@@ -24,7 +24,7 @@ Placed = TypeVar("Placed", Finding, Issue)
 
 
 def verify_folder(folder: Path, fingerprints: Path | None = None) -> Findings:
-    """Check a study, merged or not, all of it.
+    """Check a whole study, merged or not.
 
     Parameters
     ----------

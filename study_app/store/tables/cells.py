@@ -1,4 +1,4 @@
-"""What the cells of a column look like: a pattern, and a schema.org description of the column."""
+"""The format of a column's cells: a pattern, and a schema.org description of the column."""
 
 from typing import Any
 

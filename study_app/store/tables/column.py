@@ -1,4 +1,4 @@
-"""What a column of a table is."""
+"""The description of a table's column."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -11,7 +11,7 @@ MISSING = "n/a"
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column: its name, what its cells are, and what they mean.
+    """One column: its name, the kind of its cells, and their meaning.
 
     ``kind``: flags are ``true`` or ``false``, times ISO 8601 with zone. ``levels`` are all permitted values where
     these are few, each with its meaning. Where ``may_miss``, a cell can be ``n/a``. A ``sealed`` column can tell the

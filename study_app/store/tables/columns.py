@@ -1,4 +1,4 @@
-"""The column dictionary: every column of every table, said once.
+"""The column dictionary: the single definition of every column of every table.
 
 Headers, ``dataset_description.json`` and every check of a finished folder are made from these lines. Columns of one
 name mean the same in every table.

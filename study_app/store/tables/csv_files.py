@@ -46,7 +46,7 @@ def read_table(table: bytes, columns: Sequence[Column]) -> list[Row]:
     Raises
     ------
     ValueError, csv.Error
-        It is no such table.
+        It is not such a table.
     """
     found = list(csv.reader(io.StringIO(table.decode("utf-8"), newline=""), strict=True)) or [[]]
     places = [(column, found[0].index(column.name)) for column in columns]
@@ -88,7 +88,7 @@ def _without_guards(table: bytes) -> bytes:
 
 
 def cell_text(value: Any) -> str:
-    """Return a cell as it stands in a table."""
+    """Return a cell as text in a table."""
     kind = type(value)
     if value is None or (kind is float and not math.isfinite(value)):
         return MISSING

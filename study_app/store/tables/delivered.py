@@ -1,4 +1,4 @@
-"""Whether an interval was delivered as requested: what its samples show, and which limits of the study it breaks.
+"""Checks whether an interval was delivered as requested: its measured values, and the limits of the study it breaks.
 
 The session asks at the end of each interval, the analysis of the recording of the same interval. Forces are taken as
 recordings have them, so that both compute the same.
@@ -21,19 +21,19 @@ from study_app.protocol.trials.trial_limits import Limits
 from study_app.psychophysics.delivery import Times, Vectors, at, damping, difference, lag, motion, share
 
 FORCES: Final = ("device_force_n", "force_n")
-"""What was sent to the hand, and what the force model asked for."""
+"""The force sent to the hand, and that of the force model."""
 DAMPING: Final = "damping_nspm"
 SETTLED_S: Final = 0.2
-"""A task without a lead is judged from so long after its force has faded in [s]."""
+"""Time after the fade-in from which a task without a lead is evaluated [s]."""
 
 
 LONGEST_S: Final = 0.26
-"""The longest lag of a force that is looked for: the longest delay with the longest jitter, and a little more [s]."""
+"""The longest lag of a force that is searched: the longest delay with the longest jitter, plus a margin [s]."""
 
 JUDGED: Final = np.dtype(
     [(name, SAMPLE[name]) for name in ("time_ns", "position_m", "force_n", "device_force_n", "limiters")]
 )
-"""The fields of a sample that the delivered level is computed from."""
+"""The fields of a sample for computing the delivered level."""
 
 
 def judged(samples: Any) -> Any:
@@ -66,7 +66,7 @@ class Delivered:
 def delivered(
     protocol: Protocol, presented: Stimulated, task: AnyTask, samples: Any, *, adjusted: bool = False
 ) -> Delivered:
-    """Return what an interval delivered.
+    """Return the delivered values of an interval.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def delivered(
 
 
 def _lag_s(times_s: Times, sent_n: Vectors, model_n: Vectors, from_s: float, period_s: float) -> float | None:
-    """Return how late the force was sent [s], from a time on [s]; None without force."""
+    """Return the lag of the sent force [s], from a time on [s]; None without force."""
     most = round(min(LONGEST_S, from_s) / period_s)
     even_s = np.arange(from_s - most * period_s, times_s[-1] if len(times_s) else 0.0, period_s)
     if len(even_s) == 0:
@@ -124,13 +124,13 @@ def _lag_s(times_s: Times, sent_n: Vectors, model_n: Vectors, from_s: float, per
 
 
 def _believed(samples: Any) -> Any:
-    """Return samples without the positions that were refused."""
+    """Return samples without rejected positions."""
     glitches = samples["limiters"] & LIMITER_GLITCH != 0
     return samples[~glitches] if glitches.any() else samples
 
 
 def delay_error_ms(presented: Stimulated, summary: Mapping[str, Any]) -> float | None:
-    """Return by how much an interval's varied delay was missed [ms], by what was measured of it; None if unknown."""
+    """Return the error of an interval's varied delay [ms], from its measurements; None if unknown."""
     if presented.vary != FORCE_DELAY:
         found: float | None = summary.get("delay_error_mean_ms")
         return found

@@ -1,4 +1,4 @@
-"""The tables of a running session: at each page only the rows that changed are written, however many were before them.
+"""The tables of a running session: at each page only changed rows are written, independent of the number of rows.
 
 A program killed while it writes leaves a table that is the beginning of what the journal gives.
 """
@@ -77,17 +77,17 @@ class _GrowingTable:
         return max(0, len(self._ends) - 1)
 
     def forget(self) -> None:
-        """Write the file as a whole next time."""
+        """Rewrite the whole file next time."""
         self._ends = []
 
     def write(self, columns: Sequence[Column], rows: Sequence[Row], first: int, *, waits: bool) -> None:
-        """Write the rows from index ``first`` on; all of them where the file is not as it was left."""
+        """Write the rows from index ``first`` on; all of them if the file was changed meanwhile."""
         kept = first + 1 if self._is_as_left() else 0  # records
         start = self._ends[kept - 1] if kept else 0
         new = [*([] if kept else [header_bytes(columns)]), *records(columns, rows[max(0, kept - 1) :])]
         if not new:
             return
-        ends, self._ends = self._ends, []  # none until it is written
+        ends, self._ends = self._ends, []  # none before it is written
         if kept:
             replace_end(self._path, start, b"".join(new))
         else:

@@ -1,4 +1,4 @@
-"""The columns that say which session and which trial a row is about."""
+"""The columns that identify the session and the trial of a row."""
 
 from study_app.store.tables.column import Column, optional
 

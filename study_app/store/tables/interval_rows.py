@@ -1,4 +1,4 @@
-"""Rows of the intervals of trials, and what a trial's row says of them together."""
+"""Rows of the intervals of trials, and their summary in the trial's row."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
@@ -21,7 +21,7 @@ _LONGEST: Final = frozenset(
         "video_delay_error_max_ms",
     }
 )
-"""Of these a trial has the largest of its intervals."""
+"""Columns in which a trial has the maximum of its intervals."""
 _MEANS: Final = frozenset(
     {"tick_rate_hz", "mean_speed_mps", "force_mean_n", "withheld_share", "delay_error_mean_ms", "video_age_mean_ms"}
 )
@@ -61,7 +61,7 @@ _OF_THE_END = header(INTERVALS[[column.name for column in INTERVALS].index("inva
 
 
 def combined(intervals: Iterable[Row], names: Sequence[str]) -> Row:
-    """Return what was measured of a trial in all its intervals; None where it was measured in none."""
+    """Return the measures of a trial from all its intervals; None for those measured in none."""
     rows = list(intervals)
     return {name: _combined(name, [row[name] for row in rows if row.get(name) is not None]) for name in names}
 

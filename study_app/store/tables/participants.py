@@ -19,7 +19,7 @@ from study_app.store.tables import csv_files, session_tables
 from study_app.store.tables.column import Column, header
 from study_app.store.tables.columns import PARTICIPANTS, PARTICIPANTS_2
 
-COARSE_S = 2.0  # moments of files closer to each other than this may be in the wrong order
+COARSE_S = 2.0  # modification times closer than this may be in the wrong order
 NONE: Final[Mapping[Path, csv_files.Row]] = MappingProxyType({})
 
 _Stamp: TypeAlias = tuple[int, int] | None  # when a journal was last changed [ns since 1970], and its size; None: gone
@@ -32,9 +32,9 @@ def participants(folder: StudyFolder) -> list[csv_files.Row]:
 
 
 def participants_at_once(folder: StudyFolder) -> list[csv_files.Row]:
-    """Return what `participants` does, without reading each journal, for lists that people wait for.
+    """Return the result of `participants` without reading each journal, for fast lists.
 
-    A session's row in the table counts where neither its journal nor the study's key was changed since the table was
+    A session's row in the table is used if neither its journal nor the study's key was changed since the table was
     made. So it proves nothing: `verify` reads all.
     """
     return _rows(folder, _seen_in_table(folder), NONE)
@@ -110,7 +110,7 @@ def row_from(session: SessionFolder, contents: journal.Contents, key: Key | None
 
 
 def _damaged(session: SessionFolder, start: journal.Line) -> csv_files.Row:
-    """Return the row of a session whose journal gives none: what its folder, its first line and its receipt tell."""
+    """Return the row of a session without one from its journal: from its folder, first line and receipt."""
     if not start:
         with contextlib.suppress(StoreError):
             held = receipt.read(session.receipt)

@@ -27,7 +27,7 @@ _DELIVERED = header(DELIVERED)
 
 
 class SessionRows:
-    """The rows of a session's tables, followed line by line.
+    """The rows of a session's tables, updated line by line.
 
     ``responses`` has one row per response, in the order of confirmation; ``trials`` one per presentation of a trial, in
     order; the running one has no outcome yet. ``changed`` is the index of the first row of ``trials`` that was added or
@@ -62,7 +62,7 @@ class SessionRows:
         return {"responses": self.responses, "trials": self.trials, "intervals": self.intervals}[name]
 
     def take(self, line: Line) -> None:
-        """Follow one more line."""
+        """Process one more line."""
         match line["event"]:
             case "trial_started":
                 self._interrupt()
@@ -142,7 +142,7 @@ class SessionRows:
         return self.intervals[place]
 
     def _measured(self, line: Line) -> Row:
-        """Return what was measured of a trial that ended: of one with a design, in all its intervals."""
+        """Return the measures of a trial that ended; with a design, from all its intervals."""
         which = line["trial"], line["attempt"]
         if not is_of_intervals(self._started[which]):
             return {name: line.get(name) for name in self._measured_names}
@@ -154,7 +154,7 @@ class SessionRows:
         return self.trials[-1]
 
     def _interrupt(self) -> None:
-        """Say of a trial that was left without its end that it was interrupted."""
+        """Mark a trial without an end as interrupted."""
         if self.trials and self.trials[-1]["outcome"] is None:
             self._last()["outcome"] = "interrupted"
         if self.intervals and self.intervals[-1]["outcome"] is None:
