@@ -121,6 +121,7 @@ class DesignerController(QObject):
 
     def open(self, source: str) -> None:
         """Open a study of the workspace, one that ships, or a file; one that is open stays, with its steps."""
+        self.place.message_over.emit()
         self.saving.leave()
         try:
             file = Path(source) if Path(source).suffix == ".toml" else find(source)
@@ -133,7 +134,7 @@ class DesignerController(QObject):
                 draft = None if file.exists() else draft_of(file)
                 opened = open_file(file, self.editing.results) if draft is None else open_unsaved(file, draft)
         except StudyError as error:
-            self.place.message.emit("This study cannot be opened", f"{error}.")
+            self.place.message.emit(f"{Path(source).stem}.toml cannot be opened", f"{error}.")
             self._show_header()
             return
         self._take(opened)
@@ -158,6 +159,7 @@ class DesignerController(QObject):
 
     def ask_for_new(self, source: str = "") -> None:
         """Show the templates and the studies that can be copied, with one of them chosen."""
+        self.place.message_over.emit()
         try:
             choices = new_choices(source)
         except (StudyError, OSError) as error:

@@ -68,6 +68,7 @@ class MainWindow(QMainWindow):
         self.setMinimumSize(LEAST)
         self.theme = theme
         self.notice: Question | None = None
+        self._notice_of = ""  # the place that has it said
         self._resting = False  # whether a session has the screen
         self.not_opened: BaseException | None = None  # why a place could not be opened: a notice has said so
         self._had_keyboard: QWidget | None = None
@@ -110,7 +111,8 @@ class MainWindow(QMainWindow):
                 self._asked = self._here
                 self._say_not_opened(name, error)
                 raise
-            made.message.connect(self.show_message)
+            made.message.connect(lambda title, sentence: self.show_message(title, sentence, of=name))
+            made.message_over.connect(lambda: self._close_notice(name))
             made.go_asked.connect(self.go)
             self._places[name] = made
             self.stack.addWidget(made)
@@ -163,6 +165,7 @@ class MainWindow(QMainWindow):
     def _show(self, name: str, asked: Place) -> None:
         if self.stack.currentWidget() is not asked or name != self._here or not asked.isVisible():
             if name != self._here:
+                self._close_notice(self._here)
                 self._now().leave()
             self._here = name
             self.rail.mark(name)
@@ -234,15 +237,20 @@ class MainWindow(QMainWindow):
             self._had_keyboard.setFocus()
         self._now().enter()
 
-    def show_message(self, title: str, sentence: str) -> None:
-        """Say what went wrong, with one button."""
-        self._show_notice(Notice(self, self.theme, title, sentence))
+    def show_message(self, title: str, sentence: str, *, of: str = "") -> None:
+        """Say what went wrong, with one button; what the place ``of`` has said is closed when one leaves it."""
+        self._show_notice(Notice(self, self.theme, title, sentence), of)
 
-    def _show_notice(self, notice: Question) -> None:
+    def _show_notice(self, notice: Question, of: str = "") -> None:
         notice.finished.connect(notice.deleteLater)
-        self.notice = notice
+        self.notice, self._notice_of = notice, of
         if not self._resting:  # else it would be in front of a session
             notice.show()
+
+    def _close_notice(self, of: str) -> None:
+        """Close what a place has said."""
+        if self.notice is not None and self._notice_of == of and isValid(self.notice):
+            self.notice.accept()
 
     def show_theme(self, theme: Theme) -> None:
         """Wear a theme from now on."""

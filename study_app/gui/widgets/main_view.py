@@ -13,10 +13,12 @@ from study_app.viewmodels.designer.keys import keys_of
 class Place(Themed, QWidget):
     """A part that fills the main window next to the rail.
 
-    ``message`` carries a title and a sentence that the main window is to say, ``go_asked`` the name of another place.
+    ``message`` carries a title and a sentence that the main window is to say, until the place is left or emits
+    ``message_over``; ``go_asked`` the name of another place.
     """
 
     message = Signal(str, str)
+    message_over = Signal()
     go_asked = Signal(str)
 
     def enter(self) -> None:

@@ -223,4 +223,22 @@ def test_a_name_that_cannot_be_is_refused_in_place(designer: Any, name: str) -> 
 def test_a_file_that_is_not_utf_8_is_refused_with_a_message(designer: Any) -> None:
     designer.file.write_bytes(b"format = 1\n# \xff\n")
     designer.controller.open("kitchen")
-    assert designer.messages == [("This study cannot be opened", "line 2 is not UTF-8 text: save the file as UTF-8.")]
+    assert designer.messages == [("kitchen.toml cannot be opened", "line 2 is not UTF-8 text: save the file as UTF-8.")]
+
+
+@pytest.mark.parametrize("then", ["another study", "the same study", "a new study", "another place"])
+def test_why_a_file_cannot_be_opened_is_closed_by_what_is_opened_next(designer: Any, then: str) -> None:
+    designer.file.with_name("odd.toml").write_bytes(b"\xff")
+    designer.controller.open("kitchen")
+    designer.window.go("home")
+    designer.controller.open("odd")
+    designer.window.go("designer")
+    notice = designer.window.notice
+    assert notice.isVisible()
+    if then == "a new study":
+        designer.controller.ask_for_new()
+    elif then == "another place":
+        designer.window.go("home")
+    else:
+        designer.controller.open("demo" if then == "another study" else "kitchen")
+    assert not notice.isVisible()

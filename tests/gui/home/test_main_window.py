@@ -98,6 +98,14 @@ def test_a_place_may_ask_for_another_and_have_something_said(main):
     main.notice.accept()
 
 
+def test_what_a_place_has_said_is_closed_when_one_leaves_it(main):
+    main.place("devices").message.emit("It did not work", "The cable is out.")
+    main.go("devices")
+    assert main.notice.isVisible(), "it is said before one goes there, too"
+    main.go("home")
+    assert not main.notice.isVisible()
+
+
 def test_a_session_and_the_end_leave_the_place(main, log):
     main.go("lab")
     main.rest()
