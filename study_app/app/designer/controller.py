@@ -102,6 +102,7 @@ class DesignerController(QObject):
         self.saving.kept.connect(self._show_header)
         self.saving.copy_asked.connect(self.ask_for_new)
         self.saving.continued.connect(self._take)
+        self.saving.discarded.connect(self._close)
         self.saving.compare_asked.connect(self.changes.compare_with)
         self.runs.changed.connect(self._show_header)
         self._repairs.found.connect(place.show_repairs)
@@ -127,6 +128,8 @@ class DesignerController(QObject):
             file = Path(source) if Path(source).suffix == ".toml" else find(source)
             if self.editing.opened is not None and self.editing.opened.file.resolve() == file.resolve():
                 self.place.close_new()
+                if not self.editing.opened.base:
+                    self.saving.offer_to_discard()
                 self.enter()
                 return
             opened = self._others.get(file.resolve())
@@ -178,6 +181,16 @@ class DesignerController(QObject):
         self.show()
         self.show_outline()
         self.place.areas.focus_element()
+
+    def _close(self) -> None:
+        """Close the study, of which nothing is left."""
+        if (closed := self.editing.opened) is not None:
+            self._others.pop(closed.file.resolve(), None)
+        self.editing.open(None)
+        self._choices = studies(None)
+        self.place.begin_study()
+        self.show()
+        self.place.nothing.new.setFocus()
 
     # steps that ask first
 

@@ -31,7 +31,7 @@ class Editing(QObject):
     results
         Folder that holds the studies' results folders.
 
-    ``opened_other`` is emitted when another study is open, ``changed`` after each step of the study or of its
+    ``opened_other`` is emitted when another study is open, or none, ``changed`` after each step of the study or of its
     selection, ``edited`` after each step of the study alone; ``refused`` carries the path that a refused request
     concerns, the sentence that says why, and the request; ``made`` the `Step` of a request, after ``edited``.
     """
@@ -62,8 +62,8 @@ class Editing(QObject):
         """The path of the selected element, () where no study is open."""
         return () if self.opened is None else self.opened.history.selected
 
-    def open(self, opened: OpenStudy) -> None:
-        """Take another study from now on."""
+    def open(self, opened: OpenStudy | None) -> None:
+        """Take another study from now on, None for none."""
         self.opened = opened
         self._steps, self._last, self._back = Steps(self.recorded), (None, 0.0, None), []
         self.opened_other.emit()

@@ -106,6 +106,17 @@ class OpenStudy:
         self.keeper.saved(self.base)
         self.draft = self.kept = None
 
+    def give_up(self) -> None:
+        """Delete the draft of a study that was never saved; nothing of it is left.
+
+        Raises
+        ------
+        StoreError
+            It cannot be deleted.
+        """
+        self.keeper.saved("")
+        self.keeper.write()
+
     def changed_outside(self) -> bool:
         """Return whether the file has another content than the one that is edited."""
         return content_hash(_content(self.file)) != self.base if self.file.exists() else bool(self.base)

@@ -12,11 +12,13 @@ from study_app.app.designer.open_study import OpenStudy, why_read_only
 from study_app.app.designer.versions.comparison import Comparison, compare, newest, version_of
 from study_app.app.designer.versions.file_watch import FileWatch
 from study_app.app.designer.versions.known_runs import KnownRuns
+from study_app.authoring.drafts import draft_of
 from study_app.authoring.kept_settings import begin_settings
 from study_app.authoring.versions.contents import ChangedOutsideError, kept_versions
 from study_app.authoring.versions.runs import Standing, check_version
 from study_app.authoring.writer.refused import Refused, free_in
 from study_app.errors import StudyError
+from study_app.gui.designer.prompts import DiscardCard
 from study_app.gui.designer.versions.save_card import SaveCard
 from study_app.gui.designer.view import DesignerPlace
 from study_app.number_text import counted
@@ -34,7 +36,8 @@ class Saving(QObject):
 
     ``kept`` is emitted when a draft was written or the banner changed, ``saved`` carries the file that was written,
     ``copy_asked`` the study of which a copy is to be made, ``compare_asked`` the version to compare with (its hash, or
-    "file"), ``continued`` the study under another name that is open from now on.
+    "file"), ``continued`` the study under another name that is open from now on; ``discarded`` is emitted when nothing
+    is left of the study, which was never saved.
     """
 
     kept = Signal()
@@ -42,6 +45,7 @@ class Saving(QObject):
     copy_asked = Signal(str)
     compare_asked = Signal(str)
     continued = Signal(object)
+    discarded = Signal()
 
     def __init__(self, editing: Editing, place: DesignerPlace, runs: KnownRuns) -> None:
         super().__init__(editing)
@@ -65,15 +69,22 @@ class Saving(QObject):
     # the banner
 
     def _begin(self) -> None:
-        opened = self.editing.opened
-        assert opened is not None  # noqa: S101 - that is what was opened
+        self._note(None)
+        self.banner, opened = None, self.editing.opened
+        if opened is None:
+            return
         self._drafting.start(DRAFT_MS)
         self._others, self._trouble = opened.keeper.others, ""
-        self._note(None)
-        if opened.draft is not None and opened.edited and opened.base:
-            when = time_words(opened.draft.kept_at)
-            self._note(f"Draft of {when}, not saved", ("discard", "Discard the draft"), lasts=True)
+        self.offer_to_discard()
         self.banner = _banner(opened) or self._notice
+
+    def offer_to_discard(self) -> None:
+        """Say of when the draft is that was found, of a study that was never saved each time it is opened."""
+        opened = self.editing.opened
+        draft = None if opened is None else opened.draft if opened.base else draft_of(opened.file)
+        if opened is not None and draft is not None and opened.edited:
+            words = f"Draft of {time_words(draft.kept_at)}, {'not' if opened.base else 'never'} saved"
+            self._note(words, ("discard", "Discard the draft"), lasts=True)
 
     def _note(self, words: str | None, *actions: tuple[BannerAction, str], lasts: bool | None = None) -> None:
         """Show a line that needs no answer where no other one is needed, None for none; ``lasts`` says for how long."""
@@ -130,6 +141,11 @@ class Saving(QObject):
         if action == "close":
             self._close_notice(opened)
             return
+        if action == "discard" and not opened.base:
+            card = DiscardCard(opened.title or opened.file.stem, opened.file.name)
+            card.answered.connect(self.give_up)
+            self.place.show_prompt(card, card.first)
+            return
         self._note(None)
         if action == "keep":
             self._try(opened, lambda: opened.keep_mine(time.monotonic()))
@@ -137,6 +153,19 @@ class Saving(QObject):
             self._try(opened, opened.take_outside)
         else:
             self._try(opened, opened.discard_draft)
+
+    def give_up(self) -> None:
+        """Discard the draft of a study that was never saved: nothing of it is left."""
+        self.place.flush()
+        opened = self.editing.opened
+        if opened is None or opened.base:
+            return
+        try:
+            opened.give_up()
+        except StudyError as error:
+            self.place.message.emit("The draft was not discarded", f"{error}.")
+            return
+        self.discarded.emit()
 
     # saving
 

@@ -1,4 +1,4 @@
-"""Questions as cards in the place: what to do with what names a deleted element, and the values of a series."""
+"""Questions as cards in the place: deleting what is named elsewhere, discarding a study, the values of a series."""
 
 from itertools import zip_longest
 
@@ -82,6 +82,21 @@ class DeleteCard(Prompt):
         add_layout(self.column, self.buttons)
         self.other.setVisible(bool(asked.others))
         self.first: QWidget = self.all
+
+
+class DiscardCard(Prompt):
+    """Whether a study that was never saved is discarded; ``answered`` comes where it is."""
+
+    def __init__(self, title: str, file: str) -> None:
+        super().__init__(
+            f"Discard “{title}”?",
+            f"{file} was never saved: without its draft nothing of this study is left. This cannot be undone.",
+        )
+        self.go_on = ActionButton("trash", "Discard the draft", role="danger", height=40)
+        self.go_on.clicked.connect(lambda: self.answered.emit(file))
+        self.buttons.addWidget(self.go_on)
+        add_layout(self.column, self.buttons)
+        self.first: QWidget = self.cancel
 
 
 class SeriesCard(Prompt):

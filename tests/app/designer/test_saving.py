@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel
 
 from study_app.authoring.drafts import Draft, draft_of, keep
 from study_app.authoring.versions.contents import content_hash, kept_content
@@ -226,3 +227,53 @@ def test_a_line_about_a_pilot_hides_no_question_about_the_file(drafted: Any) -> 
     assert place.header.strip.isVisible()
     assert place.banner.isVisible()
     assert place.banner_words.text().startswith("Another program changed this file")
+
+
+@pytest.fixture
+def never_saved(designer: Any) -> Any:
+    """The designer with a study that was never saved, opened by its draft."""
+    designer.controller.begin("template:compare-liquids", "mine")
+    designer.controller.open("kitchen")
+    designer.controller.open(str(designer.file.with_name("mine.toml")))
+    return designer
+
+
+def test_a_study_that_was_never_saved_is_discarded_once_that_is_confirmed(never_saved: Any) -> None:
+    place, file = never_saved.place, never_saved.file.with_name("mine.toml")
+    assert place.banner_words.text().endswith(", never saved")
+    place.banner.buttons[0].click()
+    assert "cannot be undone" in " ".join(one.text() for one in place.prompt.findChildren(QLabel))
+    assert place.prompt.cancel.hasFocus()
+    place.prompt.cancel.click()
+    assert draft_of(file) is not None
+    place.banner.buttons[0].click()
+    place.prompt.go_on.click()
+    assert draft_of(file) is None
+    assert never_saved.editing.opened is None
+    assert place.nothing.isVisible()
+    assert place.nothing.new.hasFocus()
+    assert (place.prompt, place.banner.isVisible(), place.parts.isVisible()) == (None, False, False)
+    assert file.name not in [one.file for one in place.header.state.studies]
+    never_saved.saving.write_draft(at_once=True)
+    assert draft_of(file) is None
+    never_saved.controller.open("kitchen")
+    assert place.parts.isVisible()
+    never_saved.controller.begin("template:compare-liquids", "mine")
+    assert never_saved.editing.opened.history.done == ()
+
+
+def test_a_study_that_was_never_saved_can_be_discarded_each_time_it_is_opened(designer: Any) -> None:
+    designer.controller.begin("template:compare-liquids", "mine")
+    assert not designer.place.banner.isVisible(), "it was begun just now"
+    designer.window.go("home")
+    designer.controller.open(str(designer.file.with_name("mine.toml")))
+    designer.window.go("designer")
+    assert [one.text() for one in designer.place.banner.buttons] == ["Discard the draft"]
+
+
+def test_a_study_stays_open_where_its_draft_cannot_be_deleted(never_saved: Any, stuck: pytest.MonkeyPatch) -> None:
+    never_saved.place.banner.buttons[0].click()
+    never_saved.place.prompt.go_on.click()
+    assert [title for title, _ in never_saved.messages] == ["The draft was not discarded"]
+    assert never_saved.editing.opened.name == "mine"
+    stuck.undo()
