@@ -97,6 +97,11 @@ class Study:
         """Whether the text is valid TOML; otherwise only the text can be edited."""
         return self._read[0] is not None
 
+    @property
+    def unreadable(self) -> bool:
+        """Whether there is only a text: it cannot be read, and no text before it could be."""
+        return not self.is_toml and not self.before
+
     def needs(self, place: Path) -> bool:
         """Return whether a table of a section would be incomplete without one of its keys."""
         after, _ = self.edited(Unset(place))

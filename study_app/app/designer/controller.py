@@ -180,7 +180,11 @@ class DesignerController(QObject):
         self.place.close_new()
         self.show()
         self.show_outline()
-        self.place.areas.focus_element()
+        if opened.study.unreadable:
+            self.place.show_tab("file")  # also where the fault has no line
+            self.place.problem_steps.open_next()
+        else:
+            self.place.areas.focus_element()
 
     def _close(self) -> None:
         """Close the study, of which nothing is left."""

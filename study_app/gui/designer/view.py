@@ -198,7 +198,7 @@ class DesignerPlace(Place):
         self.file.show_file(view.file, scroll=elsewhere, read_only=view.header.read_only)
         self.problem_steps.show_problems(view.problems, view.form.path)
         self.outline.duplicate.setEnabled(self.form.head.copy.isEnabled())
-        self.outline.add.setEnabled(not view.header.read_only)
+        self.outline.add.setEnabled(not view.header.read_only and not view.form.unreadable)
         self.outline.tree.rows.movable = not view.header.read_only
         if self.outline.rows:
             self.outline.mark(view.form.path)
@@ -292,7 +292,7 @@ class DesignerPlace(Place):
 
     def ask_to_add(self) -> None:
         """Ask what can be added."""
-        if self.view.form is not None and not self.view.header.read_only and not self.stack.currentIndex():
+        if self.view.form is not None and self.outline.add.isEnabled() and not self.stack.currentIndex():
             self.flush()
             self.add_asked.emit()
 

@@ -6,7 +6,7 @@ from typing import Any, Final, TypeAlias
 
 from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.edited_study import Study
-from study_app.authoring.outline import Element, found, outline
+from study_app.authoring.outline import Element, found, outline, title_of
 from study_app.number_text import counted
 from study_app.protocol.source.document import Path, entries, names, value_at
 from study_app.viewmodels.designer.element_facts import brief
@@ -82,6 +82,9 @@ def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> 
     find : str
         What an element's title, id or one of its texts must hold, or the label or a choice of one of its fields.
     """
+    if study.unreadable:
+        only = Element(FIRST, title_of({}, FIRST), FIRST[0], faults=len(study.faults))
+        return (_row(study, only, {}, in_session=False),)
     shown, words = outline(study), find.strip()
     fields = found_in_elements(study, words)
     rows: list[OutlineRow] = []

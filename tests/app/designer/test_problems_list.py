@@ -256,3 +256,33 @@ def test_the_list_begins_anew_with_another_study(qtbot: Any, designer: Any) -> N
     assert problems.isVisible()
     designer.controller.open("demo")
     assert not problems.isVisible()
+
+
+@pytest.mark.parametrize("width", [1600, 1100])
+def test_a_file_that_was_never_readable_is_opened_at_the_line_of_its_fault(designer: Any, width: int) -> None:
+    text = designer.file.read_text()
+    line = text[: text.index("[study]")].count("\n")
+    designer.file.write_text(text.replace("[study]", "[study"))
+    designer.window.resize(width, 900)
+    designer.controller.open("kitchen")
+    place, editor = designer.place, designer.place.file.editor
+    assert (place.pane.tab, place.pane.isVisible(), editor.hasFocus()) == ("file", True, True)
+    assert editor.textCursor().blockNumber() == line
+    assert "Expected ']'" in place.problems.lines[0].row.message
+    assert f"Line {line + 1}: Not TOML" in place.form.own.text()
+    assert (place.form.rows, [row.path for row in place.outline.rows]) == ([], [("study",)])
+    assert not place.outline.add.isEnabled()
+    place.ask_to_add()
+    assert not place.adding.isVisible()
+    designer.editing.type_text("Correct the file", text)
+    designer.controller.show_outline()
+    assert place.form.rows
+    assert len(place.outline.rows) > 10
+    assert place.outline.add.isEnabled()
+
+
+def test_a_file_whose_fault_has_no_line_is_shown_too(designer: Any) -> None:
+    designer.file.write_text(f"a = {'[' * 5000}")
+    designer.controller.open("kitchen")
+    assert (designer.place.pane.tab, designer.place.problems.isVisible()) == ("file", True)
+    assert designer.place.form.own.text().startswith("Is nested too deeply")

@@ -26,6 +26,7 @@ ENTRIES: Final = "Entries"
 DEEPEST: Final = 3
 """So many tables within each other are shown in one form."""
 NO_QUESTIONS: Final = QuestionLines((), ())
+UNREADABLE: Final = "Correct the text in the tab File"
 LEAST, MOST = "at least ", "at most "
 
 WITH_LIQUIDS = ("liquids", "conditions", "blocks")
@@ -152,6 +153,8 @@ class Form:
         Whether there can be a series of it: elements that differ in one of its numbers.
     used : str
         How many other elements use it (`used_by`); "" where that is not said.
+    unreadable : bool
+        Whether nothing can be edited but the text of the file, in which the study cannot be read.
     """
 
     path: Path
@@ -168,6 +171,7 @@ class Form:
     feel: str = ""
     series: bool = False
     used: str = ""
+    unreadable: bool = False
 
     @property
     def rows(self) -> tuple[FormRow, ...]:
@@ -177,6 +181,11 @@ class Form:
 
 def form(study: Study, path: Path) -> Form:
     """Return the form of the element at ``path``."""
+    if study.unreadable:
+        lines = [f"Line {one.line}: " if one.line else "" for one in study.problems]
+        said = [_sentence(study, one.message, one.hint) for one in study.problems]
+        why = tuple(map("".join, zip(lines, said, strict=True)))
+        return Form(FIRST, title_of({}, FIRST), icon_of(FIRST, {}), UNREADABLE, faults=why, unreadable=True)
     document, places = study.document, places_of(study.text)
     own_row = row_at(document, path) if len(path) == 1 else None
     if own_row is not None and own_row.kind == "tables":

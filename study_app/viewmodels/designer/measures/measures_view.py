@@ -200,7 +200,7 @@ def _cards(study: Study, facts: Facts, path: Path, focus: Focus, controls: Contr
     asked = path[0] == "questionnaires" and protocol is not None and path[1:2] and path[1] in protocol.questionnaires
     found: list[Card] = [cards.session_card(study, facts, path, None if asked else slow.parts)]
     if protocol is None:
-        return [*found, cards.texts_card(study)]
+        return found if study.unreadable else [*found, cards.texts_card(study)]
     if asked:
         found = [cards.questions_card(protocol, str(path[1]), slow.parts), cards.texts_card(study), *found]
     if block is not None and (

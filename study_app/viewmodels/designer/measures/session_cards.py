@@ -164,6 +164,8 @@ def block_card(study: Study, facts: Facts, protocol: Protocol, block: Block) -> 
 
 def text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
     """Return whether texts are missing, and whether a text reveals a condition."""
+    if study.unreadable:
+        return ()
     missing = ", ".join(f"{count} in {language_name(code)}" for code, count in facts.missing.items())
     codes = languages_of(study)
     languages = " and ".join(language_name(code) for code in codes) if len(codes) < 3 else f"{len(codes)} languages"

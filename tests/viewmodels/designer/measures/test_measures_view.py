@@ -231,3 +231,9 @@ def test_ticks_are_round_and_few() -> None:
     assert even_ticks(0, 8.16, 5) == (0, 2, 4, 6, 8)
     assert even_ticks(50, 100, 7) == (50, 60, 70, 80, 90, 100)
     assert [rounded(value) for value in (0.0201, 53.0, 1234.5, 0, 8.0)] == ["0.0201", "53", "1234", "0", "8"]
+
+
+def test_nothing_is_said_of_the_texts_of_a_file_that_was_never_readable() -> None:
+    (session,) = view(Study("[study"), ("study",)).cards
+    assert isinstance(session, SessionCard)
+    assert session.verdicts == ()
