@@ -103,7 +103,7 @@ class MeasuresController(QObject):
         valid = valid_part(study)
         protocol = valid.protocol
         self._focus = focus = focus_of(protocol, path)
-        controls = self._controls(protocol, focus)
+        controls = self._controls(opened.study, protocol, focus)
         wanted = () if protocol is None else wanted_of(protocol, focus, controls)
         wanted = tuple(one for one in wanted if valid.forces or not isinstance(one, Detecting))
         self.slow.want(wanted if self._is_looked_at else tuple(one for one in wanted if isinstance(one, Advising)))
@@ -146,9 +146,9 @@ class MeasuresController(QObject):
         self._thresholds, self._last, self._repairs = {}, {}, {}
         self._idle.start()
 
-    def _controls(self, protocol: Protocol | None, focus: Focus) -> Controls:
-        participants = participants_of(protocol) if self._participants is None else self._participants
-        planned = planned_of(protocol)
+    def _controls(self, study: Study, protocol: Protocol | None, focus: Focus) -> Controls:
+        participants = participants_of(study) if self._participants is None else self._participants
+        planned = planned_of(study)
         if focus.plan is None or focus.block is None:
             return Controls(participants, lapses=self._lapses, planned=planned)
         asked = self._thresholds.get(focus.block.id)
@@ -208,7 +208,7 @@ class MeasuresController(QObject):
         if opened is None:
             return
         asked = _permitted(number)
-        self._participants = None if asked == participants_of(valid_part(opened.study).protocol) else asked
+        self._participants = None if asked == participants_of(opened.study) else asked
         keep_setting(opened.file, "participants", self._participants)
         self.show()
 

@@ -5,13 +5,16 @@ import math
 from typing import Any, Final
 
 from study_app.app.designer.measures.measures_worker import Advising, Detecting, Grouping, Measuring, Observing, Wanted
+from study_app.authoring.edited_study import Study
 from study_app.authoring.measures.participant_texts import text_keys
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import ThresholdPlan, threshold_plan
 from study_app.protocol.levels.presented_levels import clipping
 from study_app.protocol.model import Protocol
+from study_app.protocol.source.document import value_at
 from study_app.viewmodels.designer.measures.measures_view import Controls, Focus
 
+PLANNED: Final = ("analysis", "participants")
 PARTICIPANTS: Final = 12
 """Simulated participants of a study without `analysis.participants`."""
 PRECISION: Final = 0.15
@@ -50,15 +53,16 @@ def precision_of(protocol: Protocol | None) -> float:
     return PRECISION if decided is None or decided.precision is None else decided.precision
 
 
-def participants_of(protocol: Protocol | None) -> int:
+def participants_of(study: Study) -> int:
     """Return how many participants are simulated unless another number is asked for: the planned ones."""
-    return planned_of(protocol) or PARTICIPANTS
+    return planned_of(study) or PARTICIPANTS
 
 
-def planned_of(protocol: Protocol | None) -> int | None:
-    """Return how many participants the file plans; None where it does not say."""
-    decided = None if protocol is None else protocol.analysis
-    return None if decided is None else decided.participants
+def planned_of(study: Study) -> int | None:
+    """Return how many participants the file plans, whatever else is wrong with it; None where it does not say."""
+    planned = value_at(study.document, PLANNED)
+    faulty = any(fault.path == PLANNED for fault in study.faults)
+    return planned if isinstance(planned, int) and not faulty else None
 
 
 def threshold_of(plan: ThresholdPlan) -> float:

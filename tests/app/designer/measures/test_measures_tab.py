@@ -82,6 +82,25 @@ def test_the_number_of_participants_is_kept_for_each_study(qtbot: Any, designer:
     assert kept_participants(file) is None  # from now on it follows the file
 
 
+@pytest.mark.parametrize(
+    ("right", "wrong", "shown"),
+    [
+        ("precision = 0.15", "precision = 15", ("24", "planned")),
+        ("format = 2", "format = 9", ("24", "planned")),
+        ("participants = 24", "participants = 0", ("12", "(none planned)")),
+    ],
+)
+def test_the_planned_number_of_participants_is_that_of_a_faulty_file_too(
+    qtbot: Any, designer: Any, worker: Worker, right: str, wrong: str, shown: tuple[str, str]
+) -> None:
+    jnd(designer)
+    control = designer.place.measures.controls.participants
+    designer.file.write_text(designer.text.replace(right, wrong, 1))
+    designer.controller.open("kitchen")
+    assert designer.editing.opened.study.faults
+    qtbot.waitUntil(lambda: (control.field.text(), control.unit.text()) == shown)
+
+
 def test_a_new_study_has_no_number_of_participants_of_one_that_was_discarded(
     qtbot: Any, designer: Any, worker: Worker
 ) -> None:
