@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QKeyEvent, QPainter
+from PySide6.QtGui import QColor, QFontMetrics, QKeyEvent, QPainter
 from PySide6.QtWidgets import QStyle, QStyledItemDelegate, QStyleOptionViewItem
 
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.widgets.controls import Choice
-from study_app.viewmodels.designer.designer_view import BETWEEN, StudyChoice
+from study_app.viewmodels.designer.designer_view import BEFORE_ORIGIN, StudyChoice
 
 MARK_PX = 28
 TITLE_ROLE = Qt.ItemDataRole.UserRole + 1
@@ -20,6 +20,12 @@ OPENS = {
 Index = QModelIndex | QPersistentModelIndex
 
 
+def cut_title(words: str, length: int, metrics: QFontMetrics, room_px: int) -> str:
+    """Return the first letters of words, the title, as many as leave room for the rest."""
+    rest_px = metrics.horizontalAdvance(words[length:])
+    return metrics.elidedText(words[:length], Qt.TextElideMode.ElideRight, max(0, room_px - rest_px))
+
+
 class StudyLine(QStyledItemDelegate):
     """A study in the list of all: its file is less prominent than its title, and the open one has a check mark."""
 
@@ -28,11 +34,12 @@ class StudyLine(QStyledItemDelegate):
         self._studies = studies
 
     def sizeHint(self, option: QStyleOptionViewItem, index: Index) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for the words and the mark."""
-        return super().sizeHint(option, index) + QSize(MARK_PX, 0)
+        """Return the room for the words and the mark, as far as the window has it."""
+        wanted = super().sizeHint(option, index) + QSize(MARK_PX, 0)
+        return QSize(min(wanted.width(), self._studies.window().width() * 2 // 3), wanted.height())
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
-        """Paint the title, what follows it in another ink, and the mark at the right."""
+        """Paint the title, cut where it is too long, what follows it in another ink, and the mark at the right."""
         shown = QStyleOptionViewItem(option)
         self.initStyleOption(shown, index)
         style, words, title = self._studies.style(), index.data(), index.data(TITLE_ROLE)
@@ -42,7 +49,8 @@ class StudyLine(QStyledItemDelegate):
         style.drawControl(QStyle.ControlElement.CE_ItemViewItem, shown, painter, self._studies.view())
         if title:
             painter.setFont(shown.font)  # type: ignore[attr-defined]
-            for part, ink in ((words[:title], "text"), (words[title:], "text2")):
+            called = cut_title(words, title, painter.fontMetrics(), room.width() - MARK_PX)
+            for part, ink in ((called, "text"), (words[title:], "text2")):
                 painter.setPen(QColor(getattr(self._studies.theme, ink)))
                 painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, part)
                 room.setLeft(room.left() + painter.fontMetrics().horizontalAdvance(part))
@@ -67,9 +75,16 @@ class StudyList(Choice):
             self.setItemData(self.count() - 1, f"{study.words}, open", Qt.ItemDataRole.AccessibleTextRole)
 
     def fitted(self, words: str, room_px: int) -> str:
-        """Return title and file, the title alone where there is no room for both."""
+        """Return title and file; where there is no room for both, the title alone unless another study has it, too."""
         shown = super().fitted(words, room_px)
-        return shown if shown == words else super().fitted(words.partition(BETWEEN)[0], room_px)
+        if shown == words:
+            return shown
+        length = self.currentData(TITLE_ROLE) or len(words)
+        titles = [self.itemText(at)[: self.itemData(at, TITLE_ROLE)] for at in range(self.count())]
+        if titles.count(title := words[:length]) < 2:
+            return super().fitted(title, room_px)
+        file = words[length:].partition(BEFORE_ORIGIN)[0]
+        return super().fitted(cut_title(title + file, length, self.fontMetrics(), room_px) + file, room_px)
 
     def showPopup(self) -> None:  # noqa: N802 - Qt's name
         """Open the list; where no study is open, at its first line."""

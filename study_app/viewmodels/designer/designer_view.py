@@ -12,6 +12,8 @@ from study_app.viewmodels.tones import Tone
 
 BETWEEN: Final = "  ·  "
 """What is between the title of a study and its file."""
+BEFORE_ORIGIN: Final = "  ("
+"""What is between its file and where it is from."""
 NO_FILE: Final = FileText()
 NO_VERSION: Final = VersionChip()
 BannerAction: TypeAlias = Literal["copy", "keep", "take", "compare", "discard", "problems", "close"]
@@ -42,7 +44,7 @@ class StudyChoice:
     def words(self) -> str:
         """Title, file and where it is from: titles are not unique."""
         origin = "shipped" if self.shipped else self.original and f"copy of {self.original}"
-        return f"{self.title}{BETWEEN}{self.file}" + (f"  ({origin})" if origin else "")
+        return f"{self.title}{BETWEEN}{self.file}" + (f"{BEFORE_ORIGIN}{origin})" if origin else "")
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication
 
 from study_app.authoring.kept_settings import begin_settings
+from study_app.gui.designer.study_list import cut_title
 from study_app.protocol.source.files import shipped
 from study_app.viewmodels.designer.requests import SetText
 
@@ -52,6 +53,36 @@ def test_studies_are_listed_by_title_with_their_files_whatever_was_opened_last(d
         box.itemData(box.currentIndex(), Qt.ItemDataRole.AccessibleTextRole)
         == "Melons  ·  beta.toml  (copy of alpha), open"
     )
+
+
+def test_the_field_shows_the_file_of_a_study_whose_title_another_one_has(designer: Any) -> None:
+    for name in ("beta", "alpha"):
+        add_study(designer, name, "Which of two liquids is the thicker one?")
+    add_study(designer, "zeta", "Which of two liquids is the warmer one?")
+    begin_settings(designer.file.with_name("beta.toml"), "alpha")
+    box = designer.place.header.study
+    for name in ("alpha", "beta"):
+        designer.controller.open(name)
+        shown = box.fitted(box.currentText(), 240)
+        assert shown.startswith("Which of")
+        assert shown.endswith(f"…  ·  {name}.toml")
+        assert box.fontMetrics().horizontalAdvance(shown) <= 240
+    designer.controller.open("zeta")
+    assert box.fitted(box.currentText(), 240).endswith("…")
+
+
+def test_the_list_cuts_a_long_title_and_not_the_file(qtbot: Any, designer: Any) -> None:
+    add_study(designer, "alpha", "Which of two liquids is the thicker one? " * 9)
+    designer.controller.open("alpha")
+    box = designer.place.header.study
+    box.setFocus()
+    qtbot.keyClick(box, Qt.Key.Key_Down)
+    assert box.view().width() < designer.window.width()
+    words, length = box.currentText(), len(designer.editing.opened.title)
+    cut = cut_title(words, length, box.fontMetrics(), 600)
+    assert cut.endswith("…")
+    assert box.fontMetrics().horizontalAdvance(cut + words[length:]) <= 600
+    assert cut_title("Melons  ·  a.toml", 6, box.fontMetrics(), 600) == "Melons"
 
 
 def test_the_list_shows_a_title_as_it_is_edited(designer: Any) -> None:

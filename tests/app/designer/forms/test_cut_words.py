@@ -79,6 +79,7 @@ def test_the_title_of_a_study_gets_the_room_that_its_file_has_not(qtbot: Any) ->
     studies = StudyList()
     qtbot.addWidget(studies)
     study = StudyChoice("A first look", "first_look.toml", "first_look")
+    studies.add_study(study, opened=True)
     room = studies.fontMetrics().horizontalAdvance(study.words)
     assert studies.fitted(study.words, room + 10) == study.words
     assert studies.fitted(study.words, room - 10) == study.title
