@@ -224,9 +224,30 @@ class HomePlace(Place):
             cards.append(card)
         for made in cards:
             apply_theme_within(made, self.theme)
+        held, bar = self._focused_card(), self.cards_area.verticalScrollBar()
+        down_px = bar.value()
         self.grid.show_cards(cards)
         self._order_focus()
         self._arrange()
+        bar.setValue(down_px)
+        if held is not None:
+            self._focus_card(*held)
+
+    def _focused_card(self) -> tuple[int, str, int] | None:
+        """Return which card has the keyboard: its place, its study, and which of its buttons; None where none has."""
+        now = self.window().focusWidget() if self.isVisible() else None
+        for at, card in enumerate(self.grid.cards):
+            if isinstance(card, StudyCard | BrokenCard) and now in _buttons(card):
+                return at, card.facts.source, _buttons(card).index(now)
+        return None
+
+    def _focus_card(self, at: int, source: str, button: int) -> None:
+        """Give the keyboard to the card of a study, which may be elsewhere now, else to the one at its place."""
+        cards = [card for card in self.grid.cards if isinstance(card, StudyCard | BrokenCard)]
+        card = next((one for one in cards if one.facts.source == source), cards[at] if at < len(cards) else None)
+        if card is not None:
+            _buttons(card)[min(button, len(_buttons(card)) - 1)].setFocus(Qt.FocusReason.OtherFocusReason)
+            QTimer.singleShot(0, card, lambda: self.cards_area.ensureWidgetVisible(card))  # once it has its place
 
     def _order_focus(self) -> None:
         """Let Tab go through the page as it is read: cards are made anew, and Qt would put them last."""

@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import QEvent, QPoint, Qt
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 
-from study_app.authoring.drafts import Draft, keep
+from study_app.authoring.drafts import Draft, discard, keep
 from study_app.authoring.kept_settings import begin_settings
 from study_app.gui.home import view
 from study_app.gui.home.main_window import MainWindow
@@ -169,3 +169,34 @@ def test_cards_of_studies_with_one_title_show_their_files(qtbot, tmp_path, monke
     cards = [card for card in study_cards(home) if card.facts.title == "A first look"]
     assert [card.origin.whole for card in cards] == ["Own study  ·  own.toml", "Shipped study  ·  demo.toml"]
     assert len({card.new.accessibleName() for card in cards}) == 2
+
+
+@pytest.mark.parametrize("after", ["saved", "never saved"])
+def test_the_card_that_one_went_on_from_keeps_the_keyboard_and_is_in_sight(qtbot, tmp_path, monkeypatch, after):
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    text = own_study(tmp_path, "Zest").read_text(encoding="utf-8")
+    for name in "abcdefgh":
+        made = text.replace('name = "own"', f'name = "{name}"').replace("Zest", f"Study {name}")
+        (tmp_path / "protocols" / f"{name}.toml").write_text(made, encoding="utf-8")
+    file = tmp_path / "protocols" / ("own.toml" if after == "saved" else "fresh.toml")
+    keep(file, Draft(text.replace("Zest", "Else"), ""))
+    home = open_home(qtbot, tmp_path / "results")
+    home.main.resize(1366, 768)
+    home.main.activateWindow()
+    qtbot.waitUntil(home.main.isActiveWindow)
+    count, bar = len(home.grid.cards), home.cards_area.verticalScrollBar()
+    pen = home.grid.cards[0].pen
+    assert pen.text() == "Continue"
+    qtbot.mouseClick(pen, Qt.MouseButton.LeftButton)
+    discard(file)
+    home.enter()
+    qtbot.waitUntil(lambda: not any(card.facts.draft for card in home.grid.cards))
+    QApplication.processEvents()
+    now = home.main.focusWidget()
+    (held,) = (card for card in home.grid.cards if card.isAncestorOf(now))
+    assert now is held.pen
+    assert home.cards_area.viewport().rect().contains(held.mapTo(home.cards_area.viewport(), held.rect().center()))
+    if after == "saved":
+        assert (held.facts.title, bar.value() > 0) == ("Zest", True)
+    else:
+        assert (len(home.grid.cards), held, bar.value()) == (count - 1, home.grid.cards[0], 0)
