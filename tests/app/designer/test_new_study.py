@@ -189,6 +189,20 @@ def test_tab_goes_to_the_chosen_card_and_arrows_to_others_which_are_scrolled_to(
     assert len(seen) > 2
 
 
+def test_tab_goes_through_the_questions_to_the_button_that_makes_the_study(qtbot: Any, designer: Any) -> None:
+    for template in ("viscosity-jnd", "compare-liquids"):
+        designer.controller.ask_for_new(f"template:{template}")
+        page, questions = designer.place.new_page, designer.place.new_page.card.questions
+        qtbot.waitUntil(lambda questions=questions: all(field.isVisible() for field in questions.own.values()))
+        expected = [questions.title, questions.name, *questions.languages.values(), *questions.own.values(), page.make]
+        assert questions.title.hasFocus()
+        for part in expected:
+            assert QApplication.focusWidget() is part
+            qtbot.keyClick(part, Qt.Key.Key_Tab)
+        qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Backtab)
+        assert QApplication.focusWidget() is page.make
+
+
 @pytest.mark.parametrize("width", [1600, 1024])
 def test_arrows_skip_no_card_and_no_row(qtbot: Any, designer: Any, width: int) -> None:
     designer.window.resize(width, 1000)

@@ -20,6 +20,7 @@ from study_app.gui.designer.new_study.cards import RING, TemplateButton
 from study_app.gui.designer.new_study.new_study_questions import Questions
 from study_app.gui.designer.new_study.recovery_bar import RecoveryBar
 from study_app.gui.designer.repair_button import NameRefusal
+from study_app.gui.designer.tab_order import lead_by_tab
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule
@@ -123,6 +124,8 @@ class ChosenCard(Card):
             self.inside.insertWidget(at, new)
             remove_widget(old)
         self.questions.show_choice(choice)
+        asked = (*self.questions.languages.values(), *self.questions.own.values())
+        lead_by_tab(self.questions.name, (*asked, self.refusal.use, self.make))
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Show the questions before the session where there is no room for both."""
