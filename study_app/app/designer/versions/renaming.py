@@ -37,6 +37,7 @@ class Renaming(QObject):
         place.asked.connect(self._note)
         editing.changed.connect(self._lock)
         editing.edited.connect(self._tell)
+        editing.refused.connect(self._forget)
         runs.changed.connect(self._lock)
         place.form.head.unlock_asked.connect(self._explain)
         place.form.head.comments_asked.connect(self._list_comments)
@@ -87,6 +88,10 @@ class Renaming(QObject):
         if isinstance(asked, RenameElement) and opened is not None:
             self._renamed = (self._id(asked.path), len(references_to(opened.study.document, asked.path)))
 
+    def _forget(self) -> None:
+        """Forget a rename that was refused: the next step is another one."""
+        self._renamed = None
+
     def _tell(self) -> None:
         """Say how many references followed a rename, and which comments mention the old id."""
         renamed, self._renamed = self._renamed, None
@@ -95,7 +100,7 @@ class Renaming(QObject):
             head.show_followed("")
             return
         name, references = renamed
-        head.show_followed(f"{counted(references, 'place')} updated")
+        head.show_followed(f"{counted(references, 'place')} updated" if references else "")
         found = comments_naming(opened.study.text, name)
         if found:
             self._listed = (self.editing.selected, name, found)
