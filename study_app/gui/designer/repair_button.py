@@ -42,13 +42,19 @@ class RepairButton(ActionButton):
 
 
 class NameRefusal(QWidget):
-    """Why a name is not taken, and a button with one that is free, which ``chosen`` carries."""
+    """Why a name is not taken, and a button with one that is free, which ``chosen`` carries.
+
+    Parameters
+    ----------
+    does
+        What is done at once with the name that is free, such as "Rename to".
+    """
 
     chosen = Signal(str)
 
-    def __init__(self) -> None:
+    def __init__(self, does: str) -> None:
         super().__init__()
-        self._free = ""
+        self._does, self._free = does, ""
         self.words = label("", "label", "bad", wraps=True)
         self.use = ActionButton("", "", height=32)
         self.use.setProperty("dense", "true")
@@ -65,7 +71,8 @@ class NameRefusal(QWidget):
         """Say why a name is not taken, "" for nothing, and offer one that is free."""
         self._free = free
         self.words.setText(f"{sentence[:1].upper()}{sentence[1:]}")
-        self.use.show_action("", f"Use {free if len(free) <= LONGEST else 'it'}")
-        self.use.setAccessibleName(f"Use {free}")
+        words = f"{self._does} {free}"
+        self.use.show_action("", words if len(free) <= LONGEST else f"{self._does.split()[0]} it")
+        self.use.setAccessibleName(words)
         self.use.setVisible(bool(free))
         self.setVisible(bool(sentence))

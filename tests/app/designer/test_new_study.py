@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit
 from study_app.app.designer.controller import DesignerController
 from study_app.authoring.templates import templates
 from study_app.gui.designer.new_study.cards import RING
+from study_app.gui.designer.repair_button import NameRefusal
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.protocol.source.files import shipped
 from study_app.viewmodels.designer.requests import SetValue
@@ -98,6 +99,7 @@ def test_a_short_name_that_is_refused_can_be_replaced_by_one_that_is_free(
     page.name.setText(name)
     page.make.click()
     assert page.refusal.text().endswith(f'; "{free}" is free.')
+    assert (page.refusal.use.text(), page.refusal.use.accessibleName()) == (f"Make {free}", f"Make {free}")
     qtbot.keyClick(page.refusal.use, Qt.Key.Key_Return)
     assert designer.editing.opened.file.stem == free
 
@@ -291,3 +293,10 @@ def test_enter_begins_a_study_at_a_language_too(qtbot: Any, designer: Any) -> No
     qtbot.keyClick(dutch, Qt.Key.Key_Return)
     assert begun == ["twodrinks"]
     assert designer.editing.opened.study.document["study"]["languages"] == ("en", "nl")
+
+
+def test_the_button_of_a_long_free_name_says_what_it_does(qtbot: Any) -> None:
+    refusal = NameRefusal("Save as")
+    qtbot.addWidget(refusal)
+    refusal.show_refusal("It is taken", free="a" * 30)
+    assert (refusal.use.text(), refusal.use.accessibleName()) == ("Save it", f"Save as {'a' * 30}")

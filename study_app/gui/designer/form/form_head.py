@@ -77,7 +77,7 @@ class FormHead(QWidget):
         self.comments.hide()
         self._lock: tuple[object, str] = ((), "")
         self._read_only = False
-        self.refusal = NameRefusal()
+        self.refusal = NameRefusal("Rename to")
         self.refusal.chosen.connect(self._take_free)
         self.feel = IconButton("drop", "Feel", size=34)
         self.series = ActionButton("bars", "Series …", height=34)

@@ -78,7 +78,7 @@ class ChosenCard(Card):
         super().__init__(padding=20, gap=10)
         self.questions = Questions()
         self.title = label("", "card")
-        self.refusal = NameRefusal()
+        self.refusal = NameRefusal("Make")
         self.make = ActionButton("plus", "Make study", cap="Enter", role="primary", height=44)
         self.area = QScrollArea()
         self.area.setWidgetResizable(True)

@@ -39,7 +39,7 @@ class SaveCard(Prompt):
         self.version = _field("Version to save as", asked.version, 110)
         self.name = _field("Short name of the other study", "", 220)
         self.name.setPlaceholderText("small letters and digits")
-        self.refusal = NameRefusal()
+        self.refusal = NameRefusal("Save as")
         self.refusal.chosen.connect(self._take_name)
         self.changes = ActionButton("", "Show in Changes", role="plain", height=40)
         self.another = ActionButton("copy", "Save as another study …", height=40)

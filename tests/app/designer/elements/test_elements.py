@@ -130,6 +130,7 @@ def test_an_id_that_is_refused_can_be_replaced_by_one_that_is_free(qtbot: Any, d
     designer.editing.ask(RenameElement(("liquids", "thin"), "thick"))
     head = designer.place.form.head
     assert head.refusal.text() == 'The name "thick" is taken: "thick_2" is free.'
+    assert head.refusal.use.text() == "Rename to thick_2"
     head.refusal.use.setFocus()
     qtbot.keyClick(head.refusal.use, Qt.Key.Key_Return)
     assert (head.id.text(), designer.editing.selected) == ("thick_2", ("liquids", "thick_2"))

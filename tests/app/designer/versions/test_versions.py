@@ -84,6 +84,7 @@ def test_what_changes_the_measure_can_be_saved_as_another_study(ran: Any, qtbot:
     qtbot.keyClick(name, Qt.Key.Key_Return)
     refusal = ran.place.prompt.refusal
     assert refusal.text().endswith('already there; "kitchen2" is free.')
+    assert refusal.use.text() == "Save as kitchen2"
     click(qtbot, refusal.use)
     file = ran.file.parent / "kitchen2.toml"
     assert ran.editing.opened.file == file
