@@ -28,7 +28,8 @@ from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.controls import Choice
 from study_app.number_text import typed_numbers
-from study_app.viewmodels.designer.form.form_rows import STUDY_LANGUAGES, Entry, FormRow, new_words
+from study_app.viewmodels.designer.form.form_rows import STUDY_LANGUAGES, Entry, FormRow
+from study_app.viewmodels.designer.form.form_words import new_words
 from study_app.viewmodels.designer.requests import AddElement, AddEntry, AddNamed, SetValue, Several
 
 KINDS = {

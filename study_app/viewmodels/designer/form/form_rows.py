@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.changes.languages import is_copied
 from study_app.authoring.changes.series import NUMBERS, is_element, series_starts
 from study_app.authoring.edited_study import Study
@@ -183,7 +182,7 @@ def form(study: Study, path: Path) -> Form:
     """Return the form of the element at ``path``."""
     if study.unreadable:
         lines = [f"Line {one.line}: " if one.line else "" for one in study.problems]
-        said = [_sentence(study, one.message, one.hint) for one in study.problems]
+        said = [_sentence(one.message, one.hint) for one in study.problems]
         why = tuple(map("".join, zip(lines, said, strict=True)))
         return Form(FIRST, title_of({}, FIRST), icon_of(FIRST, {}), UNREADABLE, faults=why, unreadable=True)
     document, places = study.document, places_of(study.text)
@@ -197,8 +196,8 @@ def form(study: Study, path: Path) -> Form:
     shown |= {section.path for section in sections if section.path != path}
     within = [fault for fault in study.faults if fault.path[: len(path)] == path]
     within = [fault for fault in within if not any(fault.path[: len(one)] == one for one in shown)]
-    own = tuple(_sentence(study, one.message, one.hint) for one in within if one.path != (*path, "id"))
-    of_id = tuple(_sentence(study, one.message, one.hint) for one in within if one.path == (*path, "id"))
+    own = tuple(_sentence(one.message, one.hint) for one in within if one.path != (*path, "id"))
+    of_id = tuple(_sentence(one.message, one.hint) for one in within if one.path == (*path, "id"))
     value = value_at(document, path)
     name = value.get("id") if isinstance(value, Mapping) else None
     if name is None and len(path) == 2 and isinstance(value, Mapping):
@@ -287,7 +286,7 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
     title = "" if depth == 0 else label_of(path[-1])
     inside = {row.row.path for row in shown}
     faults = tuple(
-        _sentence(study, fault.message, fault.hint)
+        _sentence(fault.message, fault.hint)
         for fault in study.faults
         if depth
         and fault.path[: len(path)] == path
@@ -318,9 +317,7 @@ def _optional(row: Row) -> bool:
 
 def _form_row(study: Study, row: Row, places: Places) -> FormRow:
     document, path = study.document, row.path
-    faults = tuple(
-        _sentence(study, fault.message, fault.hint) for fault in study.faults if fault.path[: len(path)] == path
-    )
+    faults = tuple(_sentence(fault.message, fault.hint) for fault in study.faults if fault.path[: len(path)] == path)
     if path == STUDY_LANGUAGES:
         row = replace(row, choices=tuple(Choice(code, language_name(code)) for code in LANGUAGES))
     codes = [str(code) for _, code in entries(document, "study.languages.*")] or ["en"]
@@ -381,24 +378,6 @@ def _fits(row: Row, value: Any) -> bool:
     return row.kind not in {"numbers", "vector", "points", "texts", "choices", "references", "list", "table", "tables"}
 
 
-def _sentence(_study: Study, message: str, hint: str) -> str:
+def _sentence(message: str, hint: str) -> str:
     sentence = f"{message[:1].upper()}{message[1:]}"
     return f"{sentence} ({hint})" if hint else sentence
-
-
-def is_right_to_left(code: str) -> bool:
-    """Return whether a language is written from right to left."""
-    return code in LANGUAGES and LANGUAGES[code].right_to_left
-
-
-def new_words(section: str) -> str:
-    """Return what the choice is called that adds an element to a section and names it."""
-    return f"New {label_of(singular(section)).lower()} …"
-
-
-def choice_words(choice: Choice, default: object) -> str:
-    """Return what a choice is called: its value in words, marked where it counts without being written."""
-    if choice.value is None:
-        return "Not set"
-    words = label_of(str(choice.value)) if not str(choice.value).isdigit() else str(choice.value)
-    return f"{words} (default)" if choice.value == default else words
