@@ -108,7 +108,8 @@ def reproduce(
         for sentence in _against(planned.get(trial.number), trial)
     ]
     numbers = [trial if isinstance(trial, int) else trial.number for trial in attempts]
-    found += _progress(numbers, len(planned), complete=complete)
+    blocks = protocol["study"].get("resume") == "block"
+    found += _progress(numbers, planned, complete=complete, blocks=blocks)
     return tuple(dict.fromkeys(found))
 
 
@@ -128,16 +129,23 @@ def _against(planned: Trial | None, run: RecordedTrial) -> Iterator[str]:
         yield f"trial {run.number}: items {_listed(run.items)} recorded, the seed gives {_listed(planned.items)}"
 
 
-def _progress(numbers: list[int], planned: int, *, complete: bool) -> Iterator[str]:
-    """Yield where the trials did not come one after the other, each attempt after the one before."""
+def _progress(numbers: list[int], planned: dict[int, Trial], *, complete: bool, blocks: bool) -> Iterator[str]:
+    """Yield where the trials did not come one after the other, each attempt after the one before.
+
+    With ``blocks`` a resumed session presents the block again that it was within, from its first trial.
+    """
     before = 0
+    first = {trial.block: number for number, trial in reversed(planned.items())}
     for number in numbers:
-        if number not in {before, before + 1}:
+        due = {before, before + 1}
+        again = {first[planned[one].block] for one in due & planned.keys()} if blocks else set()
+        if number not in due | again:
             after = f"after trial {before}" if before else "first"
             yield f"trial {number}: came {after}, where trial {before + 1} was due"
         before = number
-    if complete and before < planned:
-        missing = f"trial {planned} was" if before + 1 == planned else f"trials {before + 1} to {planned} were"
+    last = len(planned)
+    if complete and before < last:
+        missing = f"trial {last} was" if before + 1 == last else f"trials {before + 1} to {last} were"
         yield f"{missing} not recorded, though the session is complete"
 
 

@@ -22,7 +22,7 @@ from study_app.protocol.model import Explore, Follow, Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.trials.stimuli import DELAYS, Stimulated
 from study_app.protocol.trials.task import AnyTask
-from study_app.session.pages import DesignPage, FeedbackPage, Interval, QuestionnairePage, TaskPage, TextPage
+from study_app.session.pages import DesignPage, FeedbackPage, Interval, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import REHEARSED_SCREENS
 from study_app.session.simulated.adjusting_observer import LOOK_S
 from study_app.session.simulated.design_observer import OBSERVER, Comparison
@@ -30,7 +30,7 @@ from study_app.session.simulated.observers import reading_s
 from study_app.session.simulated.participant import SimulatedParticipant
 from study_app.session.simulated.trial_features import REHEARSED_PEOPLE, ConditionFeatures, condition_features
 from study_app.session.transitions.commands import Adjust, Command, Finish, ShowPage, StartTrial, Write
-from study_app.session.transitions.events import Begin, Continue, Event, Stepped, TaskDone, TimeUp
+from study_app.session.transitions.events import Begin, Continue, Event, ResumeAsked, Stepped, TaskDone, TimeUp
 from study_app.session.transitions.state import FINAL, SessionState
 from study_app.session.transitions.table import advance, open_session
 from study_app.store.clock import SessionClock
@@ -178,6 +178,8 @@ class Answering(SimulatedParticipant):
                     self._post(TaskDone(self._time.seconds, "complete", {}))
                 case QuestionnairePage() | DesignPage() as page:
                     self._fill_in(page)
+                case PausePage():  # before the trial that a resumed session goes on with
+                    self._post(ResumeAsked(self._time.seconds, "participant"))
                 case _:
                     raise SessionError(f"the session failed at {self.page}")
 

@@ -31,4 +31,7 @@ def whole_protocol(published: Mapping[str, Any], key: Key) -> Protocol:
     tables = {name: table for name, table in key.tables.items() if name != "blocks"}
     if "analysis" in tables:
         tables["analysis"] = {**published["analysis"], **tables["analysis"]}
-    return Protocol.model_validate({**published, **tables, "questionnaires": questionnaires, "blocks": blocks})
+    whole = {**published, **tables, "questionnaires": questionnaires, "blocks": blocks}
+    if not whole.get("sequence"):  # each group has its own, or each session
+        whole.pop("sequence", None)
+    return Protocol.model_validate(whole)

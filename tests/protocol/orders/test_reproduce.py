@@ -111,6 +111,18 @@ def test_repeated_and_unanswered_attempts_are_reproduced():
     assert reproduce(kept(SHUFFLED), 3, "P001", recorded, complete=True) == ()
 
 
+@pytest.mark.parametrize("reached", [4, 5])
+def test_a_block_that_a_resumed_session_presents_again_is_reproduced_where_the_study_says_so(reached: int):
+    trials, receipt = run(SHUFFLED, "P001", 3), kept(SHUFFLED)
+    for resume, expected in (("block", ()), ("trial", (f"trial 2: came after trial {reached}",))):
+        receipt["study"]["resume"] = resume
+        found = reproduce(receipt, 3, "P001", [*trials[:reached], *trials[1:]], complete=True)
+        assert tuple(one.partition(",")[0] for one in found) == expected
+    receipt["study"]["resume"] = "block"
+    (found,) = reproduce(receipt, 3, "P001", [*trials[:reached], *trials[2:]], complete=True)
+    assert found.startswith(f"trial 3: came after trial {reached}, where")
+
+
 def journal(trials: tuple[Trial, ...]) -> Iterator[dict[str, Any]]:
     """The lines of a session whose third trial was repeated, and whose fourth was broken off and never answered."""
     yield {"n": 1, "event": "session_started", "participant": "P001"}
