@@ -70,6 +70,17 @@ def pytest_collection_finish() -> None:
         gc.freeze()
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call() -> Iterator[None]:
+    """Fail where a window or dialog that is there after a test prints program text, in its tips and names too."""
+    yield
+    widgets = sys.modules.get("PySide6.QtWidgets")
+    if widgets is not None and isinstance(widgets.QApplication.instance(), widgets.QApplication):
+        from tests.program_text import printed_in_windows
+
+        assert not (found := printed_in_windows()), found
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_runtest_teardown() -> None:
     """Collect what is due; what a full collection leaves, mostly modules, is not looked at again."""

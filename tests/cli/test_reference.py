@@ -4,6 +4,7 @@ import click
 
 from study_app.cli import commands
 from study_app.cli.reference import commands_markdown
+from tests.program_text import printed
 
 
 def leaves(command: click.Command, path: tuple[str, ...] = ()) -> dict[str, click.Command]:
@@ -33,6 +34,7 @@ def test_rows_have_three_cells_and_no_internal_names() -> None:
     assert {row.count("|") for row in rows} == {4}
     assert "UNSET" not in text
     assert "INTEGER" not in text
+    assert not printed(text)
 
 
 def test_required_options_and_defaults_are_named() -> None:

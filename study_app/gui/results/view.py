@@ -233,7 +233,7 @@ class ResultsPlace(Place):
             title=f"Report of {self._name()}",
             explanation=(
                 "One page with figures, tests and conclusions, and every number, table and figure as a file. Large "
-                "studies take some minutes.{self._by_code()}"
+                f"studies take some minutes.{self._by_code()}"
             ),
             go_on="Write the report",
             to=self._handed_to / f"{self._name()}-report",

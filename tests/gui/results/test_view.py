@@ -213,6 +213,16 @@ def test_exporting_asks_for_what_the_command_has(qtbot):
     assert place.writing is None
 
 
+@pytest.mark.parametrize("sealed", [True, False])
+def test_both_outputs_say_that_settings_appear_as_codes_while_the_key_is_sealed(qtbot, sealed):
+    place = opened(qtbot, shown=view(sealed=sealed))
+    for button in (place.export, place.report):
+        click(qtbot, button)
+        (explanation,) = (one.text() for one in place.writing.findChildren(QLabel) if "very " in one.text())
+        assert explanation.endswith("Settings appear as codes because the key is sealed.") is sealed
+        place.writing.reject()
+
+
 def test_a_report_can_be_given_up_and_a_refusal_lets_one_try_again(place, qtbot):
     click(qtbot, place.report)
     dialog = place.writing
