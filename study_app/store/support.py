@@ -20,7 +20,8 @@ from study_app.workspace import workspace
 NAME: Final = "liquid-study-support.zip"
 CRASHES: Final = 3
 _DRIVERS: Final = ("pyusb", "libusb-package", "hidapi")
-_PRIVATE: Final = frozenset({"operator", "firmware", "workspace", "recent"})  # initials; paths may name a person
+_PRIVATE: Final = frozenset({"operator", "firmware", "workspace", "recent", "camera"})
+"""Initials, paths that may name a person, and an address that may contain a password."""
 _PLACE: Final = re.compile(r'^ *(File "[^"]*", line \d+ in \S+|<no Python frame>)$')
 _HEADING: Final = re.compile(
     r"^(Fatal Python error: [\w \-]+|(Current thread|Thread) 0x[0-9a-f]+ \(most recent call first\):)$"
@@ -28,7 +29,7 @@ _HEADING: Final = re.compile(
 ABOUT: Final = """What liquid-study knows about itself on this machine, for support.
 
 versions.json    the program, Python, the system and libraries
-settings.json    the settings of this machine, without initials and folders
+settings.json    the settings of this machine, without initials, folders and the camera's address
 log.txt          the program's log: text and lines of the source, failures of devices
 last-error.txt   the last error in the log
 diagnosis.txt    findings about the device, if it was examined
@@ -69,7 +70,7 @@ def _parts(diagnosis: str) -> Iterator[tuple[str, str]]:
 
 def _settings(settings: workstation.MachineSettings) -> dict[str, object]:
     """Return the settings; of private ones whether they are set."""
-    held = settings.model_dump(mode="json")
+    held = settings.model_dump(mode="json", exclude={"benches": {"__all__": {"report"}}})
     return {name: bool(value) if name in _PRIVATE else value for name, value in held.items()}
 
 

@@ -11,7 +11,9 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, Final
+from urllib.parse import urlsplit
 
 import numpy as np
 
@@ -27,7 +29,8 @@ OPENS_S, STALLS_S, ENDS_S = 8.0, 1.0, 5.0
 MOST_AGE_S: Final = 10.0
 """Time stamps that differ more from both system clocks are from another clock. [choice]"""
 SPARE_NS: Final = SECOND_NS // 2
-LOGIN: Final = re.compile(r"//[^/@]*@")
+HOST: Final = re.compile(r"([\w.-]+|\[[\da-fA-F:.]+\])(:\d{1,5})?")
+NOT_SHOWN: Final = "(address not shown)"
 COUNTED: Final = 30
 """Number of intervals between frames whose median is the period."""
 
@@ -153,8 +156,16 @@ class Camera:
 
 
 def without_login(source: str) -> str:
-    """Return the address of a camera without name and password."""
-    return LOGIN.sub("//", source)
+    """Return the name of a device, or scheme and host of an URL, whose other parts may contain name and password."""
+    if source.partition(":")[0] in KINDS:
+        return source
+    with suppress(ValueError):  # of an URL that is not valid
+        parts = urlsplit(source)
+        host = parts.netloc.rpartition("@")[2]
+        no_later = source.count("@") == parts.netloc.count("@")  # else a / in a password may have cut off the host
+        if parts.scheme and no_later and HOST.fullmatch(host):
+            return f"{parts.scheme}://{host}"
+    return NOT_SHOWN
 
 
 class _Numbers:

@@ -14,11 +14,12 @@ from study_app.errors import DeviceLost, StoreError, StudyError
 from study_app.store import workstation
 from study_app.store.program_log import DEVICE_FAILED, keep_log, kept_log, last_error, log_file
 from study_app.store.support import write_support
-from study_app.store.workstation import MachineSettings
+from study_app.store.workstation import DeviceBench, MachineSettings
 from study_app.workspace import WORKSPACE_VARIABLE
 
 ID, ANSWER, DENSITY, NONCE, INITIALS = "P9047", "responded6of7", "1013.7", "c0ffee5eed", "ZQX"
-PLANTED = (ID, ANSWER, DENSITY, NONCE, INITIALS, "sub-", "tester-home")
+CAMERA = "rtsp://camerist:se@cr/3t@192.168.0.77/live?key=se@cr"
+PLANTED = (ID, ANSWER, DENSITY, NONCE, INITIALS, "sub-", "tester-home", "camerist", "se@cr", "192.168.0.77")
 log = logging.getLogger("study_app.tests.support")
 
 
@@ -73,9 +74,18 @@ def test_nothing_of_a_study_is_in_it(
         "Fatal Python error: Segmentation fault\n\nCurrent thread 0x00007f (most recent call first):\n"
         f'  File "/opt/tester-home/study_app/app/session/bridge.py", line 12 in start\n{ID} {DENSITY}\n'
     )
-    firmware, recent = "/x/tester-home/falcon.bin", ("/x/tester-home/own.toml",)
+    axes = (1.0, 1.0, 1.0)
+    measured = dict.fromkeys(("mass_kg", "damping_nspm", "friction_n", "delay_ms", "stable_nspm"), axes)
+    bench = DeviceBench(name="falcon", measured="2026-11-01", report="/x/tester-home/bench.md", **measured)
     workstation.save(
-        MachineSettings(workspace=str(results.parent), operator=INITIALS, firmware=firmware, recent=recent)
+        MachineSettings(
+            workspace=str(results.parent),
+            operator=INITIALS,
+            firmware="/x/tester-home/falcon.bin",
+            recent=("/x/tester-home/own.toml",),
+            camera=CAMERA,
+            benches=(bench,),
+        )
     )
     plant(caplog)
     write_support(tmp_path / "help.zip", "1  FOUND  no reply\n")
@@ -93,8 +103,9 @@ def test_nothing_of_a_study_is_in_it(
     assert found["diagnosis.txt"] == "1  FOUND  no reply\n"
     assert "app/session/bridge.py" in found["crash-1.txt"]
     settings = json.loads(found["settings.json"])
-    private = [settings[name] for name in ("operator", "workspace", "firmware", "recent")]
-    assert (private, settings["device"]) == ([True] * 4, "mouse")
+    private = [settings[name] for name in ("operator", "workspace", "firmware", "recent", "camera")]
+    assert (private, settings["device"]) == ([True] * 5, "mouse")
+    assert settings["benches"][0]["mass_kg"] == list(axes)
     assert json.loads(found["versions.json"]).keys() >= {"liquid-study", "python", "system", "numba", "pyusb"}
 
 

@@ -17,7 +17,7 @@ from study_app.session.transitions.events import Broke, broken
 from study_app.store import workstation
 from study_app.store.workstation import MachineSettings
 from study_app.video import sources
-from study_app.video.camera import without_login
+from study_app.video.camera import NOT_SHOWN, without_login
 from study_app.video.frames import VideoFrame, stopped
 from study_app.video.sources import Videos
 from tests.video.clips import write_clip
@@ -89,10 +89,49 @@ def test_a_camera_that_opens_after_all_were_closed_is_closed_too(study: Protocol
 
 def test_the_receipt_has_neither_name_nor_password_of_a_camera(study: Protocol, camera: type[FakeCamera]) -> None:
     camera.opens.set()
-    every = videos(study, "rtsp://operator:secret@192.168.0.7/live")
+    every = videos(study, "rtsp://operator:se@cret@192.168.0.7:554/live?key=secret")
     assert every.open().fault == ""
-    assert every.describe()["camera"]["source"] == "rtsp://192.168.0.7/live"
-    assert without_login("dshow:video=NAME") == "dshow:video=NAME"
+    assert every.describe()["camera"]["source"] == "rtsp://192.168.0.7:554"
+
+
+@pytest.mark.parametrize(
+    ("source", "shown"),
+    [
+        ("rtsp://operator:secret@camera.example/live", "rtsp://camera.example"),
+        ("rtsp://operator:se@cret@camera.example:554/live", "rtsp://camera.example:554"),
+        ("http://camera.example/live?user=operator&password=secret#secret", "http://camera.example"),
+        ("http://operator:secret@[fd00::1]:8080/secret", "http://[fd00::1]:8080"),
+        ("tcp://127.0.0.1:9", "tcp://127.0.0.1:9"),
+        ("v4l2:/dev/video0", "v4l2:/dev/video0"),
+        ("dshow:video=NAME", "dshow:video=NAME"),
+        *(
+            (unclear, NOT_SHOWN)
+            for unclear in (
+                "rtsp://operator:se/cret@camera.example/live",
+                "rtsp://operator:1/cret@camera.example/live",  # 1 could be a port
+                "rtsp://operator:1?cret@camera.example/live",
+                "rtsp://operator:1#cret@camera.example/live",
+                "rtsp://operator:secret",
+                "rtsp://operator:secret@",
+                "rtsp://operator%3Asecret%40camera.example/live",
+                "rtsp://operator:123456",
+                "rtsp://operator:secret@camera.example:port/live",
+                "rtsp://operator:secret@[fd00::1/live",
+                "rtsp://operator:secret@fd00::1]/live",
+                "rtsp://operator:secret@[secret]/live",
+                "rtsp://operator:secret@a\u2100b/live",  # a sign that Unicode writes as a/c
+                "//operator:secret@camera.example/live",
+                "operator:secret@camera.example/live",
+                "async:http://operator:secret@camera.example/live",
+                "rtsp:\\\\operator:secret@camera.example\\live",
+                "/home/operator/secret.ts",
+                "",
+            )
+        ),
+    ],
+)
+def test_of_an_address_scheme_and_host_alone_are_shown(source: str, shown: str) -> None:
+    assert without_login(source) == shown
 
 
 def test_check_notes_that_this_machine_has_no_camera(camera_study: Path) -> None:
