@@ -37,11 +37,16 @@ def freeze(to: Path, work: Path) -> Path:
 
 
 def drop_twins(inside: Path) -> int:
-    """Remove a package's copy of each shared library that lies in the program's own folder, too; return the bytes."""
+    """Remove a package's copy of each shared library that lies in the program's own folder, too; return the bytes.
+
+    A symbolic link is no copy: where the program's own folder has one, the package has the only file.
+    """
     saved = 0
     for path in sorted(inside.glob("pyarrow/*")):
         twin = inside / path.name
-        if path.is_file() and twin.is_file() and path.read_bytes() == twin.read_bytes():
+        if path.is_symlink() or twin.is_symlink() or not (path.is_file() and twin.is_file()):
+            continue
+        if path.read_bytes() == twin.read_bytes():
             saved += path.stat().st_size
             path.unlink()
     return saved
@@ -69,7 +74,7 @@ def sizes(bundle: Path) -> Counter[str]:
     for path in bundle.rglob("*"):
         if path.is_file() and not path.is_symlink():
             parts = path.relative_to(inside).parts if path.is_relative_to(inside) else ("program",)
-            name = parts[0] if len(parts) > 1 or parts[0] == "program" else library(parts[0])
+            name = parts[0].removesuffix(".libs") if len(parts) > 1 or parts[0] == "program" else library(parts[0])
             if parts[:2] == ("study_app", "compiled"):
                 name = "compile cache"
             counted[name] += path.stat().st_size

@@ -39,9 +39,10 @@ def test_its_start_is_the_commands() -> None:
 
 
 def test_its_start_runs_modules_and_code_as_python_does() -> None:
-    """The Falcon's guard is `sys.executable -P -m`, the load of a timing `-S -c`."""
-    guard = "study_app.devices.falcon.guard"
-    assert started("-P", "-m", guard, "socket:/nowhere", send=b"done\n") == "ready\n"
+    """A guard is `sys.executable -P -m`, the load of a timing `-S -c`."""
+    guard = "study_app.devices.guard"
+    words = ("falcon", "study_app.devices.falcon.transport.transport:end_torque", "falcon-socket:/nowhere")
+    assert started("-P", "-m", guard, *words, send=b"done\n") == "ready\n"
     assert started("-S", "-c", "import sys; print(sys.argv[1:], __name__)", "a") == "['a'] __main__\n"
 
 
@@ -57,6 +58,7 @@ def test_sizes_add_up_and_the_compile_cache_is_counted_apart(bundle: dict[str, A
         "liquid-study": 7,
         "_internal/libarrow.so.1": 11,
         "_internal/pyarrow/lib.so": 13,
+        "_internal/numpy.libs/libblas.so": 23,
         "_internal/study_app/compiled/x/a.nbc": 17,
         "_internal/study_app/cli.py": 19,
     }
@@ -64,17 +66,21 @@ def test_sizes_add_up_and_the_compile_cache_is_counted_apart(bundle: dict[str, A
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_bytes(b"x" * size)
     found = bundle["sizes"](tmp_path)
-    assert found == {"program": 7, "pyarrow": 24, "compile cache": 17, "study_app": 19}
+    assert found == {"program": 7, "pyarrow": 24, "numpy": 23, "compile cache": 17, "study_app": 19}
 
 
-def test_only_equal_copies_of_a_library_are_dropped(bundle: dict[str, Any], tmp_path: Path) -> None:
+def test_only_equal_copies_of_a_library_are_dropped_and_links_are_kept(bundle: dict[str, Any], tmp_path: Path) -> None:
     (tmp_path / "pyarrow").mkdir()
     for name, there, inside in (("same", b"x", b"x"), ("other", b"x", b"y")):
         (tmp_path / name).write_bytes(there)
         (tmp_path / "pyarrow" / name).write_bytes(inside)
     (tmp_path / "pyarrow" / "alone").write_bytes(b"z")
+    (tmp_path / "alone").symlink_to("pyarrow/alone")
+    (tmp_path / "pyarrow" / "link").symlink_to("../other")
+    (tmp_path / "link").write_bytes(b"x")
     assert bundle["drop_twins"](tmp_path) == 1
-    assert sorted(path.name for path in (tmp_path / "pyarrow").iterdir()) == ["alone", "other"]
+    assert sorted(path.name for path in (tmp_path / "pyarrow").iterdir()) == ["alone", "link", "other"]
+    assert (tmp_path / "alone").read_bytes() == b"z"
 
 
 def test_the_recipe_contains_the_pages_of_help(monkeypatch: pytest.MonkeyPatch) -> None:
