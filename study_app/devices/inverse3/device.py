@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.devices.base import Device
+from study_app.devices.bench.kept import dynamics_of
 from study_app.devices.call_gate import LET_GO, RUNS, check_left, let_go
 from study_app.devices.inverse3 import exchange
 from study_app.devices.inverse3.exchange import COUNTERS, exchange_functions, finish, new_exchange
@@ -15,7 +16,7 @@ from study_app.devices.inverse3.failures import FAILURES
 from study_app.devices.inverse3.json_scan import text_hash
 from study_app.devices.inverse3.link import HOST, PORT, Link, SocketLink
 from study_app.devices.inverse3.opening import Messages, open_session
-from study_app.devices.inverse3.probe import PORTS, force_scale
+from study_app.devices.inverse3.probe import PORTS, check_force_scale, force_scale
 from study_app.errors import DeviceError
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 
@@ -70,7 +71,7 @@ class Inverse3Device(Device):
         self._progress = progress
         self._link: Link | None = None
         self._found: dict[str, Any] = {}
-        self._round_trip_s: float | None = None
+        self._dynamics = UNKNOWN
         self.memory = new_exchange("", force_limit_n, 1)
         self.exchange = self.memory[0]
         self.context = int(self.memory.ctypes.data)
@@ -94,8 +95,8 @@ class Inverse3Device(Device):
             messages = Messages(link)
             messages.upgrade(f"{self._host}:{self._port}")
             session = open_session(messages, link, self._wanted_id)
-            self._found = session.described | {"force_scale": self._check_force_scale()}
-            self._round_trip_s = session.round_trip_s
+            self._found = session.described | {"force_scale": check_force_scale(self._force_scale())}
+            self._dynamics = dynamics_of(session.round_trip_s, None, None, name=self.name, serial=session.device_id)
             self.memory[:] = new_exchange(session.device_id, self.force_limit_n, secrets.randbits(64))
             self.exchange.scan.own_id = text_hash(session.device_id.encode())
             left = np.frombuffer(messages.left, np.uint8)
@@ -127,8 +128,8 @@ class Inverse3Device(Device):
 
     @property
     def dynamics(self) -> Dynamics:
-        """The round trip that was measured when it was opened; count and mass are not published, so the usual ones."""
-        return Dynamics(self._round_trip_s, UNKNOWN.count_m, UNKNOWN.mass_kg)
+        """The round trip measured when it was opened; count and mass, which are not published, as benched."""
+        return self._dynamics
 
     @property
     def counters(self) -> dict[str, int]:
@@ -168,20 +169,7 @@ class Inverse3Device(Device):
     def _connect(self) -> Link:
         return SocketLink(self._host, self._port)
 
-    def _check_force_scale(self) -> float | None:
-        """Return the service's multiplier of all forces; None where it does not say.
-
-        Raises
-        ------
-        DeviceFailure
-            It is not 1, so that forces are other than commanded.
-        """
-        scale = self._force_scale()
-        if scale is not None and scale != 1.0:
-            raise FAILURES.failure("settings", f"devices/force_scale is {scale:g}, and 1 is required")
-        return scale
-
-    def _force_scale(self) -> float | None:
+    def _force_scale(self) -> Any:
         return force_scale(self._host, (self._port, *PORTS))
 
 

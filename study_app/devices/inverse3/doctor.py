@@ -58,10 +58,9 @@ def _words(device: Inverse3Device, fresh_hz: float) -> tuple[str, ...]:
     """Return what is worth reading of what was seen."""
     found = device.describe()
     settings = found["service_settings"]
-    scale = found["force_scale"]
     return (
         f"opened, device {found['device_id']}, round trip {found['round_trip_ms']:.2f} ms",
         f"settings {'confirmed' if settings['confirmed'] else 'not confirmed by the service'}",
-        "force scale: " + ("not reported by the service: it must be 1" if scale is None else f"{scale:g}"),
+        f"force scale: {found['force_scale']:g}",
         f"new positions per second: {fresh_hz:.0f}",
     )

@@ -6,6 +6,7 @@ of the emulator. Once it is open, the emulator's time is that of the servo's tic
 
 from collections.abc import Callable
 from random import Random
+from typing import Any
 
 import numpy as np
 
@@ -90,5 +91,5 @@ class EmulatedInverse3(Inverse3Device):
     def _connect(self) -> Link:
         return EmulatedLink(self.hand)
 
-    def _force_scale(self) -> float | None:
+    def _force_scale(self) -> Any:
         return self.hand.force_scale

@@ -73,6 +73,14 @@ _MODES: Final = (
         "config of a full state, and the setting devices/force_scale",
     ),
     FailureMode(
+        "unknown-scale",
+        "the service reports its force scale",
+        "the multiplier of all forces is not known",
+        "the service does not report its setting devices/force_scale, or in a form that this program does not know",
+        "restart Haply Hub; if it stays, use version 3.5 of the service, or update this program",
+        "the answer to GET /settings/devices/force_scale",
+    ),
+    FailureMode(
         "no-reply",
         "every command is answered",
         "the Inverse Service stopped answering",

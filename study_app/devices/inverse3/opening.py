@@ -161,6 +161,7 @@ def open_session(messages: Messages, link: Link, wanted_id: str = "") -> Session
     round_trip_s = _measure(messages, link, device_id)
     described = {
         "device_id": device_id,
+        "serial": device_id,
         "device_info": config.get("device_info"),
         "firmware": config.get("extended_firmware_version"),
         "service_settings": {

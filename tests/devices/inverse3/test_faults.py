@@ -30,6 +30,7 @@ OPENING = {
     "gravity-off": "settings",
     "disobeys": "settings",
     "force-scale": "settings",
+    "unknown-scale": "unknown-scale",
 }
 STREAM = {
     "late": "no-reply",

@@ -18,7 +18,7 @@ from study_app.devices.inverse3.device import Inverse3Device
 from study_app.devices.inverse3.emulator.server import ServiceServer
 from study_app.devices.inverse3.emulator.service import Service
 from study_app.devices.inverse3.link import SocketLink
-from study_app.devices.inverse3.probe import force_scale, probe
+from study_app.devices.inverse3.probe import check_force_scale, force_scale, probe
 from study_app.errors import DeviceLost
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
@@ -125,7 +125,7 @@ def test_a_device_is_probed_without_a_session(service: Service, server: ServiceS
     found = probe(ports=(server.port,))
     assert found.state == "connected: EMU1"
     assert found.why == ""
-    assert force_scale("127.0.0.1", (server.port,)) == 1.0
+    assert check_force_scale(force_scale("127.0.0.1", (server.port,))) == 1.0
     service.take("no-device")
     assert probe(ports=(server.port,)).state == NONE
 
@@ -138,22 +138,54 @@ def test_without_a_service_the_probe_says_what_to_start() -> None:
     assert "start Haply Hub" in found.why
 
 
-@pytest.mark.parametrize("answer", [b"2.5", b'{"value": 2.5}', b'{"devices/force_scale": 2.5}'])
-def test_a_force_scale_is_understood_in_each_shape(answer: bytes) -> None:
+@pytest.mark.parametrize("answer", [b"1", b"1.0", b'{"value": 1}', b'{"devices/force_scale": 1.0}'])
+def test_a_force_scale_of_1_is_understood_in_each_shape(answer: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("http_proxy", "http://127.0.0.1:9")  # where nothing answers
+    monkeypatch.setattr("urllib.request._opener", None)
     with HttpAnswer(answer) as port:
-        assert force_scale("127.0.0.1", (port,)) == 2.5
+        assert check_force_scale(force_scale("127.0.0.1", (port,))) == 1.0
 
 
-@pytest.mark.parametrize("answer", [b'{"value": "2.5"}', b"true", b"[]", b"not json"])
-def test_a_force_scale_that_is_no_number_is_not_known(answer: bytes) -> None:
-    with HttpAnswer(answer) as port:
-        assert force_scale("127.0.0.1", (port,)) is None
+HUGE = b"1" + b"0" * 400
+NOT_1 = (b"2.5", b'{"value": 2.5}', b'{"devices/force_scale": 2.5}', b"0", b"-1", b"NaN", b"Infinity", b"1e999", HUGE)
+UNKNOWN = (
+    *(None, b"", b"not json", b"null", b"true", b'"1"', b"[1]", b"{}", b'{"scale": 1}', b'{"value": true}'),
+    *(b'{"value": "1"}', b'{"value": null}', b'{"value": {"value": 1}}', b"9" * 5000, b"[" * 100_000),
+    b'["' + b"many\\n" * 1000 + b'"]',
+)
+
+
+@pytest.mark.parametrize(
+    ("answer", "mode"),
+    [*((answer, "settings") for answer in NOT_1), *((answer, "unknown-scale") for answer in UNKNOWN)],
+)
+def test_any_other_answer_about_the_force_scale_is_refused_in_a_line(answer: bytes | None, mode: str) -> None:
+    with HttpAnswer(answer) as port, pytest.raises(DeviceFailure) as refused:
+        check_force_scale(force_scale("127.0.0.1", (port,)))
+    assert refused.value.mode == mode
+    assert "\n" not in str(refused.value)
+    assert len(str(refused.value)) < 400
+
+
+@pytest.mark.parametrize("answer", [b"", b"not HTTP\r\n\r\n"], ids=["late", "not HTTP"])
+def test_a_service_that_does_not_answer_about_its_force_scale_moves_nothing(
+    answer: bytes, service: Service, server: ServiceServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    late = threading.Event()
+    monkeypatch.setattr(server, "_answer_http", lambda _head: answer or str(late.wait(ENOUGH_S)).encode())
+    with pytest.raises(
+        DeviceFailure, match=r"multiplier of all forces is not known \(no number within 0\.5 s\).*restart"
+    ):
+        Inverse3Device(f"127.0.0.1:{server.port}").open()
+    late.set()
+    assert service.state.pushes == 0
+    assert until(lambda: service.state.ended == 1)
 
 
 class HttpAnswer:
-    """Answers one GET with a body."""
+    """Answers one GET with a body; with None it only waits."""
 
-    def __init__(self, body: bytes) -> None:
+    def __init__(self, body: bytes | None) -> None:
         self._body = body
         self._socket = socket.create_server(("127.0.0.1", 0))
 
@@ -168,6 +200,9 @@ class HttpAnswer:
         connection, _ = self._socket.accept()
         with connection:
             connection.recv(4096)
+            if self._body is None:
+                connection.recv(4096)
+                return
             connection.sendall(
                 b"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Length: %d\r\n\r\n%b" % (len(self._body), self._body)
             )

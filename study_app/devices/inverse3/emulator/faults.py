@@ -17,6 +17,7 @@ OF_OPENING: Final = (
     "gravity-off",  # gravity compensation was turned off for the device
     "disobeys",  # keeps its own settings
     "force-scale",
+    "unknown-scale",  # no answer about the force scale
 )
 OF_TIME: Final = (
     "late",  # each state 30 ms late

@@ -96,10 +96,9 @@ class ServiceServer:
 
     def _answer_http(self, head: bytes) -> bytes:
         """Answer a GET: "HTTP" 3.4.x, Devices; "Settings Reference" 3.5.x, GET /settings/KEY."""
-        known: dict[str, Any] = {"/settings/devices/force_scale": {"value": self.service.force_scale}}
-        known["/devices"] = self.service.inventory()
+        known = {"/settings/devices/force_scale": self.service.force_scale, "/devices": self.service.inventory()}
         path = head.split(b" ")[1].decode("latin-1")
-        if path not in known:
+        if known.get(path) is None:
             return b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
         body = json.dumps(known[path]).encode()
         return b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\nConnection: close\r\n\r\n%b" % (len(body), body)

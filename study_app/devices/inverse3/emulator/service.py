@@ -59,7 +59,7 @@ class Service(HandOrders):
     Attributes
     ----------
     config, status : of the device, as the documentation shows them; may be changed before a client connects
-    force_scale : the setting devices/force_scale
+    force_scale : the answer about the setting devices/force_scale; None: there is none
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class Service(HandOrders):
         self._tremble(random, tremor_m)
         self.config = config()
         self.status = dict(STATUS)
-        self.force_scale: float | None = 1.0
+        self.force_scale: Any = {"value": 1.0}
         self.version = "3.5"
         self.obeys = True
         quoted = np.frombuffer(f'"{DEVICE_ID}"'.encode(), np.uint8)
@@ -138,7 +138,9 @@ class Service(HandOrders):
         elif fault == "disobeys":
             self.obeys = False
         elif fault == "force-scale":
-            self.force_scale = 2.0
+            self.force_scale = {"value": 2.0}
+        elif fault == "unknown-scale":
+            self.force_scale = None
         elif fault == "late":
             state.lag_ns = 30_000_000
         elif fault == "slow":
