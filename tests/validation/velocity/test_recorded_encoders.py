@@ -1,0 +1,61 @@
+"""Real encoders go through estimators, sample validation and safety layer without an alarm."""
+
+import numpy as np
+import pytest
+
+from study_app.haptics.kernels.sample_validation import FASTEST_HAND_MPS
+from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_FADE, LIMITER_NORM, LIMITER_SLEW, LIMITER_SLOPE
+from study_app.protocol.load import load_scene
+from tests.haptics.scenes import COMPILED
+from tests.validation.velocity.recorded_encoders import (
+    COUNTS_M,
+    ESTIMATORS,
+    FORCE_LIMIT_N,
+    errors,
+    excerpt,
+    felt,
+    smoothed_mps,
+)
+
+pytestmark = [pytest.mark.skipif(not COMPILED, reason="many thousands of ticks"), pytest.mark.slow]
+
+LIMITERS = LIMITER_SLOPE | LIMITER_ENERGY | LIMITER_NORM | LIMITER_SLEW | LIMITER_FADE
+SHAKEN = {"Tool_5_Maryland_L_3/29", "Tool_4_Maryland_L_4/07"}
+"""Recordings in which the spindle shakes or the motor runs away: the passivity controller acts."""
+
+
+@pytest.mark.parametrize("encoder", COUNTS_M)
+@pytest.mark.parametrize(("study", "liquid"), [("physical2", "honey"), ("rek2024", "light_oil")])
+def test_no_sample_of_a_real_encoder_is_rejected(encoder: str, study: str, liquid: str) -> None:
+    """The motor is faster than strokes of a hand, and slower than the bound of the validation."""
+    scene, fastest_mps = load_scene(study, liquid), 0.0
+    for name, counts in excerpt().items():
+        x_m = COUNTS_M[encoder] * counts[:, list(COUNTS_M).index(encoder)]
+        fastest_mps = max(fastest_mps, 1e3 * float(np.abs(np.diff(x_m)).max()))
+        samples = felt(scene, x_m, COUNTS_M[encoder])
+        assert not (samples.limiters & ~LIMITERS).any(), name
+        assert not samples.status.any(), name
+        assert np.linalg.norm(samples.device_force_n, axis=1).max() <= FORCE_LIMIT_N * (1 + 1e-9)
+        assert name in SHAKEN or samples.withheld_n.sum() < 0.002 * samples.permitted_n.sum(), name
+    assert 0.9 < fastest_mps < FASTEST_HAND_MPS
+
+
+def test_errors_on_real_encoders_rank_the_estimators() -> None:
+    found = {
+        encoder: np.mean([errors(count_m * counts[:, column], count_m) for counts in excerpt().values()], axis=0)
+        for column, (encoder, count_m) in enumerate(COUNTS_M.items())
+    }
+    kinds = [velocity.kind for velocity in ESTIMATORS]
+    coarse, fine = (dict(zip(kinds, found[encoder], strict=True)) for encoder in ("spindle", "motor"))
+    assert fine["kalman"] < 10
+    assert fine["kalman"] < 0.6 * fine["lead"] < 0.6 * fine["ewma"]
+    assert coarse["raw"] == max(coarse.values())
+    assert all(coarse[kind] > fine[kind] for kind in kinds)
+
+
+def test_the_acausal_smoother_finds_the_speed_of_a_counted_stroke() -> None:
+    t_s = np.arange(3000) * 1e-3
+    count_m = COUNTS_M["spindle"]
+    found_mps = smoothed_mps(np.round(0.026 * np.sin(2 * np.pi * t_s) / count_m) * count_m)
+    true_mps = (0.052 * np.pi * np.cos(2 * np.pi * t_s))[500:-500]
+    assert np.sqrt(np.mean((found_mps - true_mps) ** 2)) < 0.01 * np.sqrt(np.mean(true_mps**2))
