@@ -133,10 +133,8 @@ def open_rig(
         cancelled=cancelled,
         options=settings.options,
     )
-    if cancelled is not None and cancelled():
-        device.close()
-        raise DeviceError(f"opening the device '{name}' was cancelled")
     try:
+        _check_wanted(name, cancelled)
         rig = Rig(device, Servo(device, clock=clock, rate_hz=settings.rate_hz, elements=settings.elements))
         if clock is None or clock.runs:
             rig.servo.start()
@@ -144,3 +142,8 @@ def open_rig(
         device.close()
         raise
     return rig
+
+
+def _check_wanted(name: str, cancelled: Callable[[], bool] | None) -> None:
+    if cancelled is not None and cancelled():
+        raise DeviceError(f"opening the device '{name}' was cancelled")

@@ -28,7 +28,8 @@ class Errors:
     ``wake`` is the largest difference as a share of Σ|e|/S, ``force_n`` that of the forces [N]; None where there is no
     reference. ``lag_s`` is the lag of the velocity filter under constant acceleration. ``left_out`` are effects that
     were not compared. ``withheld`` is the share of the force that safety withholds in the requested stroke
-    (``evaluation.appraisal_measurement``), None without one.
+    (``evaluation.appraisal_measurement``), None without one. ``velocity`` is the relative error of the velocity, and
+    what it would be if nothing of the device's dynamics were unknown; None if nothing is.
     """
 
     wake: float | None
@@ -36,3 +37,4 @@ class Errors:
     lag_s: float
     left_out: tuple[str, ...]
     withheld: float | None = None
+    velocity: tuple[float, float] | None = None

@@ -8,7 +8,7 @@ import numpy as np
 from study_app.evaluation import reference_model
 from study_app.evaluation.appraisal import Costs, EffectCost, Errors
 from study_app.evaluation.cost import measure
-from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, Dynamics
 from study_app.haptics.model.effects import NAMED
 from study_app.haptics.model.gate import calls_for, resolve
 from study_app.haptics.model.motion import Motion
@@ -26,6 +26,10 @@ _MOTIONS: Final = (
     ("zigzag", {"leg_s": 0.25, "legs": 8.0}),
 )
 LASTS_S: Final = 2.0
+HAND_M: Final = 0.03
+HAND_HZ: Final = 2.0
+FINE_M: Final = 10e-6
+"""An encoder count at the handle that is finer than the assumed one."""
 
 
 def costs(scene: Scene, *, batches: int = BATCHES) -> Costs:
@@ -71,6 +75,32 @@ def lag_s(scene: Scene) -> float:
     seen = simulate(still, motion)
     last = len(t_s) // 4  # of the end, at which the filter has settled
     return float(np.mean(RAMP_MPS2 * t_s[-last:] - seen["vx_mps"][-last:])) / RAMP_MPS2
+
+
+def velocity_errors(scene: Scene, dynamics: Dynamics) -> tuple[float, float]:
+    """Return the relative error of the velocity on a device, and on one of which nothing is unknown; RMS over RMS.
+
+    The hand moves by `HAND_M` at `HAND_HZ`. An unknown encoder count is taken to be `FINE_M`, an unknown delay a tick.
+    """
+    known = dynamics._replace(
+        delay_s=BELIEVED_TICKS / scene.rate_hz if dynamics.delay_s is None else dynamics.delay_s,
+        count_m=FINE_M if "count_m" in dynamics.assumed else dynamics.count_m,
+        assumed=(),
+    )
+    return _velocity_error(scene, dynamics, known.count_m), _velocity_error(scene, known, known.count_m)
+
+
+def _velocity_error(scene: Scene, dynamics: Dynamics, count_m: float) -> float:
+    t_s = np.arange(round(LASTS_S * scene.rate_hz)) / scene.rate_hz
+    turns = 2.0 * math.pi * HAND_HZ * t_s
+    rest = np.zeros_like(t_s)
+    counted_m = scene.scale * count_m * np.rint(HAND_M * np.sin(turns) / count_m)
+    still = scene.model_copy(update={"liquids": (), "knee": Knee(law="none"), "origin_m": (0.0, 0.0, 0.0)})
+    seen = samples_along(still, Motion(t_s, np.column_stack([counted_m, rest, rest])), dynamics)
+    true_mps = scene.scale * HAND_M * 2.0 * math.pi * HAND_HZ * np.cos(turns)
+    settled = len(t_s) // 4
+    wrong_mps = seen["velocity_mps"][settled:, 0] - true_mps[settled:]
+    return float(np.sqrt(np.mean(wrong_mps**2) / np.mean(true_mps[settled:] ** 2)))
 
 
 def _difference(scene: Scene, motion: Motion) -> tuple[float, float]:

@@ -16,7 +16,7 @@ from study_app.workers.server import Send, Stop
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """A scene to appraise, and optionally a stroke in it on a device of these dynamics."""
+    """A scene to appraise, and optionally a stroke in it, on a device of these dynamics."""
 
     scene: Scene
     stroke: Stroke | None = None
@@ -48,4 +48,5 @@ def appraise(question: Question, send: Send, stop: Stop) -> Errors | None:
         return None
     stroke = question.stroke
     share = measured.withheld_share(question.scene, stroke, question.dynamics) if stroke is not None else None
-    return replace(measured.errors(question.scene), withheld=share)
+    velocity = measured.velocity_errors(question.scene, question.dynamics) if question.dynamics.unknown else None
+    return replace(measured.errors(question.scene), withheld=share, velocity=velocity)

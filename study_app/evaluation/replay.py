@@ -1,8 +1,8 @@
 """Recomputes every force of a session from the recorded times and places, by the tick that sent them.
 
 The recordings contain the CRC-32 of each second of exact forces; here the forces are recomputed and compared with it.
-The same version of the program on the same kind of processor gives the same bits; seconds that differ are named. The
-delivered values of each interval are also recomputed from its recording and compared with the journal.
+The same kind of processor gives the same bits, by the version of the force rules that the receipt states; seconds that
+differ are named. The delivered values of each interval are also recomputed and compared with the journal.
 
 The key is opened only in memory, and not printed: the user who replays a session stays blind.
 
@@ -14,7 +14,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ from study_app.evaluation.recorded_intervals import (
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.safety import START_FADE_S, begin_scene, new_safety
 from study_app.haptics.model.device_dynamics import Dynamics, dynamics_from
+from study_app.haptics.model.force_rules import ForceRules, rules_from
 from study_app.haptics.model.layout import LIMITER_FADE, SAMPLE, records
 from study_app.haptics.model.scene import FADE_S, Scene
 from study_app.haptics.runtime.pack import adjust_into, pack
@@ -105,7 +106,7 @@ def replay(session_folder: Path) -> Replayed:
         raise StoreError(f"{study.key} is not the key that {session.path} ran under: restore it from a copy")
     lines = opened(journal.read(session.journal), key)
     protocol, devices, (drawn_from, participant) = _ran(session.receipt, kept, key, lines)
-    _again(records(SAMPLE, 0), Scene(), *devices[None], None)  # loads the compiled code: no part of what is measured
+    _again(records(SAMPLE, 0), Scene(), devices[None], None)  # loads the compiled code: no part of what is measured
     found = _Found()
     intervals = {_which(line): line for line in lines if line["event"] == "interval_ended"}
     before: _Before | None = None
@@ -129,7 +130,7 @@ def replay(session_folder: Path) -> Replayed:
         recorded, checks = recording_files.read_samples(path), recording_files.read_checks(path)
         start = time.perf_counter()
         samples = as_one_scene(recorded, steps)
-        before = _again(samples, scene, *devices[resumed], before, places_of(recorded, steps))
+        before = _again(samples, scene, devices[resumed], before, places_of(recorded, steps))
         found.compare(name, samples, before, checks)
         if (ended := intervals.get(_which(started))) is not None and _until_gap(samples.tick) == len(samples):
             interval = presented_by(protocol, key.codes, started).intervals[started["interval"] - 1]
@@ -137,6 +138,14 @@ def replay(session_folder: Path) -> Replayed:
             found.differences += [f"{name}: the column {column} differs" for column in different(again, ended)]
         found.computed_s += time.perf_counter() - start
     return found.replayed(time.perf_counter() - began)
+
+
+class _Device(NamedTuple):
+    """A device as a receipt records it, and the rules by which its forces were computed."""
+
+    limit_n: float
+    dynamics: Dynamics
+    rules: ForceRules
 
 
 @dataclass(slots=True)
@@ -155,12 +164,7 @@ class _Before:
 
 
 def _again(
-    samples: Any,
-    scene: Scene,
-    limit_n: float,
-    dynamics: Dynamics,
-    before: _Before | None,
-    steps: Sequence[tuple[int, Scene]] = (),
+    samples: Any, scene: Scene, device: _Device, before: _Before | None, steps: Sequence[tuple[int, Scene]] = ()
 ) -> _Before:
     """Return the forces of ``samples`` computed again, in a copy; the scene that is theirs is the last one's.
 
@@ -168,22 +172,22 @@ def _again(
     """
     out = samples.copy()
     serial = int(out.scene[-1]) if len(out) else 0
-    rest = pack(scene.model_copy(update={"liquids": (), "fade_s": FADE_S}), dynamics=dynamics)
-    model = pack(scene, dynamics=dynamics)
+    limit_n, dynamics, rules = device
+    rest = pack(scene.model_copy(update={"liquids": (), "fade_s": FADE_S}), dynamics=dynamics, rules=rules)
+    model = pack(scene, dynamics=dynamics, rules=rules)
     first = 0
     shared = _shared(before, out)
     if before is not None and shared is not None:
         first = shared
         _copy_forces(before.samples[len(before.samples) - first :], out[:first])
-        models = rest, before.model, model
-        _run_steps(models, (before.serial, serial), before.safety[0], out, first, steps, dynamics)
+        _run_steps((rest, before.model, model), (before.serial, serial), before.safety[0], out, first, steps, device)
         return _Before(serial, model, before.safety, out, before.knows_its_start)
     safety = new_safety(limit_n)
     if len(out) and out.tick[0] != 0:
         _assume(safety[0], out)
         first = 1
     knows_its_start = not out.force_n[out.scene != serial].any()
-    _run_steps((rest, rest, model), (0, serial), safety[0], out, first, steps, dynamics)
+    _run_steps((rest, rest, model), (0, serial), safety[0], out, first, steps, device)
     return _Before(serial, model, safety, out, knows_its_start)
 
 
@@ -223,12 +227,12 @@ def _run_steps(
     out: Any,
     first: int,
     steps: Sequence[tuple[int, Scene]],
-    dynamics: Dynamics,
+    device: _Device,
 ) -> None:
     """Take each of ``out`` from ``first`` on, with other numbers of its own scene from each step on."""
     for place, scene in steps:
         _run(*models, *serials, safety, out[:place], first)
-        adjust_into(models[-1], scene, dynamics=dynamics)
+        adjust_into(models[-1], scene, dynamics=device.dynamics, rules=device.rules)
         first = max(first, place)
     _run(*models, *serials, safety, out, first)
 
@@ -374,17 +378,17 @@ def _presented(lines: Sequence[Line]) -> Iterator[tuple[Line, Line | None, str |
 
 def _ran(
     path: Path, kept: Mapping[str, Any], key: blinding.Key, lines: Sequence[Line]
-) -> tuple[Protocol, dict[str | None, tuple[float, Dynamics]], tuple[int, str]]:
+) -> tuple[Protocol, dict[str | None, _Device], tuple[int, str]]:
     """Return what ran, by the receipt that was ``kept`` at ``path``: protocol, devices, and seed with participant.
 
-    A device is its force limit [N] and its dynamics, by the time at which the session was resumed with it, or it was
-    connected again; that of the session's beginning is under None.
+    Devices are by the time at which they were opened again; that of the session's beginning is under None.
     """
     try:
         described = {None: kept["device"]} | {entry["at"]: entry["device"] for entry in kept.get("resumed", ())}
         described |= {line["at"]: line["described"] for line in lines if line["event"] == "device_reconnected"}
         devices = {
-            at: (float(device.get("force_limit_n", np.inf)), dynamics_from(device)) for at, device in described.items()
+            at: _Device(float(device.get("force_limit_n", np.inf)), dynamics_from(device), rules_from(device))
+            for at, device in described.items()
         }
         whose = kept["seed"], kept["participant"]
         return as_recorded(whole_protocol(kept["protocol"], key), kept, key), devices, whose

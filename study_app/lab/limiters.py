@@ -13,6 +13,7 @@ from study_app.haptics.model.layout import (
     LIMITER_GLITCH,
     LIMITER_NON_FINITE,
     LIMITER_NORM,
+    LIMITER_SATURATED,
     LIMITER_SLEW,
     LIMITER_SLOPE,
     LIMITER_STALE,
@@ -33,6 +34,7 @@ WORDS: Final = {
     LIMITER_NON_FINITE: "Non-finite force",
     LIMITER_STOP: "Force stopped",
     LIMITER_ESTIMATOR: "Velocity filter",
+    LIMITER_SATURATED: "Saturated motors",
 }
 """The displayed name of each limiter in all windows, in the order of the lab's card."""
 

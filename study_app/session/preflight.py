@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from study_app.devices.registry import descriptor_of
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, UNKNOWN, Dynamics
 from study_app.haptics.model.slope_limits import refuses
 from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
@@ -36,6 +37,8 @@ SLOW_PROBE_S = 0.1
 TABLES_BYTES = 20_000_000
 RECORDED_BYTES_PER_S = 60e6 / 1800
 MOST_OF_A_TICK = 0.2  # share of a tick that the force model may take
+SAME = 1.1  # greatest ratio of two errors that count as equal
+_UNKNOWN = {"delay_s": "delay", "count_m": "encoder count", "mass_kg": "mass"}
 SPARE = 3  # times what a session of the expected length takes
 
 
@@ -59,8 +62,9 @@ class Facts:
     ``grant`` what the system lets the servo's thread do. ``dynamics`` are the device's, with its measured
     delay, ``delay_ticks`` is the delay that the servo uses now. ``withheld`` is the share of
     the force that passivity controller and slew limit are expected to withhold in the fastest stroke of a task, by
-    liquid; None where it was not computed. ``outlets`` are the streams and ports to other programs; ``video`` is what
-    was found of the study's videos, None without any.
+    liquid; None where it was not computed. ``velocity_errors`` are the relative error of the velocity and what it would
+    be if all of the device's dynamics were known; None where all is. ``outlets`` are the streams and ports to other
+    programs; ``video`` is what was found of the study's videos, None without any.
     """
 
     device: str
@@ -79,6 +83,7 @@ class Facts:
     dynamics: Dynamics = UNKNOWN
     delay_ticks: int = BELIEVED_TICKS
     withheld: Mapping[str, float] | None = None
+    velocity_errors: tuple[float, float] | None = None
     outlets: tuple[OutletStatus, ...] = ()
     video: VideosFound | None = None
     lateness_ns: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64), compare=False, repr=False)
@@ -126,7 +131,7 @@ def checks(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
         *_video(facts),
     ]
     found += _outlets(facts)
-    return (*found, *_cost(facts, protocol), *_withheld(facts, protocol), *_balance(facts, protocol))
+    return (*found, *_cost(facts, protocol), *_velocity(facts), *_withheld(facts, protocol), *_balance(facts, protocol))
 
 
 def refused(found: Iterable[Check]) -> str:
@@ -295,6 +300,20 @@ def _cost(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
     if share > MOST_OF_A_TICK:
         return (Check("Cost of the scenes", "warning", value, about, "Remove an effect from the scene.", share),)
     return (Check("Cost of the scenes", "ok", value, about, share=share),)
+
+
+def _velocity(facts: Facts) -> tuple[Check, ...]:
+    """Say what is not known of a device that gives force, and what that costs."""
+    if facts.velocity_errors is None or not facts.dynamics.unknown or descriptor_of(facts.device).kind != "felt":
+        return ()
+    now, known = (100 * error for error in facts.velocity_errors)
+    missing = [_UNKNOWN[name] for name in facts.dynamics.unknown]
+    listed = " and ".join(filter(None, (", ".join(missing[:-1]), missing[-1])))
+    about = f"error at 2 Hz, because the device's {listed} {'are' if len(missing) > 1 else 'is'} unknown"
+    if now <= SAME * known:
+        return (Check("Velocity", "ok", f"{now:.2g} %", about.replace("because", "although")),)
+    advice = f"Measure the device: liquid-study devices bench {facts.device}."
+    return (Check("Velocity", "warning", f"{now:.2g} % instead of {known:.2g} %", about, advice),)
 
 
 def _withheld(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:

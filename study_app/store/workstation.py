@@ -63,7 +63,8 @@ class DeviceBench(_Strict):
     """What a bench measured of a device, on the day ``measured``; of x, y and z.
 
     ``mass_kg``, ``damping_nspm`` and ``friction_n`` are the device's own, ``stable_nspm`` the greatest stable damping,
-    ``delay_ms`` how late a force acts, ``gain`` newtons on a scale for each newton sent (None without a scale). A
+    ``delay_ms`` how late a force acts, ``gain`` newtons on a scale for each newton sent (None without a scale),
+    ``count_m`` the encoder count [m] that explains the noise of positions in motion (None: it moved too little). A
     device is known by ``name`` and ``serial``, "" where it has none. ``report`` is the path of bench.md.
     """
 
@@ -76,6 +77,7 @@ class DeviceBench(_Strict):
     delay_ms: OfAxes
     stable_nspm: OfAxes
     gain: float | None = None
+    count_m: Annotated[float, Field(gt=0.0)] | None = None
     report: Place | None = None
 
     @property

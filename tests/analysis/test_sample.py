@@ -20,6 +20,7 @@ from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclude
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
+from study_app.store.tables.columns import LATER
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
@@ -46,7 +47,7 @@ def known(session: SessionFolder, folder: Path) -> list[dict[str, float]]:
     """Return what was measured of each trial: forces, motion, and how often each limiter acted."""
     measured = ("limiter_", "force_", "path_", "mean_speed", "duration_")
     return [
-        {name: value for name, value in line.items() if name.startswith(measured) and value is not None}
+        {name: it for name, it in line.items() if name.startswith(measured) and it is not None and name not in LATER}
         for line in opened(journal.read(session.journal), read_key(folder))
         if line["event"] == "trial_ended"
     ]

@@ -11,9 +11,11 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.devices.bench import measurements, procedure
+from study_app.devices.bench.kept import dynamics_of
 from study_app.devices.bench.measurements import gain_of
 from study_app.devices.bench.report import as_json, as_markdown, kept
 from study_app.errors import DeviceError, DeviceLost
+from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.store import workstation
 from tests.compiled import needs_servo
 
@@ -71,6 +73,7 @@ def test_numbers_of_the_simulated_handle_are_found(found_of, name, delay_ms):
         assert motion.friction_n == pytest.approx(0.1, abs=0.01)
         assert motion.delay_ms == pytest.approx(delay_ms, abs=0.2)
         assert motion.explained > 0.99
+    assert found.count_m == pytest.approx(found.device["dynamics"]["count_m"], rel=0.2)
     assert found.gain.gain == pytest.approx(1.0, abs=0.01)
     assert found.regularity.new_share == pytest.approx(1.0)
     assert found.regularity.delay_ticks == (round(delay_ms), round(delay_ms))
@@ -97,6 +100,9 @@ def test_report_and_settings_hold_what_was_found(found_of, tmp_path, monkeypatch
     settings = workstation.load()
     assert len(settings.benches) == 1
     assert settings.bench_of(found.device) == own
+    kept_of = dynamics_of(1e-3, None, None, name="falcon-emulated", serial="EMULATED")
+    assert kept_of == Dynamics(1e-3, own.count_m, min(own.mass_kg))
+    assert dynamics_of(None, 1e-5, None, name="falcon-emulated", serial="ANOTHER").unknown == ("delay_s", "mass_kg")
     assert settings.bench_of({"name": "falcon-emulated", "serial": "ANOTHER"}) is None
     from study_app.session.start import with_bench
 

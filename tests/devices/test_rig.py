@@ -29,3 +29,23 @@ def test_a_device_cancelled_while_it_opens_is_closed_and_gets_no_servo(monkeypat
     with pytest.raises(DeviceError, match="'scripted' was cancelled"):
         rig.open_rig("scripted", SETTINGS, cancelled=lambda: bool(opened))
     assert closed == ["scripted"]
+
+
+@needs_servo
+def test_a_device_is_closed_if_asking_whether_to_cancel_fails(monkeypatch: Any) -> None:
+    opened: list[Any] = []
+    open_before = rig.open_device
+
+    def open_device(*words: Any, **named: Any) -> Any:
+        device = open_before(*words, **named)
+        opened.append(device)
+        monkeypatch.setattr(device, "close", lambda: opened.append("closed"))
+        return device
+
+    def fail() -> bool:
+        raise RuntimeError("the window is gone")
+
+    monkeypatch.setattr(rig, "open_device", open_device)
+    with pytest.raises(RuntimeError, match="the window is gone"):
+        rig.open_rig("scripted", SETTINGS, cancelled=fail)
+    assert opened[1:] == ["closed"]

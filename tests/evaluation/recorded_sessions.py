@@ -8,9 +8,11 @@ import numpy as np
 import pyarrow as pa  # type: ignore[import-untyped]
 from pyarrow import parquet
 
+from study_app.devices.rig import Rig
 from study_app.devices.scripted import ScriptedDevice
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
+from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.pages import Page, TaskPage
 from study_app.session.ports import Ports
@@ -31,18 +33,30 @@ from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
 from tests.session import small
 
+STRESSED: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "honey": (
+        {"scale": 3, "velocity": {"kind": "kalman"}, "body": {"diameter_m": 0.068, "density_kg_m3": 1000}},
+        {"density_kg_m3": 1420, "viscosity_pa_s": 10, "effects": ["buoyancy", "unsteady_drag"]},
+    ),
+    "light_oil": (
+        {"scale": 10, "velocity": {"kind": "ewma"}},
+        {"density_kg_m3": 4500, "effects": ["drag", "added_mass", "wake"], "wake": {"length": 125, "scaling": 250}},
+    ),
+}
+"""Scene and liquid of studies on which limits and passivity controller act."""
 
-def begun(folder: Path, device: ScriptedDevice, servo: Servo) -> SessionStore:
+
+def begun(folder: Path, device: ScriptedDevice, servo: Servo, study: Protocol | None = None) -> SessionStore:
     return begin(
         folder,
-        small.protocol(),
+        study or small.protocol(),
         b"small",
         SessionStart(
             "P001",
             seed=1,
             operator="",
             language="en",
-            device=device.describe(),
+            device=Rig(device, servo).described,
             screens={},
             simulated=True,
             recordings=True,
@@ -51,9 +65,11 @@ def begun(folder: Path, device: ScriptedDevice, servo: Servo) -> SessionStore:
     )
 
 
-def held(store: SessionStore, device: ScriptedDevice, servo: Servo) -> tuple[Runner, Callable[[int], None]]:
+def held(
+    store: SessionStore, device: ScriptedDevice, servo: Servo, study: Protocol | None = None
+) -> tuple[Runner, Callable[[int], None]]:
     """Return the runner of a session in which a hand moves, and what lets ticks pass."""
-    study, t_s = small.protocol(), np.arange(0, 60, 0.005)
+    study, t_s = study or small.protocol(), np.arange(0, 60, 0.005)
     schedule = build_schedule(study, "P001", 1)
 
     def present(page: Page) -> None:
@@ -98,6 +114,46 @@ def troubled(folder: Path) -> Path:
             wait(1500)
             runner.post(EndAsked(clock.seconds(), "aborted", ""))
             place: Path = store.folder.path
+    return place
+
+
+def stressed(folder: Path, liquid: str) -> Path:
+    """Hold a session in which a hand shakes and then stirs a liquid of `STRESSED`; return its folder.
+
+    A force acts two ticks late, later three; single positions are 5 mm off.
+    """
+    scene, made_of = STRESSED[liquid]
+    explore = {**small.TABLES["tasks"]["explore"], "min_s": 5, "max_s": 6}
+    study = Protocol.model_validate(
+        small.TABLES
+        | {"format": 2, "scene": scene, "liquids": dict.fromkeys(("thin", "thick"), made_of)}
+        | {"tasks": {**small.TABLES["tasks"], "explore": explore}}
+    )
+    device = ScriptedDevice()
+    handle = device.state.handle
+    handle.delay = 2
+    with (
+        device,
+        Servo(device, clock=VirtualClock(), elements=200) as servo,
+        begun(folder, device, servo, study) as store,
+    ):
+        runner, wait = held(store, device, servo, study)
+        t_s = np.arange(0, 10, 0.001)
+        along_m = np.where(t_s < 1.2, 0.03 * np.sin(10 * np.pi * t_s), 0.02 * np.sin(3.2 * np.pi * t_s))
+        device.follow(t_s, np.column_stack((along_m, 0.005 * np.cos(9 * t_s), 0 * t_s)))
+        runner.post(Begin(store.clock.seconds()))
+        wait(100)
+        runner.post(Continue(store.clock.seconds()))
+        wait(2300)
+        for _ in range(3):
+            handle.position_m[0] += 0.005
+            servo.advance(1)
+            handle.position_m[0] -= 0.005
+            wait(300)
+        handle.delay = 3
+        wait(600)
+        runner.post(EndAsked(store.clock.seconds(), "aborted", ""))
+        place: Path = store.folder.path
     return place
 
 

@@ -18,7 +18,7 @@ from study_app.evaluation.appraisal_worker import Question, appraise, start_appr
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.liquid import Box
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Ewma, Line, Raw
+from study_app.haptics.model.scene import Ewma, Kalman, Line, Raw
 from study_app.haptics.runtime.offline import samples_along
 from study_app.protocol.load import load, load_scenes
 from study_app.protocol.trials.tasks.explore import Explore
@@ -49,6 +49,24 @@ def test_the_thesis_liquids_are_the_definition_to_rounding(name: str) -> None:
     assert found.wake < 1e-12
     assert found.force_n < 1e-9
     assert found.left_out == ()
+
+
+@pytest.mark.parametrize(
+    ("unknown", "now", "known"),
+    [
+        (UNKNOWN, (0.11, 0.14), (0.0, 0.012)),  # EWMA in place of the Kalman filter
+        (Dynamics(1e-3, assumed=("count_m",)), (0.0, 0.02), (0.0, 0.012)),
+        (Dynamics(1e-3, 10e-6, assumed=("mass_kg",)), (0.0, 0.012), (0.0, 0.012)),
+    ],
+)
+def test_the_velocity_is_worse_where_the_devices_numbers_are_unknown(
+    unknown: Dynamics, now: tuple[float, float], known: tuple[float, float]
+) -> None:
+    scene = THESIS["honey"].model_copy(update={"velocity": Kalman()})
+    found = appraisal_measurement.velocity_errors(scene, unknown)
+    assert now[0] < found[0] < now[1]
+    assert known[0] < found[1] < known[1]
+    assert (found[0] > found[1]) == (unknown.assumed != ("mass_kg",))
 
 
 def test_an_error_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:

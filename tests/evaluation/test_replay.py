@@ -7,12 +7,15 @@ from typing import Any
 
 import pytest
 
+from study_app.devices.rig import Rig
 from study_app.devices.scripted import ScriptedDevice
 from study_app.errors import StoreError
 from study_app.evaluation import replay as replay_module
 from study_app.evaluation.replay import replay
 from study_app.haptics.model import gate
 from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.force_rules import FORCE_RULES, VERSIONS
+from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_SLEW, LIMITER_SLOPE
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol import formats
@@ -21,7 +24,7 @@ from study_app.session.transitions.events import Begin, Continue, EndAsked, Paus
 from study_app.store import recording_files
 from study_app.store.sessions.reopen import reopen
 from tests.compiled import needs_servo
-from tests.evaluation.recorded_sessions import begun, held, rewrite, session, troubled
+from tests.evaluation.recorded_sessions import STRESSED, begun, held, rewrite, session, stressed, troubled
 from tests.faults.support import short
 from tests.session import small
 
@@ -58,7 +61,7 @@ def resumed_on_another_device(folder: Path) -> Path:
             runner.post(PauseAsked(store.clock.seconds(), "operator"))
         place: Path = store.folder.path
     with LightDevice() as device, Servo(device, clock=VirtualClock(), elements=100) as servo:
-        described = device.describe()
+        described = Rig(device, servo).described
         with reopen(
             place, small.protocol(), b"small", operator="", device=described, screens={}, now_ns=servo.now_ns
         ) as store:
@@ -110,6 +113,16 @@ def test_repeats_pauses_stops_and_fades_come_out_to_the_last_bit(tmp_path: Path)
     assert found.recordings == 5
 
 
+@pytest.mark.parametrize("liquid", STRESSED)
+def test_forces_that_limits_change_come_out_to_the_last_bit(tmp_path: Path, liquid: str) -> None:
+    place = stressed(tmp_path / "results", liquid)
+    limiters = recording_files.read_samples(place / "recordings" / "trial-001.parquet").limiters
+    assert all((limiters & bit).any() for bit in (LIMITER_SLOPE, LIMITER_ENERGY, LIMITER_SLEW))
+    found = replay(place)
+    assert (found.differences, found.uncompared) == ((), ())
+    assert (found.recordings, found.proved) == (1, True)
+
+
 def test_a_session_that_goes_on_with_another_device_comes_out_to_the_last_bit(tmp_path: Path) -> None:
     place = resumed_on_another_device(tmp_path / "results")
     found = replay(place)
@@ -118,6 +131,28 @@ def test_a_session_that_goes_on_with_another_device_comes_out_to_the_last_bit(tm
     receipt = json.loads((place / "receipt.json").read_text())
     (place / "receipt.json").write_text(json.dumps(receipt | {"resumed": []}))
     with pytest.raises(StoreError, match="lacks the device since"):
+        replay(place)
+
+
+def test_each_part_of_a_session_is_replayed_by_the_force_rules_that_its_receipt_states(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for liquid in small.TABLES["liquids"].values():
+        monkeypatch.setitem(liquid, "effects", ["drag", "added_mass"])
+    place = resumed_on_another_device(tmp_path / "results")
+    receipt = json.loads((place / "receipt.json").read_text())
+    lighter = receipt["resumed"][0]["device"]
+    assert receipt["device"]["force_rules"] == lighter["force_rules"] == FORCE_RULES
+    monkeypatch.setitem(VERSIONS, 1, VERSIONS[1]._replace(cut_inertia_share=0.0))
+    assert replay(place).proved
+    del lighter["force_rules"]
+    (place / "receipt.json").write_text(json.dumps(receipt))
+    differences = replay(place).differences
+    assert differences
+    assert all(line.startswith("trial 1, attempt 2:") for line in differences)
+    lighter["force_rules"] = FORCE_RULES + 1
+    (place / "receipt.json").write_text(json.dumps(receipt))
+    with pytest.raises(StoreError, match=f"force rules {FORCE_RULES + 1}, this version knows 1 to {FORCE_RULES}"):
         replay(place)
 
 

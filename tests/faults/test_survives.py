@@ -51,7 +51,7 @@ def rows(results: Path) -> list[dict[str, str]]:
 def test_an_unplugged_device_is_reconnected_and_its_trial_presented_again(session: tuple[dict[str, Any], Path]) -> None:
     told, results = session
     assert not told["lost"]["force"]
-    assert "stopped responding" in told["lost"]["banner"]
+    assert "it is no longer there" in told["lost"]["banner"]
     assert "Plug in the device" in told["lost"]["advice"]
     assert told["lost"]["banner_in_window"]
     assert "device" not in told["lost"]["page"]

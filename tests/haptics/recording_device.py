@@ -8,6 +8,7 @@ from study_app.haptics.kernels.c_functions import (
     READ_NEW,
     READ_NOTHING_NEW,
     WRITE,
+    WRITE_SATURATED,
     c_function,
     fence,
     record_at,
@@ -32,6 +33,7 @@ PROBE = np.dtype(
         ("buttons", np.int64),
         ("delay_ticks", np.int64),  # as it says it measured it
         ("share_sent", np.float64),  # of the force, as it says
+        ("saturates", np.int64),  # 1 where it says that its motors saturate
         ("measured", np.int64),  # what it says it measured, of the following
         ("measured_mps", np.float64, (3,)),
         ("orientation", np.float64, (4,)),
@@ -93,7 +95,9 @@ def _write(context, command):
     probe.writes += 1
     if probe.reads >= probe.lost_at_read and probe.held_when_lost_n != 0.0:
         row.sent_n[0] = probe.held_when_lost_n
-    return READ_LOST if probe.writes >= probe.lost_at_write else 0
+    if probe.writes >= probe.lost_at_write:
+        return READ_LOST
+    return WRITE_SATURATED if probe.saturates else 0
 
 
 class Probe:

@@ -8,7 +8,7 @@ import pytest
 
 from study_app.devices.scripted import ScriptedDevice
 from study_app.errors import StoreError
-from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.servo import Servo
@@ -98,6 +98,34 @@ def test_the_delay_of_the_loop_is_told_with_where_it_comes_from(delay_s: float |
     (found,) = [check for check in checks(facts, small.protocol()) if check.name == "Loop delay"]
     assert found.value == "1 tick"
     assert said in found.about
+
+
+@pytest.mark.parametrize(
+    ("dynamics", "errors", "said"),
+    [
+        (
+            UNKNOWN,
+            (0.121, 0.0101),
+            "12 % instead of 1 %; error at 2 Hz, because the device's delay, encoder count and mass are unknown; "
+            "Measure the device: liquid-study devices bench force-dimension:7.",
+        ),
+        (
+            Dynamics(1e-3, assumed=("mass_kg",)),
+            (0.01, 0.01),
+            "1 %; error at 2 Hz, although the device's mass is unknown",
+        ),
+    ],
+)
+def test_what_is_not_known_of_a_device_is_told_with_its_cost(
+    dynamics: Dynamics, errors: tuple[float, float], said: str
+) -> None:
+    changed = {"dynamics": dynamics, "velocity_errors": errors}
+    facts = replace(small.WELL, device="force-dimension:7", **changed)
+    (check,) = [one for one in checks(facts, small.protocol()) if one.name == "Velocity"]
+    assert check.said == said
+    assert check.verdict == ("warning" if "instead" in said else "ok")
+    assert "Velocity" not in verdicts(**changed)  # a mouse gives no force
+    assert "Velocity" not in verdicts(device="force-dimension", dynamics=Dynamics(1e-3))
 
 
 def test_what_was_not_granted_is_told_with_how_to_grant_it() -> None:

@@ -6,9 +6,12 @@ import io
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from study_app.store.blinded.blinding import Key, read_key
+from study_app.store.blinded.sealing import opened, sealed
 from study_app.store.folders import StudyFolder
 from study_app.store.tables.columns import TABLES
 
@@ -16,8 +19,8 @@ RECORDED: dict[str, dict[str, str]] = json.loads((Path(__file__).parent / "forma
 UNEQUAL = ("at", "previous", "version", "sha256", "frames_sha256")
 """Fields of the journal that differ from run to run or with the program's version."""
 
-ADDED = ("text_sha256", "study_version")
-"""Fields that later versions write besides: of the consent that the participant read."""
+ADDED = ("text_sha256", "study_version", "limiter_saturated")
+"""Fields that later versions write besides: of the consent that the participant read, and a sealed count."""
 
 WALL_CLOCK = {column.name for columns in TABLES.values() for column in columns if column.kind == "time"}
 
@@ -26,10 +29,11 @@ def sha256(content: object) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True, ensure_ascii=False).encode()).hexdigest()
 
 
-def journal(path: Path) -> list[dict[str, object]]:
+def journal(path: Path, key: Key) -> list[dict[str, Any]]:
     """Return the lines without what differs from run to run; the recorder writes its own lines whenever it is done."""
-    lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
-    kept = [{name: value for name, value in line.items() if name not in UNEQUAL + ADDED} for line in lines]
+    lines = opened([json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()], key)
+    fields = ({name: value for name, value in line.items() if name not in UNEQUAL + ADDED} for line in lines)
+    kept = [sealed(lines[0], one["event"], one, key) for one in fields]
     told = [line for line in kept if line["event"] != "recorded"]
     recorded = [{**line, "t_s": None} for line in kept if line["event"] == "recorded"]
     recorded.sort(key=lambda line: (line["trial"], line["attempt"]))
@@ -48,7 +52,7 @@ def hashes(folder: StudyFolder) -> Iterator[tuple[str, str]]:
         yield path.relative_to(folder.path).as_posix(), sha256(table(path))
     for session in folder.sessions():
         place = session.path.relative_to(folder.path).as_posix()
-        yield f"{place}/journal", sha256(journal(session.journal))
+        yield f"{place}/journal", sha256(journal(session.journal, read_key(folder.path)))
         yield f"{place}/protocol", sha256(json.loads(session.receipt.read_text(encoding="utf-8"))["protocol"])
 
 

@@ -1,12 +1,18 @@
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
 from study_app import __version__
 from study_app.errors import StoreError
+from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
+from study_app.protocol.streams import stream
+from study_app.store.blinded.blinding import open_or_draw_key, read_key
+from study_app.store.blinded.whole_protocol import whole_protocol
 from study_app.store.receipt import read, versions, without_conditions, write
+from tests.protocol.trials.level_studies import text_of
 
 
 def test_the_protocol_is_kept_without_its_conditions(protocol: Protocol) -> None:
@@ -26,6 +32,24 @@ def test_the_protocol_is_kept_without_its_conditions(protocol: Protocol) -> None
     }
     assert shown["blocks"]["practice"]["compares"] is None
     assert not any("conditions" in block for block in shown["blocks"].values())
+
+
+@pytest.mark.parametrize(
+    "steps",
+    [
+        ('sequence = ["viscosity"]', 'sequence = ["viscosity"]'),
+        ('sequences = [["viscosity"], ["viscosity"]]', 'sequence = ["viscosity"]'),
+        ("", 'sequences = [["viscosity"]]'),
+        (),
+    ],
+)
+def test_the_protocol_is_whole_again_with_its_key_whoever_has_which_steps(tmp_path: Path, steps: Sequence[str]) -> None:
+    groups = "".join(f"\n[groups.g{number}]\n{own}\n" for number, own in enumerate(steps))
+    shared = () if "" in steps else (('sequence = ["viscosity"]\n', "" if steps else 'sequences = [["viscosity"]]\n'),)
+    protocol = parse(f"{text_of(*shared)}{groups}".encode(), "levels")
+    open_or_draw_key(tmp_path, protocol, random=stream(1, "key").random)
+    shown = json.loads(json.dumps(without_conditions(protocol)))
+    assert whole_protocol(shown, read_key(tmp_path)) == protocol
 
 
 def test_versions_name_what_shapes_a_session() -> None:

@@ -23,6 +23,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 RELEASES = Path(__file__).parent / "releases"
 ROOT = Path(__file__).parents[2]
+RECORDED = sorted(path.parent for path in RELEASES.glob("*/*/data/sub-P001/ses-01/recordings"))
 STUDIES = [
     (path.parent.name, study)
     for path in sorted(RELEASES.glob("*/expected.json"))
@@ -71,10 +72,12 @@ def test_every_answer_is_exported_and_the_report_is_whole(
 
 
 @needs_servo
-def test_its_recordings_give_the_same_forces(tmp_path: Path) -> None:
-    folder = StudyFolder(Path(shutil.copytree(RELEASES / "0.2" / "demo", tmp_path / "demo")))
-    found = replay(folder.session("P001", 1).path)
-    assert (found.recordings, found.differences, found.uncompared) == (4, (), ())
+@pytest.mark.parametrize("session", RECORDED, ids=lambda path: path.parts[-4])
+def test_its_recordings_give_the_same_forces(session: Path) -> None:
+    """The code of 0.2 recorded "honey" and "light_oil" (`recorded_sessions.stressed`)."""
+    found = replay(session)
+    assert (found.differences, found.uncompared) == ((), ())
+    assert found.recordings == len(list(session.glob("recordings/trial-???.parquet"))) > 0
 
 
 @needs_servo

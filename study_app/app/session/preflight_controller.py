@@ -43,6 +43,7 @@ class Asked(NamedTuple):
 class Appraisal:
     """Cost of the most expensive scene of a study, and error of the least accurate; asked one scene after another.
 
+    ``velocity_errors`` are those of `Facts`, None if all is known of the device.
     ``withheld`` is the share of each liquid's force that is withheld in the fastest stroke on a device of these
     ``dynamics``, once all are known.
     """
@@ -55,6 +56,7 @@ class Appraisal:
         self.tick_s: float | None = None
         self.error_n: float | None = None
         self.withheld: dict[str, float] | None = None
+        self.velocity_errors: tuple[float, float] | None = None
         self._errors_n: list[float | None] = []
         self._shares: dict[str, float] = {}
         self._ask()
@@ -75,6 +77,8 @@ class Appraisal:
                 news = True
                 continue
             self._errors_n.append(answer.force_n if isinstance(answer, Errors) else None)
+            if isinstance(answer, Errors) and answer.velocity is not None:
+                self.velocity_errors = max(answer.velocity, self.velocity_errors or answer.velocity)
             liquid = self._waiting.pop(0).liquid
             if isinstance(answer, Errors) and answer.withheld is not None:
                 self._shares[liquid] = max(answer.withheld, self._shares.get(liquid, 0.0))
@@ -158,6 +162,7 @@ class Preflight(QObject):
             self._ready.facts_with(shown_on.refreshRate(), shown_on.devicePixelRatio()),
             tick_s=found.tick_s,
             withheld=found.withheld,
+            velocity_errors=found.velocity_errors,
         )
 
     def _show(self) -> None:

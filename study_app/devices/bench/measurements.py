@@ -18,6 +18,11 @@ SIGMA_S: Final = 4e-3
 SLOW_MPS: Final = 1e-3
 """Speed at which the model's friction is three quarters of that in motion."""
 MOST_DELAY_S: Final = 8e-3
+DIFFERENCE: Final = 5
+COUNTING_MPS: Final = (0.02, 0.2)
+"""Speeds at which positions show the encoder's count."""
+LEAST_COUNTED: Final = 200
+_MEDIAN_OF_NORMAL: Final = 0.6745  # of a normal distribution's absolute value, by its standard deviation
 _STEP_S: Final = 0.1e-3
 _NEAR: Final = 10
 _REACH: Final = 5  # widths of the Gaussian on either side
@@ -44,13 +49,17 @@ class Noise(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """The dynamics of an axis: mass [kg], damping [N·s/m], Coulomb friction [N], delay [ms], variance explained."""
+    """The dynamics of an axis: mass [kg], damping [N·s/m], Coulomb friction [N], delay [ms], variance explained.
+
+    ``count_um`` is the encoder count [µm] that explains the noise of its positions; NaN if it moved too little.
+    """
 
     mass_kg: float
     damping_nspm: float
     friction_n: float
     delay_ms: float
     explained: float
+    count_um: float = math.nan
 
 
 class Gain(NamedTuple):
@@ -159,7 +168,32 @@ def motion_under_force(stretches: Sequence[Any], axis: int, rate_hz: float) -> M
         float(friction_n),
         1e3 * delay_s,
         1.0 - left / variance if variance > 0.0 else 0.0,
+        count_um(stretches, axis),
     )
+
+
+def count_um(stretches: Sequence[Any], axis: int) -> float:
+    """Return the encoder count [µm] along an axis; NaN if it moved too little.
+
+    Counting moves a position by up to half a count, evenly distributed: by count / √12 RMS. `DIFFERENCE`th differences
+    of positions contain this noise and almost nothing of a motion below 25 Hz. Slower motion would repeat counts; in
+    faster motion the uncertain time of samples would count, too.
+    """
+    noises_m: list[Floats] = []
+    for samples in stretches:
+        t_s, position_m = _new(samples)
+        if len(t_s) <= DIFFERENCE:
+            continue
+        steps_s, x_m = np.diff(t_s), position_m[:, axis]
+        speed_mps = np.abs(x_m[DIFFERENCE:] - x_m[:-DIFFERENCE]) / (t_s[DIFFERENCE:] - t_s[:-DIFFERENCE])
+        longest_s = np.lib.stride_tricks.sliding_window_view(steps_s, DIFFERENCE).max(axis=1)
+        used = (speed_mps > COUNTING_MPS[0]) & (speed_mps < COUNTING_MPS[1]) & (longest_s < 1.5 * np.median(steps_s))
+        noises_m.append(np.diff(x_m, DIFFERENCE)[used])
+    noise_m = np.concatenate(noises_m) if noises_m else np.empty(0)
+    if len(noise_m) < LEAST_COUNTED:
+        return math.nan
+    spread_m = float(np.median(np.abs(noise_m))) / _MEDIAN_OF_NORMAL
+    return 1e6 * math.sqrt(12.0 / math.comb(2 * DIFFERENCE, DIFFERENCE)) * spread_m
 
 
 class _Prepared(NamedTuple):

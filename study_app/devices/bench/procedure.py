@@ -91,6 +91,12 @@ class Found:
     overruns: int
 
     @property
+    def count_m(self) -> float | None:
+        """The coarsest encoder count of the three axes [m]; None where the handle moved too little."""
+        counts_um = [one.count_um for one in self.motions if one.count_um > 0.0]
+        return 1e-6 * max(counts_um) if counts_um else None
+
+    @property
     def fits(self) -> bool:
         """Whether mass, damping and friction explain the handle's motion: it was not touched and reached no stop."""
         return all(one.explained >= LEAST_EXPLAINED and one.mass_kg > 0.0 for one in self.motions)

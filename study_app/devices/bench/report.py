@@ -47,6 +47,7 @@ def kept(found: Found, day: str) -> dict[str, Any]:
         "serial": found.device.get("serial") or "",
         "measured": day,
         **{name: tuple(float(getattr(one, name)) for one in found.motions) for name in own},
+        "count_m": found.count_m,
         "stable_nspm": tuple(one.damping_nspm for one in found.damping),
         "gain": None if found.gain is None else found.gain.gain,
     }
@@ -77,6 +78,7 @@ def _lines(found: Found, day: str) -> Iterator[str]:
         ("damping [N·s/m]", "damping_nspm", 2),
         ("Coulomb friction [N]", "friction_n", 3),
         ("delay from sending a force to motion [ms]", "delay_ms", 1),
+        ("encoder count, from the noise in motion [µm]", "count_um", 1),
         ("explained variance of the force", "explained", 4),
     ):
         yield f"| {label} | {_row(tuple(getattr(one, name) for one in found.motions), digits)} |"

@@ -2,6 +2,5 @@
 
 ``wire`` (constants, packets and replies of the protocol), ``transport`` (the USB bridge), ``firmware`` and ``boot``
 (loading the firmware after power-up), ``mechanics`` (geometry, kinematics, calibration), ``exchange`` (the compiled
-tick), ``device`` and ``homing`` (opening, lights, no force before homing), ``guard`` (zero torque when the program
-dies). ``emulator`` answers as a Falcon would.
+tick), ``device`` and ``homing`` (opening, lights, no force before homing). ``emulator`` answers as a Falcon would.
 """

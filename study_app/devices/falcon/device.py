@@ -1,5 +1,6 @@
 """The Falcon as a device: opened with its program loaded, homed and guarded; closed without torque."""
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
@@ -11,23 +12,25 @@ from study_app.devices.call_gate import FINISHED, RUNS, check_left, let_go
 from study_app.devices.falcon import boot
 from study_app.devices.falcon.exchange import BRIDGE_LOST, COUNTERS, LEAST_MASS_KG, exchange_functions, new_exchange
 from study_app.devices.falcon.facts import OPEN, Facts
-from study_app.devices.falcon.failure_modes import sentence
+from study_app.devices.falcon.failure_modes import BY_ID, sentence
 from study_app.devices.falcon.failures import ProgramMissing, usb_failure
 from study_app.devices.falcon.firmware import check
-from study_app.devices.falcon.guard import Guard, quiet
 from study_app.devices.falcon.homing import PATIENCE_S, home
 from study_app.devices.falcon.mechanics import calibration
 from study_app.devices.falcon.mechanics.geometry import DEFAULT_GEOMETRY, WORKSPACE_M, geometry_named
 from study_app.devices.falcon.mechanics.kinematics import REACHED, count_at, inverse, new_mechanism
 from study_app.devices.falcon.transport.bulk_calls import BulkCalls
-from study_app.devices.falcon.transport.transport import Transport, open_transport
+from study_app.devices.falcon.transport.transport import Transport, end_torque, open_transport, quiet
 from study_app.devices.falcon.wire.constants import ERROR_NO_DEVICE
+from study_app.devices.guard import DIED, Guard
 from study_app.errors import DeviceError, DeviceLost
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import new_command, new_reading
 
 FORCE_LIMIT_N: Final = 8.0
 
+ENDS_TORQUE: Final = f"{end_torque.__module__}:{end_torque.__name__}"
+_SILENT_TICKS: Final = 40  # after 50 ms without a new position the servo ends the force
 _FARTHEST = 1700  # counts, slightly more than are used in practice
 _CLOSED = BulkCalls(0, 0)
 
@@ -109,7 +112,7 @@ class FalconDevice(Device):
             self._calibrate(transport.serial)
             self.transport = transport
             if self.guarded:
-                self.guard = Guard(transport.name, self._lose_guard)
+                self.guard = Guard(self.name, ENDS_TORQUE, transport.name, died=self._lose_guard)
                 self.guard.start()
             if self._left_guard is not None:
                 self._left_guard.recall()
@@ -165,9 +168,22 @@ class FalconDevice(Device):
     def check(self) -> None:
         """Raise ``DeviceLost`` if its guard has died: no force is sent any more, and its reads say that it is lost."""
         if self._guard_died:
-            raise DeviceLost(
-                "the Falcon's guard process has died, so the force was turned off: start the program again"
-            )
+            raise DeviceLost(DIED)
+
+    @property
+    def failure(self) -> str | None:
+        """Cause and cure of what ended the exchange, in a sentence; None while nothing did."""
+        state = self.falcon
+        if self._guard_died:
+            return DIED
+        if state.ended == BRIDGE_LOST:
+            return sentence(Facts(usb="no-device"))
+        if state.ended != RUNS or state.apart <= _SILENT_TICKS:
+            return None
+        if state.unhomed:
+            return f"it is no longer homed: {BY_ID['power'].cure(sys.platform)}"
+        failed = 2 * (state.read_errors + state.write_errors) > state.apart
+        return sentence(Facts(usb="io") if failed else Facts(replies=False))
 
     def describe(self) -> dict[str, Any]:
         """Return its record for the receipt."""

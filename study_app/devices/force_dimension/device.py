@@ -4,18 +4,26 @@ from pathlib import Path
 from typing import Any, Final, Protocol
 
 from study_app.devices.base import Device
+from study_app.devices.bench.kept import dynamics_of
 from study_app.devices.call_gate import LET_GO, RUNS, let_go
 from study_app.devices.force_dimension import exchange
 from study_app.devices.force_dimension.exchange import COUNTERS, FUNCTIONS, exchange_functions, finish, new_exchange
 from study_app.devices.force_dimension.failures import CAUSES, FAILURES
-from study_app.devices.force_dimension.library import Library
+from study_app.devices.force_dimension.library import Library, end_force
+from study_app.devices.guard import Guard
 from study_app.errors import DeviceError
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 
 WORKSPACE_M: Final = (0.05, 0.05, 0.05)
 FORCE_LIMIT_N: Final = 8.0
 _SILENT_NS: Final = 40_000_000  # after 50 ms without a new position the servo ends the force
-_ENDED: Final = {exchange.ERROR: "error", exchange.BAD_NUMBER: "not-finite", exchange.FORCE_OFF: "force-off"}
+_ENDED: Final = {
+    exchange.ERROR: "error",
+    exchange.BAD_NUMBER: "not-finite",
+    exchange.FORCE_OFF: "force-off",
+    exchange.UNGUARDED: "unguarded",
+}
+ENDS_FORCE: Final = f"{end_force.__module__}:{end_force.__name__}"
 
 
 class Functions(Protocol):
@@ -33,8 +41,8 @@ class Functions(Protocol):
         """Return where a function is, for compiled code."""
         ...
 
-    def abandon(self, device: int) -> None:
-        """End the force and close a device that could not be prepared."""
+    def abandon(self, device: int) -> bool:
+        """End the force and close a device that could not be prepared; return whether it accepted the end."""
         ...
 
     def close(self, device: int) -> None:
@@ -54,6 +62,7 @@ class ForceDimensionDevice(Device):
     """
 
     name = "force-dimension"
+    guarded = True
 
     def __init__(
         self,
@@ -74,6 +83,9 @@ class ForceDimensionDevice(Device):
         self._path = library
         self._functions: Functions | None = None
         self._found: dict[str, Any] = {}
+        self._dynamics = UNKNOWN
+        self.guard: Guard | None = None
+        self._left_guard: Guard | None = None  # of a device that may still push
         self.memory = new_exchange(force_limit_n)
         self.exchange = self.memory[0]
         self.context = int(self.memory.ctypes.data)
@@ -100,9 +112,13 @@ class ForceDimensionDevice(Device):
             self.memory[:] = new_exchange(self.force_limit_n)
             for field, name in FUNCTIONS.items():
                 self.exchange[field] = functions.address(name)
+            self._start_guard(found)
         except BaseException:
             functions.abandon(device)
+            self._dismiss_guard()
             raise
+        measured = (found.pop(name) for name in ("delay_s", "count_m", "mass_kg"))
+        self._dynamics = dynamics_of(*measured, name=self.name, serial=found.get("serial"))
         self._found, self._functions = found, functions
         self.exchange.id = device
         self.exchange.wrist = found["wrist"]
@@ -114,7 +130,7 @@ class ForceDimensionDevice(Device):
         """Send zero force, take the current off the motors, and close the device; a second call does nothing.
 
         Where a call of the library does not return, its thread does the first two once it does; until then the
-        device's watchdog is what ends the force.
+        device's watchdog is what ends the force. Where the device accepts neither, its guard goes on trying.
         """
         functions = self._functions
         if functions is None or not let_go(self.exchange):
@@ -124,12 +140,15 @@ class ForceDimensionDevice(Device):
             if self.exchange.ended == LET_GO:
                 finish(self.exchange, self.context)
         finally:
-            functions.close(int(self.exchange.id))
+            try:
+                functions.close(int(self.exchange.id))
+            finally:
+                self._dismiss_guard()
 
     @property
     def dynamics(self) -> Dynamics:
-        """What is believed of a device that was not measured: encoder count and mass cannot be asked for."""
-        return UNKNOWN
+        """The delay measured when it was opened, and what the library or a bench says of encoder count and mass."""
+        return self._dynamics
 
     @property
     def counters(self) -> dict[str, int]:
@@ -158,8 +177,31 @@ class ForceDimensionDevice(Device):
             "workspace_m": list(self.workspace_m),
             "force_limit_n": self.force_limit_n,
             "dynamics": self.dynamics.describe(),
+            "guard": self.guard is not None,
             **self._found,
         }
+
+    def _start_guard(self, found: dict[str, Any]) -> None:
+        """Start the guard of a device whose own watchdog is absent or off, and end one that still tries to open it."""
+        if self.guarded and found.get("watchdog_s") is None:
+            path, serial = "" if self._path is None else str(self._path), found.get("serial") or ""
+            self.guard = Guard(self.name, ENDS_FORCE, path, serial, died=self._lose_guard)
+            self.guard.start()
+        if self._left_guard is not None:
+            self._left_guard.recall()
+            self._left_guard = None
+
+    def _dismiss_guard(self) -> None:
+        guard, self.guard = self.guard, None
+        if guard is not None and self.exchange.pushes:
+            self._left_guard = guard
+            guard.leave()
+        elif guard is not None:
+            guard.stand_down()
+
+    def _lose_guard(self) -> None:
+        """Block every force from now on; called by the guard's thread."""
+        self.exchange.unguarded = 1
 
     def _load(self) -> Functions:
         return Library(self._path)

@@ -66,8 +66,9 @@ class EmulatedFunctions:
     def prepare(self, device: int, force_limit_n: float) -> dict[str, Any]:
         """Enable the force."""
         self.state.force_on = 1
-        names = ("wrist", "gripper", "active_wrist", "active_gripper")
-        return {"sdk": None, "system": "emulated"} | dict.fromkeys(names, False)
+        names, handle = ("wrist", "gripper", "active_wrist", "active_gripper"), self._hand.dynamics
+        known = {"delay_s": handle.delay_s, "count_m": handle.count_m, "mass_kg": handle.mass_kg}
+        return {"sdk": None, "system": "emulated"} | dict.fromkeys(names, False) | known
 
     def address(self, name: str) -> int:
         """Return where an emulated function is."""
@@ -85,9 +86,10 @@ class EmulatedFunctions:
             raise DeviceError(f"fault '{fault}' is not known; choose of: {', '.join(FAULTS)}")
         self.state.fault, self.state.fault_after = FAULTS[fault], after
 
-    def abandon(self, device: int) -> None:
+    def abandon(self, device: int) -> bool:
         """Take the force off the handle."""
         self._hand.close()
+        return True
 
     def close(self, device: int) -> None:
         """Take the force off the handle."""
@@ -106,6 +108,7 @@ class EmulatedForceDimension(ForceDimensionDevice):
     """
 
     name = "force-dimension-emulated"
+    guarded = False  # it ends with the program
 
     def __init__(
         self,

@@ -23,6 +23,7 @@ from study_app.haptics.kernels.c_functions import (
     READ_NEW,
     READ_NOTHING_NEW,
     WRITE,
+    WRITE_SATURATED,
     c_function,
     call_at,
     record_at,
@@ -58,7 +59,7 @@ STATUS_TICKS: Final = 32
 """The status is read once in so many ticks."""
 _NORM_SLACK = 1.001
 
-ERROR, BAD_NUMBER, FORCE_OFF = range(FIRST_CAUSE, FIRST_CAUSE + 3)  # why the exchange ended
+ERROR, BAD_NUMBER, FORCE_OFF, UNGUARDED = range(FIRST_CAUSE, FIRST_CAUSE + 4)  # why the exchange ended
 
 FORCE_DIMENSION = np.dtype(
     [
@@ -79,6 +80,8 @@ FORCE_DIMENSION = np.dtype(
         *GATE,
         ("off_cause", np.int64),  # what the device stated where its force is off
         ("force_limit_n", np.float64),
+        ("unguarded", np.int64),  # 1: its guard has died: no force passes, and the exchange ends
+        ("pushes", np.int64),  # 1 where neither zero force nor ``dhdStop`` was accepted at the end
         # what the library fills in
         ("position_m", np.float64, (3,)),
         ("velocity_mps", np.float64, (3,)),
@@ -159,8 +162,9 @@ def _write(context: int, command: int) -> int:
 @kernel
 def finish(device: Any, _context: int) -> None:
     """Send zero force, and take the current off the motors."""
-    _push(device, 0.0, 0.0, 0.0)
-    _call_stop(device.stop, device.id)
+    zeroed = _push(device, 0.0, 0.0, 0.0) >= 0
+    stopped = np.int32(_call_stop(device.stop, device.id)) >= 0
+    device.pushes = 0 if zeroed or stopped else 1
     clear(device.sent_n)
 
 
@@ -168,6 +172,8 @@ def finish(device: Any, _context: int) -> None:
 def _take_sample(device: Any, context: int, now_ns: int, out: Any) -> int:
     device.now_ns = now_ns
     device.ticks += 1
+    if device.unguarded != 0:
+        return _end(device, context, UNGUARDED)
     if device.ticks % STATUS_TICKS == 0:
         if np.int32(_call_fill(device.get_status, context + _STATUS, device.id)) < 0:
             return _end(device, context, ERROR)
@@ -249,6 +255,8 @@ def _put_quaternion(rotation: Any, out: Any) -> bool:
 @kernel
 def _send_force(device: Any, context: int, force_n: Any) -> int:
     """Send a force [N, hand frame]."""
+    if device.unguarded != 0:
+        return _end(device, context, UNGUARDED)
     x_n, y_n, z_n = force_n[0], force_n[1], force_n[2]
     square = x_n * x_n + y_n * y_n + z_n * z_n
     most_n = _NORM_SLACK * device.force_limit_n
@@ -257,9 +265,10 @@ def _send_force(device: Any, context: int, force_n: Any) -> int:
     got = _push(device, x_n, y_n, z_n)
     if got < 0:
         return _end(device, context, ERROR)
+    device.sent_n[0], device.sent_n[1], device.sent_n[2] = x_n, y_n, z_n
     if got == MOTOR_SATURATED:
         device.saturated += 1
-    device.sent_n[0], device.sent_n[1], device.sent_n[2] = x_n, y_n, z_n
+        return WRITE_SATURATED
     return 0
 
 

@@ -84,6 +84,14 @@ FAILURES: Final = FailureTable(
             "dhdGetPosition",
         ),
         FailureMode(
+            "unguarded",
+            "the guard process of a device without a watchdog runs",
+            "the guard process has died, so the force was turned off",
+            "another program ended it",
+            "start this program again",
+            "the guard process ends before it is dismissed",
+        ),
+        FailureMode(
             "hangs",
             "every call of the library returns",
             "a call of the library does not return",

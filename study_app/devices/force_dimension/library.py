@@ -27,6 +27,7 @@ SIGNATURES: Final[dict[str, tuple[Any, tuple[Any, ...]]]] = {
     "dhdOpenSerial": (c_int, (c_int,)),  # 225
     "dhdClose": (c_int, (c_byte,)),  # 227
     "dhdStop": (c_int, (c_byte,)),  # 229
+    "dhdGetComMode": (c_int, (c_byte,)),  # 230
     "dhdEnableForce": (c_int, (c_ubyte, c_byte)),  # 231
     "dhdGetSystemType": (c_int, (c_byte,)),  # 233
     "dhdGetSystemName": (c_char_p, (c_byte,)),  # 235
@@ -50,10 +51,23 @@ SIGNATURES: Final[dict[str, tuple[Any, tuple[Any, ...]]]] = {
     "dhdDisableExpertMode": (c_int, ()),  # 316
     "dhdSetTimeGuard": (c_int, (c_int, c_byte)),  # 319
     "dhdGetVelocityThreshold": (c_int, (POINTER(c_uint), c_byte)),  # 321
+    "dhdDeltaEncoderToPosition": (c_int, (c_int, c_int, c_int, _OUT, _OUT, _OUT, c_byte)),  # 331
+    "dhdDeltaPositionToEncoder": (c_int, (c_double, c_double, c_double, *(POINTER(c_int),) * 3, c_byte)),  # 332
+    "dhdDeltaEncodersToJointAngles": (c_int, (c_int, c_int, c_int, _OUT, _OUT, _OUT, c_byte)),  # 355
+    "dhdGetJointAngles": (c_int, (_OUT, c_byte)),  # 366: double j[DHD_MAX_DOF]
+    "dhdJointAnglesToInertiaMatrix": (c_int, (_OUT, _OUT, c_byte)),  # 369: double inertia[6][6]
     "dhdSetWatchdog": (c_int, (c_ubyte, c_byte)),  # 373
     "dhdGetWatchdog": (c_int, (POINTER(c_ubyte), c_byte)),  # 374
     "drdIsInitialized": (c_bool, (c_byte,)),  # drdc.h 41
 }
+MOST_JOINTS: Final = 8  # DHD_MAX_DOF, dhdc.h 128
+SYNC: Final = 0  # DHD_COM_MODE_SYNC, dhdc.h 194
+ROUND_TRIPS: Final = 50
+COUNTS: Final = 10
+"""Over so many counts of each encoder the handle's motion is computed."""
+COUNT_M: Final = (1e-7, 1e-3)
+MASS_KG: Final = (0.01, 5.0)
+"""Least and greatest plausible values; others count as unknown."""
 STATUS_WORDS: Final = 32
 """Room for more than the DHD_MAX_STATUS (17) words of 3.17.5 (dhdc.h 164)."""
 RESET, FORCE, FORCE_OFF_CAUSE = 3, 5, 14  # dhdc.h 170, 172, 181
@@ -149,17 +163,18 @@ class Library:
             "effector_mass_kg": mass.value if has_mass else None,
             "max_force_n": most_n if most_n >= 0.0 else None,
             **safety,
+            **self._dynamics(device),
         }
 
     def close(self, device: int) -> None:
         """Close a device; the force was ended before."""
         self._functions.dhdClose(device)
 
-    def abandon(self, device: int) -> None:
-        """End the force and close a device that could not be prepared."""
-        self._functions.dhdSetForce(0.0, 0.0, 0.0, device)
-        self._functions.dhdStop(device)
+    def abandon(self, device: int) -> bool:
+        """End the force and close a device that could not be prepared; return whether it accepted the end."""
+        answers = self._functions.dhdSetForce(0.0, 0.0, 0.0, device), self._functions.dhdStop(device)
         self._functions.dhdClose(device)
+        return any(answer >= 0 for answer in answers)
 
     def _keep_safe(self, device: int) -> dict[str, Any]:
         """Keep the safety functions on and return them; a watchdog, if there is one, is set to its longest: 32 ms."""
@@ -178,6 +193,68 @@ class Library:
             "velocity_threshold": threshold.value,
             "watchdog_s": watchdog.value * WATCHDOG_S if watched and watchdog.value else None,
         }
+
+    def _dynamics(self, device: int) -> dict[str, Any]:
+        """Return delay [s], encoder count [m] and least mass [kg] at the handle; None for what the library lacks."""
+        mode = int(self._functions.dhdGetComMode(device))
+        round_trip_s = self._round_trip_s(device)
+        self._functions.dhdEnableExpertMode()
+        try:
+            count_m, mass_kg = self._in_the_middle(device)
+        finally:
+            self._functions.dhdDisableExpertMode()
+        # In other modes than SYNC the next exchange begins while one is under way: a position may be that much older.
+        delay_s = round_trip_s if round_trip_s is None or mode == SYNC else 2 * round_trip_s
+        return {"com_mode": mode, "delay_s": delay_s, "count_m": count_m, "mass_kg": mass_kg}
+
+    def _round_trip_s(self, device: int) -> float | None:
+        """Return the 90th percentile of the time that a zero force and a new position take [s]."""
+        call, place, taken = self._functions, [c_double() for _ in range(3)], []
+        for _ in range(ROUND_TRIPS):
+            time.sleep(0.001)  # the time guard answers earlier readings from memory
+            began_s = time.perf_counter()
+            call.dhdSetForce(0.0, 0.0, 0.0, device)
+            got = call.dhdGetPosition(*place, device)
+            if got < 0:
+                raise FAILURES.failure("error", f"dhdGetPosition: {self._last_error()}")
+            if got == 0:
+                taken.append(time.perf_counter() - began_s)
+        return sorted(taken)[int(0.9 * len(taken))] if taken else None
+
+    def _in_the_middle(self, device: int) -> tuple[float | None, float | None]:
+        """Return the longest motion within an encoder count [m] and the least mass [kg] in the workspace's middle.
+
+        The maker's kinematics and inertia matrix compute both for the model and its calibration: no document states
+        them. None where the library cannot, or where its answers contradict one another.
+        """
+        import numpy as np  # noqa: PLC0415 - the guard, which loads this module, needs no arrays
+
+        call, encoders = self._functions, [c_int() for _ in range(3)]
+        if call.dhdDeltaPositionToEncoder(0.0, 0.0, 0.0, *encoders, device) < 0:
+            return None, None
+        counts = [encoder.value for encoder in encoders]
+        places = []
+        for axis in range(-1, 3):
+            place = [c_double() for _ in range(3)]
+            moved = (count + COUNTS * (axis == i) for i, count in enumerate(counts))
+            if call.dhdDeltaEncoderToPosition(*moved, *place, device) < 0:
+                return None, None
+            places.append([one.value for one in place])
+        rates_m = (np.array(places[1:]) - places[0]).T / COUNTS
+        longest_m = float(np.linalg.norm(rates_m, 2)) if np.isfinite(rates_m).all() else math.nan
+        joints, inertia = (c_double * MOST_JOINTS)(), (c_double * 36)()
+        arms = [c_double() for _ in range(3)]
+        if call.dhdGetJointAngles(joints, device) < 0 or call.dhdDeltaEncodersToJointAngles(*counts, *arms, device) < 0:
+            return _within(longest_m, COUNT_M), None
+        joints[:3] = [arm.value for arm in arms]
+        if call.dhdJointAnglesToInertiaMatrix(joints, inertia, device) < 0:
+            return _within(longest_m, COUNT_M), None
+        matrix = np.array(inertia).reshape(6, 6)
+        least_kg = math.nan
+        if np.isfinite(matrix).all():
+            linear, coupled, turning = matrix[:3, :3], matrix[:3, 3:], matrix[3:, 3:]
+            least_kg = float(np.linalg.eigvalsh(linear - coupled @ np.linalg.pinv(turning) @ coupled.T).min())
+        return _within(longest_m, COUNT_M), _within(least_kg, MASS_KG)
 
     def _enable_force(self, device: int) -> None:
         """Enable the force at zero, and wait until the device says that it is."""
@@ -204,6 +281,19 @@ class Library:
         return (self._functions.dhdErrorGetLastStr() or b"").decode(errors="replace")
 
 
+def end_force(path: str, serial: str) -> None:
+    """Open the device with this serial number ("": the first one), and end its force: what a guard does.
+
+    Raises
+    ------
+    DeviceFailure
+        There is no such library or device, another program still uses it, or it accepts no end of the force.
+    """
+    library = Library(path or None)
+    if not library.abandon(library.open(int(serial) if serial else None)):
+        raise FAILURES.failure("error")
+
+
 def probe() -> Backend:
     """Return whether the library is installed, and how many devices it finds; opens none."""
     try:
@@ -214,6 +304,10 @@ def probe() -> Backend:
     if found < 1:
         return Backend("force-dimension", by, NONE, _CAN, FAILURES.sentence("no-device"))
     return Backend("force-dimension", by, f"connected: {found}", _CAN)
+
+
+def _within(value: float, limits: tuple[float, float]) -> float | None:
+    return value if limits[0] <= value <= limits[1] else None
 
 
 def _load(path: str | Path | None) -> ctypes.CDLL:

@@ -8,7 +8,8 @@ in C offers its functions as objects with an ``address``.
 ``READ``    ``int32 (intp context, int64 now_ns, intp reading)``: fill the ``layout.READING`` record at the address
             ``reading``, no further than its ``size_bytes``; return ``READ_NEW``, ``READ_NOTHING_NEW`` or ``READ_LOST``
 ``WRITE``   ``int32 (intp context, intp command)``: send the force of the ``layout.COMMAND`` record at the address
-            ``command``; where another force is sent, say so in it; return 0, or ``READ_LOST``
+            ``command``; where another force is sent, say so in it; return 0, ``WRITE_SATURATED`` if the motors may
+            have given less, or ``READ_LOST``
 ``NOW``     ``int64 (intp context)``: monotonic time [ns]
 ``SLEEP``   ``int64 (intp context, int64 deadline_ns)``: return not before the deadline; gives the time then [ns]
 ==========  ======================================================================================================
@@ -37,6 +38,7 @@ SLEEP = types.int64(types.intp, types.int64)
 READ_NEW = 0
 READ_NOTHING_NEW = 1
 READ_LOST = -1
+WRITE_SATURATED = 1
 
 
 class Driver(Protocol):

@@ -10,9 +10,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from study_app.haptics.kernels.c_functions import NOW, READ, READ_LOST, READ_NEW, SLEEP, WRITE, call_at, fence
+from study_app.haptics.kernels.c_functions import (
+    NOW,
+    READ,
+    READ_LOST,
+    READ_NEW,
+    SLEEP,
+    WRITE,
+    WRITE_SATURATED,
+    call_at,
+    fence,
+)
 from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.passivity import log_delivery
+from study_app.haptics.kernels.passivity import log_delivery, log_saturation
 from study_app.haptics.kernels.safety import begin_scene
 from study_app.haptics.kernels.sample_validation import FAULT_NS
 from study_app.haptics.kernels.tick import tick
@@ -213,7 +223,7 @@ def follow_delay(safety: Any, sample: Any, measured: int) -> None:
 
 @kernel
 def _send(sample: Any, safety: Any, command: Any, device: Any, clock: Any, began_ns: int) -> int:
-    """Command the force, then zero if the tick hung; log the force that the device sent instead, if any."""
+    """Command the force, then zero if the tick hung; log the force that the device sent instead, or may have."""
     row = command[0]
     for axis in range(3):
         row.force_n[axis] = row.sent_n[axis] = sample.device_force_n[axis]
@@ -225,6 +235,8 @@ def _send(sample: Any, safety: Any, command: Any, device: Any, clock: Any, began
         if row.sent_n[axis] != sample.device_force_n[axis]:
             log_delivery(safety, sample, row.sent_n)
             break
+    if answer == WRITE_SATURATED:
+        log_saturation(safety, sample)
     return int(answer)
 
 

@@ -14,6 +14,8 @@ inertial effects in the share that is sent (`pack`). τ is the lag of the veloci
 power that it absorbs: a filtered damper stores up to K τ P (`stored_energy`). Without these the lag of each quick
 reversal would count as a debt.
 
+Motors that saturate give a force between 0 and the logged one: in each step the one counts that supplies more energy.
+
 A delayed loop and a force held for too long cause E < 0. Three balances of E are kept: for a force that acts at once,
 for one that acts after the assumed loop delay, at least one tick, and for one that acts another tick later; the lowest
 counts. A delayed force belongs to an earlier velocity: a delayed balance may include the energy stored then. A debt of
@@ -47,7 +49,7 @@ from study_app.haptics.kernels.incremental_passivity import begin_incremental, c
 from study_app.haptics.kernels.stored_energy import filter_storage
 from study_app.haptics.kernels.vector import clear, copy, distance, is_finite, norm, square
 from study_app.haptics.model.device_dynamics import MOST_DELAY
-from study_app.haptics.model.layout import LIMITER_ENERGY, Record
+from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_SATURATED, Record
 
 ALLOWANCE_J = 1e-3
 SPENDING_S = 20e-3
@@ -71,6 +73,7 @@ def reset_observer(passivity: Record) -> None:
     passivity.row = 0
     for tick in range(MOST_DELAY + 2):
         clear(passivity.sent_n[tick])
+        clear(passivity.saturated_n[tick])
         clear(passivity.acted_n[tick])
         passivity.stored_j[tick] = 0.0
     clear(passivity.impulse_ns)
@@ -97,9 +100,9 @@ def update_observer(model: Any, safety: Record, interval_s: float) -> None:
     """
     parameters, state, passivity = model.parameters[0], model.state[0], safety.passivity
     delay_ticks = max(safety.delay_ticks, 1)
-    sent_n = passivity.sent_n[passivity.row]
-    late_n = passivity.sent_n[_row_before(passivity, delay_ticks)]
-    later_n = passivity.sent_n[_row_before(passivity, delay_ticks + 1)]
+    sent_n = _least_favourable(passivity, state, passivity.row, interval_s)
+    late_n = _least_favourable(passivity, state, _row_before(passivity, delay_ticks), interval_s)
+    later_n = _least_favourable(passivity, state, _row_before(passivity, delay_ticks + 1), interval_s)
     acted_n = passivity.acted_n[_row_before(passivity, safety.delay_ticks)]
     for axis in range(3):
         passivity.acted_impulse_ns[axis] += acted_n[axis] * safety.tick_s
@@ -111,9 +114,10 @@ def update_observer(model: Any, safety: Record, interval_s: float) -> None:
         return
     if passivity.impulse_s == 0.0:  # two samples at once: no time to average over
         passivity.impulse_s = 1.0
-        copy(sent_n, passivity.impulse_ns)
-        copy(late_n, passivity.late_impulse_ns)
-        copy(later_n, passivity.later_impulse_ns)
+        for axis in range(3):
+            passivity.impulse_ns[axis] = sent_n[axis]
+            passivity.late_impulse_ns[axis] = late_n[axis]
+            passivity.later_impulse_ns[axis] = later_n[axis]
     share = interval_s / SMOOTHING_S
     weight = share / (1.0 + share * (0.5 + share / 12.0))  # 1 - exp(-share), to 1 % over four milliseconds
     per_scale, per_s = 1.0 / parameters.scale, 1.0 / interval_s
@@ -158,6 +162,23 @@ def _row_before(passivity: Record, ticks: int) -> int:
     """Return the row of the force that was sent ``ticks`` before the last one."""
     row: int = passivity.row - ticks
     return row if row >= 0 else row + MOST_DELAY + 2
+
+
+@part
+def _least_favourable(passivity: Record, state: Record, row: int, interval_s: float) -> tuple[float, float, float]:
+    """Return the force of a row [N]; of saturated motors the one, from 0 on, that absorbs least in the newest step.
+
+    Without a new sample, ``interval_s`` 0, the last velocity stands for the step.
+    """
+    sent_n, saturated_n = passivity.sent_n[row], passivity.saturated_n[row]
+    power = 0.0
+    for axis in range(3):
+        step = passivity.velocity_mps[axis]
+        if interval_s > 0.0:
+            step = state.position_m[axis] - state.previous_m[axis] - state.drift_mps[axis] * interval_s
+        power += saturated_n[axis] * step
+    share = 1.0 if power < 0.0 else 0.0
+    return (sent_n[0] - share * saturated_n[0], sent_n[1] - share * saturated_n[1], sent_n[2] - share * saturated_n[2])
 
 
 @part
@@ -253,6 +274,7 @@ def log_command(passivity: Record, force_n: Any) -> None:
     stored_j = passivity.stored_j[passivity.row]
     passivity.row = passivity.row + 1 if passivity.row <= MOST_DELAY else 0
     passivity.stored_j[passivity.row] = stored_j  # until the next sample
+    clear(passivity.saturated_n[passivity.row])
     _log(passivity, force_n)
 
 
@@ -275,6 +297,13 @@ def log_delivery(safety: Record, sample: Record, sent_n: Any) -> None:
         sample.device_force_n[axis] = round(sent_n[axis] * DELIVERY_STEPS_PER_N) / DELIVERY_STEPS_PER_N
     _log(safety.passivity, sample.device_force_n)
     sample.withheld_n = distance(safety.permitted_n, sample.device_force_n)
+
+
+@kernel
+def log_saturation(safety: Record, sample: Record) -> None:
+    """Log that the device's motors may have given only a part of the last force."""
+    sample.limiters |= LIMITER_SATURATED
+    copy(sample.device_force_n, safety.passivity.saturated_n[safety.passivity.row])
 
 
 @part

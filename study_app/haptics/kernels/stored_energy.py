@@ -22,10 +22,13 @@ def filter_storage(model: Any, passivity: Record) -> float:
     lag_s = parameters.fallback_lag_s if state.kalman.distrusted else parameters.filter_lag_s
     if lag_s == 0.0:
         return 0.0
-    sent_n = passivity.sent_n[passivity.row]
-    power_w = 0.0
+    sent_n, saturated_n = passivity.sent_n[passivity.row], passivity.saturated_n[passivity.row]
+    power_w = missing_w = 0.0
     for axis in range(3):
-        power_w -= sent_n[axis] * (state.estimate_mps[axis] - state.drift_mps[axis])
+        v_mps = state.estimate_mps[axis] - state.drift_mps[axis]
+        power_w -= sent_n[axis] * v_mps
+        missing_w -= saturated_n[axis] * v_mps
+    power_w -= max(missing_w, 0.0)
     if power_w <= 0.0:
         return 0.0
     share = 1.0 - 2.0 / 3.0 * math.sqrt(passivity.norm_share)

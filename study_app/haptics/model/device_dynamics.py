@@ -18,27 +18,34 @@ class Dynamics(NamedTuple):
     changed, minus the tick in which it is written [s]; None if the device does not measure it. ``count_m`` is one
     encoder count at the handle [m], ``mass_kg`` the least effective mass there [kg]. ``velocity_lag_s`` is the mean lag
     of the velocity that the device measures and gives with every new sample [s]; None if it measures none.
+    ``assumed`` names those of ``count_m`` and ``mass_kg`` that neither the device reports nor a bench measured.
     """
 
     delay_s: float | None = None
     count_m: float = 38e-6
     mass_kg: float = 0.1
     velocity_lag_s: float | None = None
+    assumed: tuple[str, ...] = ()
 
     def delay_ticks(self, rate_hz: float) -> int:
         """Return the delay in whole ticks, rounded up; `BELIEVED_TICKS` where it is not measured."""
         return BELIEVED_TICKS if self.delay_s is None else math.ceil(self.delay_s * rate_hz - _ROUNDING_TICKS)
 
-    def describe(self) -> dict[str, float | None]:
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """The names of the values that are not known: of the delay, and those assumed."""
+        return (*(("delay_s",) if self.delay_s is None else ()), *self.assumed)
+
+    def describe(self) -> dict[str, Any]:
         """Return the values for the receipt."""
-        return self._asdict()
+        return {**self._asdict(), "assumed": list(self.assumed)}
 
 
-UNKNOWN: Final = Dynamics()
+UNKNOWN: Final = Dynamics(assumed=("count_m", "mass_kg"))
 """Defaults of a device that reports nothing: a Falcon's count, a light handle, one tick of delay."""
 
 
 def dynamics_from(described: Mapping[str, Any]) -> Dynamics:
     """Return the dynamics that a receipt records of its device; `UNKNOWN` in receipts of earlier versions."""
     recorded = described.get("dynamics")
-    return UNKNOWN if recorded is None else Dynamics(**recorded)
+    return UNKNOWN if recorded is None else Dynamics(**{**recorded, "assumed": tuple(recorded.get("assumed", ()))})

@@ -12,6 +12,7 @@ from study_app.haptics.model.device_dynamics import MOST_DELAY
 from study_app.haptics.model.effect import Fields
 from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.estimators import ESTIMATORS
+from study_app.haptics.model.force_rules import ForceRules
 
 Record: TypeAlias = Any  # one row of a recarray: fields as attributes, compiled or not
 
@@ -32,8 +33,12 @@ LIMITER_STALE = 1 << 6
 LIMITER_GLITCH = 1 << 7  # the position was rejected and must not be used
 LIMITER_STOP = 1 << 8
 LIMITER_ESTIMATOR = 1 << 9  # the velocity is EWMA's: the Kalman filter had a fault within the last second
+LIMITER_SATURATED = 1 << 10  # the device's motors saturated: its force was between 0 and ``device_force_n``
 
-LIMITER_NAMES = ("slope", "non_finite", "energy", "norm", "slew", "fade", "stale", "glitch", "stop", "estimator")
+LIMITER_NAMES = (
+    *("slope", "non_finite", "energy", "norm", "slew", "fade", "stale", "glitch", "stop", "estimator"),
+    "saturated",
+)
 
 # Status of the servo, in Sample.status; the owner turns a fault into ServoFault.
 STATUS_OK = 0
@@ -150,6 +155,8 @@ LINK_STATE = np.dtype(
     align=True,
 )
 
+RULES = np.dtype([(name, np.float64) for name in ForceRules._fields])
+
 PARAMETERS = np.dtype(
     [
         ("scale", np.float64),  # scene metres per hand metre
@@ -174,6 +181,7 @@ PARAMETERS = np.dtype(
         ("count_m", np.float64),  # one encoder count of the device, hand frame
         ("mass_kg", np.float64),  # the device's least effective mass
         ("link", LINK),
+        ("rules", RULES),
     ],
     align=True,
 )
@@ -279,6 +287,7 @@ PASSIVITY = np.dtype(
         ("later_balance_j", np.float64),  # the same, if they act another tick later
         ("row", np.int64),  # the row of the newest force below
         ("sent_n", np.float64, (MOST_DELAY + 2, 3)),  # forces of the last ticks, without buoyancy and weight
+        ("saturated_n", np.float64, (MOST_DELAY + 2, 3)),  # the part of them that saturated motors may not have given
         ("acted_n", np.float64, (MOST_DELAY + 2, 3)),  # the same of the forces on the hand (a shadow's differ)
         ("acted_impulse_ns", np.float64, (3,)),  # of such forces after the assumed loop delay, times time
         ("reserve_j", np.float64),  # greatest energy that liquids and estimator could return at the last sample

@@ -21,8 +21,6 @@ SLOWEST_HZ: Final = 500.0
 
 INERTIA_SHARE: Final = 0.3
 """Share of the drag limit for added mass and history if they need not be exact."""
-CUT_INERTIA_SHARE: Final = 0.15
-"""The same if added mass and history exceed their limit: with more, released handles of 50 g oscillated for 0.6 s."""
 
 MEASURED_KG: Final = 0.1
 """Mass of the free handle in the measurement of the table."""

@@ -13,16 +13,10 @@ from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.estimators import NAMED as ESTIMATORS
 from study_app.haptics.model.estimators.device import MOST_LAG_TICKS, DeviceVelocity
 from study_app.haptics.model.force_link import FORCES
+from study_app.haptics.model.force_rules import CURRENT, ForceRules
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.scene import MAX_LIQUIDS, MAX_WINDOW, Ewma, Given, Kalman, Scene
-from study_app.haptics.model.slope_limits import (
-    CUT_INERTIA_SHARE,
-    LIGHTER,
-    MEASURED_KG,
-    DampingLimits,
-    damping_limits,
-    slew_limit_n,
-)
+from study_app.haptics.model.slope_limits import LIGHTER, MEASURED_KG, DampingLimits, damping_limits, slew_limit_n
 from study_app.haptics.runtime.scene_records import (
     KINDS,
     EffectRows,
@@ -65,14 +59,19 @@ def window_needed(scene: Scene) -> int:
 
 
 def pack(
-    scene: Scene, *, capacity: int | None = None, limits: DampingLimits | None = None, dynamics: Dynamics = UNKNOWN
+    scene: Scene,
+    *,
+    capacity: int | None = None,
+    limits: DampingLimits | None = None,
+    dynamics: Dynamics = UNKNOWN,
+    rules: ForceRules = CURRENT,
 ) -> Model:
     """Return the memory of ``scene``; ``gate`` selects effects that the scene leaves open.
 
     ``capacity`` is the least number of wake rows to own, with room for any number of liquids, so that other scenes fit
     in later (`pack_into`); by default the model owns exactly what the scene calls for. ``limits`` is the greatest
     damping at the hand; by default those of the scene's rate and estimator at each delay. ``dynamics`` are
-    those of the device.
+    those of the device, ``rules`` those of the version that computes the force.
     """
     scene = _for_device(scene, dynamics)
     rows = rows_needed(scene)
@@ -94,7 +93,8 @@ def pack(
             }
         ),
     )
-    _fill(model, scene, _by_delay(scene, dynamics) if limits is None else (limits,) * (MOST_DELAY + 1), dynamics)
+    by_delay = _by_delay(scene, dynamics) if limits is None else (limits,) * (MOST_DELAY + 1)
+    _fill(model, scene, by_delay, dynamics, rules)
     return model
 
 
@@ -131,13 +131,13 @@ def pack_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> No
                     f"the scene needs {rows[name]} {kind.words}; the model was packed with room for "
                     f"{len(getattr(model.rows, name))}: pack it with a greater capacity"
                 )
-    _fill(model, scene, _by_delay(scene, dynamics), dynamics)
+    _fill(model, scene, _by_delay(scene, dynamics), dynamics, CURRENT)
 
 
-def adjust_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> None:
+def adjust_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN, rules: ForceRules = CURRENT) -> None:
     """Write the parameters of a scene like the one in memory of `pack` (`built_alike`) into it; keep its state."""
     scene = _for_device(scene, dynamics)
-    _fill_constants(model, scene, _by_delay(scene, dynamics), dynamics)
+    _fill_constants(model, scene, _by_delay(scene, dynamics), dynamics, rules)
 
 
 def built_alike(scene: Scene, other: Scene) -> bool:
@@ -162,7 +162,7 @@ def _constants(scene: Scene) -> Model:
     """Return a resolved scene's constants, in new memory."""
     nothing = [layout.records(layout.STATE, 0)] * (len(Model._fields) - 2)
     model = Model(layout.records(layout.PARAMETERS, 1), layout.records(layout.LIQUID, len(scene.liquids)), *nothing)
-    _fill_constants(model, scene, _by_delay(scene, UNKNOWN), UNKNOWN)
+    _fill_constants(model, scene, _by_delay(scene, UNKNOWN), UNKNOWN, CURRENT)
     return model
 
 
@@ -199,14 +199,16 @@ def _by_delay(scene: Scene, dynamics: Dynamics) -> Sequence[DampingLimits]:
     return [DampingLimits(lighter * limit.drag_nspm, lighter * limit.inertia_nspm) for limit in found]
 
 
-def _fill(model: Model, scene: Scene, limits: Sequence[DampingLimits], dynamics: Dynamics) -> None:
+def _fill(model: Model, scene: Scene, limits: Sequence[DampingLimits], dynamics: Dynamics, rules: ForceRules) -> None:
     """Write constants and a fresh state."""
     for rows in (model.state, model.liquid_states):
         rows.view(np.uint8)[:] = 0
-    _fill_constants(model, scene, limits, dynamics)
+    _fill_constants(model, scene, limits, dynamics, rules)
 
 
-def _fill_constants(model: Model, scene: Scene, limits: Sequence[DampingLimits], dynamics: Dynamics) -> None:
+def _fill_constants(
+    model: Model, scene: Scene, limits: Sequence[DampingLimits], dynamics: Dynamics, rules: ForceRules
+) -> None:
     for rows in (model.parameters, model.liquids):
         rows.view(np.uint8)[:] = 0
     parameters = model.parameters[0]
@@ -230,15 +232,16 @@ def _fill_constants(model: Model, scene: Scene, limits: Sequence[DampingLimits],
     parameters.link.acts = scene.link.acts
     parameters.link.delay_ticks, parameters.link.jitter_ticks = scene.link.ticks(scene.rate_hz)
     parameters.link.loss, parameters.link.seed = scene.link.loss, scene.link.seed
+    parameters.rules = tuple(rules)
     first = no_rows()
     for record, liquid in zip(model.liquids, scene.liquids, strict=False):
         fill(record, liquid, scene, first)
-        record.inertia_share = [_inertia_share(record, limit, scene.scale) for limit in limits]
+        record.inertia_share = [_inertia_share(record, limit, scene.scale, rules) for limit in limits]
         first = rows_after(first, liquid, scene.rate_hz)
         parameters.effects |= record.effects
 
 
-def _inertia_share(record: layout.Record, limits: DampingLimits, scale: float) -> float:
+def _inertia_share(record: layout.Record, limits: DampingLimits, scale: float, rules: ForceRules) -> float:
     """Return the stable share of inertial forces, which count by their damping of fast motion.
 
     Forces above the limit are reduced to the share that is stable in any loop. [choice]
@@ -249,4 +252,4 @@ def _inertia_share(record: layout.Record, limits: DampingLimits, scale: float) -
             damping_nspm += effect.damping_nspm(record[effect.name])
     if damping_nspm * scale <= limits.inertia_nspm:
         return 1.0
-    return min(limits.inertia_nspm, CUT_INERTIA_SHARE * limits.drag_nspm) / (damping_nspm * scale)
+    return min(limits.inertia_nspm, rules.cut_inertia_share * limits.drag_nspm) / (damping_nspm * scale)

@@ -11,11 +11,11 @@ import numpy as np
 
 from study_app.haptics.kernels.compiled import kernel, part
 from study_app.haptics.kernels.effects.wake import REST_MPS
-from study_app.haptics.kernels.passivity import log_acted, log_delivery
+from study_app.haptics.kernels.passivity import log_acted, log_delivery, log_saturation
 from study_app.haptics.kernels.tick import tick
 from study_app.haptics.kernels.vector import copy, distance, square
 from study_app.haptics.model.effects import local_wake, wake
-from study_app.haptics.model.layout import LIMITER_STOP, STATUS_DEVICE_LOST, Record, records
+from study_app.haptics.model.layout import LIMITER_SATURATED, LIMITER_STOP, STATUS_DEVICE_LOST, Record, records
 
 PLACE = np.dtype(
     [
@@ -56,13 +56,14 @@ def was_lost_at_read(sample: Record) -> bool:
 
 @part
 def take_sample(model: Any, safety: Record, sample: Record, delivered: bool) -> None:
-    """Recompute the tick of a sample from the servo's inputs in it: stop, delay, and the force that the device sent.
+    """Recompute the tick of a sample from the servo's inputs in it: stop, delay, saturation, the device's force.
 
     If that force was not ``delivered`` for this model's command, only the velocity estimator receives it, since it
     moved the hand.
     """
     sent_x, sent_y, sent_z = sample.device_force_n[0], sample.device_force_n[1], sample.device_force_n[2]
     as_asked = sent_x == sample.command_n[0] and sent_y == sample.command_n[1] and sent_z == sample.command_n[2]
+    saturated = sample.limiters & LIMITER_SATURATED
     safety.stop = 1 if sample.limiters & LIMITER_STOP else 0
     safety.delay_ticks = sample.delay_ticks
     tick(model, safety, sample)
@@ -70,6 +71,8 @@ def take_sample(model: Any, safety: Record, sample: Record, delivered: bool) -> 
         log_acted(safety.passivity, (sent_x, sent_y, sent_z))
     elif not as_asked:
         log_delivery(safety, sample, (sent_x, sent_y, sent_z))
+    if delivered and saturated:
+        log_saturation(safety, sample)
 
 
 @kernel

@@ -8,6 +8,7 @@ from typing import Any, Self
 from study_app.errors import DeviceLost, ServoFault, StudyError
 from study_app.haptics.kernels.c_functions import Driver
 from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.force_rules import FORCE_RULES
 from study_app.haptics.model.layout import STATUS_DEVICE_LOST, STATUS_NON_FINITE, STATUS_OK, STATUS_STALE_FAULT
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.clocks.clock import Clock, SystemClock
@@ -219,7 +220,7 @@ class Servo:
         return self.loop.grant
 
     def describe(self) -> dict[str, Any]:
-        """Return the values for a receipt: rate, the thread's priority, and the assumed delay of a force.
+        """Return the values for a receipt: rate, priority, assumed delay of a force, version of the force rules.
 
         ``estimator`` is "device" if the device measures the velocity, else "scene": the protocol names it. No value
         depends on the liquids: they are blinded.
@@ -228,6 +229,7 @@ class Servo:
             "rate_hz": self.rate_hz,
             "priority": self.loop.grant.priority,
             "delay_ticks": self.delay_ticks,
+            "force_rules": FORCE_RULES,
             "estimator": "device" if takes_device_velocity(self.rate_hz, self.dynamics) else "scene",
         }
 

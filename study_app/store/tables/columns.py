@@ -82,6 +82,7 @@ _LIMITERS = {
     "glitch": "a sample was rejected as implausible",
     "stop": "the force was stopped",
     "estimator": "EWMA gave the velocity, because the Kalman filter's innovations were too large or the delay changed",
+    "saturated": "the device's motors saturated: its force was between zero and the recorded one",
 }
 
 TRIALS: tuple[Column, ...] = (
@@ -318,6 +319,7 @@ LATER = frozenset(
         "loop_delay_ticks",
         "loop_delay_changes",
         "limiter_estimator",
+        "limiter_saturated",
         "recording_lost",
         "group",
         "intervals",

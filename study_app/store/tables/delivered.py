@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.haptics.model.layout import FORCE_STEP_N, LIMITER_GLITCH, LIMITER_NORM, SAMPLE
+from study_app.haptics.model.layout import FORCE_STEP_N, LIMITER_GLITCH, LIMITER_NORM, LIMITER_SATURATED, SAMPLE
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.due import Due
 from study_app.protocol.trials.presentation import presented_condition
@@ -48,7 +48,7 @@ def judged(samples: Any) -> Any:
 class Delivered:
     """What an interval delivered; names and meanings are those of the columns of ``intervals``.
 
-    ``clipped`` is whether the force limit cut what was judged.
+    ``clipped`` is whether the force limit, or saturated motors, cut what was judged.
     """
 
     value_delivered: float | None
@@ -109,7 +109,7 @@ def delivered(
         force_share=share(sent_n, model_n),
         apparent_mass_kg=None if fitted is None else fitted[1],
         pace_mps=moved.rms_speed_mps,
-        clipped=bool((samples["limiters"][first:] & LIMITER_NORM).any()),
+        clipped=bool((samples["limiters"][first:] & (LIMITER_NORM | LIMITER_SATURATED)).any()),
     )
 
 

@@ -1,6 +1,7 @@
 """Every fault of the emulator, through the real driver, ends in the words of its failure mode."""
 
 import re
+import sys
 
 import numba
 import pytest
@@ -204,21 +205,31 @@ class TestFaultsOfTheEmulator:
             servo.advance(200)
             servo.check()
 
-    def test_in_use_a_pulled_cable_says_to_plug_it_in(self):
+    @pytest.mark.parametrize(
+        ("fault", "error", "mode"),
+        [("unplugged", DeviceLost, "unplugged"), ("power", ServoFault, "power"), ("drop", ServoFault, "power")],
+    )
+    def test_in_use_the_servo_names_cause_and_cure(self, fault, error, mode):
         with EmulatedFalcon(emulator=Emulator(running=True)) as device, turning(device) as servo:
             servo.advance(100)
-            device.hand.faults.on("unplugged")
-            servo.advance(10)
-            with pytest.raises(DeviceLost, match="reconnect it"):
+            servo.check()
+            assert device.failure is None
+            if fault == "power":
+                device.hand.power(False)
+            elif fault == "drop":
+                device.hand.faults.chance(fault, 1.0)
+            else:
+                device.hand.faults.on(fault)
+            servo.advance(200)
+            cause, cure = BY_ID[mode].cause, BY_ID[mode].cure(sys.platform)
+            with pytest.raises(error, match=re.escape(f"stopped: {cause}: {cure}; the force is zero")):
                 servo.check()
 
-    def test_in_use_a_pulled_mains_adapter_stops_the_servo(self):
-        with EmulatedFalcon(emulator=Emulator(running=True)) as device, turning(device) as servo:
-            servo.advance(100)
-            device.hand.power(False)
-            servo.advance(200)
-            with pytest.raises(ServoFault, match="nothing usable for 50 ms"):
-                servo.check()
+    @pytest.mark.parametrize(("unhomed", "read_errors", "cause"), [(1, 0, "no longer homed"), (0, 90, "not carry out")])
+    def test_in_use_a_lost_homing_and_failed_transfers_are_told_apart(self, unhomed, read_errors, cause):
+        with EmulatedFalcon(emulator=Emulator(running=True)) as device:
+            device.falcon.apart, device.falcon.unhomed, device.falcon.read_errors = 100, unhomed, read_errors
+            assert cause in device.failure
 
 
 def shown_ids(failure):
@@ -271,7 +282,7 @@ class TestDoctor:
         pull = {"Hold": lambda: emulator.faults.on("unplugged")}
         examined = examine("falcon-emulated", emulator=emulator, progress=lambda line: pull.get(line.split()[0], int)())
         assert "unplugged" in [mode.id for mode in diagnose(examined.facts)]
-        assert "reconnect it" in examined.failure
+        assert BY_ID["unplugged"].cure(sys.platform) in examined.failure
 
     def test_only_falcons_are_looked_at_and_only_emulated_ones_are_given_faults(self):
         with pytest.raises(DeviceError, match="'mouse' is none"):

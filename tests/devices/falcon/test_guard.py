@@ -10,26 +10,26 @@ import pytest
 if not hasattr(socket, "AF_UNIX"):
     pytest.skip("no Unix sockets here", allow_module_level=True)
 
-from study_app.devices.falcon import guard as guarding
-from study_app.devices.falcon.failures import FalconNotFound
-from study_app.devices.falcon.guard import PACKETS, PATIENCE_S, Guard, watch
+from study_app.devices import guard as guarding
 from study_app.devices.falcon.transport.socket_frames import DESCRIPTOR
-from study_app.devices.falcon.transport.transport import open_transport
+from study_app.devices.falcon.transport.transport import PACKETS, open_transport, quiet
 from study_app.devices.falcon.wire.constants import FLAG_HOMING, quiet_packet
+from study_app.devices.guard import PATIENCE_S, watch
 from study_app.errors import DeviceError
 from tests.devices.falcon.support.bridges import Server, compiled, warm
 
 pytestmark = pytest.mark.slow
 
+ENDS_TORQUE = "study_app.devices.falcon.transport.transport:end_torque"
 QUIET = [quiet_packet(FLAG_HOMING)] * PACKETS
 PUSHING = b"<PPPAPPPAPPPABA>"  # 4095 on every motor, homing on
 
 PROGRAM = """
 import os, signal, sys
-from study_app.devices.falcon.guard import Guard
 from study_app.devices.falcon.transport.transport import open_transport
+from study_app.devices.guard import Guard
 transport = open_transport(sys.argv[1])
-guard = Guard(sys.argv[1])
+guard = Guard("falcon", {ends_torque!r}, sys.argv[1])
 {guarded}
 transport.write({packet!r}, 1.0)
 print("pushing", flush=True)
@@ -46,7 +46,8 @@ def server(tmp_path):
 
 def program(bridge, then="sys.stdin.read()", *, guarded=True):
     """Return a program that pushes."""
-    code = PROGRAM.format(packet=PUSHING, then=then, guarded="guard.start()" if guarded else "")
+    start = "guard.start()" if guarded else ""
+    code = PROGRAM.format(packet=PUSHING, then=then, guarded=start, ends_torque=ENDS_TORQUE)
     running = subprocess.Popen(
         [sys.executable, "-c", code, bridge], stdin=subprocess.PIPE, stdout=subprocess.PIPE, process_group=0
     )
@@ -59,6 +60,10 @@ def ended(running):
     running.stdin.close()
     running.stdout.close()
     return code
+
+
+def guard_for(bridge):
+    return guarding.Guard("falcon", ENDS_TORQUE, bridge)
 
 
 def guard_of(guard):
@@ -120,7 +125,7 @@ def test_the_guard_waits_until_the_falcon_is_let_go(server):
             return said
         return answer(kind)
 
-    guard = Guard(server.bridge)
+    guard = guard_for(server.bridge)
     guard.start()
     server.answer = answer_busy
     guard.release()
@@ -129,7 +134,7 @@ def test_the_guard_waits_until_the_falcon_is_let_go(server):
 
 
 def test_a_guard_that_is_left_behind_waits_for_the_falcon_to_come_back(tmp_path):
-    guard = Guard(f"falcon-socket:{tmp_path / 'falcon'}")
+    guard = guard_for(f"falcon-socket:{tmp_path / 'falcon'}")
     guard.start()
     guard.leave()  # and does not wait
     assert not guard.watching
@@ -140,7 +145,7 @@ def test_a_guard_that_is_left_behind_waits_for_the_falcon_to_come_back(tmp_path)
 
 
 def test_a_guard_that_was_left_behind_is_recalled_when_the_falcon_is_opened_again(tmp_path, capfd):
-    guard = Guard(f"falcon-socket:{tmp_path / 'falcon'}")
+    guard = guard_for(f"falcon-socket:{tmp_path / 'falcon'}")
     guard.start()
     left = guard.child
     guard.leave()
@@ -151,7 +156,7 @@ def test_a_guard_that_was_left_behind_is_recalled_when_the_falcon_is_opened_agai
 
 
 def test_what_ends_a_program_does_not_end_its_guard(server):
-    guard = Guard(server.bridge)
+    guard = guard_for(server.bridge)
     guard.start()
     child = guard_of(guard)
     assert os.getsid(child.pid) != os.getsid(0)
@@ -163,7 +168,7 @@ def test_what_ends_a_program_does_not_end_its_guard(server):
 
 
 def test_a_guard_stands_down_at_a_good_end(server):
-    with Guard(server.bridge) as guard:
+    with guard_for(server.bridge) as guard:
         assert guard.watching
         child = guard_of(guard)
         guard.start()
@@ -179,7 +184,7 @@ def test_a_guard_acts_at_a_bad_end(server):
     transport = open_transport(server.bridge)
 
     def fail():
-        with Guard(server.bridge):
+        with guard_for(server.bridge):
             transport.close()
             raise KeyboardInterrupt
 
@@ -189,7 +194,7 @@ def test_a_guard_acts_at_a_bad_end(server):
 
 
 def test_a_guard_that_died_is_not_watching_and_ends_all_the_same(server):
-    guard = Guard(server.bridge)
+    guard = guard_for(server.bridge)
     guard.start()
     child = guard_of(guard)
     child.kill()
@@ -202,7 +207,7 @@ def test_a_guard_that_died_is_not_watching_and_ends_all_the_same(server):
 def test_without_a_guard_there_is_no_force(monkeypatch):
     monkeypatch.setattr(sys, "executable", "/bin/false")
     with pytest.raises(DeviceError, match="guard"):
-        Guard("falcon").start()
+        guard_for("falcon").start()
 
 
 def test_a_falcon_that_has_gone_is_told_of(tmp_path, monkeypatch, capsys):
@@ -210,21 +215,24 @@ def test_a_falcon_that_has_gone_is_told_of(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(guarding.signal, "signal", lambda *_: None)
     with (tmp_path / "ended").open("w+") as ended_at_once:
         monkeypatch.setattr(guarding.sys, "stdin", ended_at_once)
-        assert watch(f"falcon-socket:{tmp_path / 'none'}") == 2
+        assert watch("falcon", ENDS_TORQUE, f"falcon-socket:{tmp_path / 'none'}") == 2
     said = capsys.readouterr()
     assert said.out == "ready\n"
-    assert said.err.startswith("the Falcon may still push: ")
+    assert said.err.startswith("the device 'falcon' may still push: ")
     assert said.err.endswith("; turn it off\n")
 
 
-def test_patience_ends(monkeypatch, tmp_path):
+def test_patience_ends(monkeypatch, tmp_path, capsys):
     seconds = iter(range(100))
     naps = []
     monkeypatch.setattr(time, "monotonic", lambda: float(next(seconds)))
     monkeypatch.setattr(time, "sleep", naps.append)
-    with pytest.raises(FalconNotFound):
-        guarding.open_patiently(f"falcon-socket:{tmp_path / 'none'}")
+    monkeypatch.setattr(guarding.signal, "signal", lambda *_: None)
+    with (tmp_path / "ended").open("w+") as ended_at_once:
+        monkeypatch.setattr(guarding.sys, "stdin", ended_at_once)
+        assert watch("falcon", ENDS_TORQUE, f"falcon-socket:{tmp_path / 'none'}") == 2
     assert len(naps) == guarding.PATIENCE_S
+    capsys.readouterr()
 
 
 def test_a_packet_that_does_not_go_out_does_not_keep_the_others_back():
@@ -241,20 +249,23 @@ def test_a_packet_that_does_not_go_out_does_not_keep_the_others_back():
             self.pauses += 1
 
     stubborn = Stubborn()
-    assert guarding.quiet(stubborn) == PACKETS // 2
+    assert quiet(stubborn) == PACKETS // 2
     assert stubborn.tries == stubborn.pauses == PACKETS
     assert stubborn.sent == QUIET[: PACKETS // 2]
 
 
 def test_the_guard_loads_no_compiler():
-    code = "import sys, study_app.devices.falcon.guard; sys.exit(bool({'numba', 'pandas', 'PySide6'} & {*sys.modules}))"
+    code = (
+        "import sys, study_app.devices.guard, study_app.devices.falcon.transport.transport, "
+        "study_app.devices.force_dimension.library; sys.exit(bool({'numba', 'pandas', 'PySide6'} & {*sys.modules}))"
+    )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_a_guard_loads_nothing_from_the_folder_it_is_started_in(tmp_path, monkeypatch):
     (tmp_path / "signal.py").write_text("raise SystemExit")
     monkeypatch.chdir(tmp_path)
-    with Guard("falcon") as guard:
+    with guard_for("falcon") as guard:
         assert guard.watching
 
 

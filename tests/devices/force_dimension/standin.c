@@ -1,17 +1,22 @@
 /* A stand-in for Force Dimension's library, for tests: the functions that the driver uses, and one device that moves
  * its handle by itself. Written from the declarations of dhdc.h and drdc.h (SDK 3.17.5) alone; their lines are given.
  * A call of dhdGetPosition is a millisecond. standin_fault sets a fault; built with LACKS_WATCHDOG, it lacks two functions
- * as an older library does. */
+ * as an older library does. The environment variable STANDIN_FILE names a file that holds the device's state, so
+ * that it outlives its program, as a device does; one program at a time can open it. */
+#include <fcntl.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
+#include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <time.h>
+#include <unistd.h>
 
 enum { NONE, NO_DEVICE, UNCALIBRATED, NO_THRESHOLD, WEAK, STAYS_OFF, ERROR, NOT_A_NUMBER, TURNS_OFF, SLOW, GUARDED,
-       WRITE_ERROR, SATURATED, STATUS_ERROR, HANGS };
+       WRITE_ERROR, SATURATED, STATUS_ERROR, HANGS, UNWATCHED, DEAF, UNMODELLED };
 
-static struct {
+static struct device {
     volatile int fault;
     int open, closed, stopped, expert, force_on, gravity;
     int time_guard;
@@ -20,7 +25,19 @@ static struct {
     long readings;
     double force[3], torque[3], grip, gap;
     double rotation[3][3];
-} d = {.time_guard = 0, .gap = 0.012, .rotation = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+} own = {.time_guard = 0, .gap = 0.012, .rotation = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, *at = &own;
+#define d (*at)
+static int file = -1;
+
+__attribute__((constructor)) static void share(void) {
+    const char *path = getenv("STANDIN_FILE");
+    if (path == 0 || (file = open(path, O_RDWR)) < 0 || ftruncate(file, sizeof own) < 0) return;
+    at = mmap(0, sizeof own, PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
+}
+static int lock(short kind) {
+    struct flock all = {.l_type = kind, .l_whence = SEEK_SET};
+    return file < 0 ? 0 : fcntl(file, F_SETLK, &all);
+}
 
 static double phase(void) { return 2.0 * 3.14159265358979 * 0.001 * (double)d.readings; }
 
@@ -34,7 +51,7 @@ void standin_reset(void) {
 }
 void standin_press(unsigned int buttons) { d.buttons = buttons; }
 void standin_rotate(const double *rotation) { memcpy(d.rotation, rotation, sizeof d.rotation); }
-/* force (3), torque (3), grip, force_on, open, closed, stopped, time_guard, watchdog, gravity */
+/* force (3), torque (3), grip, force_on, open, closed, stopped, time_guard, watchdog, gravity, readings */
 void standin_state(double *out) {
     int i;
     for (i = 0; i < 3; i++) {
@@ -42,20 +59,25 @@ void standin_state(double *out) {
         out[3 + i] = d.torque[i];
     }
     out[6] = d.grip, out[7] = d.force_on, out[8] = d.open, out[9] = d.closed, out[10] = d.stopped;
-    out[11] = d.time_guard, out[12] = d.watchdog, out[13] = d.gravity;
+    out[11] = d.time_guard, out[12] = d.watchdog, out[13] = d.gravity, out[14] = (double)d.readings;
 }
 
 const char *dhdErrorGetLastStr(void) { return "stand-in error"; }                         /* dhdc.h 74 */
 int dhdGetDeviceCount(void) { return d.fault == NO_DEVICE ? 0 : 1; }                      /* 218 */
 int dhdGetSerialNumber(unsigned short *sn, char ID) { (void)ID; *sn = 10233; return 0; }  /* 222 */
 int dhdOpen(void) {                                                                       /* 223 */
-    if (d.fault == NO_DEVICE) return -1;
+    if (d.fault == NO_DEVICE || lock(F_WRLCK) < 0) return -1;
     d.open = 1, d.closed = 0;
     return 0;
 }
 int dhdOpenSerial(int serial) { return serial == 10233 ? dhdOpen() : -1; }                /* 225 */
-int dhdClose(char ID) { (void)ID; d.open = 0, d.closed = 1; return 0; }                   /* 227 */
-int dhdStop(char ID) { (void)ID; d.force_on = 0, d.stopped = 1; return 0; }               /* 229 */
+int dhdClose(char ID) { (void)ID; d.open = 0, d.closed = 1; return lock(F_UNLCK); }                   /* 227 */
+int dhdStop(char ID) {                                                                    /* 229 */
+    (void)ID;
+    if (d.fault == DEAF) return -1;
+    d.force_on = 0, d.stopped = 1;
+    return 0;
+}
 int dhdEnableForce(unsigned char val, char ID) {                                          /* 231 */
     (void)ID;
     d.force_on = val && d.fault != STAYS_OFF, d.stopped = 0;
@@ -101,7 +123,7 @@ int dhdGetPosition(double *px, double *py, double *pz, char ID) {               
     return d.fault == ERROR ? -1 : 0;
 }
 static int push(double fx, double fy, double fz) {
-    if (!d.open || d.fault == WRITE_ERROR) return -1;
+    if (!d.open || d.fault == WRITE_ERROR || d.fault == DEAF) return -1;
     d.force[0] = fx, d.force[1] = fy, d.force[2] = fz;
     return d.fault == SATURATED ? 2 : 0; /* DHD_MOTOR_SATURATED: 161 */
 }
@@ -133,8 +155,47 @@ int dhdGetVelocityThreshold(unsigned int *val, char ID) {                       
     *val = d.fault == NO_THRESHOLD ? 0 : 40;
     return d.expert ? 0 : -1;
 }
+int dhdGetComMode(char ID) { (void)ID; return 1; }                                        /* 230; DHD_COM_MODE_ASYNC: 195 */
+/* a count of each encoder moves the handle by 10 um along its own axis; the middle is at 1000 counts */
+int dhdDeltaEncoderToPosition(int e0, int e1, int e2, double *px, double *py, double *pz, char ID) { /* 331 */
+    (void)ID;
+    *px = 1e-5 * (e0 - 1000), *py = 1e-5 * (e1 - 1000), *pz = 1e-5 * (e2 - 1000);
+    return d.expert && d.fault != UNMODELLED ? 0 : -1;
+}
+int dhdDeltaPositionToEncoder(double px, double py, double pz, int *e0, int *e1, int *e2, char ID) { /* 332 */
+    (void)ID;
+    *e0 = 1000 + (int)lround(1e5 * px), *e1 = 1000 + (int)lround(1e5 * py), *e2 = 1000 + (int)lround(1e5 * pz);
+    return d.expert && d.fault != UNMODELLED ? 0 : -1;
+}
+int dhdDeltaEncodersToJointAngles(int e0, int e1, int e2, double *j0, double *j1, double *j2, char ID) { /* 355 */
+    (void)ID;
+    *j0 = 1e-3 * e0, *j1 = 1e-3 * e1, *j2 = 1e-3 * e2;
+    return d.expert && d.fault != UNMODELLED ? 0 : -1;
+}
+int dhdGetJointAngles(double j[8], char ID) {                                             /* 366 */
+    (void)ID;
+    memset(j, 0, 8 * sizeof(double));
+    return d.expert && d.fault != UNMODELLED ? 0 : -1;
+}
+/* 0.25 kg along the second axis, less what the free wrist takes off: 0.01^2 / 0.002 = 0.05 kg */
+int dhdJointAnglesToInertiaMatrix(double j[8], double inertia[6][6], char ID) {           /* 369 */
+    int i;
+    (void)ID;
+    memset(inertia, 0, 36 * sizeof(double));
+    for (i = 0; i < 3; i++) {
+        inertia[i][i] = i == 1 && j[1] == 1.0 ? 0.25 : 0.3;
+        inertia[3 + i][3 + i] = 0.002;
+    }
+    inertia[1][5] = inertia[5][1] = 0.01;
+    return d.expert && d.fault != UNMODELLED ? 0 : -1;
+}
 #ifndef LACKS_WATCHDOG
-int dhdSetWatchdog(unsigned char val, char ID) { (void)ID; d.watchdog = val; return d.expert ? 0 : -1; } /* 373 */
+int dhdSetWatchdog(unsigned char val, char ID) { /* 373 */
+    (void)ID;
+    if (d.fault == UNWATCHED) return -1;
+    d.watchdog = val;
+    return d.expert ? 0 : -1;
+}
 int dhdGetWatchdog(unsigned char *val, char ID) { (void)ID; *val = d.watchdog; return d.expert ? 0 : -1; } /* 374 */
 #endif
 bool drdIsInitialized(char ID) { (void)ID; return d.fault != UNCALIBRATED; }              /* drdc.h 41 */

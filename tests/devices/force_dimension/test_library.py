@@ -1,10 +1,6 @@
 """The real driver with a stand-in library of our own, built by the C compiler: opening, ticks, faults, ends."""
 
-import ctypes
 import math
-import shutil
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -20,36 +16,18 @@ from study_app.devices.force_dimension.failures import FAILURES, VARIABLE
 from study_app.devices.force_dimension.library import LONGEST_WATCHDOG, SIGNATURES, Library, probe
 from study_app.devices.registry import open_device
 from study_app.errors import DeviceError, DeviceLost, DeviceNotFound, ServoFault
+from study_app.haptics.model.device_dynamics import UNKNOWN
+from study_app.haptics.model.layout import LIMITER_SATURATED
+from study_app.store import workstation
+from study_app.store.workstation import DeviceBench
+from study_app.user_folder import FOLDER_VARIABLE
 from tests.compiled import needs_servo
+from tests.devices.force_dimension.standin import FAULTS, StandIn, build, needs_standin
 
-COMPILER = shutil.which("cc")
-SOURCE = Path(__file__).with_name("standin.c")
 STROKE_TICKS = 1000
 
-pytestmark = [
-    needs_servo,
-    pytest.mark.skipif(COMPILER is None, reason="no C compiler ('cc') is installed"),
-    pytest.mark.skipif(sys.platform == "win32", reason="the stand-in is built with the options of a POSIX compiler"),
-]
+pytestmark = [needs_servo, *needs_standin]
 
-FAULTS = (
-    "none",
-    "no-device",
-    "uncalibrated",
-    "no-threshold",
-    "weak",
-    "stays-off",
-    "error",
-    "nan",
-    "turns-off",
-    "slow",
-    "guarded",
-    "write-error",
-    "saturated",
-    "status-error",
-    "hangs",
-)
-"""In the order of the stand-in's enumeration."""
 OPENING = {
     "no-device": "no-device",
     "uncalibrated": "uncalibrated",
@@ -68,39 +46,9 @@ REFUSED_WRITES = {"write-error"}
 """The stand-in takes no force then, not the last zero either: `dhdStop` is what ends it."""
 
 
-def build(folder: Path, *options: str) -> Path:
-    library = folder / "libdrd-standin.so"
-    command = [COMPILER, "-std=c11", "-D_POSIX_C_SOURCE=199309L", "-Wall", "-Werror", "-shared", "-fPIC", *options]
-    subprocess.run([*command, SOURCE, "-o", library, "-lm"], check=True)
-    return library
-
-
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return build(tmp_path_factory.mktemp("standin"))
-
-
-class StandIn:
-    """The stand-in's own functions, for tests."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.loaded = ctypes.CDLL(str(path))  # the same instance that the driver loads
-
-    def fault(self, name: str) -> None:
-        self.loaded.standin_fault(FAULTS.index(name))
-
-    def rotate(self, rotation: Any) -> None:
-        self.loaded.standin_rotate((ctypes.c_double * 9)(*np.ravel(rotation)))
-
-    @property
-    def state(self) -> dict[str, Any]:
-        out = (ctypes.c_double * 14)()
-        self.loaded.standin_state(out)
-        names = ("force_on", "open", "closed", "stopped", "time_guard", "watchdog", "gravity")
-        return {"force_n": list(out[:3]), "torque": list(out[3:6]), "grip": out[6]} | dict(
-            zip(names, out[7:], strict=True)
-        )
 
 
 @pytest.fixture
@@ -176,6 +124,36 @@ class TestOpening:
         assert ended(standin)
         assert standin.state["closed"] == 1.0
 
+    def test_delay_count_and_mass_are_measured_and_read(self, standin: StandIn) -> None:
+        with opened(standin) as device:
+            found = device.dynamics
+            assert device.describe()["com_mode"] == 1
+        assert found.unknown == ()
+        assert 0.0 < found.delay_s < 1e-3
+        assert found.count_m == pytest.approx(10e-6)
+        assert found.mass_kg == pytest.approx(0.2)
+
+    def test_what_the_library_lacks_comes_from_the_latest_bench_or_is_assumed(
+        self, standin: StandIn, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
+        standin.fault("unmodelled")
+        with opened(standin) as device:
+            assert device.dynamics.assumed == device.dynamics.unknown == ("count_m", "mass_kg")
+            assert device.dynamics[1:3] == UNKNOWN[1:3]
+        axes = (0.31, 0.22, 0.4)
+        bench = DeviceBench(
+            name="force-dimension", serial="10233", measured="2026-11-24", mass_kg=axes, damping_nspm=axes,
+            friction_n=axes, delay_ms=axes, stable_nspm=axes, count_m=12e-6,
+        )  # fmt: skip
+        workstation.save(workstation.DEFAULTS.with_bench(bench))
+        with opened(standin) as device:
+            assert device.dynamics.unknown == ()
+            assert device.dynamics[1:3] == (12e-6, 0.22)
+        workstation.save(workstation.DEFAULTS.with_bench(bench.model_copy(update={"serial": "10234"})))
+        with opened(standin) as device:  # another one's
+            assert device.dynamics.assumed == ("count_m", "mass_kg")
+
     def test_a_serial_number_chooses_the_device(self, standin: StandIn) -> None:
         opened(standin, "force-dimension:10233").close()
         with pytest.raises(DeviceNotFound, match="the library opens no such device"):
@@ -211,9 +189,10 @@ class TestTicks:
 
             servo = Servo(device, clock=VirtualClock())
             reader = servo.telemetry.reader()
+            before = standin.state["readings"]
             servo.advance(500)
             rows = reader.read()[1:]
-        t_s = 1e-3 * np.arange(2, len(rows) + 2)
+        t_s = 1e-3 * (before + np.arange(2, len(rows) + 2))
         assert rows.position_m[:, 0] == pytest.approx(0.03 * np.sin(2 * np.pi * t_s))
         assert (rows.position_m[:, 1] == 0.01).all()
         assert (rows.position_m[:, 2] == 0.0).all()
@@ -266,16 +245,35 @@ class TestTicks:
             assert device.counters["guarded"] == pytest.approx(STROKE_TICKS / 2, abs=1)
             assert device.counters["fresh"] + device.counters["guarded"] == device.counters["ticks"]
 
-    def test_forces_that_saturate_the_motors_are_counted(self, standin: StandIn) -> None:
+    def test_forces_that_saturate_the_motors_are_counted_and_their_ticks_marked(self, standin: StandIn) -> None:
         standin.fault("saturated")
         with opened(standin) as device:
-            ticking(device).check()
+            servo = ticking(device)
+            servo.check()
             assert device.counters["saturated"] >= STROKE_TICKS
+            reader = servo.telemetry.reader()
+            standin.fault("none")
+            servo.advance(10)
+            standin.fault("saturated")
+            servo.advance(10)
+            marked = reader.read().limiters & LIMITER_SATURATED != 0
+            assert marked[-20:].tolist() == [False] * 10 + [True] * 10
 
 
 class TestFaults:
     def test_the_tables_have_every_fault(self) -> None:
-        assert {"none", "slow", "hangs", "guarded", "saturated", *OPENING, *STREAM} == set(FAULTS)
+        assert {
+            "none",
+            "slow",
+            "hangs",
+            "guarded",
+            "saturated",
+            "unwatched",
+            "deaf",
+            "unmodelled",
+            *OPENING,
+            *STREAM,
+        } == set(FAULTS)
 
     @pytest.mark.parametrize("fault", STREAM)
     def test_a_fault_in_a_stroke_ends_in_its_message_and_zero_force(self, standin: StandIn, fault: str) -> None:

@@ -195,7 +195,7 @@ def test_while_blind_both_sides_look_alike_but_for_which_is_felt(place: Any, mov
         pictures.append(place.grab().toImage())
         one, two = place.header.sides.segments.values()
         assert (one.text(), two.text(), one.isChecked(), two.isChecked()) == ("Setting 1", "Setting 2", True, False)
-        assert (len(place.cost.lines), len(place.limiters.lines)) == (5, 10)  # nothing behind the curtain moves
+        assert (len(place.cost.lines), len(place.limiters.lines)) == (5, 11)  # nothing behind the curtain moves
     assert pictures[0] == pictures[1]
 
 

@@ -11,7 +11,14 @@ from study_app.errors import DeviceError
 from study_app.haptics.kernels.loop import FASTER_SAMPLES, SLOWER_SAMPLES
 from study_app.haptics.kernels.safety import begin_scene, new_safety
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
-from study_app.haptics.model.layout import CONTRACT_VERSION, READING, STATUS_DEVICE_LOST, new_command, new_reading
+from study_app.haptics.model.layout import (
+    CONTRACT_VERSION,
+    LIMITER_SATURATED,
+    READING,
+    STATUS_DEVICE_LOST,
+    new_command,
+    new_reading,
+)
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.pack import pack
 from study_app.haptics.runtime.recompute import new_wake_places, recompute_sample
@@ -71,6 +78,43 @@ def test_a_tick_is_recomputed_from_the_delivered_force_to_the_last_bit():
     begin_scene(safety[0])
     recompute_sample(pack(HONEY), safety[0], unaware, trail[0], places, False)
     assert np.array_equal(unaware.command_n, unaware.device_force_n)
+
+
+def balances(servo):
+    passivity = servo.loop.safety[0].passivity
+    return np.array([passivity.balance_j, passivity.late_balance_j, passivity.later_balance_j])
+
+
+def test_the_observer_takes_the_least_favourable_force_of_saturated_motors_and_a_replay_repeats_it():
+    """Braking, the motors may have given nothing; pushing the hand on, all."""
+    taken = {}
+    for name, saturates, share in (("obeyed", 0, 1.0), ("nothing", 0, 0.0), ("saturated", 1, 1.0)):
+        probe = Probe(velocity_mps=(0.3, 0.0, 0.1))
+        probe.state.saturates, probe.state.share_sent = saturates, share
+        servo = Servo(probe, clock=VirtualClock())
+        servo.load(HONEY)
+        reader = servo.telemetry.reader()
+        servo.advance(600)
+        braked = balances(servo)
+        probe.state.velocity_mps = (-0.3, 0.0, -0.1)
+        probe.state.began_ns += 1_200_000_000  # from the same place back
+        servo.advance(3)
+        taken[name] = braked, balances(servo), reader.read(), servo.loop.safety[0].copy()
+    assert (taken["obeyed"][0] > 1e-5).all()
+    assert taken["saturated"][0] == pytest.approx(taken["nothing"][0], abs=1e-9)
+    fallen = {name: it[1] - it[0] for name, it in taken.items()}
+    assert fallen["saturated"][1] == pytest.approx(fallen["obeyed"][1], abs=1e-6)
+    assert fallen["saturated"][1] < -1e-5
+
+    samples, left = taken["saturated"][2:]
+    assert (samples.limiters & LIMITER_SATURATED != 0).all()
+    assert (samples.device_force_n == samples.command_n).all()
+    model, safety, again = pack(HONEY), new_safety(8.0), samples.copy()
+    begin_scene(safety[0])
+    trail, places = new_wake_places(10)
+    recompute_sample(model, safety[0], again, trail[0], places, True)
+    assert (again.limiters == samples.limiters).all()
+    assert safety[0].passivity.late_balance_j == left.passivity.late_balance_j
 
 
 @pytest.mark.parametrize(("delay_s", "expected"), [(None, 1), (0.0, 0), (0.9e-3, 1), (1e-3, 1), (1.2e-3, 2)])

@@ -2,9 +2,10 @@
 
 Of ``demo`` one participant with all recordings and one whose program is killed in the second trial; of ``thickness``
 (format 2: forms, numbers, questions of several kinds) one participant's answers. Next to them are the protocol
-files and ``expected.json``: status and number of answers of each participant.
+files and ``expected.json``: status and number of answers of each participant. The studies of
+``recorded_sessions.STRESSED`` are for replay only.
 
-    python tests/store/releases/record.py
+    python -m tests.store.releases.record
 """
 
 import json
@@ -17,6 +18,7 @@ from study_app import __version__
 from study_app.protocol.load import source_bytes
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
+from tests.evaluation.recorded_sessions import STRESSED, stressed
 
 HERE = Path(__file__).resolve().parent
 PATIENCE_S = 300.0
@@ -61,6 +63,8 @@ def main() -> None:
     journal_of_second = demo / "data" / "sub-P002" / "ses-01" / "journal.jsonl"
     killed_in_second_trial(rehearsal("demo", demo, 2), journal_of_second)
     subprocess.run(rehearsal("thickness", to / "thickness", 1, "--answers-only"), check=True)
+    for liquid in STRESSED:
+        stressed(to / liquid, liquid)
     expected = {}
     for name in ("demo", "thickness"):
         (to / f"{name}.toml").write_bytes(source_bytes(name))

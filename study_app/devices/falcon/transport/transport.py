@@ -8,16 +8,22 @@ process. None of them loads the compiler before its `calls` are asked for: the g
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Protocol
+from contextlib import suppress
+from typing import TYPE_CHECKING, Final, Protocol
 
 from study_app.devices.falcon.failures import FalconLost, FalconNotFound, UsbFailure, usb_failure
-from study_app.errors import DeviceNotFound
+from study_app.devices.falcon.wire.constants import FLAG_HOMING, quiet_packet
+from study_app.errors import DeviceError, DeviceNotFound
 
 if TYPE_CHECKING:
     from study_app.devices.falcon.transport.bulk_calls import BulkCalls
 from study_app.devices.falcon.transport.usb import PyUsbTransport
 
 __all__ = ["FalconLost", "FalconNotFound", "PyUsbTransport", "Transport", "UsbFailure", "open_transport", "usb_failure"]
+
+PACKETS: Final = 10
+_BETWEEN_S: Final = 0.002
+_WRITE_S: Final = 0.1
 
 
 class Transport(Protocol):
@@ -98,3 +104,33 @@ def open_transport(name: str) -> Transport:
             return FtdiTransport(serial=serial)
         except UsbFailure:
             raise failure from None
+
+
+def quiet(transport: Transport) -> int:
+    """Send ``PACKETS`` packets of zero torque; return the number sent.
+
+    They keep the homing flag, and the bridge's settings are unchanged, so that the Falcon stays loaded and homed.
+    """
+    sent = 0
+    for _ in range(PACKETS):
+        with suppress(DeviceError):
+            transport.write(quiet_packet(FLAG_HOMING), _WRITE_S)
+            sent += 1
+        transport.pause(_BETWEEN_S)
+    return sent
+
+
+def end_torque(name: str) -> None:
+    """Open the bridge called ``name`` and send packets of zero torque: what a guard does.
+
+    Raises
+    ------
+    DeviceError
+        It cannot be opened, or takes no packet.
+    """
+    transport = open_transport(name)
+    try:
+        if not quiet(transport):
+            raise DeviceError("it takes no packet")
+    finally:
+        transport.close()

@@ -18,6 +18,9 @@
 #define LIQUID_STUDY_READ_NOTHING_NEW 1  /* no new sample; after 5 ms without one the force fades, after 50 ms a fault */
 #define LIQUID_STUDY_READ_LOST (-1)      /* the device is gone: the servo writes zero force and ends */
 
+/* What WRITE returns: 0, LIQUID_STUDY_READ_LOST, or */
+#define LIQUID_STUDY_WRITE_SATURATED 1   /* the motors saturated: their force was between 0 and sent_n */
+
 /* Bits of `measured`. */
 #define LIQUID_STUDY_MEASURED_VELOCITY 1
 #define LIQUID_STUDY_MEASURED_ORIENTATION 2
@@ -52,7 +55,7 @@ typedef struct {
 /* READ: fill in the record, and return a code above. `now_ns` is the servo's monotonic clock. */
 typedef int32_t (*liquid_study_read)(intptr_t context, int64_t now_ns, intptr_t reading);
 
-/* WRITE: send the force; return 0, or LIQUID_STUDY_READ_LOST. It is also called with zero force before READ. */
+/* WRITE: send the force, and return a code above. It is also called with zero force before READ. */
 typedef int32_t (*liquid_study_write)(intptr_t context, intptr_t command);
 
 #endif

@@ -1,11 +1,11 @@
-"""The guard: a small process that sends zero torque if the program dies.
+"""The guard: a small process that ends a device's force if the program dies.
 
-A Falcon without further packets may keep its last torque. So a child process waits on a pipe from the program; if the
-pipe ends without ``WORD``, the program has died, and the child opens the Falcon and sends packets of zero torque. They
-keep the homing flag, and the bridge's settings are unchanged, so that the Falcon stays loaded and homed. Run as
-``python -m study_app.devices.falcon.guard NAME``, NAME being one of ``transport.open_transport``.
+A device without a watchdog may keep its last force. So a child process waits on a pipe from the program; if the pipe
+ends without ``WORD``, the program has died, and the child calls the driver's function that opens the device and ends
+its force. Run as ``python -m study_app.devices.guard NAME MODULE:FUNCTION ARGUMENT...``.
 """
 
+import pkgutil
 import signal
 import subprocess
 import sys
@@ -16,38 +16,37 @@ from contextlib import suppress
 from types import TracebackType
 from typing import IO, Final, Self
 
-from study_app.devices.falcon.transport.transport import Transport, open_transport
-from study_app.devices.falcon.wire.constants import FLAG_HOMING, quiet_packet
 from study_app.errors import DeviceError
 from study_app.haptics.runtime.suspension import allow_suspension, refuse_suspension
 
 WORD: Final = b"done\n"
 READY: Final = b"ready\n"
-PACKETS: Final = 10
+DIED: Final = "its guard process has died, so the force was turned off: start the program again"
 PATIENCE_S: Final = 10.0
-"""Time in which the guard tries to open the Falcon: the system needs a moment to release it from a dead program."""
+"""Time in which the guard tries to open the device: the system needs a moment to release it from a dead program."""
 
 _RETRY_S = 0.02
-_BETWEEN_S = 0.002
-_WRITE_S = 0.1
 _LEAVE_S = 5.0
 
 
 class Guard:
-    """The guard of the Falcon that ``open_transport(name)`` opens.
+    """The guard of a device.
 
     It can act when the program has died, not while it is suspended: from its start until it is dismissed Ctrl-Z does
     nothing. As a context manager it starts on entry and is dismissed on exit; after an exception it is not dismissed,
-    but sends its packets as soon as the Falcon is closed.
+    but ends the force as soon as the device is closed.
 
     Parameters
     ----------
-    name : of the Falcon
+    name : of the device, for messages
+    ends_force : "MODULE:FUNCTION" of a function that opens the device and ends its force, or raises ``DeviceError``
+    arguments : of this function
     died : called in a separate thread if the guard ends before it is dismissed: then no force may be sent
     """
 
-    def __init__(self, name: str, died: Callable[[], object] | None = None) -> None:
+    def __init__(self, name: str, ends_force: str, *arguments: str, died: Callable[[], object] | None = None) -> None:
         self._name = name
+        self._words = (name, ends_force, *arguments)
         self._died = died
         self.child: subprocess.Popen[bytes] | None = None
         self._left: subprocess.Popen[bytes] | None = None
@@ -63,7 +62,7 @@ class Guard:
         """
         if self.child is not None:
             return
-        command = [sys.executable, "-P", "-m", __spec__.name, self._name]  # -P: no modules of the present folder
+        command = [sys.executable, "-P", "-m", __spec__.name, *self._words]  # -P: no modules of the present folder
         # In a separate session or console: closing the program's terminal does not end its guard.
         child = subprocess.Popen(  # noqa: S603 - our own module, and no shell
             command,
@@ -78,7 +77,8 @@ class Guard:
             child.wait()
             _close(child)
             raise DeviceError(
-                "the Falcon's guard process does not start, so no force may be sent: reinstall liquid-study"
+                f"the guard process of the device '{self._name}' does not start, so no force may be sent: reinstall "
+                "liquid-study"
             )
         self.child = child
         refuse_suspension(self)
@@ -96,17 +96,17 @@ class Guard:
             self._died()
 
     def stand_down(self) -> None:
-        """Dismiss the guard: the torque is zero and the Falcon closed. A second call does nothing."""
+        """Dismiss the guard: the force is zero and the device closed. A second call does nothing."""
         self._end(WORD)
 
     def release(self) -> None:
-        """Let it send its packets after the Falcon is closed; wait for the end."""
+        """Let it end the force after the device is closed; wait for the end."""
         self._end(b"")
 
     def leave(self) -> None:
-        """Let the guard send its packets once the Falcon is connected again, within a limited time; return at once.
+        """Let the guard end the force once the device is connected again, within a limited time; return at once.
 
-        For a lost link: the Falcon may still exert force, and may reconnect before any program opens it.
+        For a lost link: the device may still exert force, and may reconnect before any program opens it.
         """
         child, self.child = self.child, None
         allow_suspension(self)
@@ -117,9 +117,9 @@ class Guard:
         threading.Thread(target=_see_off, args=(child, self.listener), name="guard", daemon=True).start()
 
     def recall(self) -> None:
-        """End the process that `leave` left behind: the program has opened the Falcon again, with another guard.
+        """End the process that `leave` left behind: the program has opened the device again, with another guard.
 
-        Otherwise it would try until its time limit to open a Falcon that is in use, and report a danger.
+        Otherwise it would try until its time limit to open a device that is in use, and report a danger.
         """
         left, self._left = self._left, None
         if left is not None:
@@ -169,47 +169,27 @@ def _close(child: subprocess.Popen[bytes]) -> None:
             stream.close()
 
 
-def quiet(transport: Transport) -> int:
-    """Send ``PACKETS`` packets of zero torque; return the number sent."""
-    sent = 0
-    for _ in range(PACKETS):
-        with suppress(DeviceError):
-            transport.write(quiet_packet(FLAG_HOMING), _WRITE_S)
-            sent += 1
-        transport.pause(_BETWEEN_S)
-    return sent
-
-
-def open_patiently(name: str) -> Transport:
-    """Return the opened Falcon, with attempts for ``PATIENCE_S``; then raise the error."""
-    ends_s = time.monotonic() + PATIENCE_S
-    while True:
-        try:
-            return open_transport(name)
-        except DeviceError:
-            if time.monotonic() > ends_s:
-                raise
-        time.sleep(_RETRY_S)
-
-
-def watch(name: str) -> int:
-    """Wait for the end of the standard input; without ``WORD`` in it, send zero torque. Return an exit code."""
+def watch(name: str, ends_force: str, *arguments: str) -> int:
+    """Wait for the end of the standard input; without ``WORD`` in it, end the device's force. Return an exit code."""
     for number in ("SIGINT", "SIGTERM", "SIGHUP"):
         if hasattr(signal, number):
             signal.signal(getattr(signal, number), signal.SIG_IGN)  # it ends when the program has ended
+    end_force = pkgutil.resolve_name(ends_force)
     sys.stdout.buffer.write(READY)
     sys.stdout.flush()
     if sys.stdin.buffer.read().endswith(WORD):
         return 0
-    try:
-        transport = open_patiently(name)
-    except DeviceError as error:
-        sys.stderr.write(f"the Falcon may still push: {error}; turn it off\n")
-        return 2
-    try:
-        return 0 if quiet(transport) else 2
-    finally:
-        transport.close()
+    ends_s = time.monotonic() + PATIENCE_S
+    while True:
+        try:
+            end_force(*arguments)
+        except DeviceError as error:
+            if time.monotonic() > ends_s:
+                sys.stderr.write(f"the device '{name}' may still push: {error}; turn it off\n")
+                return 2
+        else:
+            return 0
+        time.sleep(_RETRY_S)
 
 
 if __name__ == "__main__":
