@@ -1,0 +1,295 @@
+"""How many faults the tests notice: one fault in each of some functions drawn at random, and the tests that cover it.
+
+Once, hours before: the contexts of the quick and of the slow tests (``NUMBA_DISABLE_JIT=1`` covers compiled code)::
+
+    COVERAGE_FILE=FOLDER/quick.coverage python -m pytest -n 2 --dist loadfile -m "not slow and not nightly" \
+        --cov --cov-context=test --cov-report= --junitxml=FOLDER/quick.xml
+    COVERAGE_FILE=FOLDER/slow.coverage python -m pytest -n 2 --dist loadfile -m "slow and not nightly" \
+        --cov --cov-context=test --cov-report= --junitxml=FOLDER/slow.xml
+
+Then ``python tests/benchmarks/project/faults.py FOLDER [--functions 100] [--seed 1] [--package haptics]``. Each fault
+runs in a copy of the work tree, with the quick tests first; the first failure ends it. Neither mutmut nor cosmic-ray
+exchanges arguments or columns, or chooses tests by contexts, so the faults are made here.
+"""
+
+import argparse
+import ast
+import os
+import random
+import shutil
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from queue import Queue
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+from coverage import CoverageData
+
+ROOT = Path(__file__).resolve().parents[3]
+CIRCLES = ("quick", "slow")
+LIMIT_S = 90.0
+"""Longest run of the tests of a fault in one circle; a run that exceeds it although its tests usually fit hangs."""
+FILL = 0.5
+"""Share of `LIMIT_S` that the chosen tests usually take."""
+SWAPPED: dict[type[ast.AST], str] = {
+    ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*", ast.FloorDiv: "*", ast.Mod: "*", ast.And: "or",
+    ast.Or: "and", ast.Lt: ">=", ast.LtE: ">", ast.Gt: "<=", ast.GtE: "<", ast.Eq: "!=", ast.NotEq: "==",
+    ast.In: "not in", ast.NotIn: "in", ast.Is: "is not", ast.IsNot: "is",
+}  # fmt: skip
+
+
+class Fault(NamedTuple):
+    """One replacement in the source of a function; offsets are bytes of the file."""
+
+    path: str
+    function: str
+    lines: tuple[int, int]
+    line: int
+    kind: str
+    edits: tuple[tuple[int, int, bytes], ...]
+
+    def apply(self, source: bytes) -> bytes:
+        """Return the source with this fault."""
+        for begin, end, text in sorted(self.edits, reverse=True):
+            source = source[:begin] + text + source[end:]
+        return source
+
+
+class Source:
+    """A module's text and places in it."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path.relative_to(ROOT).as_posix()
+        self.bytes = path.read_bytes()
+        self.tree = ast.parse(self.bytes)
+        self._starts = [0]
+        for line in self.bytes.splitlines(keepends=True):
+            self._starts.append(self._starts[-1] + len(line))
+
+    def span(self, node: ast.expr | ast.stmt) -> tuple[int, int]:
+        """Return the first byte of a node and the one after it."""
+        assert node.end_lineno is not None
+        assert node.end_col_offset is not None
+        return (
+            self._starts[node.lineno - 1] + node.col_offset,
+            self._starts[node.end_lineno - 1] + node.end_col_offset,
+        )
+
+    def text(self, node: ast.expr | ast.stmt) -> bytes:
+        """Return the source of a node."""
+        begin, end = self.span(node)
+        return self.bytes[begin:end]
+
+    def functions(self) -> Iterator[tuple[str, ast.FunctionDef]]:
+        """Yield each function with its qualified name."""
+
+        def below(node: ast.AST, prefix: str) -> Iterator[tuple[str, ast.FunctionDef]]:
+            for child in ast.iter_child_nodes(node):
+                if isinstance(child, ast.FunctionDef):
+                    yield prefix + child.name, child
+                if isinstance(child, ast.FunctionDef | ast.ClassDef):
+                    yield from below(child, f"{prefix}{child.name}.")
+
+        return below(self.tree, "")
+
+    def faults(self, name: str, function: ast.FunctionDef) -> list[Fault]:
+        """Return all faults of a function's body, those of texts that only people read left out."""
+        assert function.end_lineno is not None
+        lines = function.lineno, function.end_lineno
+        return [
+            Fault(self.path, name, lines, node.lineno, kind, edits)
+            for node in _walk(function.body)
+            for kind, edits in self._edits(node)
+        ]
+
+    def _edits(self, node: ast.expr | ast.stmt) -> Iterator[tuple[str, tuple[tuple[int, int, bytes], ...]]]:
+        match node:
+            case ast.BinOp(left, op, right) if type(op) in SWAPPED:
+                yield "operator", (self._between(left, right, SWAPPED[type(op)]),)
+            case ast.BoolOp(op, values):
+                yield "operator", tuple(self._between(one, two, SWAPPED[type(op)]) for one, two in pairwise(values))
+            case ast.Compare(left, [op], [right]):
+                yield "operator", (self._between(left, right, SWAPPED[type(op)]),)
+            case ast.Constant(bool(value)):
+                yield "bound", ((*self.span(node), str(not value).encode()),)
+            case ast.Constant(int(value)):
+                yield "bound", ((*self.span(node), str(value + 1).encode()),)
+            case ast.Constant(float(value)):
+                yield "bound", ((*self.span(node), repr(value * 1.5 if value else 1.0).encode()),)
+            case ast.If(test) | ast.IfExp(test):
+                yield "branch", ((*self.span(test), b"False"),)
+            case ast.Expr(ast.Call()):
+                yield "call", ((*self.span(node), b"pass"),)
+        arguments = node.args if isinstance(node, ast.Call) else []
+        for one, two in pairwise(arguments):
+            if not isinstance(one, ast.Starred) and not isinstance(two, ast.Starred) and ast.dump(one) != ast.dump(two):
+                yield "argument", self._exchange(one, two)
+        elements = node.keys if isinstance(node, ast.Dict) else getattr(node, "elts", [])
+        for one, two in pairwise(elements):
+            if isinstance(one, ast.Constant) and isinstance(two, ast.Constant) and one.value != two.value:
+                yield "column", self._exchange(one, two)
+
+    def _between(self, left: ast.expr, right: ast.expr, operator: str) -> tuple[int, int, bytes]:
+        begin, end = self.span(left)[1], self.span(right)[0]
+        closing = self.bytes[begin:end]
+        before = closing[: len(closing) - len(closing.lstrip(b") \n"))]
+        after = closing[len(closing.rstrip(b"( \n")) :]
+        return begin, end, before.rstrip(b" ") + f" {operator} ".encode() + after.lstrip(b" ")
+
+    def _exchange(self, one: ast.expr, two: ast.expr) -> tuple[tuple[int, int, bytes], ...]:
+        return (*self.span(one), self.text(two)), (*self.span(two), self.text(one))
+
+
+def _walk(nodes: list[ast.stmt]) -> Iterator[ast.expr | ast.stmt]:
+    """Yield statements and expressions, without functions within, annotations, messages of errors and f-strings."""
+    queue: list[ast.AST] = list(nodes)
+    while queue:
+        node = queue.pop()
+        if isinstance(node, ast.Raise | ast.JoinedStr | ast.FunctionDef | ast.Assert):
+            continue
+        if isinstance(node, ast.expr | ast.stmt):
+            yield node
+        queue += [
+            child
+            for field, value in ast.iter_fields(node)
+            if field not in ("annotation", "returns", "decorator_list")
+            for child in (value if isinstance(value, list) else [value])
+            if isinstance(child, ast.AST)
+        ]
+
+
+def draw(count: int, seed: int, package: str) -> list[Fault]:
+    """Return one fault in each of ``count`` functions, drawn by ``seed``: first a kind, then a place."""
+    sources = [Source(path) for path in sorted((ROOT / "study_app" / package).rglob("*.py"))]
+    functions = [faults for source in sources for each in source.functions() if (faults := source.faults(*each))]
+    generator = random.Random(seed)  # noqa: S311
+    drawn = []
+    for faults in generator.sample(functions, min(count, len(functions))):
+        kind = generator.choice(sorted({fault.kind for fault in faults}))
+        drawn.append(generator.choice([fault for fault in faults if fault.kind == kind]))
+    return drawn
+
+
+@cache
+def durations(folder: Path, circle: str) -> dict[str, float]:
+    """Return how long each test took [s], by its name in the contexts."""
+    found = {}
+    for case in ElementTree.parse(folder / f"{circle}.xml").iter("testcase"):  # noqa: S314
+        module = case.attrib["classname"].replace(".", "/")
+        found[f"{module}.py::{case.attrib['name']}"] = float(case.attrib["time"])
+    return found
+
+
+def covering(folder: Path, circle: str, fault: Fault) -> list[str]:
+    """Return tests of a circle that run the function: first those of the faulty line, of its package, quick ones."""
+    data = CoverageData(str(folder / f"{circle}.coverage"))
+    data.read()
+    by_line = data.contexts_by_lineno(fault.path)
+    times_s = durations(folder, circle)
+
+    def at(*lines: int) -> set[str]:
+        return {name.split("|")[0] for line in lines for name in by_line.get(line, ()) if name}
+
+    at_fault, package = at(fault.line), f"tests/{Path(fault.path).parts[1]}/"
+    total_s, chosen = 0.0, []
+    for test in sorted(
+        at(*range(fault.lines[0], fault.lines[1] + 1)),
+        key=lambda test: (test not in at_fault, not test.startswith(package), times_s.get(test, 1.0), test),
+    ):
+        total_s += times_s.get(test, 1.0)
+        if chosen and total_s > FILL * LIMIT_S:
+            break
+        chosen.append(test)
+    return chosen
+
+
+def noticed_by(fault: Fault, folder: Path, copy: Path) -> str:
+    """Return the circle whose tests fail with the fault, or "none"; a test that fails without it does not count."""
+    faulty = copy / fault.path
+    sound = faulty.read_bytes()
+    environment = os.environ | {
+        "PYTHONPATH": str(copy),
+        "LIQUID_STUDY_WORKSPACE": str(copy),
+        "LIQUID_STUDY_CONFIG": str(copy / "config"),
+        "NUMBA_DISABLE_JIT": "1" if fault.path.startswith(("study_app/haptics", "study_app/devices")) else "0",
+    }
+
+    def failed(tests: list[str]) -> list[str]:
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider", *tests]
+        try:
+            done = subprocess.run(
+                command, check=False, cwd=copy, env=environment, capture_output=True, text=True, timeout=LIMIT_S
+            )
+        except subprocess.TimeoutExpired:
+            return tests[:1]
+        if done.returncode in (0, 5):
+            return []
+        named = [line.split()[1] for line in done.stdout.splitlines() if line.startswith(("FAILED ", "ERROR "))]
+        return [test for test in tests if any(test.startswith(name) for name in named)][:1] or tests[:1]
+
+    for circle in CIRCLES:
+        if not (tests := covering(folder, circle, fault)):
+            continue
+        faulty.write_bytes(fault.apply(sound))
+        first = failed(tests)
+        faulty.write_bytes(sound)
+        if first and not failed(first):
+            return circle
+    return "none"
+
+
+def main() -> None:
+    """Print a row for each fault, then the shares."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--functions", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--package", default="")
+    parser.add_argument("--workers", type=int, default=1)
+    given = parser.parse_args()
+    faults = draw(given.functions, given.seed, given.package)
+    counts: Counter[str] = Counter()
+    with TemporaryDirectory() as temporary, ThreadPoolExecutor(given.workers) as workers:
+        copies: Queue[Path] = Queue()
+        for number in range(given.workers):
+            copies.put(_copy(Path(temporary) / str(number)))
+
+        def judge(fault: Fault) -> tuple[Fault, str, float]:
+            copy, begun = copies.get(), time.monotonic()
+            try:
+                return fault, noticed_by(fault, given.folder.resolve(), copy), time.monotonic() - begun
+            finally:
+                copies.put(copy)
+
+        for fault, circle, took_s in workers.map(judge, faults):
+            counts[circle] += 1
+            change = " ".join(text.decode() for *_, text in fault.edits)
+            print(
+                f"{circle:6} {took_s:4.0f} s  {fault.kind:9} {fault.path}:{fault.line} {fault.function}: {change[:60]}",
+                flush=True,
+            )
+    total = counts.total()
+    shares = ", ".join(f"{name} {counts[name]} ({counts[name] / total:.0%})" for name in (*CIRCLES, "none"))
+    print(f"seed {given.seed}, {total} faults: {shares}; noticed {1 - counts['none'] / total:.0%}")
+
+
+def _copy(folder: Path) -> Path:
+    """Copy what Git tracks, as it stands in the work tree."""
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    for name in listed.splitlines():
+        if (ROOT / name).is_file():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, folder / name)
+    return folder
+
+
+if __name__ == "__main__":
+    main()
