@@ -37,6 +37,11 @@ else:
     QT_IS_HERE = True
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option that writes golden files anew."""
+    parser.addoption("--regenerate", action="store_true", help="write the golden files anew; review the difference")
+
+
 def pytest_plugin_registered(plugin: object, manager: pytest.PytestPluginManager) -> None:
     """Without Qt the plugin that tests it cannot start, and must not keep the other tests from running."""
     if not QT_IS_HERE and manager.get_name(plugin) == "pytest-qt":
