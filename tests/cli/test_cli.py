@@ -193,3 +193,12 @@ def test_verify_ends_with_a_verdict_and_its_exit_code(tmp_path: Path, liquid_stu
     table.write_bytes(table.read_bytes() + b"\n")
     verified = liquid_study("verify", "study")
     assert (verified.returncode, verified.stdout.splitlines()[-1]) == (3, "12 sessions: not sound")
+
+
+def test_interrupting_a_command_ends_it_with_130(liquid_study: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(**_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(commands.commands["check"], "callback", interrupted)
+    finished = liquid_study("check", "demo")
+    assert (finished.returncode, finished.stdout, finished.stderr.strip()) == (130, "", "")

@@ -212,6 +212,13 @@ def test_every_level_that_steps_led_to_is_looked_for_and_stands_nowhere(study: P
     assert words.in_text(f"{lines[-1]['n']} {max(numbers - {18.0})!r}")
 
 
+def test_a_level_that_was_set_is_found_in_a_note(session: Path) -> None:
+    level = next(line["setting"] for line in lines_of(session) if len(str(line.get("setting"))) > 6)
+    (session / "note.txt").write_text(f"it was {level!r}", encoding="utf-8")
+    warnings = [str(one) for one in verify(session.parents[2], None).warnings]
+    assert any("note.txt, line 1 reveals a condition, although the key is sealed" in one for one in warnings)
+
+
 @pytest.mark.nightly
 def test_settings_without_a_servo_follow_too(protocol: Path, tmp_path: Path) -> None:
     study = rehearse_answers(protocol, participants=1, seed=2, results=tmp_path / "study")

@@ -72,8 +72,11 @@ class TestSerial:
             os.close(file)
 
     def test_a_reader_of_the_other_end_gets_the_bytes(self, pair: tuple[int, str]) -> None:
+        import termios
+
         ours, name = pair
         thread = SinkThread(open_sink(f"serial:{name}@9600", time.monotonic_ns))
+        assert termios.tcgetattr(ours)[4:6] == [termios.B9600, termios.B9600]
         for event in ("trial_started", "interval_started", "responses", "trial_ended"):
             thread.mark(marker(event=event))
         thread.close(5)

@@ -58,6 +58,13 @@ def test_number_takes_point_and_comma(opening: Any, text: str) -> None:
     assert opened.answers == [("size", 1.5)]
 
 
+@pytest.mark.parametrize(("value", "text"), [(1.5, "1.5"), (-0.25, "−0.25"), (0, "0")])
+def test_answered_number_is_shown_again(opening: Any, value: float, text: str) -> None:
+    opened = opening(form((NumberView("size", 1, "How large?", True),), chosen=(("size", value),)))
+    assert opened.field("size").entry.text() == text
+    assert opened.field("size").is_answered
+
+
 def test_emptied_entry_is_retracted(opened: Opened) -> None:
     field = opened.field("comment")
     field.setFocus()

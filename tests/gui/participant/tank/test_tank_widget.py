@@ -5,14 +5,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QEvent, QPoint
+from PySide6.QtCore import QEvent, QPoint, QPointF
 from PySide6.QtGui import QRegion
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.participant.tank.frame import changes
 from study_app.gui.participant.tank_widget import TankWidget
+from study_app.protocol.wording.languages import words
 from tests.gui.participant.tank.painted import shown
-from tests.gui.small import view
+from tests.gui.small import reach, task_page, view
 
 
 def test_ball_is_drawn_where_the_view_says(tank: TankWidget) -> None:
@@ -24,6 +25,32 @@ def test_ball_is_drawn_where_the_view_says(tank: TankWidget) -> None:
         colour = tank.grab().toImage().pixelColor(place)
         assert colour.red() > 170
         assert colour.red() > colour.green() > colour.blue() + 20
+
+
+@pytest.mark.parametrize("other_z_mm", [-25, 25])
+def test_the_nearer_of_ball_and_target_is_painted_over_the_other(qtbot: Any, other_z_mm: int) -> None:
+    """Where the lit ring crosses the ball, the ball's colour shows if it is nearer, else the pale ring."""
+    tank = TankWidget(task_page(reach(targets_mm=((-30, 0, 0), (30, 0, other_z_mm)))), words("en"))
+    qtbot.addWidget(tank)
+    tank.resize(960, 640)
+    tank.show()
+    tank.show_view(view((0, 0.02, 0), lit=0))
+    assert tank.camera is not None
+    assert tank.placer is not None
+    target = tank.targets[0]
+    ring = target.middle + QPointF(target.radius, 0)
+    seen = []
+    for z in (0.02, -0.02):
+        flat = tank.camera.scale((0, 0, z))
+        centre = tank.camera.point((0, 0, z))
+        tank.show_view(view(((ring.x() - centre[0]) / flat, (centre[1] - ring.y()) / flat, z), lit=0))
+        assert tank.ball is not None
+        assert (tank.ball.middle - ring).manhattanLength() < tank.ball.radius / 2
+        assert (tank.ball.depth_m < target.depth_m) is (z > 0)
+        seen.append(tank.grab().toImage().pixelColor(ring.toPoint()))
+    near, far = seen
+    assert near.red() > near.blue() + 40
+    assert far.blue() > near.blue() + 40
 
 
 def test_lit_and_dim_targets_differ_in_shape_and_light(tank: TankWidget) -> None:
