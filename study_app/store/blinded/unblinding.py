@@ -54,20 +54,22 @@ def unblind(folder: Path, by: str, reason: str) -> Unblinded:
     Raises
     ------
     StoreError
-        As `blinding.reveal`, and then nothing has changed.
+        As `blinding.reveal`, or another program writes to the folder; then nothing has changed.
     """
-    codes = reveal(folder, by, reason)
-    study, key = StudyFolder(folder), read_key(folder)
-    left: list[str] = []
-    for session in study.sessions():
+    study = StudyFolder(folder)
+    with open_alone(folder) if is_there(study.key) else contextlib.nullcontext():
+        codes = reveal(folder, by, reason)
+        key = read_key(folder)
+        left: list[str] = []
+        for session in study.sessions():
+            try:
+                left += _open_tables(study, session, key)
+            except StoreError as error:
+                left.append(f"{error}; then: liquid-study rebuild {session.path}")
         try:
-            left += _open_tables(study, session, key)
+            _open_study(study)
         except StoreError as error:
-            left.append(f"{error}; then: liquid-study rebuild {session.path}")
-    try:
-        _open_study(study)
-    except StoreError as error:
-        left.append(f"{error}; then unblind again")
+            left.append(f"{error}; then unblind again")
     excluded: tuple[Exclusion, ...] = ()
     try:
         excluded = exclude_inattentive(folder)

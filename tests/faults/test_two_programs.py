@@ -1,0 +1,90 @@
+"""Two programs that unblind, exclude, withdraw, export or verify one study folder at the same moment."""
+
+import contextlib
+import io
+import json
+import multiprocessing
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.cli import main
+from study_app.store.exclusions import exclusions
+from study_app.store.verification.verify_study import verify
+from tests.platforms import needs_fork
+from tests.studies import once, rehearsed
+
+pytestmark = [pytest.mark.slow, needs_fork]
+
+ROUNDS = 4
+ASKED = ("--by", "AB", "--reason", "a test")
+COMMANDS = {
+    "unblind": ("unblind", *ASKED),
+    "exclude P001": ("exclude", "--participant", "P001", *ASKED),
+    "exclude P002": ("exclude", "--participant", "P002", *ASKED),
+    "withdraw P001": ("withdraw", "--participant", "P001", *ASKED),
+    "withdraw P002": ("withdraw", "--participant", "P002", *ASKED),
+    "export": ("export", "--to", "exported"),
+    "verify": ("verify",),
+}
+PAIRS = [
+    ("unblind", "unblind"),
+    ("unblind", "export"),
+    ("exclude P001", "exclude P002"),
+    ("withdraw P001", "withdraw P002"),
+    ("withdraw P001", "unblind"),
+    ("withdraw P001", "verify"),
+]
+
+
+def carry_out(folder: Path, words: tuple[str, ...], start: Any, done: Any) -> None:
+    """Run a command on the folder when the other program does; report its exit code and errors."""
+    command, *options = words
+    to = [str(folder / word) if word == "exported" else word for word in options]
+    sys.argv = ["liquid-study", command, str(folder / "study"), *to]
+    said, code = io.StringIO(), 0
+    with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
+        start.wait(60)
+        try:
+            main()
+        except SystemExit as ended:
+            code = int(ended.code or 0)
+    done.put((words, code, said.getvalue()))
+
+
+@pytest.mark.parametrize("pair", PAIRS, ids=" and ".join)
+def test_two_programs_leave_a_sound_study(
+    pair: tuple[str, str], tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    study = once(tmp_path_factory, "two-programs", rehearsed) / "demo"
+    forking = multiprocessing.get_context("fork")
+    for number in range(ROUNDS):
+        folder = tmp_path / str(number)
+        shutil.copytree(study, folder / "study")
+        start, done = forking.Barrier(2), forking.SimpleQueue()
+        programs = [forking.Process(target=carry_out, args=(folder, COMMANDS[name], start, done)) for name in pair]
+        for program in programs:
+            program.start()
+        ended = [done.get() for _ in programs]
+        for program in programs:
+            program.join(60)
+            assert program.exitcode == 0
+        codes = sorted(code for _, code, _ in ended)
+        assert codes in ([0, 0], [0, 2], [0, 3], [2, 2]), ended  # of two that write, at most one continues
+        for words, code, said in ended:
+            assert "Traceback" not in said
+            assert code == 0 or len(said.splitlines()) == 1 or words[0] in ("export", "verify"), said
+        assert verify(folder / "study").errors == (), ended
+        effects = [words for words, code, _ in ended if code == 0]
+        if reveals := sum(words[0] == "unblind" for words in effects):
+            records = (folder / "study" / "blinding" / "reveals.jsonl").read_text("utf-8").splitlines()
+            assert [json.loads(record)["by"] for record in records] == ["AB"] * reveals
+        for words in effects:
+            if words[0] == "withdraw":
+                assert not list((folder / "study" / "data").glob(f"sub-{words[2]}*"))
+            if words[0] == "exclude":
+                kept = {one.participant for one in exclusions(folder / "study")}
+                assert words[2] in kept or any(other[0] == "withdraw" for other in effects)
