@@ -1,0 +1,63 @@
+"""Data of one time zone are the same data in another, and under another default locale."""
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QLocale
+
+from study_app.analysis.export.export import export
+from study_app.analysis.report.write_report import report
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.verification.verify_study import verify
+from tests.studies import rehearsed
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.usefixtures("quick_pdf"),
+    pytest.mark.skipif(not hasattr(time, "tzset"), reason="this system sets no time zone for one process"),
+]
+
+
+@pytest.fixture
+def travel(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], None]]:
+    """Go to a time zone."""
+
+    def go(zone: str) -> None:
+        monkeypatch.setenv("TZ", zone)
+        time.tzset()
+
+    yield go
+    monkeypatch.undo()
+    time.tzset()
+
+
+@pytest.fixture
+def german() -> Iterator[None]:
+    """Write numbers with a comma where nothing else is said."""
+    before = QLocale()
+    QLocale.setDefault(QLocale("de_DE"))
+    yield
+    QLocale.setDefault(before)
+
+
+@pytest.mark.usefixtures("german")
+def test_data_are_the_same_in_every_time_zone(tmp_path: Path, travel: Callable[[str], None]) -> None:
+    travel("LINT-14")  # Kiritimati
+    study = rehearsed(tmp_path)
+    travel("NST3:30NDT")  # Newfoundland, where it is the day before
+    assert verify(study).errors == ()
+    unblind(study, "AB", "elsewhere")
+    written = {}
+    for zone in ("NST3:30NDT", "NPT-5:45"):
+        travel(zone)
+        assert verify(study).errors == ()
+        to = tmp_path / zone[:3]
+        export(study, to, extras=["wide"])
+        report(study, to)
+        written[zone] = {path.name: path.read_bytes() for path in to.iterdir() if path.suffix == ".csv"}
+    first, second = written.values()
+    assert first == second
+    assert len(first) > 4
+    assert b"0.5" in first["study-demo_description-trials_data.csv"]
