@@ -10,6 +10,7 @@ from study_app.validation.stability.damping_boundary import boundary_nspm
 from study_app.validation.stability.stability_cases import GRIPS
 from study_app.validation.velocity import held_handle as held
 from study_app.validation.velocity import imposed_motions as imposed
+from study_app.validation.velocity.wiener_bound import wiener_bound
 
 ESTIMATORS: Final[tuple[Velocity, ...]] = (Kalman(), Ewma(), Lead())
 """The estimator that is judged, then its references."""
@@ -30,12 +31,16 @@ Progress = Callable[[str], None]
 
 
 class Row(NamedTuple):
-    """One quantity: its values by estimator, and the limit of the first, a least one where ``least`` says so."""
+    """One quantity: its values by estimator, and the limit of the first, a least one where ``least`` says so.
+
+    ``bound`` is the least value of a linear estimator (`wiener_bound`), None where it is not computed.
+    """
 
     name: str
     values: tuple[float, ...]
     goal: float | None = None
     least: bool = False
+    bound: float | None = None
 
     @property
     def met(self) -> bool:
@@ -66,7 +71,9 @@ def _lines(rows: Sequence[Row]) -> Iterator[str]:
     for row in rows:
         values = "".join(f"{value:9.4g}" if value >= 100 else f"{value:9.2f}" for value in row.values)
         goal = "" if row.goal is None else f"   {'≥' if row.least else '≤'} {row.goal:.3g}: "
-        yield f"{row.name:{width}} {values}{goal}{'' if row.goal is None else 'met' if row.met else 'not met'}"
+        judged = "" if row.goal is None else "met" if row.met else "not met"
+        bound = "" if row.bound is None else f"   least of linear estimators {row.bound:.3g}"
+        yield f"{row.name:{width}} {values}{goal}{judged}{bound}"
 
 
 def _each(measured: Callable[[Velocity], Any]) -> tuple[Any, ...]:
@@ -111,10 +118,11 @@ def _held() -> Iterator[Row]:
 
 def _whole() -> Iterator[Row]:
     for name, scene in zip(held.WHOLE_LIQUIDS, held.whole_forces(), strict=True):
+        bound = 100 * wiener_bound(scene, imposed.COUNT_M, held.DELAY * PERIOD_S)
         for hand in held.HANDS:
             values = tuple(held.error(scene, it, GRIPS[hand], held.WHOLE) for it in ESTIMATORS)
             goal = WHOLE_PERCENT[name] if hand == "middle" else None
-            yield Row(f"whole force, {held.WHOLE}, scale 3, {name}, {hand} [%]", values, goal)
+            yield Row(f"whole force, {held.WHOLE}, scale 3, {name}, {hand} [%]", values, goal, bound=bound)
 
 
 def _cost() -> Iterator[Row]:
