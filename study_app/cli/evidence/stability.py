@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     "--table", type=click.Path(path_type=Path), metavar="FILE", help="Only measure the table of slope limits."
 )
 @click.option("--withheld", is_flag=True, help="Only print the share of each liquid's force that safety withholds.")
+@click.option("--delivered", is_flag=True, help="Only print the error of each liquid's force in the hand.")
 @click.option(
     "--velocity",
     is_flag=True,
@@ -55,6 +56,7 @@ def stability(
     line: str | None,
     table: Path | None,
     withheld: bool,
+    delivered: bool,
     velocity: bool,
     delayed: Path | None,
     estimated: int | None,
@@ -80,6 +82,7 @@ def stability(
         case=line,
         table=table,
         withheld=withheld,
+        delivered=delivered,
         velocity=velocity,
         delayed=delayed,
         estimation=estimated,
@@ -101,6 +104,9 @@ def stability(
         return
     if withheld:
         _print_withheld(workers)
+        return
+    if delivered:
+        _print_delivered(workers)
         return
     if velocity:
         _print_velocity()
@@ -147,6 +153,18 @@ def _print_withheld(workers: Workers) -> None:
         shares = measure(executor=executor)
     click.echo(report(shares))
     if not all(share.met for share in shares):
+        click.get_current_context().exit(EXIT_FOUND)
+
+
+def _print_delivered(workers: Workers) -> None:
+    """Print the errors of the forces sent; end with 3 if a limit is missed."""
+    from study_app.validation.stability.delivered_force import measure, report
+
+    with progress() as show, executor_for(workers) as executor:
+        show("measuring the force delivered")
+        found = measure(executor=executor)
+    click.echo(report(found))
+    if not all(it.met for it in found):
         click.get_current_context().exit(EXIT_FOUND)
 
 

@@ -14,7 +14,7 @@ from study_app.haptics.model.estimators.device import MOST_LAG_TICKS
 from study_app.haptics.model.force_link import MOST_DELAY_MS, MOST_JITTER_MS, MOST_LOSS, ForceLink, too_long
 from study_app.haptics.model.scene import Liquid, Scene
 from study_app.protocol.load import load
-from study_app.protocol.source.files import shipped_file
+from study_app.protocol.source.files import shipped, shipped_file
 
 REACHES: Final = "reaches"
 CIRCLES: Final = "circles"
@@ -29,6 +29,9 @@ FALCON: Final = "falcon"
 
 DAMPER: Final = "damper"
 """The strongest linear damper that a file may ask for."""
+
+OF_SWEEP: Final = {"rek2024": "", "physical_liquids": "physical_"}
+"""Studies whose liquids the sweep presents, and what precedes their names."""
 
 THROWN: Final = "thrown"
 LETS_GO: Final = "lets-go"
@@ -214,7 +217,7 @@ def liquids() -> Mapping[str, Scene]:
     ask for.
     """
     found: dict[str, Scene] = {}
-    for protocol, prefix in (("rek2024", ""), ("physical_liquids", "physical_")):
+    for protocol, prefix in OF_SWEEP.items():
         study = load(shipped_file(protocol))
         found |= {f"{prefix}{name}": study.scene_of(name) for name in study.liquids}
     damper = Liquid(id=DAMPER, density_kg_m3=1000, drag=Drag(law="linear", damping_nspm=DAMPING_NSPM[1]))
@@ -225,9 +228,11 @@ def liquids() -> Mapping[str, Scene]:
 
 @cache
 def scenes() -> Mapping[str, Scene]:
-    """Return what a case may present: what the sweep does, and the liquids of physical2 and slime."""
+    """Return what a case may present: what the sweep does, and the liquids of all other shipped studies."""
     found = dict(liquids())
-    for protocol in ("physical2", "slime"):
+    for protocol in shipped():
+        if protocol in OF_SWEEP:
+            continue
         study = load(shipped_file(protocol))
         found |= {f"{protocol}_{name}": study.scene_of(name) for name in study.liquids}
     return found
