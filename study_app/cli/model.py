@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from study_app.cli.options import SCENE_FILE, Target
+from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, MOST_DELAY
 
 
 @click.command()
@@ -43,14 +44,22 @@ def assignment(change: str) -> tuple[str, str]:
 @click.command()
 @SCENE_FILE
 @click.option("--liquid", metavar="NAME", help="Only this liquid; default: every liquid of the file.")
-def scene(scene: str, liquid: str | None) -> None:
+@click.option(
+    "--delay",
+    type=click.IntRange(0, MOST_DELAY),
+    default=BELIEVED_TICKS,
+    show_default=True,
+    metavar="TICKS",
+    help="The device's delay, for the expected error.",
+)
+def scene(scene: str, liquid: str | None, delay: int) -> None:
     """Print the effects that a scene needs and why, the measured cost of each, and the expected force error."""
     from study_app.evaluation.cost import report
     from study_app.evaluation.expected_error import error_report
     from study_app.protocol.load import load_scene, load_scenes
 
     chosen = [load_scene(scene, liquid)] if liquid else list(load_scenes(scene).values())
-    click.echo("\n\n".join(f"{report(one)}\n{error_report(one)}" for one in chosen))
+    click.echo("\n\n".join(f"{report(one)}\n{error_report(one, delay)}" for one in chosen))
 
 
 @click.command()

@@ -1,70 +1,86 @@
 """The expected result of a scene's choice of effects: its time per tick, and its force error during strokes of a hand.
 
 The hand makes back-and-forth strokes with the greatest speed and acceleration of the scene's motion, quantised to
-encoder counts, with the scene's velocity estimator. The force is that of the effects, before the safety layer.
+encoder counts, with the scene's velocity estimator. The force is the one sent, after limits.
 """
 
+import itertools
 import math
+from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from study_app.evaluation import reference_solutions
 from study_app.evaluation.cost import measure
-from study_app.evaluation.force_error import ROUNDING, Error, error_of
+from study_app.evaluation.force_error import ROUNDING, error_of
 from study_app.evaluation.hand_motions import COUNT_M, stroke, vectors_x
 from study_app.evaluation.non_newtonian_law import non_newtonian_n
 from study_app.evaluation.reference_model import local_wakes, lowered, resistance_nspm, respond
 from study_app.evaluation.reference_solutions import CYCLES, Case, Truth
 from study_app.evaluation.scene_variants import with_effects
 from study_app.evaluation.unsteady_law import unsteady_n
+from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, Dynamics
 from study_app.haptics.model.effect import GRAVITY_MPS2
 from study_app.haptics.model.effects.local_wake import LocalWake
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Effect, Everywhere, Scene
-from study_app.haptics.runtime.offline import simulate
+from study_app.haptics.runtime.offline import samples_along
 
 SETTLED: Final = 2 / 3
 """After this share of the strokes the flow no longer depends on their start."""
 
 
+class Causes(NamedTuple):
+    """What each cause changes of a force along the same strokes: RMS of the change over the RMS of the reference.
+
+    From the reference to the force sent, one step each: the scene's effects with exact velocities (``law``), dw/dt
+    smoothed (``acceleration``), velocities estimated from encoder counts (``velocity``), and the safety layer of a
+    device with this delay (``limits``).
+    """
+
+    velocity: float = 0.0
+    acceleration: float = 0.0
+    limits: float = 0.0
+    law: float = 0.0
+
+
 class Expected(NamedTuple):
     """The time of a scene's choice per tick, and the RMS error of its force, relative to the reference's RMS and in N.
 
-    ``known_velocity_share`` is the same with exact velocities: the error of effects and laws alone. ``against``
-    describes the reference.
+    ``causes`` splits the error, ``against`` describes the reference.
     """
 
     cost_ns: float
     error_share: float
     error_n: float
-    known_velocity_share: float
+    causes: Causes
     against: str
 
 
-def expected(scene: Scene) -> Expected:
+def expected(scene: Scene, delay_ticks: int = BELIEVED_TICKS) -> Expected:
     """Measure a scene's cost and predict its error; of several liquids that with the greatest one."""
-    return Expected(measure(scene).scene_ns, *_errors(resolve(scene)))
+    return Expected(measure(scene).scene_ns, *_errors(resolve(scene), delay_ticks))
 
 
-def error_report(scene: Scene) -> str:
-    """Return the expected error as a line of text."""
-    error_share, error_n, known_share, against = _errors(resolve(scene))
-    known = f"{100 * known_share:.2g} %" if known_share > ROUNDING else "none"
+def error_report(scene: Scene, delay_ticks: int = BELIEVED_TICKS) -> str:
+    """Return the expected error on a device with a delay as a line of text."""
+    error_share, error_n, causes, against = _errors(resolve(scene), delay_ticks)
+    split = (f"{name} {f'{100 * it:.2g} %' if it > ROUNDING else 'none'}" for name, it in causes._asdict().items())
     return (
-        f"expected error in its fastest strokes: {error_n:.2g} N, {100 * error_share:.2g} % of the force; {known} if "
-        f"velocities were known exactly; against {against}"
+        f"expected error in its fastest strokes, delay {delay_ticks}: {error_n:.2g} N, {100 * error_share:.2g} % of "
+        f"the force; by {', '.join(split)}; against {against}"
     )
 
 
-def _errors(scene: Scene) -> tuple[float, float, float, str]:
+def _errors(scene: Scene, delay_ticks: int) -> tuple[float, float, Causes, str]:
     if not scene.liquids:
-        return 0.0, 0.0, 0.0, "a scene without liquid"
-    return max((_of_one(scene, index) for index in range(len(scene.liquids))), key=lambda it: it[1])
+        return 0.0, 0.0, Causes(), "a scene without liquid"
+    return max((_of_one(scene, index, delay_ticks) for index in range(len(scene.liquids))), key=lambda it: it[1])
 
 
-def _of_one(scene: Scene, index: int) -> tuple[float, float, float, str]:
+def _of_one(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, Causes, str]:
     """Return the errors of one liquid, as if it were the only one, everywhere and without a current."""
     liquid = scene.liquids[index].model_copy(update={"region": Everywhere(), "current": None})
     named: tuple[Effect, ...] = () if liquid.effects == "auto" else liquid.effects
@@ -87,20 +103,28 @@ def _of_one(scene: Scene, index: int) -> tuple[float, float, float, str]:
         alone = with_effects(alone, *kept)
         true_n = _defined_n(alone, motion)
         against = f"the definition of {' and '.join(kept).replace('_', ' ') or 'nothing'}"
-    truth = Truth("", "", (Case(motion, true_n, motion.t_s >= SETTLED * motion.t_s[-1]),))
     if not true_n.any():
-        return 0.0, 0.0, 0.0, against
-    felt, known = _error(alone, motion, truth, counted=True), _error(alone, motion, truth, counted=False)
-    return felt.rms, felt.rms_n, known.rms, against
+        return 0.0, 0.0, Causes(), against
+    truth = Truth("", "", (Case(motion, true_n, motion.t_s >= SETTLED * motion.t_s[-1]),))
+    steps_n = [true_n, *_forces(alone, motion, Dynamics(delay_ticks / alone.rate_hz, COUNT_M))]
+    law, acceleration, velocity, limits = (
+        error_of([true_n + after_n - before_n], truth).rms for before_n, after_n in itertools.pairwise(steps_n)
+    )
+    whole = error_of(steps_n[-1:], truth)
+    return whole.rms, whole.rms_n, Causes(velocity, acceleration, limits, law), against
 
 
-def _error(scene: Scene, motion: Motion, truth: Truth, *, counted: bool) -> Error:
-    """Return the errors of the scene, from encoder counts or from exact velocities."""
-    if counted and scene.velocity.kind != "given":
-        step_m = COUNT_M * scene.scale
-        motion = Motion(motion.t_s, np.rint(motion.position_m / step_m) * step_m)
-    table = simulate(scene, motion)
-    return error_of([np.column_stack([table.fx_n, table.fy_n, table.fz_n])], truth)
+def _forces(scene: Scene, motion: Motion, dynamics: Dynamics) -> Iterator[Floats]:
+    """Yield the forces (n, 3) [N] of which each differs from the one before by one more cause, as `Causes` lists."""
+    yield samples_along(scene, motion, dynamics).force_n
+    yield samples_along(scene, motion, dynamics, smooths=True).force_n
+    step_m = dynamics.count_m * scene.scale
+    seen = (
+        motion if scene.velocity.kind == "given" else Motion(motion.t_s, np.rint(motion.position_m / step_m) * step_m)
+    )
+    felt = samples_along(scene, seen, dynamics)
+    yield felt.force_n
+    yield felt.device_force_n
 
 
 def physical_n(scene: Scene, speed_mps: float, rate_per_s: float, t_s: Floats) -> Floats:

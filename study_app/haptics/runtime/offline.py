@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from study_app.errors import StudyError
 from study_app.haptics.kernels.compiled import kernel
@@ -65,19 +66,30 @@ def simulate(scene: Scene, path: Motion | str | os.PathLike[str]) -> Table:
     return _table(motion.t_s, samples_along(scene, motion))
 
 
-def samples_along(scene: Scene, motion: Motion, dynamics: Dynamics | None = None) -> Any:
+def samples_along(scene: Scene, motion: Motion, dynamics: Dynamics | None = None, *, smooths: bool = False) -> Any:
     """Return the results of `simulate` as the servo's samples: (n,) recarray of ``layout.SAMPLE``.
 
     ``dynamics`` are those of a device: limits, slew and delay are then those of its loop at the scene's rate. By
     default the loop is that of `simulate`. A velocity that the device measures is the difference of the positions.
+    With ``smooths``, dw/dt is smoothed as for the scene's estimator, although velocities are given.
 
     Raises
     ------
     StudyError
         The scene wants a given velocity and there is none.
     """
-    along = ModelAlong(scene, dynamics, given=motion.velocity_mps is not None)
+    along = ModelAlong(scene, dynamics, given=motion.velocity_mps is not None, smooths=smooths)
     return along.follow(motion.t_s, motion.position_m, motion.velocity_mps)
+
+
+def law_along(scene: Scene, t_s: Floats, position_m: Floats, velocity_mps: Floats) -> NDArray[np.float64]:
+    """Return the force of a scene's effects (n, 3) [N], before any limit, on a known motion of the hand.
+
+    ``position_m`` and ``velocity_mps`` (n, 3) are the hand's, at times (n,) [s].
+    """
+    place_m = scene.origin_m + scene.scale * position_m
+    force_n: NDArray[np.float64] = samples_along(scene, Motion(t_s, place_m, scene.scale * velocity_mps)).force_n
+    return force_n
 
 
 class ModelAlong:
@@ -91,6 +103,8 @@ class ModelAlong:
         Of a device; by default the loop is that of `simulate`.
     given : bool
         Whether each piece brings velocities.
+    smooths : bool
+        Whether dw/dt is smoothed as for the scene's estimator, although velocities are given.
 
     Raises
     ------
@@ -98,11 +112,13 @@ class ModelAlong:
         The scene wants a given velocity and there is none.
     """
 
-    def __init__(self, scene: Scene, dynamics: Dynamics | None = None, *, given: bool = False) -> None:
+    def __init__(
+        self, scene: Scene, dynamics: Dynamics | None = None, *, given: bool = False, smooths: bool = False
+    ) -> None:
         estimator = scene.velocity
-        if given:
+        if given and not smooths:
             scene = scene.model_copy(update={"velocity": Given()})
-        elif isinstance(scene.velocity, Given):
+        elif isinstance(scene.velocity, Given) and not given:
             raise StudyError("the scene takes the velocity as given, but the motion has no vx_mps, vy_mps, vz_mps")
         if dynamics is None:
             self._model = pack(scene, limits=damping_limits(1e-3, 1, estimator), dynamics=Dynamics(delay_s=1e-3))
@@ -110,6 +126,8 @@ class ModelAlong:
         else:
             self._model = pack(scene, dynamics=dynamics)
             self._safety = new_safety(delay_ticks=min(dynamics.delay_ticks(scene.rate_hz), MOST_DELAY))
+        if given:
+            self._model.parameters[0].estimator = GIVEN
         self._safety[0].fade, self._safety[0].fade_s = 1.0, 0.0
         self._before_s = math.nan
 

@@ -149,7 +149,7 @@ def survey_markdown(found: tuple[Surveyed, ...]) -> str:
             _percent(it.solver) + (f" (Re {_range(least, greatest)})" if it.solver is not None else ""),
             f"{checked_mps:.2g} m/s" if it.model == "unsteady drag" else "–",
             _percent(spread(it.reynolds)),
-            _percent(it.expected.known_velocity_share),
+            _percent(it.expected.causes.law),
             _percent(it.expected.error_share),
             f"{it.expected.cost_ns:.0f}",
         )
@@ -174,7 +174,7 @@ _WHAT: Final = (
     f"a solved motion, or the scene's greatest speed. Above Re {NO_REFERENCE_REYNOLDS:g} there is no reference for "
     "unsteady motion, and steady drag is as uncertain as published laws of it differ. "
     "Strokes: at the scene's greatest speed and acceleration, against the laws themselves, with velocities known and "
-    "with those of the scene's estimator from encoder counts. Below, drag coefficients by each law."
+    "with those of the scene's estimator from encoder counts, after limits. Below, drag coefficients by each law."
 )
 
 

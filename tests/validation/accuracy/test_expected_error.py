@@ -8,7 +8,7 @@ from study_app.evaluation.expected_error import error_report, expected, physical
 from study_app.evaluation.hand_motions import stroke
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.effects.local_wake import LocalWake
-from study_app.haptics.model.scene import Given, Scene
+from study_app.haptics.model.scene import Ewma, Given, Kalman, Scene
 from tests.validation.accuracy.scenes import HONEY, REAL, TANK, WATER, compiled
 
 pytestmark = pytest.mark.slow
@@ -18,12 +18,13 @@ pytestmark = pytest.mark.slow
 def test_an_exact_model_with_the_true_velocity_is_expected_to_be_right():
     tank = expected(TANK)
     assert tank.cost_ns > 0
-    assert tank.known_velocity_share < 1e-10
+    assert tank.causes.law < 1e-10
     assert 0.01 < tank.error_share < 0.5
-    assert expected(TANK.model_copy(update={"velocity": Given()})).error_share < 1e-10
+    known = expected(TANK.model_copy(update={"velocity": Given()}))
+    assert known.error_share == pytest.approx(known.causes.limits, abs=1e-10)
     local = LocalWake(length=300, scaling=300)
     places = WATER.model_copy(update={"effects": ("drag", "local_wake"), "local_wake": local})
-    assert expected(Scene(liquids=(places,))).known_velocity_share < 0.05
+    assert expected(Scene(liquids=(places,))).causes.law < 0.05
 
 
 @compiled
@@ -31,8 +32,8 @@ def test_what_a_scene_leaves_out_is_expected_to_be_missing():
     named = HONEY.model_copy(update={"effects": ("drag",), "drag": Drag(law="haider-levenspiel")})
     lacking = expected(REAL.model_copy(update={"liquids": (named,)}))
     whole = expected(REAL)
-    assert whole.known_velocity_share < 0.05
-    assert lacking.known_velocity_share > 0.4
+    assert whole.causes.law < 0.05
+    assert lacking.causes.law > 0.4
     both = expected(REAL.model_copy(update={"liquids": (HONEY, named.model_copy(update={"id": "other"}))}))
     assert both.error_n == pytest.approx(lacking.error_n)
     assert "drag by experiments" in both.against
@@ -41,9 +42,34 @@ def test_what_a_scene_leaves_out_is_expected_to_be_missing():
 
 @compiled
 def test_the_expected_error_is_reported_in_a_line():
-    line = error_report(TANK)
-    assert "of the force; none if velocities were known exactly; against the definition of drag and wake" in line
+    line = error_report(TANK, 2)
+    causes = expected(TANK, 2).causes
+    assert "expected error in its fastest strokes, delay 2: " in line
+    assert f"of the force; by velocity {100 * causes.velocity:.2g} %, acceleration none, limits " in line
+    assert ", law none; against the definition of drag and wake" in line
     assert "\n" not in line
+
+
+@compiled
+def test_the_error_is_split_by_what_causes_it():
+    """EWMA lags in velocity; behind a Kalman filter the smoothing of dw/dt lags; each limit takes its part alone."""
+
+    def causes(delay=1, **changes):
+        found = expected(REAL.model_copy(update={"velocity": Kalman(), **changes}), delay)
+        assert found.error_share < sum(found.causes) + 1e-12
+        return found.causes
+
+    kalman, ewma, known = (causes(velocity=it) for it in (Kalman(), Ewma(), Given()))
+    assert kalman.acceleration > 2 * kalman.velocity > 0
+    assert ewma.velocity > 4 * kalman.velocity
+    assert max(known.velocity, known.acceleration) < 1e-12
+    assert kalman.law == ewma.law == known.law > 0
+    assert causes(liquids=(HONEY.model_copy(update={"effects": ("drag",)}),)).acceleration < 1e-12
+    assert causes(delay=4).limits > kalman.limits + 0.1
+    weak = causes(force_limit_n=1.0)
+    assert weak.limits > kalman.limits + 0.3
+    assert weak[0] == pytest.approx(kalman.velocity, rel=0.5)
+    assert (weak.acceleration, weak.law) == (kalman.acceleration, kalman.law)
 
 
 def test_the_force_of_a_slow_stroke_is_that_of_creeping_flow():
