@@ -2,12 +2,14 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
 
 from study_app.haptics.model.layout import LIMITER_GLITCH
 from study_app.haptics.model.scene import Scene
+from study_app.haptics.runtime.offline import law_along
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.answered import presented_by
 from study_app.protocol.trials.presentation import scene_of
@@ -15,7 +17,7 @@ from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tracks import adjusting_of, design_of
 from study_app.store.blinded.blinding import Key
 from study_app.store.journals.journal import Line
-from study_app.store.tables.delivered import Delivered, delivered, judged
+from study_app.store.tables.delivered import Delivered, delivered, delivered_error, judged
 
 TOLERANCE: Final = 1e-9
 
@@ -101,9 +103,15 @@ def delivered_again(
     return delivered(protocol, presented, protocol.tasks[block.task], own, adjusted=adjusted)
 
 
-def different(found: Delivered, ended: Mapping[str, Any]) -> Iterator[str]:
+def error_again(scene: Scene, rate_hz: float, samples: Any, ended: Mapping[str, Any]) -> float | None:
+    """Return the error of the force sent in a trial or interval, from its recording and the opened line on its end."""
+    own = judged(interval_samples(samples, ended["duration_s"]))
+    return delivered_error(own, rate_hz, scene.fade_s, partial(law_along, scene))
+
+
+def different(found: Mapping[str, float | None], ended: Mapping[str, Any]) -> Iterator[str]:
     """Yield the columns in which the journal differs from the recomputed values; none if it lacks them."""
-    for name, value in found.columns.items():
+    for name, value in found.items():
         if name in ended and not _same(value, ended[name]):
             yield name
 

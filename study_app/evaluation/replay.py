@@ -24,6 +24,7 @@ from study_app.evaluation.recorded_intervals import (
     as_one_scene,
     delivered_again,
     different,
+    error_again,
     places_of,
     scene_presented,
     steps_of,
@@ -108,7 +109,7 @@ def replay(session_folder: Path) -> Replayed:
     protocol, devices, (drawn_from, participant) = _ran(session.receipt, kept, key, lines)
     _again(records(SAMPLE, 0), Scene(), devices[None], None)  # loads the compiled code: no part of what is measured
     found = _Found()
-    intervals = {_which(line): line for line in lines if line["event"] == "interval_ended"}
+    ends = {_which(line): line for line in lines if line["event"] in ("trial_ended", "interval_ended")}
     before: _Before | None = None
     resumed_at: str | None = None
     for started, line, resumed in _presented(lines):
@@ -132,9 +133,13 @@ def replay(session_folder: Path) -> Replayed:
         samples = as_one_scene(recorded, steps)
         before = _again(samples, scene, devices[resumed], before, places_of(recorded, steps))
         found.compare(name, samples, before, checks)
-        if (ended := intervals.get(_which(started))) is not None and _until_gap(samples.tick) == len(samples):
-            interval = presented_by(protocol, key.codes, started).intervals[started["interval"] - 1]
-            again = delivered_again(protocol, interval, started, samples, ended)
+        if (ended := ends.get(_which(started))) is not None and _until_gap(samples.tick) == len(samples):
+            again: dict[str, float | None] = {}
+            if "interval" in started:
+                interval = presented_by(protocol, key.codes, started).intervals[started["interval"] - 1]
+                again |= delivered_again(protocol, interval, started, samples, ended).columns
+            if ended.get("delivered_error") is not None and ended["outcome"] != "interrupted":
+                again["delivered_error"] = error_again(scene, protocol.device.rate_hz, samples, ended)
             found.differences += [f"{name}: the column {column} differs" for column in different(again, ended)]
         found.computed_s += time.perf_counter() - start
     return found.replayed(time.perf_counter() - began)

@@ -55,7 +55,7 @@ class Motion:
         return Motion(self.times_s[later], self.velocity_mps[later], self.acceleration_mps2[later])
 
 
-def motion(times_s: NDArray[np.float64], position_m: Vectors, period_s: float) -> Motion:
+def motion(times_s: NDArray[np.float64], position_m: Vectors, period_s: float, half_s: float = HALF_S) -> Motion:
     """Return velocity and acceleration of a hand.
 
     Parameters
@@ -66,13 +66,15 @@ def motion(times_s: NDArray[np.float64], position_m: Vectors, period_s: float) -
         Positions [m].
     period_s : float
         Nominal time between two of them [s].
+    half_s : float
+        Half width of the filter [s].
 
     Returns
     -------
     Motion
-        Without the first and the last 20 ms; empty if the motion is not longer than the filter.
+        Without ``half_s`` at both ends; empty if the motion is not longer than the filter.
     """
-    half = max(2, round(HALF_S / period_s))
+    half = max(2, round(half_s / period_s))
     count = 0 if len(times_s) == 0 else int((times_s[-1] - times_s[0]) / period_s * (1 + 1e-12)) + 1
     if count <= 2 * half:
         return Motion(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))

@@ -9,7 +9,9 @@ import numpy as np
 
 from study_app.errors import StoreError
 from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.clocks.grants import Grant
+from study_app.haptics.runtime.offline import law_along
 from study_app.haptics.runtime.telemetry import timing
 from study_app.session.ports import ServoPort
 from study_app.session.preflight import Facts, Screen
@@ -42,6 +44,7 @@ def measure(
     sleep: Callable[[float], object] = time.sleep,
 ) -> Facts:
     """Look at a running servo for ``lasts_s`` and at the disk of the study folder ``results``, leaving no trace."""
+    law_along(Scene(), np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3)))  # compiled here, not at the end of a trial
     reader = servo.telemetry.reader()
     ages_s: list[float] = []
     for _ in range(max(1, round(lasts_s / LOOK_S))):

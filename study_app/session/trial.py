@@ -6,6 +6,7 @@ to show the tank. Without a window, whoever runs the session reports the first f
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from study_app.session.tasks import Outcome, TargetReached, TaskView, track
 from study_app.session.transitions.commands import StartTrial
 from study_app.session.trial_recording import Recording
 from study_app.session.trial_statistics import TrialStatistics
-from study_app.store.tables.delivered import JUDGED, judged
+from study_app.store.tables.delivered import JUDGED, delivered_error, judged
 from study_app.video.frames import VideoFrame, VideoSource
 
 # Everything is drawn this much later than the trial asks. Then the moment to draw lies between two samples at every
@@ -150,8 +151,7 @@ class RunningTrial:
         end_ns = self._tracker.end_ns
         mine = mine if end_ns is None else mine[mine["time_ns"] <= end_ns]
         self._statistics.feed(mine)
-        if self.command.interval is not None:
-            self._taken.append(judged(mine).tobytes())
+        self._taken.append(judged(mine).tobytes())
         return reached
 
     @property
@@ -190,7 +190,7 @@ class RunningTrial:
 
     @property
     def samples(self) -> Any:
-        """What is judged of the interval so far (array of ``delivered.JUDGED``); none of a trial without a design."""
+        """What is judged of the trial or interval so far (array of ``delivered.JUDGED``)."""
         return np.frombuffer(
             b"".join(self._taken), JUDGED
         )  # records are concatenated field by field, five times slower
@@ -213,11 +213,24 @@ class RunningTrial:
 
     def summary(self) -> dict[str, Any]:
         """Return what its row records until now (``store.tables.columns``)."""
-        return self._tracker.summary() | self._statistics.summary(
-            samples_dropped=0 if self._serial is None else self._reader.dropped - self._dropped_before,
-            worst_gap_s=self._servo.worst_gap_s,
-            until_ns=self._until_ns,
+        return (
+            self._tracker.summary()
+            | self._statistics.summary(
+                samples_dropped=0 if self._serial is None else self._reader.dropped - self._dropped_before,
+                worst_gap_s=self._servo.worst_gap_s,
+                until_ns=self._until_ns,
+            )
+            | {"delivered_error": self._delivered_error()}
         )
+
+    def _delivered_error(self) -> float | None:
+        """Return the error of the force sent; None where the participant set it, or the study delays it."""
+        if self._serial is None or self.command.adjusts or self._scene.link.acts:
+            return None
+        from study_app.haptics.runtime.offline import law_along  # noqa: PLC0415 - the compiler: the servo has loaded it
+
+        law_n = partial(law_along, self._scene)
+        return delivered_error(self.samples, self._servo.rate_hz, self._scene.fade_s, law_n)
 
 
 def resting_view(servo: ServoPort, task: AnyTask, now_ns: int) -> TankView:

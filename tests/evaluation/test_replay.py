@@ -22,6 +22,10 @@ from study_app.protocol import formats
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.session.transitions.events import Begin, Continue, EndAsked, PauseAsked, ResumeAsked
 from study_app.store import recording_files
+from study_app.store.blinded.blinding import read_key
+from study_app.store.blinded.sealing import opened
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
 from study_app.store.sessions.reopen import reopen
 from tests.compiled import needs_servo
 from tests.evaluation.recorded_sessions import STRESSED, begun, held, rewrite, session, stressed, troubled
@@ -86,6 +90,21 @@ def test_a_rehearsed_session_comes_out_to_the_last_bit(rehearsed: Path) -> None:
     )
     assert found.proved
     assert 0 < found.computed_s < found.took_s
+
+
+def test_the_error_of_the_force_sent_comes_out_again_and_another_is_named(
+    rehearsed: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = StudyFolder(rehearsed)
+    lines = opened(journal.read(session(rehearsed) / "journal.jsonl"), read_key(study.path))
+    errors = [line["delivered_error"] for line in lines if line["event"] == "trial_ended"]
+    assert len(errors) == 4
+    assert all(0.005 < error < 1.0 for error in errors)
+    right = replay_module.error_again
+    monkeypatch.setattr(replay_module, "error_again", lambda *which: right(*which) + 2e-6)
+    found = replay(session(rehearsed)).differences
+    assert len(found) == 4
+    assert all(it.endswith("the column delivered_error differs") for it in found)
 
 
 def test_a_session_is_replayed_with_the_model_that_its_receipt_records(

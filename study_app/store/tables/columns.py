@@ -125,6 +125,12 @@ TRIALS: tuple[Column, ...] = (
         "Share of the force that passivity controller, slew limit and device withheld during the task; 0.05 is 5 %.",
         sealed=True,
     ),
+    _measure(
+        "delivered_error",
+        "Error of the force sent against the force model on the motion itself, RMS over RMS, 0.2 s after the fade-in "
+        "and later; 0.05 is 5 %; n/a if the participant set the force, the study delays it, or it is below 0.05 N.",
+        sealed=True,
+    ),
     _count("loop_delay_ticks", "Ticks from a command of the servo until its force acts; maximum during the task."),
     _count("loop_delay_changes", "How often that delay changed during the task."),
     *(
@@ -316,6 +322,7 @@ LATER = frozenset(
     {
         "first_frame_gap_ms",
         "withheld_share",
+        "delivered_error",
         "loop_delay_ticks",
         "loop_delay_changes",
         "limiter_estimator",

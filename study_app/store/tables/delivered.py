@@ -4,7 +4,8 @@ The session asks at the end of each interval, the analysis of the recording of t
 recordings have them, so that both compute the same.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
@@ -26,6 +27,12 @@ DAMPING: Final = "damping_nspm"
 SETTLED_S: Final = 0.2
 """Time after the fade-in from which a task without a lead is evaluated [s]."""
 
+
+FELT_N: Final = 0.05
+"""RMS of a force below which it has no error: people do not feel it."""
+TRUE_HALF_S: Final = 0.018
+"""Half width of the filter [s] whose motion the error of a force is taken on: a longer one misses what the loop adds to
+the motion, a shorter one takes encoder counts for motion."""
 
 LONGEST_S: Final = 0.26
 """The longest lag of a force that is searched: the longest delay with the longest jitter, plus a margin [s]."""
@@ -111,6 +118,39 @@ def delivered(
         pace_mps=moved.rms_speed_mps,
         clipped=bool((samples["limiters"][first:] & (LIMITER_NORM | LIMITER_SATURATED)).any()),
     )
+
+
+def delivered_error(
+    samples: Any, rate_hz: float, fade_s: float, law_n: Callable[[Times, Vectors, Vectors], Vectors]
+) -> float | None:
+    """Return the error of the force sent: RMS of its difference from the law over the RMS of the law.
+
+    The law is taken on the motion itself, as the positions before and after give it. None for a motion that is
+    too short, and where the law asks for no force that is felt.
+
+    Parameters
+    ----------
+    samples : array of `JUDGED` (n,)
+        The samples of a trial or interval, from its first on.
+    rate_hz : float
+        Samples per second.
+    fade_s : float
+        How long the force fades in: the error counts from `SETTLED_S` later.
+    law_n : callable
+        Gives the law's forces (m, 3) [N] at times (m,) [s] of positions and velocities (m, 3) of the hand [m, m/s].
+    """
+    samples = _believed(samples)
+    times_s = (samples["time_ns"] - samples["time_ns"][:1]) * 1e-9
+    moved = motion(times_s, samples["position_m"], 1 / rate_hz, TRUE_HALF_S)
+    counted = moved.times_s > fade_s + SETTLED_S
+    if not counted.any():
+        return None
+    rounded_n = np.rint(samples["device_force_n"] / FORCE_STEP_N) * FORCE_STEP_N
+    position_m, sent_n = (at(moved.times_s, times_s, it) for it in (samples["position_m"], rounded_n))
+    right_n = law_n(moved.times_s, position_m, moved.velocity_mps)[counted]
+    off_n = sent_n[counted] - right_n
+    off_n2, right_n2 = (float(np.mean(np.einsum("ij,ij->i", it, it))) for it in (off_n, right_n))
+    return round(math.sqrt(off_n2 / right_n2), 6) if right_n2 > FELT_N**2 else None
 
 
 def _lag_s(times_s: Times, sent_n: Vectors, model_n: Vectors, from_s: float, period_s: float) -> float | None:

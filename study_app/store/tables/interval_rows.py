@@ -23,7 +23,15 @@ _LONGEST: Final = frozenset(
 )
 """Columns in which a trial has the maximum of its intervals."""
 _MEANS: Final = frozenset(
-    {"tick_rate_hz", "mean_speed_mps", "force_mean_n", "withheld_share", "delay_error_mean_ms", "video_age_mean_ms"}
+    {
+        "tick_rate_hz",
+        "mean_speed_mps",
+        "force_mean_n",
+        "withheld_share",
+        "delivered_error",
+        "delay_error_mean_ms",
+        "video_age_mean_ms",
+    }
 )
 """Of these a trial has the mean of its intervals; of what is left the sum."""
 

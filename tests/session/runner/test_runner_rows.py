@@ -76,9 +76,10 @@ def test_the_row_of_a_trial_holds_the_share_of_the_force_withheld_in_its_task(pr
     assert row["withheld_share"] == pytest.approx(0.5 / 6, abs=1e-6)
 
 
-def test_a_trial_without_force_has_no_share_withheld(practising: World) -> None:
+def test_a_trial_without_force_has_no_share_withheld_and_no_error(practising: World) -> None:
     practising.run(3.2)
-    assert practising.journal.of("trial_ended")[0]["withheld_share"] is None
+    (row,) = practising.journal.of("trial_ended")
+    assert (row["withheld_share"], row["delivered_error"]) == (None, None)
 
 
 def test_the_row_of_a_trial_says_that_the_loops_delay_changed(practising: World) -> None:

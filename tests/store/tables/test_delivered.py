@@ -11,7 +11,15 @@ from study_app.protocol.load import parse
 from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.trials.due import Due
 from study_app.protocol.trials.stimuli import Stimulated
-from study_app.store.tables.delivered import JUDGED, delay_error_ms, delivered, judged, missed, undelivered
+from study_app.store.tables.delivered import (
+    JUDGED,
+    delay_error_ms,
+    delivered,
+    delivered_error,
+    judged,
+    missed,
+    undelivered,
+)
 
 STUDY = """\
 format = 2
@@ -233,3 +241,32 @@ def test_the_delay_of_a_force_costs_at_most_5_ms_at_the_end_of_4_s(protocol: Pro
         delivered(protocol, FORCE_DELAY, task, taken)
         took_s.append(time.thread_time() - began)
     assert min(took_s) < 5e-3
+
+
+def error(found: Any, fade_s: float = 0.3, b_nspm: float = 8.0) -> float | None:
+    return delivered_error(judged(found), 1000.0, fade_s, lambda _t_s, _x_m, v_mps: -b_nspm * v_mps)
+
+
+def test_the_error_of_the_force_sent_is_its_difference_from_the_law_on_the_motion():
+    assert error(samples()) == pytest.approx(0.0, abs=2e-3)
+    weak, late, counted = samples(), samples(), samples()
+    weak["device_force_n"] *= 0.9
+    assert error(weak) == pytest.approx(0.1, abs=2e-3)
+    late["device_force_n"] = np.roll(late["force_n"], 10, axis=0)
+    assert error(late) == pytest.approx(2 * np.sin(np.pi * 0.01), rel=0.03)
+    counted["position_m"] = np.rint(counted["position_m"] / 38e-6) * 38e-6
+    assert error(counted) == pytest.approx(0.0, abs=0.01)
+    counted["position_m"][1000] += 0.02
+    counted["limiters"][1000] = LIMITER_GLITCH
+    assert error(counted) == pytest.approx(0.0, abs=0.01)
+
+
+def test_the_error_counts_after_the_fade_and_where_a_force_is_felt():
+    faded = samples()
+    faded["device_force_n"][:480] = 0.0
+    assert error(faded) == pytest.approx(0.0, abs=2e-3)
+    assert error(faded, fade_s=0.1) > 0.1
+    assert error(samples(lasts_s=0.4)) is None
+    assert error(samples(lasts_s=0.0)) is None
+    assert error(samples(pace=0.001)) is None
+    assert error(samples(pace=0.001), b_nspm=8000.0) is not None
