@@ -124,9 +124,12 @@ def page_lines(text: str) -> Iterator[str]:
 
 
 def leaves(place: str, value: Any) -> Iterator[str]:
-    """Yield each value of a JSON text with its place."""
-    if isinstance(value, dict | list):
-        for name, below in value.items() if isinstance(value, dict) else enumerate(value):
+    """Yield each value of a JSON text with its place; elements of lists by their name, if they have one."""
+    if isinstance(value, list):
+        named = all(isinstance(below, dict) and "name" in below for below in value)
+        value = {below["name"] if named else number: below for number, below in enumerate(value)}
+    if isinstance(value, dict):
+        for name, below in value.items():
             yield from leaves(f"{place}/{name}", below)
     else:
         yield f"{place}: {value!r}"
