@@ -97,7 +97,7 @@ def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None
     passivity.norm_share = min(limit_n / max(norm(force_n), limit_n), 1.0) if limit_n > 0.0 else 1.0
     _limit_norm(force_n, lift_n, limit_n, sample)
     _fade(force_n, lift_n, parameters, safety, sample)
-    copy(force_n, safety.permitted_n)
+    _permit(parameters, state, safety, force_n, limit_n)
     reduce_gain(parameters, passivity, sample)
     _limit_slew(force_n, parameters, state, safety, sample)
     copy(force_n, safety.slewed_n)
@@ -223,6 +223,19 @@ def _limit_slew(force_n: Any, parameters: Record, state: Record, safety: Record,
             force_n[axis] -= excess_nmps * v_mps[axis] / square_mps2
         if square_distance(force_n, safety.slewed_n) > most_n * most_n:
             sample.limiters |= LIMITER_ENERGY
+
+
+@part
+def _permit(parameters: Record, state: Record, safety: Record, force_n: Any, limit_n: float) -> None:
+    """Set ``permitted_n``, the force of the effects within norm and fade; ``force_n`` is within slope limits, too.
+
+    A link sends forces of earlier ticks: there it is ``force_n``.
+    """
+    copy(force_n, safety.permitted_n)
+    if parameters.link.acts == 0 and is_finite(state.force_n) and is_finite(force_n):
+        share = safety.fade * limit_n / max(norm(state.force_n), limit_n) if limit_n > 0.0 else 0.0
+        for axis in range(3):
+            safety.permitted_n[axis] = share * state.force_n[axis]
 
 
 @part

@@ -209,8 +209,8 @@ class Effect:
     rows : tuple of Rows
         Its rows in the arrays of the model.
     damping_nspm : callable, optional
-        Its damping [N·s/m, scene] of fast motion, from its parameters; the loop is stable with only a share of such a
-        force, and the kernel writes it to the next row of ``local.inertia_n``.
+        Its damping [N·s/m, scene] of fast motion, from its parameters and a factor of its smoothing rates; the loop is
+        stable with only a share of such a force, and the kernel writes it to the next row of ``local.inertia_n``.
     adjustable : bool
         Whether its parameters may change while it acts.
     controls : tuple of Parameter
@@ -249,7 +249,7 @@ class Effect:
     state: Fields | None = None
     fill: Callable[[Any, LiquidLike, SceneLike, Mapping[str, int]], None] = _nothing_to_fill
     rows: tuple[Rows, ...] = ()
-    damping_nspm: Callable[[Any], float] | None = None
+    damping_nspm: Callable[[Any, float], float] | None = None
     adjustable: bool = True
     controls: tuple[Parameter, ...] = ()
     with_liquid: bool = False

@@ -65,8 +65,8 @@ SAMPLE = np.dtype(
         ("force_n", np.float64, (3,)),  # sum of the effects on the body, before slope limit and safety
         ("command_n", np.float64, (3,)),  # the force on the hand that the servo commanded
         ("device_force_n", np.float64, (3,)),  # the force on the hand that the device sent
-        ("permitted_n", np.float64),  # size of the force after slope limits, norm and fades
-        ("withheld_n", np.float64),  # size of its change by passivity controller, slew limit and device
+        ("permitted_n", np.float64),  # size of the force of the effects after norm and fades
+        ("withheld_n", np.float64),  # size of its change by slope limits, passivity controller, slew limit and device
         ("delay_ticks", np.int64),  # assumed delay of a force, in writes
         ("buttons", np.int64),  # bit set: button 1 is bit 0
         ("limiters", np.int64),  # LIMITER_* bits that acted
@@ -180,6 +180,7 @@ PARAMETERS = np.dtype(
         ("fallback_lag_s", np.float64),  # the same of EWMA, which replaces a Kalman filter after a fault
         ("count_m", np.float64),  # one encoder count of the device, hand frame
         ("mass_kg", np.float64),  # the device's least effective mass
+        ("smoothing_lead", np.float64),  # share of the lag of smoothed dw/dt that is compensated
         ("link", LINK),
         ("rules", RULES),
     ],
@@ -199,6 +200,7 @@ LIQUID = np.dtype(
     [
         ("effects", np.int64),  # bits of the effects it selects
         ("inertia_share", np.float64, (MOST_DELAY + 1,)),  # stable share of inertial forces, by the delay
+        ("smoothing_rate", np.float64, (MOST_DELAY + 1,)),  # factor of the rates at which dw/dt is smoothed, likewise
         ("region", REGION),
         *((effect.name, record_type(effect.parameters)) for effect in EFFECTS if effect.parameters is not None),
     ],
@@ -326,7 +328,7 @@ SAFETY = np.dtype(
         ("delay_ticks", np.int64),  # assumed delay of a force in writes, 0 … MOST_DELAY
         ("slower", np.int64),  # samples in a row with a longer measured delay
         ("faster", np.int64),  # samples in a row with a shorter one
-        ("permitted_n", np.float64, (3,)),  # the force after slope limits, norm and fades
+        ("permitted_n", np.float64, (3,)),  # the force after norm and fades; after slope limits, too, if a link acts
         ("slewed_n", np.float64, (3,)),  # the force of the last tick, before the passivity controller changed it
         ("passivity", PASSIVITY),  # reset with each scene
     ],

@@ -13,6 +13,7 @@ from study_app.errors import StudyError
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.estimators import NAMED
 from study_app.haptics.model.estimators.device import DeviceVelocity
+from study_app.haptics.model.force_rules import CURRENT, ForceRules
 from study_app.haptics.model.scene import Ewma, Foaw, Given, Kalman, Velocity
 
 SLOWEST_HZ: Final = 500.0
@@ -32,6 +33,7 @@ SLEW_N: Final = 1.5
 KALMAN_SLEW: Final = 0.8
 """Its share with "kalman": at 1, a released handle oscillated in tar if the delay was one tick longer than assumed."""
 SLEW_S: Final = 1e-3
+NOMINAL_S: Final = 1e-3
 
 _THESIS: Final = Ewma()
 _SAME: Final = 1e-9  # tolerance for periods that differ only by rounding
@@ -63,7 +65,9 @@ def slope_limit(period_s: float, delay_ticks: int, velocity: Velocity | DeviceVe
 
 
 @lru_cache(maxsize=256)
-def damping_limits(period_s: float, delay_ticks: int, velocity: Velocity | DeviceVelocity = _THESIS) -> DampingLimits:
+def damping_limits(
+    period_s: float, delay_ticks: int, velocity: Velocity | DeviceVelocity = _THESIS, rules: ForceRules = CURRENT
+) -> DampingLimits:
     """Return the limits of a loop with a tick period [s], a delay [ticks] and a velocity estimator.
 
     Between two periods or parameters in the table the lower limit counts, between two delays the longer one; below the
@@ -86,7 +90,11 @@ def damping_limits(period_s: float, delay_ticks: int, velocity: Velocity | Devic
             "run at 250 Hz or more, with a delay of 4 ticks at most"
         )
     beyond = min(1.0, period_s / min(entry.period_s for entry in table()))
-    return DampingLimits(*(beyond * min(limits) for limits in zip(*found, strict=True)))
+    limits = DampingLimits(*(beyond * min(limits) for limits in zip(*found, strict=True)))
+    if isinstance(velocity, Kalman) and rules.most_inertia_nspm > 0.0 and abs(period_s - NOMINAL_S) < _SAME:
+        inertia_nspm = min(rules.inertia_of_drag * limits.drag_nspm, rules.most_inertia_nspm)
+        return limits._replace(inertia_nspm=inertia_nspm)
+    return limits
 
 
 def slew_limit_n(period_s: float, dynamics: Dynamics, velocity: Velocity | DeviceVelocity = _THESIS) -> float:

@@ -28,6 +28,8 @@ from study_app.haptics.runtime.scene_records import (
     rows_needed,
 )
 
+RESOLUTION = 1e-6
+"""Of the factor of smoothing rates."""
 _KNEES = {"none": layout.KNEE_NONE, "sqrt": layout.KNEE_SQRT, "square": layout.KNEE_SQUARE}
 
 
@@ -93,7 +95,7 @@ def pack(
             }
         ),
     )
-    by_delay = _by_delay(scene, dynamics) if limits is None else (limits,) * (MOST_DELAY + 1)
+    by_delay = _by_delay(scene, dynamics, rules) if limits is None else (limits,) * (MOST_DELAY + 1)
     _fill(model, scene, by_delay, dynamics, rules)
     return model
 
@@ -131,13 +133,13 @@ def pack_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> No
                     f"the scene needs {rows[name]} {kind.words}; the model was packed with room for "
                     f"{len(getattr(model.rows, name))}: pack it with a greater capacity"
                 )
-    _fill(model, scene, _by_delay(scene, dynamics), dynamics, CURRENT)
+    _fill(model, scene, _by_delay(scene, dynamics, CURRENT), dynamics, CURRENT)
 
 
 def adjust_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN, rules: ForceRules = CURRENT) -> None:
     """Write the parameters of a scene like the one in memory of `pack` (`built_alike`) into it; keep its state."""
     scene = _for_device(scene, dynamics)
-    _fill_constants(model, scene, _by_delay(scene, dynamics), dynamics, rules)
+    _fill_constants(model, scene, _by_delay(scene, dynamics, rules), dynamics, rules)
 
 
 def built_alike(scene: Scene, other: Scene) -> bool:
@@ -162,7 +164,7 @@ def _constants(scene: Scene) -> Model:
     """Return a resolved scene's constants, in new memory."""
     nothing = [layout.records(layout.STATE, 0)] * (len(Model._fields) - 2)
     model = Model(layout.records(layout.PARAMETERS, 1), layout.records(layout.LIQUID, len(scene.liquids)), *nothing)
-    _fill_constants(model, scene, _by_delay(scene, UNKNOWN), UNKNOWN, CURRENT)
+    _fill_constants(model, scene, _by_delay(scene, UNKNOWN, CURRENT), UNKNOWN, CURRENT)
     return model
 
 
@@ -192,10 +194,10 @@ def takes_device_velocity(rate_hz: float, dynamics: Dynamics) -> bool:
     return dynamics.velocity_lag_s is not None and dynamics.velocity_lag_s * rate_hz <= MOST_LAG_TICKS
 
 
-def _by_delay(scene: Scene, dynamics: Dynamics) -> Sequence[DampingLimits]:
+def _by_delay(scene: Scene, dynamics: Dynamics, rules: ForceRules) -> Sequence[DampingLimits]:
     """Return the limits of the scene's rate, estimator and device at each delay, 0 to `MOST_DELAY` ticks."""
     lighter = min(dynamics.mass_kg / MEASURED_KG, 1.0) ** LIGHTER
-    found = (damping_limits(1 / scene.rate_hz, delay, scene.velocity) for delay in range(MOST_DELAY + 1))
+    found = (damping_limits(1 / scene.rate_hz, delay, scene.velocity, rules) for delay in range(MOST_DELAY + 1))
     return [DampingLimits(lighter * limit.drag_nspm, lighter * limit.inertia_nspm) for limit in found]
 
 
@@ -229,6 +231,7 @@ def _fill_constants(
     parameters.slew_n = slew_limit_n(1 / scene.rate_hz, dynamics, scene.velocity)
     parameters.count_m = dynamics.count_m
     parameters.mass_kg = dynamics.mass_kg
+    parameters.smoothing_lead = rules.smoothing_lead if isinstance(scene.velocity, Kalman) else 0.0
     parameters.link.acts = scene.link.acts
     parameters.link.delay_ticks, parameters.link.jitter_ticks = scene.link.ticks(scene.rate_hz)
     parameters.link.loss, parameters.link.seed = scene.link.loss, scene.link.seed
@@ -236,20 +239,33 @@ def _fill_constants(
     first = no_rows()
     for record, liquid in zip(model.liquids, scene.liquids, strict=False):
         fill(record, liquid, scene, first)
-        record.inertia_share = [_inertia_share(record, limit, scene.scale, rules) for limit in limits]
+        fits = [_inertia_fit(record, limit, scene, rules) for limit in limits]
+        record.smoothing_rate, record.inertia_share = zip(*fits, strict=True)
         first = rows_after(first, liquid, scene.rate_hz)
         parameters.effects |= record.effects
 
 
-def _inertia_share(record: layout.Record, limits: DampingLimits, scale: float, rules: ForceRules) -> float:
-    """Return the stable share of inertial forces, which count by their damping of fast motion.
+def _inertia_fit(record: layout.Record, limits: DampingLimits, scene: Scene, rules: ForceRules) -> tuple[float, float]:
+    """Return the factor of smoothing rates and the share with which inertial forces are within their limit.
 
-    Forces above the limit are reduced to the share that is stable in any loop. [choice]
+    They count by their damping of fast motion; see `ForceRules`. [choice]
     """
-    damping_nspm = 0.0
-    for effect in EFFECTS:
-        if effect.damping_nspm is not None and record.effects & effect.bit:
-            damping_nspm += effect.damping_nspm(record[effect.name])
-    if damping_nspm * scale <= limits.inertia_nspm:
-        return 1.0
-    return min(limits.inertia_nspm, rules.cut_inertia_share * limits.drag_nspm) / (damping_nspm * scale)
+
+    def damping_nspm(rate: float) -> float:
+        found = (
+            effect.damping_nspm(record[effect.name], rate)
+            for effect in EFFECTS
+            if effect.damping_nspm is not None and record.effects & effect.bit
+        )
+        return sum(found, 0.0) * scene.scale
+
+    if damping_nspm(1.0) <= limits.inertia_nspm:
+        return 1.0, 1.0
+    rate = 1.0 / rules.longest_smoothing if isinstance(scene.velocity, Kalman) else 1.0
+    if damping_nspm(rate) < limits.inertia_nspm:
+        high = 1.0
+        while high - rate > RESOLUTION:
+            middle = 0.5 * (rate + high)
+            rate, high = (middle, high) if damping_nspm(middle) < limits.inertia_nspm else (rate, middle)
+        return rate, 1.0
+    return rate, min(limits.inertia_nspm, rules.cut_inertia_share * limits.drag_nspm) / damping_nspm(rate)

@@ -19,47 +19,76 @@ def added_mass_force(
 ) -> None:
     """Add F = −C_a ρ V_sub dw/dt to the force, (3,) [N]; C_a = ½ for a sphere in potential flow (Lamb 1932, §92).
 
-    dw/dt is the difference of w over Δt, smoothed over τ: a ← a + (1 − e^(−Δt/τ))(Δw/Δt − a). Unsmoothed, one encoder
-    count would cause a spike of 0.3 N. In the first tick in a liquid the acceleration is 0; in uniform motion it decays
-    to 0, not to a denormal number. Only the share that keeps the loop stable is sent.
+    dw/dt is the difference of w over Δt, smoothed (`accelerate`). Unsmoothed, one encoder count would cause a spike of
+    0.3 N. In the first tick in a liquid the acceleration is 0; in uniform motion it decays to 0, not to a denormal
+    number. Only the share that keeps the loop stable is sent.
     """
     mass, tracks, w = liquid.added_mass, local.added_mass, local.relative_mps
     if local.ticks == 0:
-        clear(tracks.acceleration_mps2)
+        clear(tracks.smoothed_mps2[0])
+        clear(tracks.smoothed_mps2[1])
         copy(w, tracks.previous_mps)
-    accelerate(tracks.acceleration_mps2, w, tracks.previous_mps, mass.filter_per_s, interval_s)
+    rate_per_s = mass.filter_per_s * liquid.smoothing_rate[delay_ticks]
+    lead = parameters.smoothing_lead
+    accelerate(tracks.acceleration_mps2, tracks.smoothed_mps2, w, tracks.previous_mps, rate_per_s, lead, interval_s)
     copy(w, tracks.previous_mps)
     force_n = local.inertia_n[local.inertial]
     local.inertial += 1
     for axis in range(3):
         force_n[axis] = -mass.mass_kg * local.share * tracks.acceleration_mps2[axis]
         state.force_n[axis] += force_n[axis]
-    square_m2ps2 = storing_square(parameters, mass, local, tracks)
+    square_m2ps2 = storing_square(parameters, local, tracks.smoothed_mps2, rate_per_s)
     state.returnable_j += 0.5 * liquid.inertia_share[delay_ticks] * mass.mass_kg * local.share * square_m2ps2
 
 
 @part
-def accelerate(acceleration_mps2: Any, w: Any, previous_mps: Any, filter_per_s: float, interval_s: float) -> None:
-    """Set the smoothed dw/dt, (3,), from w and w of the tick before."""
-    weight = -math.expm1(-filter_per_s * interval_s)
+def accelerate(
+    acceleration_mps2: Any,
+    smoothed_mps2: Any,
+    w: Any,
+    previous_mps: Any,
+    rate_per_s: float,
+    lead: float,
+    interval_s: float,
+) -> None:
+    """Set the smoothed dw/dt, (3,), from w and w of the tick before.
+
+    It is smoothed once and twice over T = (1 + g)/rate: a ← a + (1 − e^(−Δt/T))(Δw/Δt − a); with the lead g, a₁ + g
+    (a₁ − a₂) lags by (1 − g) T and passes noise as if it were smoothed once at the rate.
+    """
+    weight = -math.expm1(-rate_per_s / (1.0 + lead) * interval_s)
     for axis in range(3):
         difference_mps2 = (w[axis] - previous_mps[axis]) / interval_s
-        smoothed_mps2 = acceleration_mps2[axis] + weight * (difference_mps2 - acceleration_mps2[axis])
-        acceleration_mps2[axis] = smoothed_mps2 if abs(smoothed_mps2) > NOTHING_MPS2 else 0.0
+        once_mps2 = smoothed_mps2[0, axis] + weight * (difference_mps2 - smoothed_mps2[0, axis])
+        twice_mps2 = smoothed_mps2[1, axis] + weight * (once_mps2 - smoothed_mps2[1, axis])
+        smoothed_mps2[0, axis] = once_mps2 = once_mps2 if abs(once_mps2) > NOTHING_MPS2 else 0.0
+        smoothed_mps2[1, axis] = twice_mps2 = twice_mps2 if abs(twice_mps2) > NOTHING_MPS2 else 0.0
+        acceleration_mps2[axis] = once_mps2 + lead * (once_mps2 - twice_mps2)
 
 
 @part
-def storing_square(parameters: Record, mass: Record, local: Record, tracks: Record) -> float:
-    """Return v² [m²/s²] of the energy ½ m v² that the added mass m stores.
+def storing_square(parameters: Record, local: Record, smoothed_mps2: Any, rate_per_s: float) -> float:
+    """Return v² [m²/s²] of the energy ½ m v² that the added mass m stores (`stored_square`).
 
-    Its force is -m dw_s/dt, w_s being w smoothed over τ: w_s' = (w - w_s)/τ. So the hand does the work ∫m w_s' w dt = ½
-    m w_s² + ∫m τ w_s'² dt: only ½ m w_s² can be returned, with w_s = w - τ w_s', which at a reversal is not 0 when w
-    is. With the other estimators their own stored energy, of a longer lag, covers the difference.
+    With the other estimators their own stored energy, of a longer lag, covers that of the smoothing.
     """
     if parameters.estimator != kalman.CODE:
         return float(square(local.motion_mps))
-    lag_s, square_m2ps2 = 1.0 / mass.filter_per_s, 0.0
+    time_s, square_m2ps2 = (1.0 + parameters.smoothing_lead) / rate_per_s, 0.0
     for axis in range(3):
-        smoothed_mps = local.motion_mps[axis] - lag_s * tracks.acceleration_mps2[axis]
-        square_m2ps2 += smoothed_mps * smoothed_mps
+        once_mps = local.motion_mps[axis] - time_s * smoothed_mps2[0, axis]
+        square_m2ps2 += stored_square(once_mps, time_s * smoothed_mps2[1, axis], parameters.smoothing_lead)
     return square_m2ps2
+
+
+@part
+def stored_square(once_mps: float, less_mps: float, lead: float) -> float:
+    """Return v² [m²/s²] of the energy ½ m v² that can be returned: of w₁ and w₁ − w₂, w smoothed once and twice.
+
+    The force is -m u', u = w₁ + g (w₁ − w₂), T w₁' = w - w₁, T w₂' = w₁ - w₂. The hand does the work ∫m u' w dt ≥
+    ½ m (u² + (1 − √(1 − g²))² (w₁ − w₂)²), the available storage (Willems 1972): w₁², not w², for g = 0. At a
+    reversal it is not 0 when w is.
+    """
+    rest = 1.0 - math.sqrt(1.0 - lead * lead)
+    smoothed_mps = once_mps + lead * less_mps
+    return smoothed_mps * smoothed_mps + rest * rest * less_mps * less_mps

@@ -16,6 +16,7 @@ import math
 from typing import Any
 
 from study_app.haptics.kernels.compiled import part
+from study_app.haptics.kernels.effects.added_mass import stored_square
 from study_app.haptics.kernels.vector import clear, square
 from study_app.haptics.model.effects.history import EXPONENTIALS
 from study_app.haptics.model.estimators import kalman
@@ -45,7 +46,7 @@ def basset_force(
 ) -> None:
     """Add the history force, (3,) [N], to the force; φ is the share of the volume in the liquid.
 
-    w is first smoothed over τ, as for the added mass. Only the share that keeps the loop stable is sent. It stores the
+    w is first smoothed, as for the added mass. Only the share that keeps the loop stable is sent. It stores the
     energy of its inertia in an oscillation of 1 Hz, 3πR² √(2µρ/ω) (Landau & Lifshitz, §24).
     """
     history, tracks = liquid.history, local.history
@@ -53,7 +54,8 @@ def basset_force(
     if local.ticks == 0:
         _reset_tracks(history, tracks, local.relative_mps, exponentials)
     _fade(history, exponentials, interval_s)
-    _append(history, tracks, local.relative_mps, intervals, interval_s)
+    rate_per_s = history.filter_per_s * liquid.smoothing_rate[delay_ticks]
+    _append(history, tracks, local.relative_mps, intervals, rate_per_s, parameters.smoothing_lead, interval_s)
     force_n = local.inertia_n[local.inertial]
     local.inertial += 1
     clear(force_n)
@@ -79,8 +81,9 @@ def _storing_square(parameters: Record, local: Record, tracks: Record) -> float:
         return float(square(local.motion_mps))
     square_m2ps2 = 0.0
     for axis in range(3):
-        smoothed_mps = local.motion_mps[axis] + tracks.smoothed_mps[axis] - local.relative_mps[axis]
-        square_m2ps2 += smoothed_mps * smoothed_mps
+        once_mps = local.motion_mps[axis] + tracks.smoothed_mps[axis] - local.relative_mps[axis]
+        less_mps = tracks.smoothed_mps[axis] - tracks.twice_mps[axis]
+        square_m2ps2 += stored_square(once_mps, less_mps, parameters.smoothing_lead)
     return square_m2ps2
 
 
@@ -90,7 +93,7 @@ def _reset_tracks(history: Record, tracks: Record, w: Any, exponentials: Any) ->
     tracks.first = 0
     tracks.held = 0
     for axis in range(3):
-        tracks.smoothed_mps[axis] = w[axis] if abs(w[axis]) > NOTHING else 0.0
+        tracks.smoothed_mps[axis] = tracks.twice_mps[axis] = w[axis] if abs(w[axis]) > NOTHING else 0.0
     for i in range(EXPONENTIALS):
         clear(exponentials[history.tail_row + i].memory)
 
@@ -107,16 +110,22 @@ def _fade(history: Record, exponentials: Any, interval_s: float) -> None:
 
 
 @part
-def _append(history: Record, tracks: Record, w: Any, intervals: Any, interval_s: float) -> None:
+def _append(
+    history: Record, tracks: Record, w: Any, intervals: Any, rate_per_s: float, lead: float, interval_s: float
+) -> None:
     """Append the newest interval to the window, which has room for it. At rest, w becomes exactly 0."""
-    weight = -math.expm1(-history.filter_per_s * interval_s)
+    weight = -math.expm1(-rate_per_s / (1.0 + lead) * interval_s)
     newest = intervals[history.row + _wrapped(tracks.first + tracks.held, history.rows)]
     for axis in range(3):
         change_mps = weight * (w[axis] - tracks.smoothed_mps[axis])
         if abs(tracks.smoothed_mps[axis] + change_mps) <= NOTHING:
             change_mps = -tracks.smoothed_mps[axis]
         tracks.smoothed_mps[axis] += change_mps
-        newest.acceleration_mps2[axis] = change_mps / interval_s
+        twice_mps = weight * (tracks.smoothed_mps[axis] - tracks.twice_mps[axis])
+        if abs(tracks.twice_mps[axis] + twice_mps) <= NOTHING:
+            twice_mps = -tracks.twice_mps[axis]
+        tracks.twice_mps[axis] += twice_mps
+        newest.acceleration_mps2[axis] = (change_mps + lead * (change_mps - twice_mps)) / interval_s
     newest.duration_s = interval_s
     tracks.held += 1
 

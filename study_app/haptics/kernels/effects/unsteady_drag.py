@@ -60,8 +60,11 @@ def unsteady_drag_force(
     law, tracks, w = liquid.unsteady_drag, local.unsteady_drag, local.relative_mps
     if local.ticks == 0:
         _reset_tracks(law, tracks, w)
-    accelerate(tracks.acceleration_mps2, w, tracks.previous_mps, law.filter_per_s, interval_s)
-    accelerate(tracks.remembered_mps2, w, tracks.previous_mps, law.history_filter_per_s, interval_s)
+    lead, rate = parameters.smoothing_lead, liquid.smoothing_rate[delay_ticks]
+    of_mass_per_s, of_history_per_s = rate * law.filter_per_s, rate * law.history_filter_per_s
+    previous_mps, once_and_twice = tracks.previous_mps, tracks.history_smoothed_mps2
+    accelerate(tracks.acceleration_mps2, tracks.smoothed_mps2, w, previous_mps, of_mass_per_s, lead, interval_s)
+    accelerate(tracks.remembered_mps2, once_and_twice, w, previous_mps, of_history_per_s, lead, interval_s)
     copy(w, tracks.previous_mps)
     wake2 = square(tracks.wake_mps)
     u_mps = math.sqrt(square(w) + wake2)
@@ -80,9 +83,8 @@ def unsteady_drag_force(
     local.prompt_nspm = law.stokes_nspm * local.frontal
     state.growth = max(state.growth, GROWS_AS_SPEED)
     inertia_kg = (law.mass_kg + 0.5 * law.factor_kg_rs * math.sqrt(PERIOD_S)) * local.share
-    state.returnable_j += (
-        0.5 * liquid.inertia_share[delay_ticks] * inertia_kg * storing_square(parameters, law, local, tracks)
-    )
+    square_m2ps2 = storing_square(parameters, local, tracks.smoothed_mps2, of_mass_per_s)
+    state.returnable_j += 0.5 * liquid.inertia_share[delay_ticks] * inertia_kg * square_m2ps2
 
 
 @part
@@ -90,8 +92,9 @@ def _reset_tracks(law: Any, tracks: Record, w: Any) -> None:
     """Begin at the present velocity, as if the motion had always been uniform."""
     excess = _over_stokes(law.reynolds_spm * norm(w)) - 1.0
     copy(w, tracks.previous_mps)
-    clear(tracks.acceleration_mps2)
-    clear(tracks.remembered_mps2)
+    for order in range(2):
+        clear(tracks.smoothed_mps2[order])
+        clear(tracks.history_smoothed_mps2[order])
     copy(w, tracks.wake_mps)
     copy(w, tracks.far_wake_mps)
     for axis in range(3):

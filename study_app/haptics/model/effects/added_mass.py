@@ -66,7 +66,8 @@ PARAMETERS: Fields = (
 
 STATE: Fields = (
     ("previous_mps", FLOAT, (3,)),  # w of the tick before
-    ("acceleration_mps2", FLOAT, (3,)),  # dw/dt, smoothed
+    ("smoothed_mps2", FLOAT, (2, 3)),  # dw/dt, smoothed once and twice
+    ("acceleration_mps2", FLOAT, (3,)),  # dw/dt of these two
 )
 
 EFFECT = Effect(
@@ -82,7 +83,7 @@ EFFECT = Effect(
     parameters=PARAMETERS,
     state=STATE,
     fill=_fill,
-    damping_nspm=lambda record: damping_nspm(record.mass_kg, record.filter_per_s),
+    damping_nspm=lambda record, rate: damping_nspm(record.mass_kg, rate * record.filter_per_s),
     open_values={"filter_s": lambda scene: smoothing_s(scene.velocity, None, SMOOTHING_S)},
     controls=(
         Parameter("added_mass.coefficient", "Coefficient", "", most=2.0),

@@ -101,7 +101,8 @@ PARAMETERS: Fields = (
 STATE: Fields = (
     ("first", INT),  # where in its rows the oldest interval is; the others follow, around the end
     ("held", INT),  # how many there are
-    ("smoothed_mps", FLOAT, (3,)),  # w, smoothed
+    ("smoothed_mps", FLOAT, (3,)),  # w, smoothed once
+    ("twice_mps", FLOAT, (3,)),  # and twice
 )
 
 INTERVAL: Fields = (
@@ -139,7 +140,7 @@ EFFECT = Effect(
             lambda rate_hz: EXPONENTIALS,
         ),
     ),
-    damping_nspm=lambda record: damping_nspm(record.factor_kg_rs, record.filter_per_s),
+    damping_nspm=lambda record, rate: damping_nspm(record.factor_kg_rs, rate * record.filter_per_s),
     adjustable=False,  # its intervals depend on its numbers
     open_values={"smoothing_s": lambda scene: smoothing_s(scene.velocity, None, SMOOTHING_S)},
     controls=(

@@ -68,10 +68,10 @@ def _fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str,
     record.history_filter_per_s = rate_per_s(smoothing_s(scene.velocity, None, history.SMOOTHING_S))
 
 
-def _damping_nspm(record: Any) -> float:
+def _damping_nspm(record: Any, rate: float) -> float:
     """Return the damping of fast motion by its added mass and by its history."""
-    of_mass_nspm = added_mass.damping_nspm(record.mass_kg, record.filter_per_s)
-    return of_mass_nspm + history.damping_nspm(record.factor_kg_rs, record.history_filter_per_s)
+    of_mass_nspm = added_mass.damping_nspm(record.mass_kg, rate * record.filter_per_s)
+    return of_mass_nspm + history.damping_nspm(record.factor_kg_rs, rate * record.history_filter_per_s)
 
 
 PARAMETERS: Fields = (
@@ -86,8 +86,10 @@ PARAMETERS: Fields = (
 
 STATE: Fields = (
     ("previous_mps", FLOAT, (3,)),  # w of the tick before
-    ("acceleration_mps2", FLOAT, (3,)),  # dw/dt for the added mass, smoothed
-    ("remembered_mps2", FLOAT, (3,)),  # dw/dt for the history, smoothed
+    ("smoothed_mps2", FLOAT, (2, 3)),  # dw/dt for the added mass, smoothed once and twice
+    ("acceleration_mps2", FLOAT, (3,)),  # dw/dt of these two
+    ("history_smoothed_mps2", FLOAT, (2, 3)),  # the same for the history
+    ("remembered_mps2", FLOAT, (3,)),
     ("wake_mps", FLOAT, (3,)),  # z
     ("far_wake_mps", FLOAT, (3,)),  # s
     ("excess_mps", FLOAT, (3,)),  # y
