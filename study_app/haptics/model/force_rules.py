@@ -14,26 +14,22 @@ from study_app.errors import StoreError
 class ForceRules(NamedTuple):
     """The rules of one version.
 
-    With "kalman", added mass and history that exceed their limit are smoothed for up to ``longest_smoothing`` times as
-    long; with every estimator they are then scaled to it, or to ``cut_inertia_share`` of the drag limit if that is
-    less. At 1 kHz the limit of "kalman" is ``inertia_of_drag`` times that of drag, at most ``most_inertia_nspm`` (0:
-    that of the table). ``smoothing_lead`` is the share of the lag of smoothing that is compensated
-    (`kernels.effects.added_mass`). The others are those of the filter (`kernels.estimators.kalman`).
+    Added mass and history that exceed their limit are scaled to it, or to ``cut_inertia_share`` of the drag limit if
+    that is less. With "kalman" they are first smoothed for up to ``longest_smoothing`` times as long, until that took
+    ``smoothed_excess`` of the excess (of its logarithm): each alone distorts the force more. At 1 kHz the limit of
+    "kalman" is ``inertia_of_drag`` times that of drag, at most ``most_inertia_nspm`` (0: that of the table).
+    ``smoothing_lead`` is 1 if the smoothing does not lag with "kalman" (`kernels.effects.added_mass`), else 0, and
+    ``jerk_of_speed_ps3`` the growth of its model's jerk with speed.
     """
 
     version: int
     cut_inertia_share: float = 0.15
+    smoothed_excess: float = 0.0
     longest_smoothing: float = 1.0
     inertia_of_drag: float = 0.0
     most_inertia_nspm: float = 0.0
     smoothing_lead: float = 0.0
-    jerk_m2ps5: float = 0.5
     jerk_of_speed_ps3: float = 4000.0
-    jerk_of_acceleration_ps: float = 10.0
-    jerk_of_force_ps: float = 0.0
-    snap_of_acceleration_ps3: float = 0.0
-    snap_of_jerk_ps: float = 0.0
-    first_jerk_mps3: float = 0.0
 
 
 VERSIONS: Final = {
@@ -44,17 +40,12 @@ VERSIONS: Final = {
         ForceRules(
             version=3,
             cut_inertia_share=math.inf,
-            longest_smoothing=1.3,
-            inertia_of_drag=1.6,
+            smoothed_excess=0.5,
+            longest_smoothing=1.6,
+            inertia_of_drag=0.67,
             most_inertia_nspm=36.0,
-            smoothing_lead=0.8,
-            jerk_m2ps5=0.3,
-            jerk_of_speed_ps3=400.0,
-            jerk_of_acceleration_ps=1.0,
-            jerk_of_force_ps=16.0,
-            snap_of_acceleration_ps3=100.0,
-            snap_of_jerk_ps=3.0,
-            first_jerk_mps3=100.0,
+            smoothing_lead=1.0,
+            jerk_of_speed_ps3=2000.0,
         ),
     )
 }

@@ -65,9 +65,7 @@ def slope_limit(period_s: float, delay_ticks: int, velocity: Velocity | DeviceVe
 
 
 @lru_cache(maxsize=256)
-def damping_limits(
-    period_s: float, delay_ticks: int, velocity: Velocity | DeviceVelocity = _THESIS, rules: ForceRules = CURRENT
-) -> DampingLimits:
+def damping_limits(period_s: float, delay_ticks: int, velocity: Velocity | DeviceVelocity = _THESIS) -> DampingLimits:
     """Return the limits of a loop with a tick period [s], a delay [ticks] and a velocity estimator.
 
     Between two periods or parameters in the table the lower limit counts, between two delays the longer one; below the
@@ -90,11 +88,26 @@ def damping_limits(
             "run at 250 Hz or more, with a delay of 4 ticks at most"
         )
     beyond = min(1.0, period_s / min(entry.period_s for entry in table()))
-    limits = DampingLimits(*(beyond * min(limits) for limits in zip(*found, strict=True)))
+    return DampingLimits(*(beyond * min(limits) for limits in zip(*found, strict=True)))
+
+
+def handle_limits(
+    period_s: float,
+    delay_ticks: int,
+    velocity: Velocity | DeviceVelocity,
+    mass_kg: float = MEASURED_KG,
+    rules: ForceRules = CURRENT,
+) -> DampingLimits:
+    """Return the limits of `damping_limits` for a handle of this mass, by the rules of a version.
+
+    With "kalman" at 1 kHz, those of inertia are then the limits of drag, in proportion to the mass of a heavier handle.
+    """
+    ratio = mass_kg / MEASURED_KG
+    lighter = min(ratio, 1.0) ** LIGHTER
+    drag_nspm, inertia_nspm = (lighter * limit for limit in damping_limits(period_s, delay_ticks, velocity))
     if isinstance(velocity, Kalman) and rules.most_inertia_nspm > 0.0 and abs(period_s - NOMINAL_S) < _SAME:
-        inertia_nspm = min(rules.inertia_of_drag * limits.drag_nspm, rules.most_inertia_nspm)
-        return limits._replace(inertia_nspm=inertia_nspm)
-    return limits
+        inertia_nspm = min(rules.inertia_of_drag * drag_nspm * max(ratio, 1.0), lighter * rules.most_inertia_nspm)
+    return DampingLimits(drag_nspm, inertia_nspm)
 
 
 def slew_limit_n(period_s: float, dynamics: Dynamics, velocity: Velocity | DeviceVelocity = _THESIS) -> float:

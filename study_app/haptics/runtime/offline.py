@@ -22,7 +22,7 @@ from study_app.haptics.model.estimators.given import CODE as GIVEN
 from study_app.haptics.model.layout import SAMPLE, Record, records
 from study_app.haptics.model.motion import Floats, Motion, read
 from study_app.haptics.model.scene import Given, Scene
-from study_app.haptics.model.slope_limits import damping_limits
+from study_app.haptics.model.slope_limits import handle_limits
 from study_app.haptics.runtime.pack import pack
 
 Table: TypeAlias = "np.recarray[Any, Any]"
@@ -121,7 +121,7 @@ class ModelAlong:
         elif isinstance(scene.velocity, Given) and not given:
             raise StudyError("the scene takes the velocity as given, but the motion has no vx_mps, vy_mps, vz_mps")
         if dynamics is None:
-            self._model = pack(scene, limits=damping_limits(1e-3, 1, estimator), dynamics=Dynamics(delay_s=1e-3))
+            self._model = pack(scene, limits=handle_limits(1e-3, 1, estimator), dynamics=Dynamics(delay_s=1e-3))
             self._safety = new_safety()
         else:
             self._model = pack(scene, dynamics=dynamics)

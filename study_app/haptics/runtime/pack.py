@@ -16,7 +16,7 @@ from study_app.haptics.model.force_link import FORCES
 from study_app.haptics.model.force_rules import CURRENT, ForceRules
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.scene import MAX_LIQUIDS, MAX_WINDOW, Ewma, Given, Kalman, Scene
-from study_app.haptics.model.slope_limits import LIGHTER, MEASURED_KG, DampingLimits, damping_limits, slew_limit_n
+from study_app.haptics.model.slope_limits import DampingLimits, handle_limits, slew_limit_n
 from study_app.haptics.runtime.scene_records import (
     KINDS,
     EffectRows,
@@ -196,9 +196,8 @@ def takes_device_velocity(rate_hz: float, dynamics: Dynamics) -> bool:
 
 def _by_delay(scene: Scene, dynamics: Dynamics, rules: ForceRules) -> Sequence[DampingLimits]:
     """Return the limits of the scene's rate, estimator and device at each delay, 0 to `MOST_DELAY` ticks."""
-    lighter = min(dynamics.mass_kg / MEASURED_KG, 1.0) ** LIGHTER
-    found = (damping_limits(1 / scene.rate_hz, delay, scene.velocity, rules) for delay in range(MOST_DELAY + 1))
-    return [DampingLimits(lighter * limit.drag_nspm, lighter * limit.inertia_nspm) for limit in found]
+    period_s, kg = 1 / scene.rate_hz, dynamics.mass_kg
+    return [handle_limits(period_s, delay, scene.velocity, kg, rules) for delay in range(MOST_DELAY + 1)]
 
 
 def _fill(model: Model, scene: Scene, limits: Sequence[DampingLimits], dynamics: Dynamics, rules: ForceRules) -> None:
@@ -259,13 +258,14 @@ def _inertia_fit(record: layout.Record, limits: DampingLimits, scene: Scene, rul
         )
         return sum(found, 0.0) * scene.scale
 
-    if damping_nspm(1.0) <= limits.inertia_nspm:
+    whole_nspm = damping_nspm(1.0)
+    if whole_nspm <= limits.inertia_nspm:
         return 1.0, 1.0
-    rate = 1.0 / rules.longest_smoothing if isinstance(scene.velocity, Kalman) else 1.0
-    if damping_nspm(rate) < limits.inertia_nspm:
-        high = 1.0
-        while high - rate > RESOLUTION:
+    rate, high = 1.0, 1.0
+    if isinstance(scene.velocity, Kalman):
+        smoothed_nspm = whole_nspm * (limits.inertia_nspm / whole_nspm) ** rules.smoothed_excess
+        rate = 1.0 / rules.longest_smoothing
+        while high - rate > RESOLUTION and damping_nspm(rate) < smoothed_nspm:
             middle = 0.5 * (rate + high)
-            rate, high = (middle, high) if damping_nspm(middle) < limits.inertia_nspm else (rate, middle)
-        return rate, 1.0
+            rate, high = (middle, high) if damping_nspm(middle) < smoothed_nspm else (rate, middle)
     return rate, min(limits.inertia_nspm, rules.cut_inertia_share * limits.drag_nspm) / damping_nspm(rate)

@@ -86,9 +86,8 @@ def stored_square(once_mps: float, less_mps: float, lead: float) -> float:
     """Return v² [m²/s²] of the energy ½ m v² that can be returned: of w₁ and w₁ − w₂, w smoothed once and twice.
 
     The force is -m u', u = w₁ + g (w₁ − w₂), T w₁' = w - w₁, T w₂' = w₁ - w₂. The hand does the work ∫m u' w dt ≥
-    ½ m (u² + (1 − √(1 − g²))² (w₁ − w₂)²), the available storage (Willems 1972): w₁², not w², for g = 0. At a
-    reversal it is not 0 when w is.
+    ½ m (u² + g (w₁ − w₂)²), for g = 0 and 1 the available storage (Willems 1972), which at a reversal is not 0 when
+    w is.
     """
-    rest = 1.0 - math.sqrt(1.0 - lead * lead)
     smoothed_mps = once_mps + lead * less_mps
-    return smoothed_mps * smoothed_mps + rest * rest * less_mps * less_mps
+    return smoothed_mps * smoothed_mps + lead * less_mps * less_mps

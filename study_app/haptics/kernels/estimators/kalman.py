@@ -1,8 +1,7 @@
 """A Kalman filter of velocity that uses the sent force and estimates the mass that the force moves.
 
-Per axis the state is position, velocity, acceleration and jerk, driven by white jerk and white snap. The density of
-the jerk grows with speed, acceleration and that of the own force, and where innovations exceed their variance; that of
-the snap with acceleration and jerk (`ForceRules`). All axes share one covariance. The force, delayed by the
+Per axis the state is position, velocity and acceleration, driven by white jerk of density q that grows with speed and
+acceleration, and where innovations exceed their variance; all axes share one covariance. The force, delayed by the
 assumed loop delay, passes two high-pass filters, since only its fast part surely accelerates the device's mass and not
 the hand. Its effect is the state's response V to it at 1 kg, times the inverse mass θ, estimated separately: a
 two-stage filter (Friedland 1969, IEEE TAC 14:359). So the estimate lags neither behind the hand nor behind the effect
@@ -23,8 +22,8 @@ from study_app.haptics.kernels.compiled import part
 from study_app.haptics.kernels.vector import copy, square
 from study_app.haptics.model.layout import Record
 
-CERTAIN_M2PS4: Final = 2.0
-"""Square of the acceleration by the own force up to which it is certain."""
+JERK_M2PS5: Final = 0.5
+JERK_OF_ACCELERATION_PS: Final = 10.0
 JERK_OF_SURPRISE_M2PS5: Final = 300.0
 SURPRISE: Final = 4.0
 """Mean of Σ innovation² / its variance above which the jerk is raised: a reach that begins within 50 ms at rest."""
@@ -60,15 +59,12 @@ def begin_filter(parameters: Record, filtered: Record) -> None:
         filtered.passed_n[axis] = filtered.input_n[axis] = 0.0
         filtered.offset_m[axis] = filtered.velocity_mps[axis] = filtered.acceleration_mps2[axis] = 0.0
         filtered.response_m[axis] = filtered.response_mps[axis] = filtered.response_mps2[axis] = 0.0
-        filtered.jerk_mps3[axis] = filtered.response_mps3[axis] = 0.0
         filtered.estimate_mps[axis] = filtered.smoothed_mps[axis] = filtered.carried_mps[axis] = 0.0
     copy(filtered.force_n, filtered.before_n)
-    for k in range(10):
-        filtered.covariance[k] = 0.0
     filtered.covariance[0] = 0.5 * parameters.count_m * parameters.count_m
+    filtered.covariance[1] = filtered.covariance[2] = filtered.covariance[4] = 0.0
     filtered.covariance[3] = FIRST_SPEED_MPS * FIRST_SPEED_MPS
     filtered.covariance[5] = FIRST_ACCELERATION_MPS2 * FIRST_ACCELERATION_MPS2
-    filtered.covariance[9] = parameters.rules.first_jerk_mps3 * parameters.rules.first_jerk_mps3
     filtered.per_kg = min(USUAL_PER_KG, 1.0 / parameters.mass_kg)
     filtered.per_kg_variance = 0.25 * USUAL_PER_KG * USUAL_PER_KG
     filtered.distrusted = 0
@@ -127,39 +123,22 @@ def _filter_force(filtered: Record, interval_s: float) -> None:
 @part
 def _correct(parameters: Record, state: Record, filtered: Record, interval_s: float) -> float:
     """Predict and correct state, response and inverse mass; return Σ innovation² / its variance over the axes."""
-    t, half, rules = interval_s, 0.5 * interval_s * interval_s, parameters.rules
-    sixth = half * t / 3.0
-    speed_m2ps2, acceleration_m2ps4 = square(filtered.estimate_mps), square(filtered.acceleration_mps2)
+    t, half = interval_s, 0.5 * interval_s * interval_s
+    speed_m2ps2 = square(filtered.estimate_mps)
     excess = max(filtered.surprise - SURPRISE, 0.0)
-    jerk_m2ps5 = rules.jerk_m2ps5 + rules.jerk_of_speed_ps3 * speed_m2ps2 + JERK_OF_SURPRISE_M2PS5 * excess * excess
-    jerk_m2ps5 += rules.jerk_of_acceleration_ps * acceleration_m2ps4
-    own_m2ps4 = filtered.per_kg * filtered.per_kg * square(filtered.input_n)
-    jerk_m2ps5 += rules.jerk_of_force_ps * own_m2ps4 * own_m2ps4 / (own_m2ps4 + CERTAIN_M2PS4)
-    snap_m2ps7 = rules.snap_of_acceleration_ps3 * acceleration_m2ps4 + rules.snap_of_jerk_ps * square(
-        filtered.jerk_mps3
-    )
-    st = snap_m2ps7 * t
-    sh = snap_m2ps7 * half
+    of_speed_ps3 = parameters.rules.jerk_of_speed_ps3
+    jerk_m2ps5 = JERK_M2PS5 + of_speed_ps3 * speed_m2ps2 + JERK_OF_SURPRISE_M2PS5 * excess * excess
+    jerk_m2ps5 += JERK_OF_ACCELERATION_PS * square(filtered.acceleration_mps2)
     qt = jerk_m2ps5 * t
     qh = jerk_m2ps5 * half
     p = filtered.covariance
-    pv, pa = p[1] + t * p[3] + half * p[4] + sixth * p[7], p[2] + t * p[4] + half * p[5] + sixth * p[8]
-    va = p[4] + t * p[5] + half * p[8]
-    pj, vj, aj = p[6] + t * p[7] + half * p[8] + sixth * p[9], p[7] + t * p[8] + half * p[9], p[8] + t * p[9]
+    pv, pa, va = p[1] + t * p[3] + half * p[4], p[2] + t * p[4] + half * p[5], p[4] + t * p[5]
     pp = p[0] + t * p[1] + half * p[2] + t * pv + half * pa + 0.2 * half * half * qt
-    pp += sixth * (p[6] + pj + st * sixth / 7.0)
-    vv = p[3] + t * p[4] + t * va + t * qh * (2.0 / 3.0) + half * (p[7] + vj) + 0.6 * sixth * sh
+    vv = p[3] + t * p[4] + t * va + t * qh * (2.0 / 3.0)
     pv += t * pa + 0.5 * half * qh
-    pv += half * pj + sixth * sixth * 0.5 * snap_m2ps7
     pa += t * qh / 3.0
-    pa += t * pj + 0.4 * sixth * sh
     va += qh
-    va += t * vj + 0.5 * half * sh
-    aa = p[5] + qt + t * (p[8] + aj) + half * st * (2.0 / 3.0)
-    pj += half * sh / 6.0
-    vj += t * sh / 3.0
-    aj += sh
-    jj = p[9] + st
+    aa = p[5] + qt
 
     variance_m2 = pp + 0.5 * parameters.count_m * parameters.count_m + TIMING_S * TIMING_S * speed_m2ps2
     measured = 1.0
@@ -168,29 +147,24 @@ def _correct(parameters: Record, state: Record, filtered: Record, interval_s: fl
     elif _repeats(parameters, state, filtered, t, variance_m2):
         filtered.repeated = 1
         measured = 0.0
-    to_p, to_v = measured * pp / variance_m2, measured * pv / variance_m2
-    to_a, to_j = measured * pa / variance_m2, measured * pj / variance_m2
+    to_p, to_v, to_a = measured * pp / variance_m2, measured * pv / variance_m2, measured * pa / variance_m2
     p[0], p[1], p[2] = pp * (1.0 - to_p), pv * (1.0 - to_p), pa * (1.0 - to_p)
     p[3], p[4], p[5] = vv - to_v * pv, va - to_v * pa, aa - to_a * pa
-    p[6], p[7], p[8], p[9] = pj * (1.0 - to_p), vj - to_v * pj, aj - to_a * pj, jj - to_j * pj
 
     responses_m2 = products_m2 = squares_m2 = 0.0
     per_m = 1.0 / parameters.scale
     for axis in range(3):
-        v, a, j = filtered.velocity_mps[axis], filtered.acceleration_mps2[axis], filtered.jerk_mps3[axis]
+        v, a = filtered.velocity_mps[axis], filtered.acceleration_mps2[axis]
         step_m = (state.position_m[axis] - state.previous_m[axis]) * per_m
-        offset_m = filtered.offset_m[axis] + t * v + half * a - step_m + sixth * j
+        offset_m = filtered.offset_m[axis] + t * v + half * a - step_m
         filtered.offset_m[axis] = _or_zero(offset_m - to_p * offset_m)
-        filtered.velocity_mps[axis] = _or_zero(v + t * a + half * j - to_v * offset_m)
-        filtered.acceleration_mps2[axis] = _or_zero(a + t * j - to_a * offset_m)
-        filtered.jerk_mps3[axis] = _or_zero(j - to_j * offset_m)
-        rv, ra, rj = filtered.response_mps[axis], filtered.response_mps2[axis], filtered.response_mps3[axis]
-        input_n = filtered.input_n[axis]
-        response_m = filtered.response_m[axis] + t * rv + half * (ra + input_n) + sixth * rj
+        filtered.velocity_mps[axis] = _or_zero(v + t * a - to_v * offset_m)
+        filtered.acceleration_mps2[axis] = _or_zero(a - to_a * offset_m)
+        rv, ra, input_n = filtered.response_mps[axis], filtered.response_mps2[axis], filtered.input_n[axis]
+        response_m = filtered.response_m[axis] + t * rv + half * (ra + input_n)
         filtered.response_m[axis] = _or_zero(response_m - to_p * response_m)
-        filtered.response_mps[axis] = _or_zero(rv + t * (ra + input_n) + half * rj - to_v * response_m)
-        filtered.response_mps2[axis] = _or_zero(ra + t * rj - to_a * response_m)
-        filtered.response_mps3[axis] = _or_zero(rj - to_j * response_m)
+        filtered.response_mps[axis] = _or_zero(rv + t * (ra + input_n) - to_v * response_m)
+        filtered.response_mps2[axis] = _or_zero(ra - to_a * response_m)
         left_m = -offset_m - response_m * filtered.per_kg
         responses_m2 += response_m * response_m
         products_m2 += response_m * left_m
@@ -210,16 +184,13 @@ def _correct(parameters: Record, state: Record, filtered: Record, interval_s: fl
 @part
 def _repeats(parameters: Record, state: Record, filtered: Record, t: float, variance_m2: float) -> bool:
     """Return whether a sample repeats the last one although the predicted motion far exceeds its uncertainty."""
-    half, sixth, squares_m2 = 0.5 * t * t, t * t * t / 6.0, 0.0
+    half, squares_m2 = 0.5 * t * t, 0.0
     for axis in range(3):
         if state.position_m[axis] != state.previous_m[axis]:
             return False
         response_m = filtered.response_m[axis] + t * filtered.response_mps[axis]
-        response_m += (
-            half * (filtered.response_mps2[axis] + filtered.input_n[axis]) + sixth * filtered.response_mps3[axis]
-        )
+        response_m += half * (filtered.response_mps2[axis] + filtered.input_n[axis])
         left_m = filtered.offset_m[axis] + t * filtered.velocity_mps[axis] + half * filtered.acceleration_mps2[axis]
-        left_m += sixth * filtered.jerk_mps3[axis]
         left_m += response_m * filtered.per_kg
         squares_m2 += left_m * left_m
     return squares_m2 > REPEATED * variance_m2

@@ -31,12 +31,10 @@ STATE: Fields = (
     ("offset_m", FLOAT, (3,)),  # estimated less measured position, of a filter without the force
     ("velocity_mps", FLOAT, (3,)),
     ("acceleration_mps2", FLOAT, (3,)),
-    ("jerk_mps3", FLOAT, (3,)),
-    ("response_m", FLOAT, (3,)),  # response of these four to the force on 1 kg [1/kg · m …]
+    ("response_m", FLOAT, (3,)),  # response of these three to the force on 1 kg [1/kg · m …]
     ("response_mps", FLOAT, (3,)),
     ("response_mps2", FLOAT, (3,)),
-    ("response_mps3", FLOAT, (3,)),
-    ("covariance", FLOAT, (10,)),  # of one axis, the same for all: pp, pv, pa, vv, va, aa, pj, vj, aj, jj
+    ("covariance", FLOAT, (6,)),  # of one axis, the same for all: pp, pv, pa, vv, va, aa
     ("per_kg", FLOAT),  # θ, the inverse of the mass that the force moves
     ("per_kg_variance", FLOAT),
     ("estimate_mps", FLOAT, (3,)),  # velocity estimated with the force
