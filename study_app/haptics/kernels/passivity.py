@@ -296,7 +296,7 @@ def log_delivery(safety: Record, sample: Record, sent_n: Any) -> None:
     for axis in range(3):
         sample.device_force_n[axis] = round(sent_n[axis] * DELIVERY_STEPS_PER_N) / DELIVERY_STEPS_PER_N
     _log(safety.passivity, sample.device_force_n)
-    sample.withheld_n = distance(safety.permitted_n, sample.device_force_n)
+    sample.withheld_n = distance(safety.requested_n, sample.device_force_n)
 
 
 @kernel

@@ -97,7 +97,8 @@ def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None
     passivity.norm_share = min(limit_n / max(norm(force_n), limit_n), 1.0) if limit_n > 0.0 else 1.0
     _limit_norm(force_n, lift_n, limit_n, sample)
     _fade(force_n, lift_n, parameters, safety, sample)
-    _permit(parameters, state, safety, force_n, limit_n)
+    copy(force_n, safety.permitted_n)
+    _log_request(parameters, state, safety, limit_n)
     reduce_gain(parameters, passivity, sample)
     _limit_slew(force_n, parameters, state, safety, sample)
     copy(force_n, safety.slewed_n)
@@ -108,11 +109,12 @@ def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None
         clear(lift_n)
         clear(safety.slewed_n)
         clear(safety.permitted_n)
+        clear(safety.requested_n)
     log_command(passivity, force_n)
     copy(force_n, sample.command_n)
     sample.delay_ticks = safety.delay_ticks
-    sample.permitted_n = norm(safety.permitted_n)
-    sample.withheld_n = distance(safety.permitted_n, force_n)
+    sample.permitted_n = norm(safety.requested_n)
+    sample.withheld_n = distance(safety.requested_n, force_n)
 
 
 @part
@@ -226,16 +228,16 @@ def _limit_slew(force_n: Any, parameters: Record, state: Record, safety: Record,
 
 
 @part
-def _permit(parameters: Record, state: Record, safety: Record, force_n: Any, limit_n: float) -> None:
-    """Set ``permitted_n``, the force of the effects within norm and fade; ``force_n`` is within slope limits, too.
+def _log_request(parameters: Record, state: Record, safety: Record, limit_n: float) -> None:
+    """Set the force of the effects within norm and fade, from which the share withheld counts.
 
-    A link sends forces of earlier ticks: there it is ``force_n``.
+    A force link sends the force of earlier ticks: there the force after its limits counts.
     """
-    copy(force_n, safety.permitted_n)
-    if parameters.link.acts == 0 and is_finite(state.force_n) and is_finite(force_n):
-        share = safety.fade * limit_n / max(norm(state.force_n), limit_n) if limit_n > 0.0 else 0.0
+    copy(safety.permitted_n, safety.requested_n)
+    if parameters.link.acts == 0 and limit_n > 0.0 and is_finite(state.force_n):
+        share = safety.fade * limit_n / max(norm(state.force_n), limit_n)
         for axis in range(3):
-            safety.permitted_n[axis] = share * state.force_n[axis]
+            safety.requested_n[axis] = share * state.force_n[axis]
 
 
 @part

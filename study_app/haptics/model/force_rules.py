@@ -4,7 +4,6 @@ A receipt states the version of the rules. Compiled code reads the rules of its
 scene from ``parameters.rules`` (`layout.RULES`), so that one code computes the force of every version.
 """
 
-import math
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
@@ -14,16 +13,18 @@ from study_app.errors import StoreError
 class ForceRules(NamedTuple):
     """The rules of one version.
 
-    Added mass and history that exceed their limit are scaled to it, or to ``cut_inertia_share`` of the drag limit if
-    that is less. With "kalman" they are first smoothed for up to ``longest_smoothing`` times as long, until that took
-    ``smoothed_excess`` of the excess (of its logarithm): each alone distorts the force more. At 1 kHz the limit of
-    "kalman" is ``inertia_of_drag`` times that of drag, at most ``most_inertia_nspm`` (0: that of the table).
+    Added mass and history that exceed their limit are scaled to it up to ``kept_excess`` times the limit, beyond that
+    to less in proportion, at least to ``cut_inertia_share`` of the drag limit: with more, released handles of 50 g
+    oscillated for 0.6 s. With "kalman" they are first smoothed for up to ``longest_smoothing`` times as long, until
+    that took ``smoothed_excess`` of the excess (of its logarithm): each alone distorts the force more. At 1 kHz the
+    limit of "kalman" is ``inertia_of_drag`` times that of drag, at most ``most_inertia_nspm`` (0: that of the table).
     ``smoothing_lead`` is 1 if the smoothing does not lag with "kalman" (`kernels.effects.added_mass`), else 0, and
     ``jerk_of_speed_ps3`` the growth of its model's jerk with speed.
     """
 
     version: int
     cut_inertia_share: float = 0.15
+    kept_excess: float = 0.0
     smoothed_excess: float = 0.0
     longest_smoothing: float = 1.0
     inertia_of_drag: float = 0.0
@@ -39,13 +40,13 @@ VERSIONS: Final = {
         ForceRules(version=2),
         ForceRules(
             version=3,
-            cut_inertia_share=math.inf,
+            kept_excess=2.0,
             smoothed_excess=0.5,
             longest_smoothing=1.6,
-            inertia_of_drag=0.67,
+            inertia_of_drag=1.35,
             most_inertia_nspm=36.0,
             smoothing_lead=1.0,
-            jerk_of_speed_ps3=2000.0,
+            jerk_of_speed_ps3=2200.0,
         ),
     )
 }

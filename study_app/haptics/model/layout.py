@@ -328,7 +328,8 @@ SAFETY = np.dtype(
         ("delay_ticks", np.int64),  # assumed delay of a force in writes, 0 … MOST_DELAY
         ("slower", np.int64),  # samples in a row with a longer measured delay
         ("faster", np.int64),  # samples in a row with a shorter one
-        ("permitted_n", np.float64, (3,)),  # the force after norm and fades; after slope limits, too, if a link acts
+        ("requested_n", np.float64, (3,)),  # the force of the effects within norm and fades
+        ("permitted_n", np.float64, (3,)),  # the same after slope limits
         ("slewed_n", np.float64, (3,)),  # the force of the last tick, before the passivity controller changed it
         ("passivity", PASSIVITY),  # reset with each scene
     ],

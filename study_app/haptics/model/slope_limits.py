@@ -100,14 +100,13 @@ def handle_limits(
 ) -> DampingLimits:
     """Return the limits of `damping_limits` for a handle of this mass, by the rules of a version.
 
-    With "kalman" at 1 kHz, those of inertia are then the limits of drag, in proportion to the mass of a heavier handle.
+    With "kalman" at 1 kHz, those of inertia follow from the limits of drag (`ForceRules`).
     """
-    ratio = mass_kg / MEASURED_KG
-    lighter = min(ratio, 1.0) ** LIGHTER
-    drag_nspm, inertia_nspm = (lighter * limit for limit in damping_limits(period_s, delay_ticks, velocity))
+    lighter = min(mass_kg / MEASURED_KG, 1.0) ** LIGHTER
+    drag_nspm, inertia_nspm = damping_limits(period_s, delay_ticks, velocity)
     if isinstance(velocity, Kalman) and rules.most_inertia_nspm > 0.0 and abs(period_s - NOMINAL_S) < _SAME:
-        inertia_nspm = min(rules.inertia_of_drag * drag_nspm * max(ratio, 1.0), lighter * rules.most_inertia_nspm)
-    return DampingLimits(drag_nspm, inertia_nspm)
+        inertia_nspm = min(rules.inertia_of_drag * drag_nspm, rules.most_inertia_nspm)
+    return DampingLimits(lighter * drag_nspm, lighter * inertia_nspm)
 
 
 def slew_limit_n(period_s: float, dynamics: Dynamics, velocity: Velocity | DeviceVelocity = _THESIS) -> float:

@@ -268,4 +268,6 @@ def _inertia_fit(record: layout.Record, limits: DampingLimits, scene: Scene, rul
         while high - rate > RESOLUTION and damping_nspm(rate) < smoothed_nspm:
             middle = 0.5 * (rate + high)
             rate, high = (middle, high) if damping_nspm(middle) < smoothed_nspm else (rate, middle)
-    return rate, min(limits.inertia_nspm, rules.cut_inertia_share * limits.drag_nspm) / damping_nspm(rate)
+    least_nspm = min(limits.inertia_nspm, rules.cut_inertia_share * limits.drag_nspm)
+    kept_nspm = limits.inertia_nspm * min(rules.kept_excess * limits.inertia_nspm / whole_nspm, 1.0)
+    return rate, max(least_nspm, kept_nspm) / damping_nspm(rate)

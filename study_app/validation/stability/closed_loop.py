@@ -20,7 +20,7 @@ from study_app.haptics.kernels.plant import measure, move, push
 from study_app.haptics.kernels.sample_validation import accept_sample, watchdog
 from study_app.haptics.kernels.tick import step_model, tick, write_sample
 from study_app.haptics.kernels.tick_schedule import next_tick, random
-from study_app.haptics.kernels.vector import clear, copy, is_finite
+from study_app.haptics.kernels.vector import clear, copy, distance, is_finite, norm
 from study_app.haptics.model.layout import MEASURED_VELOCITY
 from study_app.validation.stability.arm_plant import ARM, advance, write_force
 from study_app.validation.stability.measured_velocity import MEASURED, NONE, measure_velocity
@@ -219,7 +219,8 @@ def _write_down(model: Any, safety: Any, sample: Any, handle: Any, loop: Any, ro
     for axis in range(3):
         row.drift_mps[axis] = model.state[0].drift_mps[axis] / model.parameters[0].scale
     row.reserve_j = safety.passivity.reserve_j
-    row.permitted_n, row.withheld_n = sample.permitted_n, sample.withheld_n
+    row.permitted_n = norm(safety.permitted_n)
+    row.withheld_n = distance(safety.permitted_n, sample.device_force_n)
     row.delay = handle.delay
     row.limiters = sample.limiters
 

@@ -24,7 +24,7 @@ from study_app.haptics.kernels.c_functions import Driver
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.loop import CONTROL, ClockCalls, DeviceCalls, Output, Records, run
 from study_app.haptics.kernels.safety import new_safety
-from study_app.haptics.kernels.vector import copy
+from study_app.haptics.kernels.vector import copy, distance, norm
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import new_command, new_reading, records
 from study_app.haptics.runtime.clocks.clock import VirtualClock
@@ -205,7 +205,7 @@ def _follow(
         for axis in range(3):
             row.drift_mps[axis] = model.state[0].drift_mps[axis] / model.parameters[0].scale
         row.reserve_j = safety[0].passivity.reserve_j
-        row.permitted_n, row.withheld_n = sample.permitted_n, sample.withheld_n
+        row.permitted_n, row.withheld_n = norm(safety[0].permitted_n), distance(safety[0].permitted_n, row.sent_n)
         row.delay = DELAY
         row.limiters = sample.limiters
     return int(trace.shape[0])

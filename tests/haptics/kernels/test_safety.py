@@ -7,6 +7,7 @@ from study_app.errors import StudyError
 from study_app.haptics.kernels.safety import begin_scene, new_safety
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.estimators import NAMED
+from study_app.haptics.model.force_link import ForceLink
 from study_app.haptics.model.layout import (
     LIMITER_ENERGY,
     LIMITER_FADE,
@@ -146,6 +147,22 @@ def test_added_mass_and_history_are_weakened_where_the_loop_bears_less():
     assert 0.02 < share < 0.5
     assert ratio == pytest.approx(share)
     assert (felt.limiters[100:] & LIMITER_SLOPE != 0).all()
+
+
+@pytest.mark.parametrize("velocity", [Ewma(), Kalman()], ids=["ewma", "kalman"])
+@pytest.mark.parametrize("effects", [("drag",), ("added_mass", "history")], ids=["drag", "inertia"])
+def test_what_slope_limits_take_counts_as_withheld(effects, velocity):
+    steep = scene(liquid(20_000, viscosity_pa_s=10.0, effects=effects), scale=30, velocity=velocity, knee=UNBENT)
+    hand = Hand(steep, dynamics=Dynamics(1e-3, 38e-6, 0.1))
+    for sample in [hand.tick((0.004 * np.sin(0.02 * k), 0.0, 0.0)) for k in range(400)]:
+        asked_n = sample.force_n * min(1.0, 8.0 / max(size(sample.force_n), 1e-9))
+        assert sample.permitted_n == pytest.approx(size(asked_n), rel=1e-9)
+        assert sample.withheld_n == pytest.approx(size(asked_n - sample.device_force_n), abs=1e-9)
+    assert sample.limiters & LIMITER_SLOPE
+    assert sample.withheld_n > 0.2 * sample.permitted_n > 0
+    late = Hand(steep.model_copy(update={"link": ForceLink(delay_s=0.003)}))
+    sample = [late.tick((0.004 * np.sin(0.02 * k), 0.0, 0.0)) for k in range(400)][-1]
+    assert sample.permitted_n == pytest.approx(size(late.safety[0].permitted_n))
 
 
 def test_the_slew_limit_does_not_remember_what_the_passivity_controller_added():

@@ -9,6 +9,7 @@ from study_app.haptics.kernels.estimators import kalman
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.estimators import ewma
+from study_app.haptics.model.force_rules import CURRENT
 from study_app.haptics.model.layout import LIMITER_ESTIMATOR, records
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Ewma, Kalman, Scene
@@ -57,7 +58,7 @@ def literal(position_m, interval_s, force_n):
     once, twice, before, surprise = np.zeros(3), np.zeros(3), force_n[0], 0.0
     for k, (place, t, force) in enumerate(zip(position_m, interval_s, force_n, strict=True)):
         speed, acceleration = np.linalg.norm(v[k - 1]), np.linalg.norm(x[:, 2])
-        q = kalman.JERK_M2PS5 + kalman.JERK_OF_SPEED_PS3 * speed**2 + kalman.JERK_OF_ACCELERATION_PS * acceleration**2
+        q = kalman.JERK_M2PS5 + CURRENT.jerk_of_speed_ps3 * speed**2 + kalman.JERK_OF_ACCELERATION_PS * acceleration**2
         q += kalman.JERK_OF_SURPRISE_M2PS5 * max(surprise - kalman.SURPRISE, 0) ** 2
         noise = q * np.array([[t**5 / 20, t**4 / 8, t**3 / 6], [t**4 / 8, t**3 / 3, t**2 / 2], [t**3 / 6, t**2 / 2, t]])
         kept = math.exp(-kalman.CORNER_RADPS * t)
