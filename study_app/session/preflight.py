@@ -120,7 +120,13 @@ class Check:
 
 def checks(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
     """Return what is to be said of ``facts``, for a session of ``protocol``."""
-    found = [_device(facts), _loop_delay(facts), _rate(facts, protocol), _lateness(facts, protocol), _priority(facts)]
+    found = [
+        _device(facts),
+        _loop_delay(facts, protocol),
+        _rate(facts, protocol),
+        _lateness(facts, protocol),
+        _priority(facts),
+    ]
     found += _levels(facts, protocol)
     found += [
         _delay(facts, protocol),
@@ -148,12 +154,14 @@ def _device(facts: Facts) -> Check:
     return Check("Device", "ok", "responding", about)
 
 
-def _loop_delay(facts: Facts) -> Check:
+def _loop_delay(facts: Facts, protocol: Protocol) -> Check:
     """Say how late a force acts, which the force's limits follow."""
     value = _ticks(facts.delay_ticks)
     if facts.dynamics.delay_s is None:
         return Check("Loop delay", "ok", value, "assumed: the device does not measure its delay")
     about = f"delay until a force acts: {1e3 * facts.dynamics.delay_s:.2f} ms, measured by the device"
+    if facts.delay_ticks > facts.dynamics.delay_ticks(protocol.device.rate_hz):
+        about += " when it was opened; it measured more since"
     if facts.delay_ticks > BELIEVED_TICKS:
         return Check(
             "Loop delay", "warning", value, about, "Forces are limited more strictly: connect the device without a hub."

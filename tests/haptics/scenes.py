@@ -13,6 +13,7 @@ from study_app.haptics.model.effects.current import Vortex
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.effects.local_wake import LocalWake
 from study_app.haptics.model.effects.wake import Wake
+from study_app.haptics.model.force_rules import CURRENT, ForceRules
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Box, Cylinder, Knee, Liquid, Scene
@@ -120,8 +121,10 @@ def vectors(table: Any, kind: str) -> Any:
 class Hand:
     """Moves a model as a servo would: one call, one tick of 1 ms unless said otherwise."""
 
-    def __init__(self, felt: Scene, *, faded_in: bool = True, dynamics: Dynamics = UNKNOWN) -> None:
-        self.model = pack(felt, dynamics=dynamics)
+    def __init__(
+        self, felt: Scene, *, faded_in: bool = True, dynamics: Dynamics = UNKNOWN, rules: ForceRules = CURRENT
+    ) -> None:
+        self.model = pack(felt, dynamics=dynamics, rules=rules)
         self.safety = new_safety()
         self.safety[0].fade = 1.0 if faded_in else 0.0
         self.sample = records(SAMPLE, 1)

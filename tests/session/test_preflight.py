@@ -92,12 +92,21 @@ def test_the_share_withheld_is_told_by_liquid_where_the_operator_may_know_them(b
     assert found.about == f"in the fastest stroke of a task, limit 5 %{liquids}"
 
 
-@pytest.mark.parametrize(("delay_s", "said"), [(None, "assumed"), (0.00093, "0.93 ms, measured by the device")])
-def test_the_delay_of_the_loop_is_told_with_where_it_comes_from(delay_s: float | None, said: str) -> None:
-    facts = replace(small.WELL, dynamics=Dynamics(delay_s))
+@pytest.mark.parametrize(
+    ("delay_s", "ticks", "said"),
+    [
+        (None, 1, "assumed: the device does not measure its delay"),
+        (0.00093, 1, "delay until a force acts: 0.93 ms, measured by the device"),
+        (0.0018, 2, "delay until a force acts: 1.80 ms, measured by the device"),
+        (0.00093, 3, "0.93 ms, measured by the device when it was opened; it measured more since"),
+    ],
+)
+def test_the_delay_of_the_loop_is_told_with_where_it_comes_from(delay_s: float | None, ticks: int, said: str) -> None:
+    facts = replace(small.WELL, dynamics=Dynamics(delay_s), delay_ticks=ticks)
     (found,) = [check for check in checks(facts, small.protocol()) if check.name == "Loop delay"]
-    assert found.value == "1 tick"
-    assert said in found.about
+    assert found.value == f"{ticks} tick{'s' * (ticks > 1)}"
+    assert found.about.endswith(said)
+    assert found.verdict == ("warning" if ticks > 1 else "ok")
 
 
 @pytest.mark.parametrize(

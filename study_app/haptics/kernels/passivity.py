@@ -31,7 +31,10 @@ counts. A delayed force belongs to an earlier velocity: a delayed balance may in
   of the hand E ≥ -1 mJ - F R: even the worst next step leaves D at F R.
 
 Removal of force and damping bypass the slew limit. A debt is forgiven at 1 mW, less than a hand's own damping absorbs
-at 15 mm/s: without any force no debt could be repaid.
+at 15 mm/s: without any force no debt could be repaid. A hand that shakes the handle causes debts, too, since the force
+lags. A debt that begins within 0.2 s of a fast motion is forgiven once the hand has been quiet for ``quiet_s``, and the
+gain returns within 0.3 s. One that begins otherwise, or after a gap in the samples, is not: its oscillation would
+return with the gain.
 
 With a force link, no debt is forgiven, the gain does not recover before the next scene, and it falls further as long as
 there is a debt: with a delayed force a handle would continue to oscillate at the forgiven power, or at the gain at
@@ -46,10 +49,19 @@ from typing import Any
 from study_app.haptics.kernels.compiled import kernel, part
 from study_app.haptics.kernels.incremental_passivity import ALLOWANCE_J as INCREMENTAL_ALLOWANCE_J
 from study_app.haptics.kernels.incremental_passivity import begin_incremental, close_incremental, observe_incremental
+from study_app.haptics.kernels.sample_validation import is_gap
 from study_app.haptics.kernels.stored_energy import filter_storage
-from study_app.haptics.kernels.vector import clear, copy, distance, is_finite, norm, square
+from study_app.haptics.kernels.vector import clear, copy, distance, is_finite, norm, square, square_distance
 from study_app.haptics.model.device_dynamics import MOST_DELAY
-from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_SATURATED, Record
+from study_app.haptics.model.layout import (
+    DEBT_FORGIVEN,
+    DEBT_NONE,
+    DEBT_OWN,
+    DEBT_PUSHED,
+    LIMITER_ENERGY,
+    LIMITER_SATURATED,
+    Record,
+)
 
 ALLOWANCE_J = 1e-3
 SPENDING_S = 20e-3
@@ -60,6 +72,12 @@ SURE_MPS = 0.04
 BRAKE = 0.5
 RECOVERY_PER_S = 0.5
 INDEBTED_S = 0.1
+HAND_S = 16e-3
+FAST_MPS = 0.2
+FAST_J = 2e-3
+QUIET_MPS = 0.06
+PUSHED_S = 0.2
+REGAINED_S = 0.3
 DELIVERY_STEPS_PER_N = 2.0**14
 
 
@@ -83,6 +101,10 @@ def reset_observer(passivity: Record) -> None:
     passivity.impulse_s = 0.0
     begin_incremental(passivity.fast)
     clear(passivity.velocity_mps)
+    clear(passivity.slow_mps)
+    passivity.fast_s = passivity.gap_s = math.inf
+    passivity.quiet_s = 0.0
+    passivity.debt = DEBT_NONE
     passivity.longest_m = 0.0
     passivity.strongest_n = 0.0
     passivity.gain = 1.0
@@ -132,6 +154,7 @@ def update_observer(model: Any, safety: Record, interval_s: float) -> None:
         passivity.velocity_mps[axis] += weight * (step_m * per_s - passivity.velocity_mps[axis])
         mean_n = passivity.later_impulse_ns[axis] / passivity.impulse_s
         observe_incremental(passivity.fast, axis, mean_n, step_m * per_s, interval_s)
+    _watch_motion(parameters, passivity, interval_s)
     close_incremental(passivity.fast, interval_s if parameters.link.acts == 0 else 0.0)
     if square_m2 > passivity.longest_m * passivity.longest_m:
         passivity.longest_m = math.sqrt(square_m2)
@@ -155,6 +178,24 @@ def update_observer(model: Any, safety: Record, interval_s: float) -> None:
     clear(passivity.later_impulse_ns)
     clear(passivity.acted_impulse_ns)
     passivity.impulse_s = 0.0
+
+
+@part
+def _watch_motion(parameters: Record, passivity: Record, interval_s: float) -> None:
+    """Measure how long ago the hand moved fast, since when it is quiet, and how long ago samples were missing.
+
+    Its velocity counts without what is slow: a filter of 10 Hz separates shaking from stirring. It is fast if the
+    handle has more kinetic energy than the force can have given to it without a debt.
+    """
+    share = interval_s / HAND_S
+    weight = share / (1.0 + share * (0.5 + share / 12.0))
+    for axis in range(3):
+        passivity.slow_mps[axis] += weight * (passivity.velocity_mps[axis] - passivity.slow_mps[axis])
+    square_m2ps2 = square_distance(passivity.velocity_mps, passivity.slow_mps)
+    fast_m2ps2 = max(FAST_MPS * FAST_MPS, 2.0 * FAST_J / parameters.mass_kg)
+    passivity.fast_s = 0.0 if square_m2ps2 > fast_m2ps2 else passivity.fast_s + interval_s
+    passivity.quiet_s = 0.0 if square_m2ps2 > QUIET_MPS * QUIET_MPS else passivity.quiet_s + interval_s
+    passivity.gap_s = 0.0 if is_gap(parameters, interval_s) else passivity.gap_s + interval_s
 
 
 @part
@@ -196,7 +237,10 @@ def _forgive(balance_j: float, forgiven_j: float) -> float:
 def reduce_gain(parameters: Record, passivity: Record, sample: Record) -> None:
     """Multiply the force by a gain, which a debt reduces at once and which recovers within seconds."""
     left_j = min(_left_j(passivity), INCREMENTAL_ALLOWANCE_J + passivity.fast.balance_j)
-    if parameters.link.acts == 0:
+    left_j = _judge_debt(parameters, passivity, left_j)
+    if passivity.debt == DEBT_FORGIVEN:
+        passivity.gain = min(passivity.gain + parameters.period_s / REGAINED_S, 1.0)
+    elif parameters.link.acts == 0:
         passivity.gain = min(passivity.gain * (1.0 + RECOVERY_PER_S * parameters.period_s), 1.0)
     elif left_j < 0.0:
         passivity.gain *= max(1.0 - parameters.period_s / INDEBTED_S, 0.0)
@@ -207,6 +251,25 @@ def reduce_gain(parameters: Record, passivity: Record, sample: Record) -> None:
         for axis in range(3):
             lift_n = passivity.lift_n[axis]
             sample.device_force_n[axis] = lift_n + (sample.device_force_n[axis] - lift_n) * passivity.gain
+
+
+@part
+def _judge_debt(parameters: Record, passivity: Record, left_j: float) -> float:
+    """Say why a debt began, and forgive one that a push caused once the hand is quiet; return the energy left [J]."""
+    if left_j < 0.0 and passivity.debt in (DEBT_NONE, DEBT_FORGIVEN):
+        pushed = passivity.fast_s < PUSHED_S and passivity.gap_s > PUSHED_S
+        passivity.debt = DEBT_PUSHED if pushed else DEBT_OWN
+    elif left_j >= 0.0 and passivity.gain >= 1.0:
+        passivity.debt = DEBT_NONE
+    quiet = passivity.quiet_s >= parameters.rules.quiet_s and parameters.link.acts == 0
+    if passivity.debt == DEBT_PUSHED and quiet:
+        passivity.debt = DEBT_FORGIVEN
+        passivity.balance_j = max(passivity.balance_j, 0.0)
+        passivity.late_balance_j = max(passivity.late_balance_j, 0.0)
+        passivity.later_balance_j = max(passivity.later_balance_j, 0.0)
+        passivity.fast.balance_j = 0.0
+        return ALLOWANCE_J
+    return left_j
 
 
 @part

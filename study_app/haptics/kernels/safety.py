@@ -40,7 +40,7 @@ from study_app.haptics.model.layout import (
 )
 
 START_FADE_S = 0.5
-FADE_OUT_S = 0.045
+LATE_S = 0.045
 LEAST_SLEW = 1.0 / 3.0
 """Share of the slew limit during a fade, and least share after a great energy debt."""
 
@@ -188,8 +188,8 @@ def _fade(force_n: Any, lift_n: Any, parameters: Record, safety: Record, sample:
     if safety.withheld or safety.late_s > 0.0:
         sample.limiters |= safety.withheld if safety.withheld else LIMITER_STALE
         lasted_s = max(safety.late_s, safety.tick_s if safety.withheld else 0.0)
-        safety.fade = max(safety.fade - lasted_s / FADE_OUT_S, 0.0)
-        if safety.late_s >= FADE_OUT_S:
+        safety.fade = max(safety.fade - lasted_s / parameters.rules.fade_out_s, 0.0)
+        if safety.late_s >= LATE_S:
             safety.fade_s = START_FADE_S
     else:
         safety.fade = min(safety.fade + safety.tick_s / max(safety.fade_s, parameters.fade_s), 1.0)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from study_app.haptics.kernels.compiled import part
-from study_app.haptics.kernels.vector import copy, square_distance
+from study_app.haptics.kernels.vector import copy, norm, square, square_distance
 from study_app.haptics.model.estimators import device
 from study_app.haptics.model.layout import (
     LIMITER_GLITCH,
@@ -21,6 +22,8 @@ LONGEST_S = 20e-3
 FASTEST_HAND_MPS = 10.0
 FARTHEST_HAND_M = 10.0
 REFUSALS_IN_A_ROW = 5
+COUNTS = 2.0
+"""Encoder counts by which two steps may differ at rest."""
 STALE_NS = 5_000_000
 FAULT_NS = 50_000_000
 
@@ -38,8 +41,10 @@ def accept_sample(parameters: Record, state: Record, safety: Record, sample: Rec
     Δt is the time since the last accepted sample, so that the next one covers any gap; the first takes the nominal
     period. A position is rejected if it is not finite, lies more than 10 m from the device's middle along an axis, or
     cannot be reached at 10 m/s within Δt; if the device measures velocity, also without one of at most 10 m/s along
-    each axis. After five rejections in a row tracking is lost: the next plausible position resets estimator and wakes.
-    A rejected position that the device repeats is marked as rejected, too.
+    each axis. From the third sample on, it is also rejected if no hand can have accelerated so much (`_within_reach`).
+    After five rejections in a row tracking is lost: the next plausible position resets estimator and wakes. A position
+    out of reach after a gap is accepted, but does so, too, since the device's zero may be another; the force fades in.
+    A rejected position that the device repeats is marked as rejected.
     """
     if sample.fresh == 0:
         if state.rejected > 0:
@@ -48,7 +53,7 @@ def accept_sample(parameters: Record, state: Record, safety: Record, sample: Rec
     interval_s: float = parameters.period_s
     if state.tracking:
         interval_s = clamp((sample.time_ns - state.accepted_ns) * 1e-9)
-    if not _plausible(parameters, state, sample, interval_s):
+    if not _plausible(parameters, state, safety, sample, interval_s):
         sample.limiters |= LIMITER_GLITCH
         state.rejected += 1
         if state.rejected == REFUSALS_IN_A_ROW:
@@ -56,6 +61,10 @@ def accept_sample(parameters: Record, state: Record, safety: Record, sample: Rec
             safety.withheld |= LIMITER_GLITCH
         return 0.0
     hand_m = sample.position_m
+    if is_gap(parameters, interval_s) and not _within_reach(parameters, state, 0.0, 0.0, hand_m, interval_s):
+        state.tracking = 0
+        safety.fade = 0.0
+    _note_step(state, hand_m, interval_s)
     copy(hand_m, state.hand_m)
     place(state, *_in_scene(parameters, hand_m))
     if parameters.estimator == device.CODE:
@@ -85,7 +94,7 @@ def _in_scene(parameters: Record, hand_m: Any) -> tuple[float, float, float]:
 
 
 @part
-def _plausible(parameters: Record, state: Record, sample: Record, interval_s: float) -> bool:
+def _plausible(parameters: Record, state: Record, safety: Record, sample: Record, interval_s: float) -> bool:
     """Return whether the position is plausible for a hand, and within reach of the last accepted one."""
     hand_m = sample.position_m
     for axis in range(3):
@@ -93,7 +102,69 @@ def _plausible(parameters: Record, state: Record, sample: Record, interval_s: fl
             return False
     if parameters.estimator == device.CODE and not _has_velocity(sample):
         return False
-    return state.tracking == 0 or can_have_moved(state.hand_m, hand_m, interval_s)
+    if state.tracking == 0:
+        return True
+    if not can_have_moved(state.hand_m, hand_m, interval_s):
+        return False
+    square_n2 = 0.0
+    for row in range(safety.passivity.sent_n.shape[0]):
+        square_n2 = max(square_n2, square(safety.passivity.sent_n[row]))
+    force_n = math.sqrt(square_n2)
+    late_m = 2.0 * state.fastest_mps * parameters.period_s
+    return is_gap(parameters, interval_s) or _within_reach(parameters, state, force_n, late_m, hand_m, interval_s)
+
+
+@part
+def is_gap(parameters: Record, interval_s: float) -> bool:
+    """Return whether so much time between two samples is a gap."""
+    return bool(interval_s > parameters.rules.gap_ticks * parameters.period_s)
+
+
+@part
+def _note_step(state: Record, hand_m: Any, interval_s: float) -> None:
+    """Store the velocity of the step to an accepted position; none is known of the first one.
+
+    A repeated position does not change the speeds: the device may have repeated a sample.
+    """
+    if state.tracking == 0:
+        state.steps = 0
+        state.speed_mps = state.fastest_mps = 0.0
+        return
+    state.steps = 1
+    state.step_s = interval_s
+    for axis in range(3):
+        state.step_mps[axis] = (hand_m[axis] - state.hand_m[axis]) / interval_s
+    speed_mps = norm(state.step_mps)
+    if speed_mps > 0.0:
+        state.fastest_mps = max(speed_mps, state.speed_mps)
+        state.speed_mps = speed_mps
+
+
+@part
+def _within_reach(
+    parameters: Record, state: Record, force_n: float, late_m: float, hand_m: Any, interval_s: float
+) -> bool:
+    """Return whether hand and force can have accelerated the handle to a position from its last step.
+
+    The distance from the place that it would reach at constant velocity is limited by the acceleration of hand and
+    force, and by the encoder count. With ``late_m`` it may also stop, as at an end stop, and samples may be late by
+    that way along the motion. Nothing is out of reach as long as no step is known.
+    """
+    if state.steps == 0:
+        return True
+    square_m2 = along_m2ps = 0.0
+    for axis in range(3):
+        off_m = hand_m[axis] - state.hand_m[axis] - state.step_mps[axis] * interval_s
+        square_m2 += off_m * off_m
+        along_m2ps += off_m * state.step_mps[axis]
+    speed_mps = norm(state.step_mps)
+    along_m = abs(along_m2ps) / speed_mps if speed_mps > 0.0 else math.sqrt(square_m2)
+    most_mps2 = parameters.rules.hand_mps2 + force_n / parameters.mass_kg
+    most_m = most_mps2 * 0.5 * interval_s * (interval_s + state.step_s)
+    most_m += COUNTS * parameters.count_m * (1.0 + interval_s / state.step_s)
+    if late_m > 0.0:
+        most_m += state.fastest_mps * interval_s
+    return bool(along_m <= most_m + late_m and square_m2 - along_m * along_m <= most_m * most_m)
 
 
 @part
@@ -117,7 +188,7 @@ def watchdog(parameters: Record, safety: Record, sample: Record) -> None:
     """Set the tick's duration, and start a fade after 5 ms without a usable sample; after 50 ms, zero and fault.
 
     A late tick counts alike, even with a new sample, since the device held an old force meanwhile: its fade is where
-    ticks on time would have taken it, after 50 ms at zero, and the force returns as slowly as at a start.
+    ticks on time would have taken it, and after 50 ms the force returns as slowly as at a start.
     """
     if safety.started == 0:
         safety.started = 1

@@ -4,6 +4,7 @@ A receipt states the version of the rules. Compiled code reads the rules of its
 scene from ``parameters.rules`` (`layout.RULES`), so that one code computes the force of every version.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
@@ -20,6 +21,9 @@ class ForceRules(NamedTuple):
     limit of "kalman" is ``inertia_of_drag`` times that of drag, at most ``most_inertia_nspm`` (0: that of the table).
     ``smoothing_lead`` is 1 if the smoothing does not lag with "kalman" (`kernels.effects.added_mass`), else 0, and
     ``jerk_of_speed_ps3`` the growth of its model's jerk with speed.
+    ``fade_out_s`` is how long the force takes to fade out without usable samples, ``hand_mps2`` the greatest
+    acceleration by a hand, ``gap_ticks`` the time between two samples, in nominal periods, above which it is a gap
+    (`sample_validation`), ``quiet_s`` how long a hand must be quiet for its energy debt to be forgiven (`passivity`).
     """
 
     version: int
@@ -31,6 +35,10 @@ class ForceRules(NamedTuple):
     most_inertia_nspm: float = 0.0
     smoothing_lead: float = 0.0
     jerk_of_speed_ps3: float = 4000.0
+    fade_out_s: float = 0.045
+    hand_mps2: float = math.inf
+    gap_ticks: float = math.inf
+    quiet_s: float = math.inf
 
 
 VERSIONS: Final = {
@@ -47,6 +55,10 @@ VERSIONS: Final = {
             most_inertia_nspm=36.0,
             smoothing_lead=1.0,
             jerk_of_speed_ps3=2200.0,
+            fade_out_s=0.01,
+            hand_mps2=50.0,
+            gap_ticks=4.5,
+            quiet_s=0.3,
         ),
     )
 }

@@ -214,6 +214,11 @@ STATE = np.dtype(
         ("rejected", np.int64),  # samples rejected in a row
         ("accepted_ns", np.int64),  # when the last accepted sample was taken
         ("hand_m", np.float64, (3,)),  # the last accepted position, hand frame
+        ("steps", np.int64),  # 1 once a step between two accepted positions is known
+        ("step_s", np.float64),  # its duration
+        ("step_mps", np.float64, (3,)),  # and mean velocity, hand frame
+        ("speed_mps", np.float64),  # speed of the last step with motion
+        ("fastest_mps", np.float64),  # the greater speed of it and the one before
         ("position_m", np.float64, (3,)),  # the same in the scene
         ("previous_m", np.float64, (3,)),  # the one before
         ("window_newest", np.int64),  # row of the newest sample in the model's window
@@ -300,6 +305,11 @@ PASSIVITY = np.dtype(
         ("impulse_s", np.float64),  # the time since then
         ("fast", INCREMENTAL),
         ("velocity_mps", np.float64, (3,)),  # the hand's in the frame of the current, smoothed over 2 ms
+        ("slow_mps", np.float64, (3,)),  # the same, smoothed again
+        ("fast_s", np.float64),  # time since the hand last moved fast
+        ("quiet_s", np.float64),  # for how long it has been quiet
+        ("gap_s", np.float64),  # time since the last gap in the samples
+        ("debt", np.int64),  # DEBT_*: why force is or was withheld
         ("longest_m", np.float64),  # the longest step so far
         ("strongest_n", np.float64),  # the strongest force so far
         ("gain", np.float64),  # share of the force that is sent
@@ -310,6 +320,11 @@ PASSIVITY = np.dtype(
     ],
     align=True,
 )
+
+DEBT_NONE = 0
+DEBT_PUSHED = 1  # it began in a fast motion
+DEBT_OWN = 2  # it began otherwise
+DEBT_FORGIVEN = 3  # the force returns
 
 # Persists when the scene changes; owned by the sender of the force. The host may write stop, fault and device_limit_n.
 SAFETY = np.dtype(

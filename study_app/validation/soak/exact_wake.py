@@ -11,7 +11,9 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.vector import copy, square, square_distance
 from study_app.haptics.model.effects.wake import Wake
+from study_app.haptics.model.force_rules import CURRENT
 from study_app.haptics.model.layout import LIMITER_GLITCH, SAMPLE, records
 from study_app.haptics.model.motion import Floats
 from study_app.haptics.model.scene import Everywhere, Liquid, Scene
@@ -31,6 +33,8 @@ _BOOK = np.dtype(
         ("scale", np.float64),
         ("period_ns", np.int64),
         ("tracking", np.int64),  # 1 once a position was accepted
+        ("gap_ns", np.float64),  # longer without a sample is a gap
+        ("accepted_m", np.float64, (3,)),  # the last accepted position
         ("rejected", np.int64),  # readings refused in a row
         ("accepted_ns", np.int64),
         ("stored", np.int64),
@@ -88,6 +92,7 @@ class Ledger:
         book.vertical = 1.0 if wake.axes == "xyz" else 0.0
         book.scale = scene.scale
         book.period_ns = round(1e9 / scene.rate_hz)
+        book.gap_ns = CURRENT.gap_ticks * book.period_ns
 
     def take(self, samples: Any) -> float | None:
         """Write down ``samples`` (recarray of ``SAMPLE``, all of this scene, none missing); compare at the last one.
@@ -102,7 +107,8 @@ class Ledger:
             write_down(self._book[0], self._entries, samples, 0, len(samples))
             return None
         write_down(self._book[0], self._entries, samples, 0, last)
-        defined, size_mps = self.definition() if self._goes_on() else (np.zeros(3), 0.0)
+        goes_on = self._book[0].tracking and not _begins_anew(self._book[0], samples[last])
+        defined, size_mps = self.definition() if goes_on else (np.zeros(3), 0.0)
         write_down(self._book[0], self._entries, samples, last, len(samples))
         error_mps = float(np.linalg.norm(samples.wake_mps[last] - defined))
         if size_mps == 0.0:
@@ -135,10 +141,6 @@ class Ledger:
         y = self._wake.exponent
         return float(fill ** (y - 1) if y >= 1 else (fill**2 + 0.05**2) ** ((y - 1) / 2))
 
-    def _goes_on(self) -> bool:
-        """Whether the next accepted sample meets this wake: not a new beginning after the body was lost."""
-        return bool(self._book[0].tracking)
-
 
 @kernel
 def _last_accepted(samples: Any) -> int:
@@ -146,6 +148,13 @@ def _last_accepted(samples: Any) -> int:
         if samples[i].fresh == 1 and samples[i].limiters & LIMITER_GLITCH == 0:
             return i
     return -1
+
+
+@kernel
+def _begins_anew(book: Any, sample: Any) -> bool:
+    """Return whether the body was lost in a gap: it has moved, and yet its velocity is exactly 0."""
+    moved = square_distance(sample.position_m, book.accepted_m) > 0.0
+    return bool(sample.time_ns - book.accepted_ns > book.gap_ns and moved and square(sample.velocity_mps) == 0.0)
 
 
 @kernel
@@ -161,12 +170,13 @@ def write_down(book: Any, entries: Any, samples: Any, first: int, end: int) -> N
                 book.tracking = 0
             continue
         interval_ns = book.period_ns
-        if book.tracking != 0:
+        if book.tracking != 0 and not _begins_anew(book, sample):
             interval_ns = min(max(sample.time_ns - book.accepted_ns, SHORTEST_NS), LONGEST_NS)
         else:
             _begin(book)
         book.rejected = 0
         book.accepted_ns = sample.time_ns
+        copy(sample.position_m, book.accepted_m)
         _enter(book, entries, sample, interval_ns)
 
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from random import Random
 from typing import Any, Final, NamedTuple
 
+from study_app.validation.stability.closed_loop import BURST_PERIOD_S
 from study_app.validation.stability.stability_cases import (
     CIRCLES,
     DAMPER,
@@ -68,6 +69,16 @@ LINKS: Final[Mapping[str, tuple[Any, ...]]] = {
     "force_loss": (0.0, 0.0, 0.1, 0.5),
 }
 """How a study delays forces; a link that does nothing is one of 48."""
+OUTLIERS: Final[Mapping[str, tuple[Any, ...]]] = {"outliers": (0.002, 0.02), "outlier_mm": (0.5, 2.0, 5.0, 20.0)}
+JUMPS: Final[Mapping[str, tuple[Any, ...]]] = {"burst_ms": (4.0, 8.0, 20.0, 40.0), "jump_mm": (0.5, 2.0, 5.0, 20.0)}
+DELAYS: Final[Mapping[str, tuple[Any, ...]]] = {"slows_to": (2, 3, 4), "swaps": (1,)}
+DISTURBED: Final[Mapping[str, Mapping[str, tuple[Any, ...]]]] = {
+    "outliers": OUTLIERS,
+    "jumps at a reconnection": JUMPS,
+    "delay that jumps": DELAYS,
+    "everything at once": {**OUTLIERS, **JUMPS, **DELAYS, "lost": (0.0, 0.1), "duplicated": (0.0, 0.05)},
+}
+"""What is wrong with the samples or the delay of a device, by group."""
 LATE_CASES: Final = 1000
 """Loops with a force link."""
 DEVICE_CASES: Final = 500
@@ -129,7 +140,12 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
         Group(name, tuple(map(change, _drawn(f"{seed} {name}", some(both, min(CASES, count or CASES)), light))))
         for name, change in MASSES.items()
     ]
+    for name, own in DISTURBED.items():
+        cases = some(both, min(CASES, count or CASES))
+        found.append(Group(name, tuple(_drawn(f"{seed} {name}", cases, {**light, **own}))))
     found.append(Group("let go in mid-stroke", some(releases, count)))
+    in_gap = tuple(_in_gap(f"{seed} let go in a gap", releases))
+    found.append(Group("let go in a gap of samples", some(in_gap, min(CASES, count or CASES))))
     for name in (*MISJUDGED, *MASSES):
         cases = tuple(case for case in map({**CHANGES, **MASSES}[name], releases) if case is not None)
         found.append(Group(f"let go in mid-stroke, {name}", some(cases, min(CASES, count or CASES))))
@@ -142,9 +158,9 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
     found += _of_liquids("non-Newtonian liquids", materials, seed, light, count)
     found += _of_liquids("liquids of physical2", of_physical2, seed, light, count)
     found.append(_late_forces(seed, light, count))
-    own = _by_device(seed, light, count)
+    by_device = _by_device(seed, light, count)
     fewer = min(KALMAN_CASES, count or KALMAN_CASES)
-    return (*found, own, *(_with_kalman(group, fewer) for group in (Group("first plant", sweep(seed)), *found)))
+    return (*found, by_device, *(_with_kalman(group, fewer) for group in (Group("first plant", sweep(seed)), *found)))
 
 
 def _of_liquids(
@@ -208,10 +224,22 @@ def _slowing(case: Case) -> Case | None:
     return dataclasses.replace(case, slows_to=case.delay + 1) if case.delay < 4 else None
 
 
+def _measuring(less: int) -> Callable[[Case], Case | None]:
+    """Return what makes a loop begin with such a belief, and the device measure its delay."""
+
+    def change(case: Case) -> Case | None:
+        believed = case.delay - less
+        return dataclasses.replace(case, believed=believed, slows_to=case.delay) if believed >= 0 else None
+
+    return change
+
+
 CHANGES: Final[Mapping[str, Callable[[Case], Case | None]]] = {
     "delay believed one tick too short": _believing(1),
     "delay believed one tick too long": _believing(-1),
     "device slower by a tick from 0.5 s on": _slowing,
+    "delay two ticks too short, measured": _measuring(2),
+    "delay three ticks too short, measured": _measuring(3),
     "10 % of samples lost": lambda case: dataclasses.replace(case, lost=0.1),
     "5 % of samples repeated": lambda case: dataclasses.replace(case, duplicated=0.05),
     "no sample for 20 ms, again and again": lambda case: dataclasses.replace(case, burst_ms=20.0),
@@ -266,6 +294,15 @@ def _releases(
             speed_mps=round(peak_mps(hz, 0.5e-3 * case.way_mm), 5),
             release_s=round(FIRST_RELEASE_S + phase / (PHASES * hz), 5),
         )
+
+
+def _in_gap(seed: str, cases: Iterable[Case]) -> Iterator[Case]:
+    """Yield releases at a moment at which samples are missing, after which they may be off."""
+    draw = Random(seed)  # noqa: S311 - the same cases in every run
+    for case in cases:
+        burst_ms, jump_mm = _one(draw, JUMPS["burst_ms"]), _one(draw, (0.0, *JUMPS["jump_mm"]))
+        release_s = round(3 * BURST_PERIOD_S - 1e-3 * burst_ms * draw.random(), 5)
+        yield dataclasses.replace(case, burst_ms=burst_ms, jump_mm=jump_mm, release_s=release_s)
 
 
 def peak_mps(frequency_hz: float, amplitude_m: float) -> float:

@@ -30,10 +30,10 @@ REACHES, CIRCLES, STROKE, SINE = range(4)
 BURST_PERIOD_S: Final = 0.3
 SLOWER_S: Final = 0.5
 MEASURED_S: Final = 0.03
-"""How long a device that has become slower takes to measure it."""
+"""How long a device takes to measure its delay."""
 
-MASS_S: Final = 0.15
-"""After so long the mass of the handle changes, in cases where it does: within each stroke of a hand."""
+STRETCH_S: Final = 0.15
+"""After so long the mass of the handle or the delay changes, in cases where it does: within each stroke of a hand."""
 
 # Hand, servo and encoder, in addition to the handle and the model.
 LOOP = np.dtype(
@@ -51,9 +51,17 @@ LOOP = np.dtype(
         ("lost", np.float64),  # share of ticks without a new sample
         ("duplicated", np.float64),  # share of samples that repeat the position of the sample before
         ("burst_s", np.float64),  # how long there is no new sample at all, at the end of each `BURST_PERIOD_S`
-        ("slows_to", np.int64),  # delay of the device from `SLOWER_S` on [ticks], which it measures by and by
+        ("jump_m", np.float64),  # greatest offset of all positions along an axis, drawn anew after each such gap
+        ("offset_m", np.float64, (3,)),  # that offset
+        ("outliers", np.float64),  # share of ticks whose position is wrong
+        ("outlier_m", np.float64),  # by at most so much along each axis
+        ("error_m", np.float64, (3,)),  # of the newest position: offset and outlier
+        ("in_burst", np.int64),  # 1 during such a gap
+        ("delay", np.int64),  # of the device [ticks]
+        ("slows_to", np.int64),  # its delay from `SLOWER_S` on; above 0: it measures its delay, `MEASURED_S` late
+        ("swaps", np.int64),  # 1: this delay in every second stretch of `STRETCH_S` alone
         ("mass_kg", np.float64),  # of the handle
-        ("other_kg", np.float64),  # the same in every second stretch of `MASS_S`; 0: always the same
+        ("other_kg", np.float64),  # the same in every second stretch of `STRETCH_S`; 0: always the same
         ("now_s", np.float64),
         ("broken", np.int64),  # 1 once a force or the handle's position was not finite
         ("was_m", np.float64, (3,)),  # where the hand is
@@ -72,6 +80,7 @@ TRACE = np.dtype(
         ("t_s", np.float64),
         ("fresh", np.int64),  # 1: the device reported a new sample
         ("measured", np.int64),  # 1: it is the handle's position now, 0: that of the sample before
+        ("error_m", np.float64, (3,)),  # of the position that the device reported, beside noise and count
         ("position_m", np.float64, (3,)),  # of the handle
         ("velocity_mps", np.float64, (3,)),
         ("asked_n", np.float64, (3,)),  # by the effects
@@ -141,16 +150,16 @@ def run(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any,
             place(loop, loop.now_s, loop.goes_m)
             if loop.now_s >= loop.release_s:
                 handle.held = loop.arm.held = 0
-            if loop.now_s >= SLOWER_S:
-                handle.delay = loop.arm.delay = max(handle.delay, loop.slows_to)
+            if loop.slows_to > 0:
+                handle.delay = loop.arm.delay = delay_at(loop, loop.now_s)
             if loop.other_kg > 0.0:
-                other = math.floor(loop.now_s / MASS_S) % 2.0 == 1.0
+                other = math.floor(loop.now_s / STRETCH_S) % 2.0 == 1.0
                 handle.mass_kg = loop.arm.handle_kg = loop.other_kg if other else loop.mass_kg
             _move(handle, loop, elapsed_s)
             copy(loop.goes_m, loop.was_m)
         _see(sample, handle, pace, loop)
-        if loop.slows_to > 0 and loop.now_s >= SLOWER_S + MEASURED_S:
-            follow_delay(safety, sample, handle.delay)
+        if loop.slows_to > 0 and loop.now_s >= MEASURED_S:
+            follow_delay(safety, sample, delay_at(loop, loop.now_s - MEASURED_S))
         _answer(model, safety, sample, loop)
         force = sample.device_force_n
         _push(handle, loop, force)
@@ -159,6 +168,13 @@ def run(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any,
             loop.broken = 1
         k += 1
     return k
+
+
+@kernel
+def delay_at(loop: Any, t_s: float) -> int:
+    """Return the delay of the device [ticks] at a time."""
+    slower = t_s >= SLOWER_S and (loop.swaps == 0 or math.floor(t_s / STRETCH_S) % 2.0 == 1.0)
+    return int(max(loop.delay, loop.slows_to) if slower else loop.delay)
 
 
 @kernel
@@ -210,6 +226,7 @@ def _write_down(model: Any, safety: Any, sample: Any, handle: Any, loop: Any, ro
     """Fill one row of the trace."""
     row.t_s = loop.now_s
     row.fresh, row.measured = sample.fresh, loop.measured
+    copy(loop.error_m, row.error_m)
     copy(handle.position_m, row.position_m)
     copy(handle.velocity_mps, row.velocity_mps)
     copy(sample.force_n, row.asked_n)
@@ -239,6 +256,7 @@ def play(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any
             handle.position_m[axis] = places_m[k, axis]
             handle.velocity_mps[axis] = trace[k].velocity_mps[axis]
         sample.fresh, loop.measured = trace[k].fresh, trace[k].measured
+        copy(trace[k].error_m, loop.error_m)
         _read(sample, handle, pace, loop)
         _settle_passivity(safety.passivity)
         _answer(model, safety, sample, loop)
@@ -257,8 +275,16 @@ def _settle_passivity(passivity: Any) -> None:
 
 @kernel
 def _see(sample: Any, handle: Any, pace: Any, loop: Any) -> None:
-    """Read the encoder: a new sample, a repeated one, or none."""
+    """Read the encoder: a new sample, a repeated one, a wrong one, or none."""
     in_burst = loop.now_s % BURST_PERIOD_S > BURST_PERIOD_S - loop.burst_s
+    if loop.jump_m > 0.0 and loop.in_burst and not in_burst:
+        for axis in range(3):
+            loop.offset_m[axis] = loop.jump_m * (2.0 * random(pace) - 1.0)
+    loop.in_burst = 1 if in_burst else 0
+    copy(loop.offset_m, loop.error_m)
+    if loop.outliers > 0.0 and random(pace) < loop.outliers:
+        for axis in range(3):
+            loop.error_m[axis] += loop.outlier_m * (2.0 * random(pace) - 1.0)
     sample.fresh = 0 if in_burst or (loop.lost > 0.0 and random(pace) < loop.lost) else 1
     loop.measured = 1
     if sample.fresh == 0 or (loop.duplicated > 0.0 and random(pace) < loop.duplicated):
@@ -279,7 +305,8 @@ def _read(sample: Any, handle: Any, pace: Any, loop: Any) -> None:
         if loop.noise_m > 0.0:
             for axis in range(3):
                 loop.seen_m[axis] += loop.noise_m * (random(pace) - 0.5)
-    copy(loop.seen_m, sample.position_m)
+    for axis in range(3):
+        sample.position_m[axis] = loop.seen_m[axis] + loop.error_m[axis]
 
 
 @kernel

@@ -92,7 +92,8 @@ def new_bench(case: Case, *, safe: bool, limits: DampingLimits | None = None, sc
     loop.tremor_m = 0.0 if case.hand == THROWN else TREMOR_M
     loop.noise_m = case.noise_um * 1e-6
     loop.lost, loop.duplicated, loop.burst_s = case.lost, case.duplicated, case.burst_ms * 1e-3
-    loop.slows_to = case.slows_to
+    loop.jump_m, loop.outliers, loop.outlier_m = case.jump_mm * 1e-3, case.outliers, case.outlier_mm * 1e-3
+    loop.delay, loop.slows_to, loop.swaps = case.delay, case.slows_to, case.swaps
     loop.mass_kg, loop.other_kg = case.mass_kg, case.other_kg
     if case.estimator == DEVICE:
         loop.velocity.filter = 1 + FILTERS.index(case.velocity_filter)

@@ -45,6 +45,8 @@ FILTERS: Final = (AVERAGE, FIRST_ORDER, LATE)
 """Why the velocity of such a device lags: a mean over twice the lag, a filter of first order, or delay alone."""
 OF_DEVICE: Final = ("velocity_lag", "velocity_filter", "velocity_noise_mmps", "velocity_count_mmps")
 """Fields of cases with such a device, which the line of any other leaves out."""
+OF_SOME: Final = ("swaps", "jump_mm", "outliers", "outlier_mm")
+"""Fields that a line leaves out where they are 0: the seed of a force link is that of the line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +93,10 @@ RANGES: Final[Mapping[str, tuple[float, float]]] = {
     "velocity_lag": (0.0, MOST_LAG_TICKS),
     "velocity_noise_mmps": (0.0, 1000.0),
     "velocity_count_mmps": (0.0, 1000.0),
+    "swaps": (0, 1),
+    "jump_mm": (0.0, 100.0),
+    "outliers": (0.0, 0.5),
+    "outlier_mm": (0.0, 100.0),
 }
 """What a case may be made of; the sweep's own choices lie within."""
 
@@ -107,10 +113,12 @@ class Case:
 
     ``plant`` is the device and hand of ``haptics.kernels.plant``, the second one, of `arm`, or "falcon": the driver and
     its emulator (`driven`), whose delay, encoders and samples are their own. ``believed`` is the delay that
-    the loop believes (-1: the true one), ``slows_to`` that of the device from 0.5 s on (-1: the same). ``lost`` is a
-    share of ticks without a new sample, ``duplicated`` one of samples that repeat the position before; for the last
-    ``burst_ms`` of every 300 ms there is no new sample. ``believed_kg`` is the least mass that the device states
-    (0: the true one), ``other_kg`` the mass of the handle in every second stretch of 150 ms (0: the same).
+    the loop believes (-1: the true one), ``slows_to`` that of the device from 0.5 s on, with ``swaps`` 1 in every
+    second stretch of 150 ms alone; above 0, the device measures its delay. ``lost`` is a share of ticks without a
+    new sample, ``duplicated`` one of samples that repeat the position before; for the last ``burst_ms`` of every 300 ms
+    there is no new sample, and after them all positions are off by up to ``jump_mm`` along each axis. ``outliers`` is a
+    share of ticks whose position is off by up to ``outlier_mm``. ``believed_kg`` is the least mass that the device
+    states (0: the true one), ``other_kg`` the mass of the handle in every second stretch of 150 ms (0: the same).
     ``force_delay_ms``, ``force_jitter_ms`` and ``force_loss`` are the study's own force link.
 
     With ``estimator`` "device" the device measures the velocity: ``velocity_lag`` [ticks] is the mean lag, which it
@@ -149,6 +157,10 @@ class Case:
     velocity_filter: str = AVERAGE
     velocity_noise_mmps: float = 0.0
     velocity_count_mmps: float = 0.0
+    swaps: int = 0
+    jump_mm: float = 0.0
+    outliers: float = 0.0
+    outlier_mm: float = 0.0
 
     @property
     def believed_delay(self) -> int:
@@ -161,7 +173,9 @@ class Case:
         return self.believed_delay != self.delay or self.slows_to > self.delay
 
     def __str__(self) -> str:
-        names = [field.name for field in fields(self) if self.estimator == DEVICE or field.name not in OF_DEVICE]
+        unused = () if self.estimator == DEVICE else OF_DEVICE
+        names = [field.name for field in fields(self) if field.name not in unused]
+        names = [name for name in names if name not in OF_SOME or getattr(self, name)]
         return " ".join(f"{name}={_word(getattr(self, name))}" for name in names)
 
 

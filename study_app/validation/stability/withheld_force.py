@@ -1,9 +1,10 @@
 """The share of each liquid's force that passivity controller and slew limit withhold in quick motion, and after it.
 
 The share is Σ|F_a - F_b| / Σ|F_a|, F_a the force after slope limit, fades and norm clamp, F_b the force sent. A handle
-of 0.1 kg is moved along straight strokes A cos 2πft, which begin at rest; and along one second each of four of slow
-stirring after 0.9 s of such a stroke, in circles of the radius 30 mm. Each motion is imposed twice: on the position
-itself, whatever the force; and by a hand that holds the handle firmly enough to follow a stroke of 8 Hz.
+is moved along straight strokes A cos 2πft, which begin at rest; and along one second each of four of slow stirring
+after 0.9 s of such a stroke, in circles of the radius 30 mm. Each motion is imposed three times: on the position
+itself, whatever the force; by a hand that holds the handle firmly enough to follow a stroke of 8 Hz; and on a hand that
+holds it through the tissue of its fingers, in which it swings, so that strokes have no goal.
 """
 
 import itertools
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.haptics.model.layout import records
+from study_app.validation.stability.arm_plant import MIDDLE
 from study_app.validation.stability.closed_loop import TRACE, follow
 from study_app.validation.stability.device_bench import new_bench
 from study_app.validation.stability.stability_cases import Case, liquids
@@ -47,13 +49,19 @@ HAND_KG: Final = 0.554
 HAND_NPM: Final = 2000.0
 HAND_NSPM: Final = 60.0
 """Mass of the middle grip, with stiffness and damping that keep the handle on its path at 8 Hz. [choice]"""
+HANDLE_KG: Final = 0.1
+SHAKEN_KG: Final = 0.2
+"""In tissue: with `ewma`, one of 0.1 kg swings in physical honey by itself."""
 
 MOST: Final = 0.05
 MOST_AFTER: Final = 0.005
 EXEMPT: Final = ("physical_tar",)
 ESTIMATORS: Final = ("ewma", "kalman")
 """Those that studies use."""
-MODES: Final = ("position imposed", "handle held")
+IMPOSED: Final = "position imposed"
+HELD: Final = "handle held"
+SHAKEN: Final = "hand shaken"
+MODES: Final = (IMPOSED, HELD, SHAKEN)
 
 
 class Withheld(NamedTuple):
@@ -67,8 +75,8 @@ class Withheld(NamedTuple):
 
     @property
     def quick(self) -> float:
-        """The greatest share of all strokes."""
-        return max(self.strokes)
+        """The greatest share of all strokes that have a goal."""
+        return 0.0 if self.mode == SHAKEN else max(self.strokes)
 
     @property
     def lasting(self) -> float:
@@ -91,7 +99,16 @@ def measure(
     """Return the shares of liquids (by default all that ship), each at its own scale, at 1 kHz."""
     shipped = [name for name in liquids() if name not in {"dense", "damper"}]
     planned = [
-        (Case(liquid=liquid, scale=liquids()[liquid].scale, delay=delay, estimator=estimator), mode)
+        (
+            Case(
+                liquid=liquid,
+                scale=liquids()[liquid].scale,
+                delay=delay,
+                estimator=estimator,
+                mass_kg=SHAKEN_KG if mode == SHAKEN else HANDLE_KG,
+            ),
+            mode,
+        )
         for estimator, mode, liquid in itertools.product(estimators, MODES, names or shipped)
     ]
     in_turn = map if executor is None else executor.map
@@ -134,12 +151,11 @@ def _goal(met: bool) -> str:
 
 
 def _measured(case: Case, mode: str) -> Withheld:
-    held = mode == MODES[1]
-    strokes = tuple(_share(_played(case, _stroke_m(stroke, STROKE_S), held)) for stroke in STROKES)
+    strokes = tuple(_share(_played(case, _stroke_m(stroke, STROKE_S), mode)) for stroke in STROKES)
     after = []
     for shake in QUICK:
         shaken_m = _stroke_m(shake, SHAKE_S)
-        trace = _played(case, np.concatenate([shaken_m, _stirring_m(shaken_m[-1])]), held)
+        trace = _played(case, np.concatenate([shaken_m, _stirring_m(shaken_m[-1])]), mode)
         seconds = np.split(trace[len(shaken_m) :], SECONDS)
         after.append(tuple(_share(second) for second in seconds))
     return Withheld(case.liquid, case.estimator, mode, strokes, tuple(after))
@@ -158,11 +174,13 @@ def _stirring_m(from_m: NDArray[np.float64]) -> NDArray[np.float64]:
     return from_m + STIRRING_M * np.column_stack([np.cos(angle) - 1.0, np.zeros_like(angle), np.sin(angle)])
 
 
-def _played(case: Case, path_m: NDArray[np.float64], held: bool) -> Any:
+def _played(case: Case, path_m: NDArray[np.float64], mode: str) -> Any:
     """Return the trace of a handle along a path."""
     bench = new_bench(case, safe=True)
-    handle, bench.loop.rigid = bench.handle, not held
+    handle, bench.loop.rigid = bench.handle, mode == IMPOSED
     handle.hand_kg, handle.stiffness_npm, handle.damping_nspm = HAND_KG, HAND_NPM, HAND_NSPM
+    if mode == SHAKEN:
+        handle.hand_kg, handle.stiffness_npm, handle.damping_nspm = 0.0, MIDDLE.tissue_npm, MIDDLE.tissue_nspm
     trace = records(TRACE, len(path_m))
     follow(bench.model, bench.safety[0], bench.sample[0], handle, bench.pace, bench.loop, trace, path_m)
     return trace

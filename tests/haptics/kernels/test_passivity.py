@@ -7,6 +7,8 @@ from hypothesis import strategies as st
 
 from study_app.haptics.kernels.safety import begin_scene
 from study_app.haptics.model import paths
+from study_app.haptics.model.force_link import ForceLink
+from study_app.haptics.model.force_rules import VERSIONS
 from study_app.haptics.model.laws import drag_laws as laws
 from study_app.haptics.model.layout import LIMITER_ENERGY
 from study_app.haptics.model.motion import Motion
@@ -358,3 +360,38 @@ def test_on_any_path_the_balance_stays_above_minus_1_mj_and_the_work_of_one_step
         last = sample.device_force_n.copy()
         assert passivity(hand).balance_j >= -1e-3 - strongest_n * longest_m - 1e-12
         strongest_n = max(strongest_n, np.linalg.norm(last))
+
+
+def indebted(hand, *, fast, missing=0):
+    """Return the gain after each millisecond of slow motion; a debt of 50 mJ began before, in a fast motion or not."""
+    hz = 5.0 if fast else 1.0
+    for k in range(400):
+        hand.tick(None if 300 <= k < 300 + missing else (0.03 * np.sin(2e-3 * np.pi * hz * k), 0.0, 0.0))
+    passivity(hand).balance_j = -50e-3
+    gains = []
+    for k in range(1500):
+        hand.tick((0.03 * np.sin(0.8e-3 * np.pi * hz * 1e3) + 1e-4 * k, 0.0, 0.0))
+        gains.append(float(passivity(hand).gain))
+    return np.array(gains)
+
+
+@pytest.mark.compiled
+def test_a_debt_of_a_push_that_the_hand_made_is_forgiven_once_it_is_quiet():
+    gains = indebted(Hand(HONEY), fast=True)
+    assert gains[0] < 0.05
+    assert (gains[:300] < 0.1).all()
+    assert (gains[900:] == 1.0).all()
+    assert np.diff(gains).max() <= 1.01e-3 / 0.3
+    assert indebted(Hand(HONEY, rules=VERSIONS[2]), fast=True)[900:].max() < 0.2
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("other", [{"fast": False}, {"fast": True, "missing": 5}])
+def test_a_debt_that_begins_in_slow_motion_or_after_a_gap_is_not_forgiven(other):
+    assert indebted(Hand(HONEY), **other)[900:].max() < 0.2
+
+
+@pytest.mark.compiled
+def test_with_a_force_link_no_debt_is_forgiven():
+    linked = HONEY.model_copy(update={"link": ForceLink(delay_s=0.001)})
+    assert indebted(Hand(linked), fast=True).max() < 0.1

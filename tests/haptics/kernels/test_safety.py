@@ -8,6 +8,7 @@ from study_app.haptics.kernels.safety import begin_scene, new_safety
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.estimators import NAMED
 from study_app.haptics.model.force_link import ForceLink
+from study_app.haptics.model.force_rules import VERSIONS
 from study_app.haptics.model.layout import (
     LIMITER_ENERGY,
     LIMITER_FADE,
@@ -285,7 +286,7 @@ def test_the_kalman_filter_has_a_lower_slew_limit():
 
 def test_after_an_energy_debt_the_force_changes_more_slowly():
     def steepest(gain):
-        hand = Hand(WATER)
+        hand = Hand(WATER, rules=VERSIONS[2])  # no hand changes its speed so suddenly
         hand.sweep(0.001, 50)
         passivity = hand.safety[0].passivity
         passivity.gain = gain

@@ -9,6 +9,7 @@ import pytest
 
 from study_app.validation.stability.case_groups import (
     CASES,
+    DISTURBED,
     FIRST_RELEASE_S,
     HANDLES_KG,
     KALMAN_CASES,
@@ -81,8 +82,20 @@ def test_groups_have_disturbed_samples_and_misjudged_delays(all_groups):
     assert {case.delay - case.believed for case in all_groups["delay believed one tick too long"]} == {-1}
     assert {case.slows_to - case.delay for case in all_groups["device slower by a tick from 0.5 s on"]} == {1}
     for name, cases in all_groups.items():
+        if name.removeprefix("kalman: ") in DISTURBED:
+            continue
         misjudged = "tick" in name
         assert {case.misjudged for case in cases} == {misjudged}, name
+
+
+def test_groups_have_outliers_jumps_and_delays_that_jump(all_groups):
+    for name, choices in DISTURBED.items():
+        for field, values in choices.items():
+            assert {getattr(case, field) for case in all_groups[name]} == set(values), (name, field)
+    for less, name in ((2, "delay two ticks too short, measured"), (3, "delay three ticks too short, measured")):
+        assert {(case.delay - case.believed, case.slows_to - case.delay) for case in all_groups[name]} == {(less, 0)}
+    for case in all_groups["let go in a gap of samples"]:
+        assert 0.9 - 1e-3 * case.burst_ms <= case.release_s <= 0.9
 
 
 def test_late_forces_have_delay_jitter_loss_and_the_strongest_damper(all_groups):
@@ -241,8 +254,49 @@ def test_bursts_leave_twenty_milliseconds_without_a_sample():
 
 
 @compiled
+def test_outliers_and_jumps_are_as_frequent_and_as_large_as_the_case_says():
+    case = Case(quantum_um=0.0, hand="firm", speed_mps=0.01)
+    _, true_m = samples(case, 1700)
+    _, places_m = samples(dataclasses.replace(case, outliers=0.02, outlier_mm=5.0), 1700)
+    off_m = np.abs(places_m - true_m).max(axis=1)
+    assert (off_m > 5e-4).mean() == pytest.approx(0.02, abs=0.01)
+    assert 4e-3 < off_m.max() < 6e-3
+    fresh, places_m = samples(dataclasses.replace(case, burst_ms=20.0, jump_mm=5.0), 1700)
+    steps_m = np.abs(np.diff(places_m[fresh], axis=0)).max(axis=1)
+    assert (steps_m > 2e-4).sum() == 5
+    assert steps_m.max() < 1.1e-2
+
+
+@compiled
+@pytest.mark.parametrize(
+    ("believed", "ticks"), [(-1, [(0.0, 1), (0.51, 1), (0.55, 3), (1.2, 3)]), (0, [(0.0, 0), (0.1, 1)])]
+)
+def test_a_device_that_measures_its_delay_is_believed(believed, ticks):
+    case = Case(slows_to=3, swaps=1, believed=believed)
+    bench, trace = new_bench(case, safe=True), new_trace(case)
+    begin(bench.loop, bench.handle)
+    row = 0
+    for time_s, expected in ticks:
+        row = bench.run(trace, row, time_s + 0.001)
+        assert bench.safety[0].delay_ticks == expected
+    bench.run(trace, row, 1.8)
+    delays = {round(one.t_s, 3): one.delay for one in trace}
+    assert [delays[t] for t in (0.2, 0.5, 0.55, 0.7, 0.8, 1.0)] == [1, 3, 3, 1, 3, 1]
+
+
+@compiled
 @pytest.mark.parametrize("estimator", ["ewma", "kalman"])
-@pytest.mark.parametrize("fault", [{"lost": 0.1}, {"duplicated": 0.05}, {"burst_ms": 20.0}, {"missed": 0.02}])
+@pytest.mark.parametrize(
+    "fault",
+    [
+        {"lost": 0.1},
+        {"duplicated": 0.05},
+        {"burst_ms": 20.0},
+        {"missed": 0.02},
+        {"outliers": 0.02, "outlier_mm": 2.0},
+        {"burst_ms": 8.0, "jump_mm": 5.0},
+    ],
+)
 def test_motion_is_played_with_the_samples_and_the_forces_that_the_loop_had(fault, estimator):
     case = Case(speed_mps=0.6, jitter=0.2, estimator=estimator, **fault)
     bench, trace = new_bench(case, safe=False), new_trace(case)

@@ -13,7 +13,18 @@ from study_app.validation.stability import withheld_force
 from study_app.validation.stability.closed_loop import TRACE, follow
 from study_app.validation.stability.device_bench import new_bench
 from study_app.validation.stability.stability_cases import Case
-from study_app.validation.stability.withheld_force import MODES, QUICK, SECONDS, STROKES, Withheld, measure, report
+from study_app.validation.stability.withheld_force import (
+    MODES,
+    MOST_AFTER,
+    QUICK,
+    SECONDS,
+    SHAKEN,
+    SHOWN_SHAKE,
+    STROKES,
+    Withheld,
+    measure,
+    report,
+)
 from tests.haptics.scenes import COMPILED
 
 compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
@@ -61,12 +72,24 @@ def test_position_is_imposed_or_held():
     assert 1e-4 < np.abs(held.position_m - path_m).max() < 0.02
 
 
+@pytest.mark.slow
+@compiled
+def test_a_second_after_the_hand_was_shaken_the_whole_force_arrives():
+    """Under the rules before, 80 % of light oil and physical honey are withheld for seconds."""
+    found = [one for one in measure(["light_oil", "physical_honey"]) if one.mode == SHAKEN]
+    assert len(found) == 4
+    assert max(one.after[QUICK.index(SHOWN_SHAKE)][0] for one in found) > 0.1
+    assert all(one.lasting < MOST_AFTER for one in found)
+
+
 def test_goals_are_judged_over_all_liquids_but_tar():
     met, not_met = row("honey", 0.05, 0.004), row("syrup", 0.051)
     assert met.met
     assert not not_met.met
     assert not row("syrup", 0.0, 0.005).met
     assert row("physical_tar", 0.9, 0.9).met
+    assert row("honey", 0.9, 0.0, SHAKEN).met
+    assert not row("honey", 0.0, 0.005, SHAKEN).met
     text = report((met, row("physical_tar", 0.9, 0.9)))
     assert "at most 5% in every stroke, tar aside: met (5.0%)" in text
     assert "from one second after a shake on, tar aside: met (0.4%)" in text
