@@ -32,8 +32,8 @@ counts. A delayed force belongs to an earlier velocity: a delayed balance may in
 
 Removal of force and damping bypass the slew limit. A debt is forgiven at 1 mW, less than a hand's own damping absorbs
 at 15 mm/s: without any force no debt could be repaid. A hand that shakes the handle causes debts, too, since the force
-lags. A debt that begins within 0.2 s of a fast motion is forgiven once the hand has been quiet for ``quiet_s``, and the
-gain returns within 0.3 s. One that begins otherwise, or after a gap in the samples, is not: its oscillation would
+lags. A debt that begins in fast motion, of 15 ms or more, is forgiven once the hand has been quiet for ``quiet_s``, and
+the gain returns within 0.3 s. One that begins otherwise, or after a gap in the samples, is not: its oscillation would
 return with the gain.
 
 With a force link, no debt is forgiven, the gain does not recover before the next scene, and it falls further as long as
@@ -77,6 +77,7 @@ FAST_MPS = 0.2
 FAST_J = 2e-3
 QUIET_MPS = 0.06
 PUSHED_S = 0.2
+LEAST_PUSH_S = 0.015
 REGAINED_S = 0.3
 DELIVERY_STEPS_PER_N = 2.0**14
 
@@ -102,8 +103,8 @@ def reset_observer(passivity: Record) -> None:
     begin_incremental(passivity.fast)
     clear(passivity.velocity_mps)
     clear(passivity.slow_mps)
-    passivity.fast_s = passivity.gap_s = math.inf
-    passivity.quiet_s = 0.0
+    passivity.fast_s = passivity.quiet_s = 0.0
+    passivity.gap_s = math.inf
     passivity.debt = DEBT_NONE
     passivity.longest_m = 0.0
     passivity.strongest_n = 0.0
@@ -182,10 +183,11 @@ def update_observer(model: Any, safety: Record, interval_s: float) -> None:
 
 @part
 def _watch_motion(parameters: Record, passivity: Record, interval_s: float) -> None:
-    """Measure how long ago the hand moved fast, since when it is quiet, and how long ago samples were missing.
+    """Measure for how long the hand moved fast of late, for how long it is quiet, and since when no sample was missing.
 
     Its velocity counts without what is slow: a filter of 10 Hz separates shaking from stirring. It is fast if the
-    handle has more kinetic energy than the force can have given to it without a debt.
+    handle has more kinetic energy than the force can have given to it without a debt; a handle that was let go is so
+    for a shorter time than one that is pushed.
     """
     share = interval_s / HAND_S
     weight = share / (1.0 + share * (0.5 + share / 12.0))
@@ -193,7 +195,8 @@ def _watch_motion(parameters: Record, passivity: Record, interval_s: float) -> N
         passivity.slow_mps[axis] += weight * (passivity.velocity_mps[axis] - passivity.slow_mps[axis])
     square_m2ps2 = square_distance(passivity.velocity_mps, passivity.slow_mps)
     fast_m2ps2 = max(FAST_MPS * FAST_MPS, 2.0 * FAST_J / parameters.mass_kg)
-    passivity.fast_s = 0.0 if square_m2ps2 > fast_m2ps2 else passivity.fast_s + interval_s
+    lasted_s = interval_s if square_m2ps2 > fast_m2ps2 else 0.0
+    passivity.fast_s = (passivity.fast_s + lasted_s) / (1.0 + interval_s / PUSHED_S)
     passivity.quiet_s = 0.0 if square_m2ps2 > QUIET_MPS * QUIET_MPS else passivity.quiet_s + interval_s
     passivity.gap_s = 0.0 if is_gap(parameters, interval_s) else passivity.gap_s + interval_s
 
@@ -257,7 +260,7 @@ def reduce_gain(parameters: Record, passivity: Record, sample: Record) -> None:
 def _judge_debt(parameters: Record, passivity: Record, left_j: float) -> float:
     """Say why a debt began, and forgive one that a push caused once the hand is quiet; return the energy left [J]."""
     if left_j < 0.0 and passivity.debt in (DEBT_NONE, DEBT_FORGIVEN):
-        pushed = passivity.fast_s < PUSHED_S and passivity.gap_s > PUSHED_S
+        pushed = passivity.fast_s > LEAST_PUSH_S and passivity.gap_s > PUSHED_S
         passivity.debt = DEBT_PUSHED if pushed else DEBT_OWN
     elif left_j >= 0.0 and passivity.gain >= 1.0:
         passivity.debt = DEBT_NONE

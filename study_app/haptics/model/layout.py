@@ -306,7 +306,7 @@ PASSIVITY = np.dtype(
         ("fast", INCREMENTAL),
         ("velocity_mps", np.float64, (3,)),  # the hand's in the frame of the current, smoothed over 2 ms
         ("slow_mps", np.float64, (3,)),  # the same, smoothed again
-        ("fast_s", np.float64),  # time since the hand last moved fast
+        ("fast_s", np.float64),  # for how long the hand moved fast of late
         ("quiet_s", np.float64),  # for how long it has been quiet
         ("gap_s", np.float64),  # time since the last gap in the samples
         ("debt", np.int64),  # DEBT_*: why force is or was withheld

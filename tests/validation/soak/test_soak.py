@@ -53,7 +53,7 @@ def test_two_virtual_minutes_of_every_fault_find_nothing(found):
     assert found.rests.count == 4
     assert 1 < found.rests.pushed_s < 3.5, "the wake of water pushes for 1.7 s"
     assert found.drift.comparisons > 20
-    assert 15 < found.drift.longest_s < 30
+    assert 5 < found.drift.longest_s < 30
     assert 1 < found.device.most_n <= 8
     assert not found.device.last_n.any()
     assert found.dropped == 0
