@@ -203,7 +203,7 @@ def test_a_force_above_the_limit_is_found(scenes):
             model.parameters.force_limit_n = 20.0
             model.parameters.slope_limit_nspm *= 10
 
-    found = stepped(scenes, spoil, at=0.6)
+    found = stepped(scenes, spoil, at=0.4)
     assert found.device.most_n > 8
     assert any("forces above the limit of 8 N" in finding for finding in found.findings)
     assert any("N was written" in finding for finding in found.findings)
