@@ -48,11 +48,11 @@ VERSIONS: Final = {
         ForceRules(version=2),
         ForceRules(
             version=3,
-            kept_excess=2.0,
+            kept_excess=1.75,
             smoothed_excess=0.5,
             longest_smoothing=1.6,
             inertia_of_drag=1.35,
-            most_inertia_nspm=36.0,
+            most_inertia_nspm=33.0,
             smoothing_lead=1.0,
             jerk_of_speed_ps3=2200.0,
             fade_out_s=0.01,

@@ -25,9 +25,12 @@ SHAKEN = {"Tool_5_Maryland_L_3/29", "Tool_4_Maryland_L_4/07"}
 
 
 @pytest.mark.parametrize("encoder", COUNTS_M)
-@pytest.mark.parametrize(("study", "liquid"), [("physical2", "honey"), ("rek2024", "light_oil")])
-def test_no_sample_of_a_real_encoder_is_rejected(encoder: str, study: str, liquid: str) -> None:
-    """The motor is faster than strokes of a hand, and slower than the bound of the validation."""
+@pytest.mark.parametrize(("study", "liquid", "most"), [("physical2", "honey", 0.1), ("rek2024", "light_oil", 0.002)])
+def test_no_sample_of_a_real_encoder_is_rejected(encoder: str, study: str, liquid: str, most: float) -> None:
+    """The motor is faster than strokes of a hand, and slower than the bound of the validation.
+
+    Of honey's added mass and history a share is always withheld.
+    """
     scene, fastest_mps = load_scene(study, liquid), 0.0
     for name, counts in excerpt().items():
         x_m = COUNTS_M[encoder] * counts[:, list(COUNTS_M).index(encoder)]
@@ -36,7 +39,7 @@ def test_no_sample_of_a_real_encoder_is_rejected(encoder: str, study: str, liqui
         assert not (samples.limiters & ~LIMITERS).any(), name
         assert not samples.status.any(), name
         assert np.linalg.norm(samples.device_force_n, axis=1).max() <= FORCE_LIMIT_N * (1 + 1e-9)
-        assert name in SHAKEN or samples.withheld_n.sum() < 0.002 * samples.permitted_n.sum(), name
+        assert name in SHAKEN or samples.withheld_n.sum() < most * samples.permitted_n.sum(), name
     assert 0.9 < fastest_mps < FASTEST_HAND_MPS
 
 
