@@ -43,19 +43,37 @@ class Limit(NamedTuple):
 HONEY: Final = "honey of physical2"
 BOUNDED: Final = "others of physical2"
 STEEP: Final = "steeper than a loop bears"
-OTHERS: Final = "all others"
+THESIS: Final = "rek2024"
+GROUPS: Final = {
+    "physical2_": BOUNDED,
+    "physical_": "physical_liquids",
+    "slime_": "slime",
+    "forcedelay_": "dampers",
+    "viscosityjnd_": "dampers",
+    "thickness_": "dampers",
+}
+"""By the beginning of a liquid's name; all others are of the thesis."""
+SINGLE: Final = {
+    "physical2_honey": HONEY,
+    **dict.fromkeys(("physical_tar", "physical2_tar", "slime_toothpaste", "slime_cornstarch"), STEEP),
+}
 LIMITS: Final[Mapping[tuple[str, str], tuple[Limit, Limit, Limit]]] = {
-    (HONEY, "kalman"): (Limit(15, 10), Limit(18, 10), Limit(25, 25)),
-    (BOUNDED, "kalman"): (Limit(1.5, 5), Limit(2, 5), Limit(3, 25)),
-    (STEEP, "kalman"): (Limit(90, 90), Limit(90, 90), Limit(95, 95)),
-    (OTHERS, "kalman"): (Limit(25, 10), Limit(30, 20), Limit(40, 40)),
-    (HONEY, "ewma"): (Limit(30, 5), Limit(35, 20), Limit(50, 50)),
-    (BOUNDED, "ewma"): (Limit(3.5, 5), Limit(4, 20), Limit(6, 50)),
-    (STEEP, "ewma"): (Limit(90, 90), Limit(95, 95), Limit(95, 95)),
-    (OTHERS, "ewma"): (Limit(35, 5), Limit(40, 20), Limit(50, 50)),
+    (HONEY, "kalman"): (Limit(15, 11), Limit(18, 15), Limit(60, 60)),
+    (BOUNDED, "kalman"): (Limit(1.5, 5), Limit(2, 10), Limit(5, 50)),
+    (THESIS, "kalman"): (Limit(9, 2), Limit(42, 36), Limit(70, 65)),
+    ("physical_liquids", "kalman"): (Limit(18, 11), Limit(42, 46), Limit(60, 63)),
+    ("slime", "kalman"): (Limit(13, 5), Limit(67, 66), Limit(82, 81)),
+    ("dampers", "kalman"): (Limit(3, 1), Limit(3, 1), Limit(3, 1)),
+    (STEEP, "kalman"): (Limit(85, 87), Limit(92, 92), Limit(95, 95)),
+    (HONEY, "ewma"): (Limit(40, 5), Limit(67, 60), Limit(74, 70)),
+    (BOUNDED, "ewma"): (Limit(3.5, 5), Limit(10, 65), Limit(11, 72)),
+    (THESIS, "ewma"): (Limit(18, 5), Limit(40, 30), Limit(67, 60)),
+    ("physical_liquids", "ewma"): (Limit(40, 5), Limit(65, 60), Limit(76, 73)),
+    ("slime", "ewma"): (Limit(17, 5), Limit(53, 55), Limit(70, 70)),
+    ("dampers", "ewma"): (Limit(11, 1), Limit(11, 1), Limit(11, 1)),
+    (STEEP, "ewma"): (Limit(92, 88), Limit(95, 95), Limit(97, 97)),
 }
 """By group and estimator: at one, two and three ticks of delay, on every device."""
-STEEP_LIQUIDS: Final = ("physical_tar", "physical2_tar", "slime_toothpaste", "slime_cornstarch")
 
 
 class Device(NamedTuple):
@@ -94,11 +112,8 @@ class Delivered(NamedTuple):
     @property
     def group(self) -> str:
         """The group whose limits apply."""
-        if self.liquid in STEEP_LIQUIDS:
-            return STEEP
-        if self.liquid == "physical2_honey":
-            return HONEY
-        return BOUNDED if self.liquid.startswith("physical2_") else OTHERS
+        of_file = (group for name, group in GROUPS.items() if self.liquid.startswith(name))
+        return SINGLE.get(self.liquid) or next(of_file, THESIS)
 
     @property
     def share_of_limits(self) -> tuple[float, float]:

@@ -256,6 +256,10 @@ def test_the_error_of_the_force_sent_is_its_difference_from_the_law_on_the_motio
     assert error(late) == pytest.approx(2 * np.sin(np.pi * 0.01), rel=0.03)
     counted["position_m"] = np.rint(counted["position_m"] / 38e-6) * 38e-6
     assert error(counted) == pytest.approx(0.0, abs=0.01)
+    quick, t_s = samples(), np.arange(4000) * 1e-3
+    quick["position_m"][:, 1] = 0.002 * np.sin(2 * np.pi * 10 * t_s)
+    quick["device_force_n"][:, 1] = -8.0 * 0.002 * 2 * np.pi * 10 * np.cos(2 * np.pi * 10 * t_s)
+    assert error(quick) == pytest.approx(0.0, abs=0.02)  # the smoother passes it
     counted["position_m"][1000] += 0.02
     counted["limiters"][1000] = LIMITER_GLITCH
     assert error(counted) == pytest.approx(0.0, abs=0.01)
