@@ -59,14 +59,14 @@ SINGLE: Final = {
 }
 LIMITS: Final[Mapping[tuple[str, str], tuple[Limit, Limit, Limit]]] = {
     (HONEY, "kalman"): (Limit(15, 11), Limit(18, 15), Limit(60, 60)),
-    (BOUNDED, "kalman"): (Limit(1.5, 5), Limit(2, 10), Limit(5, 50)),
+    (BOUNDED, "kalman"): (Limit(1.5, 5), Limit(2, 10), Limit(6, 50)),
     (THESIS, "kalman"): (Limit(9, 2), Limit(42, 36), Limit(70, 65)),
     ("physical_liquids", "kalman"): (Limit(18, 11), Limit(42, 46), Limit(60, 63)),
     ("slime", "kalman"): (Limit(13, 5), Limit(67, 66), Limit(82, 81)),
     ("dampers", "kalman"): (Limit(3, 1), Limit(3, 1), Limit(3, 1)),
     (STEEP, "kalman"): (Limit(85, 87), Limit(92, 92), Limit(95, 95)),
     (HONEY, "ewma"): (Limit(40, 5), Limit(67, 60), Limit(74, 70)),
-    (BOUNDED, "ewma"): (Limit(3.5, 5), Limit(10, 65), Limit(11, 72)),
+    (BOUNDED, "ewma"): (Limit(4.2, 5), Limit(12, 65), Limit(12.5, 72)),
     (THESIS, "ewma"): (Limit(18, 5), Limit(40, 30), Limit(67, 60)),
     ("physical_liquids", "ewma"): (Limit(40, 5), Limit(65, 60), Limit(76, 73)),
     ("slime", "ewma"): (Limit(17, 5), Limit(53, 55), Limit(70, 70)),
