@@ -75,7 +75,7 @@ def test_position_is_imposed_or_held():
 @pytest.mark.slow
 @compiled
 def test_a_second_after_the_hand_was_shaken_the_whole_force_arrives():
-    """Under the rules before, 80 % of light oil and physical honey are withheld for seconds."""
+    """Under the rules before, up to 28 and 56 % are still withheld with `ewma`."""
     found = [one for one in measure(["light_oil", "physical_honey"]) if one.mode == SHAKEN]
     assert len(found) == 4
     assert max(one.after[QUICK.index(SHOWN_SHAKE)][0] for one in found) > 0.1
