@@ -20,14 +20,6 @@ def wrapped() -> list[QLayoutItem]:
     return [one for one in shiboken6.getAllValidWrappers() if type(one).__name__ in {"QWidgetItem", "QSpacerItem"}]
 
 
-@pytest.mark.parametrize(
-    "text",
-    ["self.grid.takeAt(0)", "self.column.itemAt(0).layout()", "row.replaceWidget(old, new)", "column.addLayout(row)"],
-)
-def test_code_that_makes_a_wrapper_of_an_item_is_found(text: str) -> None:
-    assert READ.search(text)
-
-
 def test_only_the_functions_of_boxes_make_wrappers_of_items() -> None:
     found = {path.name for path in (ROOT / "study_app" / "gui").rglob("*.py") if READ.search(path.read_text("utf-8"))}
     assert found == {"boxes.py"}

@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QPointF, QRect, QRectF, Qt
+from PySide6.QtCore import QPoint, QRect, QRectF, Qt
 from PySide6.QtGui import QFontMetricsF, QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel
 
 from study_app.gui.participant.forms.option_button import RadioOption
-from study_app.gui.participant.pages.language_switch import LanguageButton
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant.pages.statement_field import StatementField
 from study_app.gui.participant.window import ParticipantWindow
@@ -101,13 +100,6 @@ def contrast(light: np.ndarray, place: QRect) -> float:
     ground = values[counts.argmax()]
     ratios = (np.maximum(part, ground) + 0.05) / (np.minimum(part, ground) + 0.05)
     return float(ratios.max())
-
-
-def test_contrast_is_that_of_ink_and_ground() -> None:
-    image = QImage(40, 10, QImage.Format.Format_RGB32)
-    image.fill(Qt.GlobalColor.black)
-    image.setPixelColor(3, 3, Qt.GlobalColor.white)
-    assert contrast(luminances(image), QRect(0, 0, 40, 10)) == pytest.approx(21.0)
 
 
 @pytest.mark.variants(9)
@@ -257,15 +249,6 @@ def test_no_word_is_cut_or_runs_into_another(
     assert misplaced(window, drawn_by(window)) == []
 
 
-def test_a_word_that_is_cut_or_runs_into_another_is_found(open_window: Callable[..., ParticipantWindow]) -> None:
-    window = open_window((1366, 768))
-    show(window, pages()["answers"])
-    found = drawn_by(window)
-    statement = next(one for one in found if one.text == STATEMENTS[0])
-    cut = replace(statement, room=QRectF(statement.room.topLeft(), QPointF(statement.room.right(), 0)))
-    assert misplaced(window, [cut, *found])
-
-
 def test_nine_statements_stand_on_one_page_as_long_as_their_words_can_be_read(
     open_window: Callable[..., ParticipantWindow],
 ) -> None:
@@ -312,25 +295,3 @@ def test_right_and_left_keys_go_along_the_scale_in_every_language(
     QTest.keyClick(row, Qt.Key.Key_Right)
     QTest.keyClick(row, Qt.Key.Key_Space)
     assert row.value == 2
-
-
-def test_tank_and_patch_stay_where_they_are(open_window: Callable[..., ParticipantWindow]) -> None:
-    pictures = []
-    for language in ("en", "ar"):
-        window = open_window((1366, 768), words(language))
-        show(window, task_page(progress=None))
-        assert window.tank is not None
-        assert window.tank.patch_area().right() == window.tank.width()
-        picture = window.grab().toImage()
-        pictures.append(picture.copy(QRect(300, 100, 760, 480)))
-    assert pictures[0] == pictures[1]
-
-
-def test_languages_stand_in_the_corner_where_lines_end(open_window: Callable[..., ParticipantWindow]) -> None:
-    window = open_window((1366, 768))
-    for language, at_right in (("en", True), ("ar", False)):
-        window.show_page(text_page("consent", languages=("en", "ar"), language=language))
-        QApplication.processEvents()
-        buttons = [button for button in window.findChildren(LanguageButton) if button.isVisible()]
-        middles = [button.mapTo(window, button.rect().center()).x() > 683 for button in buttons]
-        assert middles == [at_right] * 2

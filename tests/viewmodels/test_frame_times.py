@@ -50,7 +50,3 @@ def test_old_frames_are_forgotten():
     for n in range(int(3 * KEPT_S * 60)):
         frames.add(n * REFRESH_NS)
     assert frames.figures().painted == pytest.approx(KEPT_S * 60, abs=2)
-
-
-def test_a_screen_that_tells_no_rate_is_taken_for_60_hz():
-    assert FrameTimes(0.0).refresh_hz == 60.0

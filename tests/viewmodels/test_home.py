@@ -221,13 +221,6 @@ def test_lost_recordings_and_a_reconnected_device_show_in_the_row(tmp_path):
     assert incidents(read_record(rows["P001"].folder).facts) in read_record(rows["P001"].folder).about
 
 
-def test_simulated_sessions_are_not_counted_as_held(tmp_path):
-    start(tmp_path, "P001", "completed", simulated=True)
-    found = sessions(tmp_path, {})
-    assert held(found, "demo") == "no participant yet"
-    assert found[0].simulated
-
-
 @pytest.mark.parametrize("simulated", [False, True])
 def test_a_pilot_counts_as_one_also_where_its_first_steps_were_simulated(tmp_path, simulated):
     start(tmp_path, "P001", "completed", simulated=simulated, pilot=True)
@@ -260,10 +253,6 @@ def test_a_folder_that_holds_something_else_is_passed_over(tmp_path):
     (tmp_path / "holiday" / "data" / "sub-x" / "ses-01").mkdir(parents=True)
     (tmp_path / "holiday" / "data" / "sub-x" / "ses-01" / "journal.jsonl").write_text("[]\nno journal\n")
     assert [row.participant for row in sessions(tmp_path, {}) if row.study == "demo"] == ["P001"]
-
-
-def test_no_folder_no_sessions(tmp_path):
-    assert sessions(tmp_path / "none", {}) == ()
 
 
 def test_times_are_said_as_people_say_them():

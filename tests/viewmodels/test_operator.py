@@ -35,13 +35,6 @@ def words(view):
     return found
 
 
-def test_a_session_starts_by_preparing(told):
-    view = told.view()
-    assert view.state == "preparing"
-    assert not view.may_pause
-    assert not view.may_repeat
-
-
 def test_a_trial_is_counted_among_the_main_ones_with_its_neutral_name(told):
     told.welcome()
     told.start(1)
@@ -52,14 +45,6 @@ def test_a_trial_is_counted_among_the_main_ones_with_its_neutral_name(told):
     assert view.state == "running"
     assert view.may_pause
     assert view.may_repeat
-
-
-def test_the_steps_show_what_is_done_now_and_open(told):
-    told.welcome()
-    told.start(1)
-    states = [row.state for row in told.view().steps]
-    assert states[:2] == ["done", "now"]
-    assert set(states[2:]) == {"open"}
 
 
 def test_time_in_the_trial_stands_still_while_statements_are_answered(told):
@@ -145,16 +130,6 @@ def test_a_paused_session_can_resume_but_not_repeat(told):
     assert not view.may_repeat
 
 
-def test_a_stopped_force_is_a_state_of_its_own(told):
-    told.welcome()
-    told.start(1)
-    told.tell("force_stopped", by="operator")
-    told.tell("paused", by="operator")
-    view = told.view(force_on=False)
-    assert view.state == "force off"
-    assert view.may_resume
-
-
 def test_trouble_is_said_and_nothing_but_the_end_is_offered(told):
     told.welcome()
     told.tell("broke", what="the device 'mouse' stopped responding")
@@ -173,11 +148,6 @@ def test_the_device_is_what_the_servo_says_whatever_else_is_wrong(told):
     view = told.view(device_ready=False, faults=2)
     assert not view.device.ready
     assert dict(view.device.rows)["Safety faults"] == "2"
-
-
-def test_trouble_that_no_journal_could_keep_is_said_too(told):
-    told.welcome()
-    assert told.view(trouble="no space left").state == "trouble"
 
 
 def test_the_end_is_said_with_its_status(told):

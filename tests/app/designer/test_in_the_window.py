@@ -261,20 +261,6 @@ def test_the_place_fits_its_window(designer: Any, size: tuple[int, int], theme: 
     assert designer.place.pane.width() > (0.4 if designer.place.form.isVisible() else 0.95) * wide
 
 
-@pytest.mark.parametrize("size", [(1600, 1000), (1366, 768)])
-def test_the_first_facts_are_shown_whole(qtbot: Any, designer: Any, size: tuple[int, int]) -> None:
-    designer.window.resize(*size)
-    designer.controller.open("kitchen")
-    designer.editing.select(("blocks", "liquids"))
-    facts = designer.place.pane.facts
-
-    def whole() -> bool:
-        shown = [part.geometry().bottom() for part in facts.grid.parts[:2]]
-        return len(shown) == 2 and all(100 < bottom <= facts.viewport().height() for bottom in shown)
-
-    qtbot.waitUntil(whole)
-
-
 SCRIPT = """
 import sys, time
 from pathlib import Path

@@ -8,7 +8,6 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit
 
 from study_app.app.designer.controller import DesignerController
 from study_app.authoring.templates import templates
-from study_app.gui.designer.new_study.cards import RING
 from study_app.gui.designer.repair_button import NameRefusal
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.protocol.source.files import shipped
@@ -241,20 +240,6 @@ def test_the_keyboard_stays_in_the_questions_where_a_card_is_clicked(qtbot: Any,
             assert button(page, source).isChecked()
             assert field.hasFocus()
         assert (field.cursorPosition(), field.selectedText()) == (3, "")
-
-
-@pytest.mark.parametrize("theme", [LIGHT, DARK])
-def test_a_ring_shows_the_card_with_the_keyboard_and_an_edge_the_chosen_one(designer: Any, theme: Any) -> None:
-    designer.window.show_theme(theme)
-    designer.controller.ask_for_new()
-    page = designer.place.new_page
-    chosen, other, third = page.buttons[:3]
-    for focused in (chosen, other):
-        focused.setFocus()
-        for one in (chosen, other, third):
-            image, middle = one.grab().toImage(), one.height() // 2
-            ring, edge = (image.pixelColor(x, middle).name().upper() == theme.accent.upper() for x in (1, RING + 1))
-            assert (ring, edge) == (one is focused, one is chosen)
 
 
 def test_the_header_names_a_study_that_was_saved_for_the_first_time(designer: Any) -> None:

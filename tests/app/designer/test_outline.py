@@ -220,14 +220,6 @@ def test_what_changes_by_itself_is_said_once(designer: Any, monkeypatch: Any) ->
     assert len([words for words in said if words.startswith("Draft kept")]) == 1
 
 
-def test_the_buttons_below_the_outline_have_room_for_their_words(designer: Any) -> None:
-    designer.controller.open("kitchen")
-    outline = designer.place.outline
-    for button in (outline.add, outline.duplicate):
-        assert button.width() >= button.minimumSizeHint().width()
-    assert outline.duplicate.geometry().right() < outline.width()
-
-
 def test_a_drawer_holds_the_outline_in_a_small_window(qtbot: Any, designer: Any) -> None:
     designer.controller.open("kitchen")
     designer.window.resize(1024, 640)

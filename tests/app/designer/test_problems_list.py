@@ -1,22 +1,16 @@
 """The list of problems under the pointer, and what is shown of a study whose only problems are missing texts."""
 
-from itertools import combinations
 from typing import Any
 
 import pytest
 from PySide6.QtCore import QEvent, QPointF, Qt
-from PySide6.QtGui import QColor, QEnterEvent
-from PySide6.QtWidgets import QApplication, QLabel, QWidget
+from PySide6.QtGui import QEnterEvent
+from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.authoring.measures.participant_texts import texts_by_language
 from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.edits import Set
-from study_app.gui.designer.problems import ProblemLine, ProblemsCard
-from study_app.gui.theme.theme import DARK, LIGHT, Theme
-from study_app.gui.theme.themed import apply_theme
 from study_app.protocol.source.files import shipped_file
-from study_app.protocol.source.problems import Fault
-from study_app.viewmodels.designer.problem_rows import ProblemRow
 from study_app.viewmodels.designer.requests import ChangeLanguage, SetValue
 
 pytestmark = pytest.mark.slow
@@ -113,26 +107,6 @@ def test_a_problem_keeps_its_line_mark_and_repair_while_its_number_changes(qtbot
     assert not line.isEnabled()
 
 
-def test_no_text_of_a_list_that_scrolls_is_over_another_one(qtbot: Any) -> None:
-    words = "a sentence that is long enough for a second line of the list in a window 1366 wide, with all its words"
-    rows = tuple(
-        ProblemRow(Fault(("tasks", f"t{at}"), words), ("tasks", f"t{at}"), f"Task {at}", "route", words, "a hint", at)
-        for at in range(10)
-    )
-    card = ProblemsCard()
-    qtbot.addWidget(card)
-    card.resize(900, 290)
-    apply_theme(card, LIGHT)
-    card.show_problems(rows, None, {})
-    card.show()
-    qtbot.waitUntil(lambda: card.area.verticalScrollBar().maximum() > 0)
-    for line in card.lines:
-        shown = [one.geometry() for one in line.findChildren(QLabel) if one.text()]
-        assert any(one.height() > 30 for one in shown)
-        assert not [pair for pair in combinations(shown, 2) if pair[0].intersects(pair[1])]
-        assert all(line.rect().contains(one) for one in shown)
-
-
 def test_the_chip_of_warnings_opens_a_list_of_them(qtbot: Any, designer: Any) -> None:
     designer.controller.open("kitchen")
     designer.editing.make("Alike", Set(("liquids", "thick", "density_kg_m3"), 1001))
@@ -208,19 +182,6 @@ def test_every_text_of_a_second_language_is_copied_from_the_list_or_a_field_in_o
     next(button for button in title.repairs if button.text() == words).click()
     assert designer.editing.opened.study.faults == ()
     assert "not translated yet" in designer.row("pages", "welcome", "title").field.copied.text()
-
-
-@pytest.mark.parametrize("theme", [LIGHT, DARK])
-def test_the_name_of_a_problem_is_in_the_colour_of_text(qtbot: Any, theme: Theme) -> None:
-    fault = Fault(("blocks", "liquids", "order"), "unknown")
-    row = ProblemRow(fault, ("blocks", "liquids"), "Block Liquids, Order", "layers", "Unknown", "", 12)
-    line = ProblemLine(row, (), narrow=False)
-    qtbot.addWidget(line)
-    apply_theme(line, theme)
-    line.show()
-    picture = line.go.grab().toImage()
-    inks = {picture.pixelColor(x, y).name() for x in range(picture.width()) for y in range(picture.height())}
-    assert QColor(theme.text).name() in inks
 
 
 def test_closing_the_list_returns_the_keyboard_to_where_it_was(qtbot: Any, designer: Any) -> None:

@@ -1,6 +1,5 @@
 """Devices opened behind the lab's page: one at a time, cancelled, refused, let go of."""
 
-import gc
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -12,7 +11,6 @@ from study_app.app.lab.controller import LabController
 from study_app.app.lab.device_opening import LabOpening
 from study_app.app.session.termination import Patience
 from study_app.errors import DeviceNotFound, ServoFault
-from study_app.lab import live
 from tests.app.lab.worlds import SOON_MS, SlowDevices
 from tests.compiled import needs_servo
 
@@ -34,19 +32,6 @@ def test_what_is_being_opened_can_be_cancelled_and_is_let_go_of(qtbot: Any) -> N
     devices.gate.set()
     opening.wait()
     assert (devices.open, devices.closed) == (0, 1)
-
-
-def test_only_the_first_device_freezes_what_was_loaded(qtbot: Any, monkeypatch: Any) -> None:
-    devices, frozen, opened = SlowDevices(), [], []
-    devices.gate.set()
-    monkeypatch.setattr(live, "open_live", devices)
-    monkeypatch.setattr(gc, "freeze", lambda: frozen.append(True))
-    opening = LabOpening()
-    opening.opened.connect(opened.append)
-    for count in (1, 2):
-        opening.want("mouse")
-        qtbot.waitUntil(lambda count=count: len(opened) == count, timeout=SOON_MS)
-    assert len(frozen) == 1
 
 
 def test_two_devices_are_never_opened_at_a_time(qtbot: Any) -> None:

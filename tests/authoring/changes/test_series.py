@@ -25,16 +25,6 @@ def made(study: Study, field: Path, text: str) -> list[tuple[str, str]]:
     return [(one.name, one.title) for one in members(study, field[:2], row, text)]
 
 
-@pytest.mark.parametrize("text", ["0 60 120", "0, 60, 120,", "0\n60\n 120 ms", " 0; 60ms; 120 ", "0ms,60ms,120ms"])
-def test_values_are_typed_with_spaces_commas_or_lines(study: Study, text: str) -> None:
-    assert [name for name, _ in made(study, DELAY, text)] == ["water", "water_60", "water_120"]
-
-
-@pytest.mark.parametrize("text", ["0,5 1 1,5 ms", "0.5, 1, 1.5", "0,5;1;1,5", "0,5\n1\n1,5"])
-def test_decimal_commas_are_read(study: Study, text: str) -> None:
-    assert [name for name, _ in made(study, DELAY, text)[1:]] == ["water_1", "water_1_5"]
-
-
 @pytest.mark.parametrize(
     ("text", "why"),
     [

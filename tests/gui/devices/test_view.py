@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QPoint, QSize, Qt
-from PySide6.QtWidgets import QAbstractButton, QFileDialog, QLabel
+from PySide6.QtWidgets import QAbstractButton, QFileDialog
 
 from study_app.devices.descriptor import NONE, NOT_AVAILABLE, READY, Backend
 from study_app.gui.devices.view import NO_FILE, DevicesPlace
@@ -60,10 +60,6 @@ def test_one_is_marked_and_another_can_be_chosen_by_the_keyboard(place, qtbot):
     assert marked(place) == ["falcon-emulated"]
     place.show_devices(devices_shown(FOUND), "falcon-socket:/run/falcon")
     assert marked(place) == []
-
-
-def test_what_needs_a_path_cannot_be_marked(place):
-    assert isinstance(rows(place)["falcon-socket:PATH"].title, QLabel)
 
 
 def test_falcons_can_be_diagnosed_and_nothing_else(place, qtbot):

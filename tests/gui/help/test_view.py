@@ -5,7 +5,7 @@ from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QFontDatabase, QTextDocument, QTextTable
 
 from study_app.gui.help.view import PAGE, HelpPlace
-from study_app.gui.theme.theme import DARK, LIGHT
+from study_app.gui.theme.theme import LIGHT
 from study_app.gui.theme.themed import apply_theme
 
 pytestmark = pytest.mark.slow
@@ -23,12 +23,6 @@ def place(qtbot):
 
 def shown(place):
     return place.reader.toPlainText()
-
-
-def test_it_begins_at_the_start_page_with_all_sections(place):
-    assert place.reader.page == "index"
-    assert place.list.currentItem().data(PAGE) == "index"
-    assert "Tutorials" in shown(place)
 
 
 def test_a_page_is_chosen_from_the_list_by_key_and_by_mouse(place, qtbot):
@@ -90,12 +84,3 @@ def test_a_page_has_its_tables_code_and_pictures(place):
     assert "run -->" not in shown(place)
     picture = place.reader.loadResource(2, QUrl("pictures/home.png"))
     assert 0 < picture.width() / picture.devicePixelRatio() <= place.reader.viewport().width()
-
-
-@pytest.mark.parametrize("theme", [LIGHT, DARK])
-def test_links_and_surface_have_the_colours_of_the_theme(place, theme):
-    apply_theme(place, theme)
-    cursor = place.reader.document().find("Tutorials")
-    assert cursor.charFormat().foreground().color().name().upper() == theme.accent.upper()
-    corner = place.reader.viewport().grab().toImage().pixelColor(3, 3)
-    assert corner.name().upper() == theme.surface.upper()

@@ -2,13 +2,12 @@
 
 import pytest
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QVBoxLayout
 
 from study_app.errors import StoreError
 from study_app.gui.home.main_window import FULL, LEAST, MainWindow
-from study_app.gui.home.navigation import DESTINATIONS, FOCUS_RING, NARROW_RAIL, WIDE_RAIL
-from study_app.gui.theme.theme import DARK, font
+from study_app.gui.home.navigation import DESTINATIONS, NARROW_RAIL, WIDE_RAIL
+from study_app.gui.theme.theme import DARK
 from study_app.gui.widgets.main_view import Place
 
 
@@ -137,13 +136,6 @@ def test_keyboard_is_after_a_session_where_it_was_before(main, qtbot):
     assert main.focusWidget() is began
 
 
-def test_what_was_said_goes_with_the_window(main):
-    main.show_message("It did not work", "The cable is out.")
-    assert main.notice.isVisible()
-    main.close()
-    assert not main.notice.isVisible()
-
-
 def test_a_place_made_later_wears_the_theme(main):
     main.rail.theme_asked.emit()
     main.go("results")
@@ -169,16 +161,6 @@ def test_whoever_goes_on_before_a_prepared_place_is_shown_gets_where_they_asked_
         QApplication.processEvents()
     assert window.here == "devices"
     window.close()
-
-
-@pytest.mark.slow
-def test_the_words_of_a_narrow_rail_stay_whole_in_another_theme(main, qtbot):
-    main.resize(LEAST)
-    main.rail.theme_asked.emit()
-    for button in (*main.rail.buttons.values(), main.rail.switch):
-        qtbot.waitUntil(lambda button=button: button.height() == 58)
-        words_px = QFontMetrics(font("key")).horizontalAdvance(button.text())
-        assert words_px + 2 * 2 * FOCUS_RING <= button.width(), "the words do not touch the ring"
 
 
 def test_a_place_that_is_not_prepared_never_freezes_the_window(qtbot):
@@ -292,15 +274,3 @@ def test_a_place_that_is_asked_for_twice_is_filled_once(qtbot):
     qtbot.wait(20)
     assert tried == ["fill"]
     window.close()
-
-
-@pytest.mark.parametrize("name", ["home", "results"])
-def test_the_rail_shows_which_button_has_the_keyboard(main, qtbot, name):
-    button = main.rail.buttons[name]
-    main.activateWindow()
-    main.centralWidget().setFocus()
-    without = button.grab().toImage()
-    button.setFocus(Qt.FocusReason.TabFocusReason)
-    ring = button.grab().toImage()
-    assert without.pixelColor(button.width() // 2, 1) != ring.pixelColor(button.width() // 2, 1)
-    assert ring.pixelColor(button.width() // 2, 1).name() == main.theme.accent.lower()

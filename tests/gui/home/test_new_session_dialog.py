@@ -1,6 +1,5 @@
 """The questions before a session: checked as they are answered, and nothing created before Begin."""
 
-import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -41,23 +40,6 @@ def use(results: Path, participant: str, session: int = 1) -> None:
     folder = results / "rek2024" / "data" / f"sub-{participant}" / f"ses-{session:02d}"
     folder.mkdir(parents=True)
     (folder / "checksums.sha256").touch()  # something that comes after a session's beginning
-
-
-@pytest.mark.slow
-def test_a_key_in_a_field_reads_no_folder_in_the_windows_thread(dialog, qtbot, monkeypatch):
-    threads, read = [], new_session_dialog.read_study_folder_state
-
-    def noted(*arguments):
-        threads.append(threading.current_thread())
-        return read(*arguments)
-
-    monkeypatch.setattr(new_session_dialog, "read_study_folder_state", noted)
-    dialog.participant.clear()
-    qtbot.keyClicks(dialog.participant, "P0042")
-    dialog.session.setValue(3)
-    settle(qtbot, dialog)
-    assert threads
-    assert threading.main_thread() not in threads
 
 
 def test_what_another_program_began_meanwhile_is_refused(dialog, results, qtbot):
@@ -273,11 +255,6 @@ def test_enter_presses_the_button_that_has_the_keyboard_and_no_other(dialog, qtb
     dialog.cancel.setFocus()
     with qtbot.waitSignal(dialog.rejected):
         qtbot.keyClick(dialog.cancel, Qt.Key.Key_Return)
-
-
-def test_enter_in_a_field_begins(dialog, qtbot):
-    with qtbot.waitSignal(dialog.accepted):
-        qtbot.keyClick(dialog.participant, Qt.Key.Key_Return)
 
 
 def test_the_foot_stays_on_a_small_screen_and_every_question_is_reached(dialog, results, qtbot):

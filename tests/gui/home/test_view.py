@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from PySide6.QtCore import QPoint, QRect, QSize, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QAccessible, QFontMetrics
 from PySide6.QtWidgets import QApplication, QFileDialog, QPushButton
 
@@ -170,44 +170,6 @@ def test_the_theme_changes(home, qtbot):
     assert rail.switch.text() == "Light theme"
 
 
-def show_mouse(home):
-    says = "visual only, no force: the ball moves as it would in the liquid"
-    (mouse,) = devices_shown([Backend("mouse", "", NONE, says, "")])
-    home.show_machine(MachineSettings(device="mouse"), mouse)
-
-
-def test_three_studies_and_the_sessions_fit_in_a_small_screen(qtbot, results, monkeypatch):
-    monkeypatch.setattr("study_app.viewmodels.home.sources", lambda: ("rek2024", "physical_liquids", "demo"))
-    home = open_home(qtbot, results, QSize(1366, 768))
-    show_mouse(home)
-    QApplication.processEvents()
-    assert home.area.verticalScrollBar().maximum() == 0
-
-
-@pytest.mark.parametrize("size", [QSize(1366, 768), QSize(1440, 900), QSize(1600, 1000)])
-def test_the_sessions_stay_in_sight_below_many_studies_whose_titles_are_whole(qtbot, results, size):
-    home = open_home(qtbot, results, size)
-    show_mouse(home)
-    table = home.sessions.rows.table
-    QApplication.processEvents()
-    assert len(home.grid.cards) > 6
-    assert home.area.verticalScrollBar().maximum() == 0
-    assert home.rect().contains(QRect(table.mapTo(home, table.rect().topLeft()), table.size()))
-    assert table.viewport().height() > 3 * table.rowHeight(0)
-    assert home.device.height() >= home.device.heightForWidth(home.device.width())
-    first, second = (home.grid.cards[at].mapTo(home.cards_area, QPoint()) for at in (0, 3))
-    assert first.y() == 0
-    assert home.grid.row_height < second.y() < home.cards_area.height()
-    for card in study_cards(home):
-        assert (" ".join(card.title.text().split("\n")), card.title.toolTip()) == (card.facts.title, "")
-    home.window().activateWindow()
-    home.sessions.kind.setFocus()
-    qtbot.waitUntil(lambda: home.focusWidget() is home.sessions.kind)
-    home.focusPreviousChild()
-    assert home.focusWidget() is home.grid.cards[-1].rehearse
-    assert home.cards_area.rect().contains(home.focusWidget().mapTo(home.cards_area, QPoint(1, 1)))
-
-
 def test_a_long_title_is_cut_after_two_lines_and_whole_in_tip_and_name(qtbot, results, monkeypatch):
     long = "How people tell " + ", ".join(f"liquid {number}" for number in range(20)) + " apart"
     home = open_home(qtbot, results)
@@ -287,9 +249,3 @@ def test_tab_goes_through_home_as_it_is_read(home, qtbot):
     begun = [name for name in names if name.startswith("New session")]
     assert len(begun) == len(home.grid.cards)
     assert max(map(names.index, begun)) < names.index("Sessions shown") < names.index("Sessions")
-
-
-def test_cards_in_a_row_need_no_more_than_the_window_has(home):
-    for width in range(400, 1800, 10):
-        home.grid.arrange(width)
-        assert home.grid.minimumSizeHint().width() <= width

@@ -23,13 +23,6 @@ FOUND = EstimateShown(
 )
 
 
-def test_without_a_source_there_is_only_the_choice(place: Any, still: LabView) -> None:
-    place.show_view(still)
-    assert place.estimate.source.isVisible()
-    assert not place.estimate.apply.isVisible()
-    assert [place.estimate.source.itemText(k) for k in range(4)] == [words for _, words in SOURCES]
-
-
 def test_values_stand_with_their_intervals_and_are_applied_on_request(place: Any, still: LabView) -> None:
     said = {name: heard(place, name) for name in ("estimate_apply_asked", "estimate_follow_asked")}
     place.show_view(dataclasses.replace(still, estimate=FOUND))

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QEvent, QObject
 
 from study_app.lab.ab_comparison import Setting, Workbench
 from study_app.lab.presets import spoken
@@ -59,26 +58,6 @@ def test_the_limit_is_that_of_the_setting_in_hand(place: Any) -> None:
         assert limit.value() == limit_n
 
 
-def test_a_view_like_the_last_lays_nothing_out(place: Any) -> None:
-    requests: list[QEvent] = []
-
-    class Spy(QObject):
-        def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
-            if event.type() == QEvent.Type.LayoutRequest and watched is place.area.widget():
-                requests.append(event)
-            return False
-
-    view, spy = still_view(bench("ketchup", "honey")), Spy()
-    for _ in range(2):
-        place.show_view(view)
-        settle()
-    place.area.widget().installEventFilter(spy)
-    for _ in range(3):
-        place.show_view(view)
-        settle()
-    assert requests == []
-
-
 def test_while_blind_the_curves_are_hidden_and_nothing_moves(place: Any) -> None:
     view = still_view(bench("ketchup", "honey"))
     place.show_view(view)
@@ -89,14 +68,3 @@ def test_while_blind_the_curves_are_hidden_and_nothing_moves(place: Any) -> None
     assert [place.curves.stress.size(), place.tank.size()] == before
     for card in (place.curves.stress, place.curves.force):
         assert not card.plot.isVisible()
-
-
-@pytest.mark.parametrize("size", [(1294, 768), (1528, 1000)])
-def test_the_cards_fit(place: Any, size: tuple[int, int]) -> None:
-    place.resize(*size)
-    place.show_view(still_view(bench("shampoo", "cornstarch")))
-    settle()
-    area = place.area
-    assert area.widget().width() == area.viewport().width()
-    if size[1] >= 1000:
-        assert area.widget().height() == area.viewport().height()

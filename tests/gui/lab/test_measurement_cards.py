@@ -2,16 +2,13 @@
 
 import dataclasses
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QRectF
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.lab.lab_plots import POINTS, A, B, CurvePlot, thinned
-from study_app.haptics.model.effects import EFFECTS
 from study_app.viewmodels.lab import CostRow, LabView
 
 pytestmark = pytest.mark.slow
@@ -57,19 +54,6 @@ def test_the_limit_is_always_inside(plot: CurvePlot) -> None:
     assert plot.limit.value() == 8.0
 
 
-@pytest.mark.parametrize("height", [110, 160, 400])
-def test_numbers_of_the_axis_do_not_touch_and_are_inside(plot: CurvePlot, height: int) -> None:
-    plot.resize(300, height)
-    QApplication.processEvents()
-    plot.show_curves(np.array([0.0]), (np.array([7.3]), np.array([0.0])), limit=8.0)
-    ticks = sorted(place for place, _ in plot.ticks["left"])
-    pixels = [plot.box.mapViewToDevice(plot.box.viewRect().topLeft().__class__(0, place)).y() for place in ticks]
-    steps = -np.diff(pixels)
-    assert steps.min() >= 14
-    room: QRectF = plot.box.mapRectToScene(plot.box.boundingRect())
-    assert min(pixels) - room.top() >= 8
-
-
 @pytest.mark.parametrize("count", [0, 1, 7, 240, 241, 2500])
 def test_thinning_keeps_the_newest_and_every_peak(count: int) -> None:
     t_s = np.arange(count, dtype=float)
@@ -80,13 +64,6 @@ def test_thinning_keeps_the_newest_and_every_peak(count: int) -> None:
         assert len(times) == len(kept) <= 2 * 240
         assert times[-1] == count - 1
         assert np.count_nonzero(kept == 7.0) == 1
-
-
-def test_curves_are_as_wide_on_a_dense_screen(plot: CurvePlot, monkeypatch: pytest.MonkeyPatch) -> None:
-    widths = [curve.opts["pen"].widthF() for curve in plot.curves]
-    monkeypatch.setattr(plot, "devicePixelRatioF", lambda: 2.0)
-    plot.apply_theme(plot.theme)
-    assert [curve.opts["pen"].widthF() for curve in plot.curves] == [2 * width for width in widths]
 
 
 def test_both_forces_are_drawn_and_named(place: Any, moved: LabView) -> None:
@@ -100,22 +77,6 @@ def test_both_forces_are_drawn_and_named(place: Any, moved: LabView) -> None:
     assert place.force.legend.accessibleName() == "A, felt now, B, same motion, limit 8 N"
     place.show_view(dataclasses.replace(moved, workbench=moved.workbench.switch()))
     assert place.force.legend.accessibleName() == "A, same motion, B, felt now, limit 8 N"
-
-
-def test_every_effect_has_a_whole_line_in_a_small_window(place: Any, still: LabView) -> None:
-    rows = tuple(
-        CostRow(effect.name, None if number > 3 else 10.0, "not used") for number, effect in enumerate(EFFECTS)
-    )
-    place.resize(1366, 700)
-    place.show_view(dataclasses.replace(still, cost=rows))
-    QApplication.processEvents()
-    card = place.cost
-    lines = [*card.lines, *card.absent]
-    assert len(lines) == len(EFFECTS)
-    for above, below in pairwise(lines):
-        assert above.geometry().bottom() < below.geometry().top()
-    shown = card.stack.widget(0).rect()
-    assert all(shown.contains(line.geometry()) for line in lines)
 
 
 def test_costs_are_bars_of_the_dearest_and_absent_ones_say_why(place: Any, still: LabView) -> None:

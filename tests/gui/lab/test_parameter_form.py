@@ -196,14 +196,3 @@ def test_the_liquid_and_the_copy_name_their_sides(place: Any, told: Any, still: 
     assert place.form.copy.text() == "Copy to A"
     place.form.liquid.activated.emit(3)
     assert [(side, choice.title) for side, choice in chosen] == [("A", "Honey"), ("B", "Syrup")]
-
-
-def test_no_row_is_cut(place: Any, told: Any) -> None:
-    for width in (1528, 1280, 952):
-        place.resize(width, 700)
-        place.layout().activate()
-        for name, row in fields(place).items():
-            assert row.field.fontMetrics().horizontalAdvance(row.field.text()) <= row.field.width() - 18, name
-            assert row.slider.width() >= 48, (name, width)
-            longest = max(row.name.text().split(), key=len)
-            assert row.name.fontMetrics().horizontalAdvance(longest) <= row.name.width(), name

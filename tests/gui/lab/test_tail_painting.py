@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPointF
 
-from study_app.gui.lab.tail_painting import SHADES, STEP_PX, THICKEST_PX, THINNEST_PX, shade_style, tail_places
+from study_app.gui.lab.tail_painting import SHADES, STEP_PX, tail_places
 from study_app.gui.participant.tank.camera import Box, Camera
 from study_app.viewmodels.lab import Floats, LabView
 
@@ -46,24 +46,6 @@ def test_it_begins_and_ends_where_the_body_was() -> None:
     assert apart(places.runs[0][1].first(), pixel((-40, 0, 0))) < 1e-6
     assert apart(places.runs[-1][1].last(), pixel((40, 5, 0))) < 1e-6
     assert apart(places.breaks[0], pixel((-40, 0, 0))) < 1e-6
-
-
-def test_runs_join_and_get_newer() -> None:
-    places = tail_places(tail([(-40, 0, 0), (40, 0, 0)]), CAMERA, BOX)
-    shades = [shade for shade, _ in places.runs]
-    assert shades == sorted(shades, reverse=True)
-    assert (shades[0], shades[-1]) == (SHADES - 1, 0)
-    for (_, before), (_, after) in zip(places.runs[:-1], places.runs[1:], strict=True):
-        assert before.last() == after.first()
-
-
-def test_newer_is_brighter_and_thicker() -> None:
-    looks = [shade_style(shade) for shade in range(SHADES)]
-    widths = [width for _, width in looks]
-    lights = [ink.lightnessF() * ink.alphaF() for ink, _ in looks]
-    assert widths == sorted(widths, reverse=True)
-    assert lights == sorted(lights, reverse=True)
-    assert (widths[0], widths[-1]) == (THICKEST_PX, THINNEST_PX)
 
 
 def test_a_break_is_a_ring_where_the_segment_before_ended_and_each_side_has_an_arrow() -> None:

@@ -13,8 +13,6 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QLabel, 
 
 from study_app.gui.lab.tank_note import SHOWN_AFTER_MS
 from study_app.gui.lab.view import preset_name
-from study_app.gui.theme.theme import DARK, LIGHT
-from study_app.gui.theme.themed import apply_theme
 from study_app.lab.ab_comparison import Workbench
 from study_app.viewmodels.lab import LabView
 from tests.gui.lab.sample import blind, heard, settle, still_view, workbench
@@ -146,24 +144,6 @@ def test_trouble_beside_a_force_that_is_on_can_be_put_away_until_there_is_anothe
     assert place.note.isVisible()
     place.show_view(dataclasses.replace(full, force_on=False))
     assert place.note.fade_in.text() == "Try again"
-
-
-@pytest.mark.parametrize("size", [(928, 560), (1294, 768)])
-def test_a_long_trouble_is_read_whole(place: Any, still: LabView, size: tuple[int, int]) -> None:
-    place.resize(*size)
-    names = ", ".join(f"SpaceMouse of kind {k}" for k in range(14))
-    place.show_view(dataclasses.replace(still, force_on=False, trouble=f"None of these is plugged in: {names}."))
-    settle()
-    note = place.note
-    assert place.tank.rect().contains(note.geometry())
-    assert note.rect().contains(note.words.geometry())
-    assert note.words.height() >= note.words.heightForWidth(note.words.width())
-
-
-def test_what_is_quick_is_not_told(place: Any, still: LabView) -> None:
-    place.show_view(dataclasses.replace(still, busy="Opening the mouse"))
-    place.show_view(still)
-    assert not place.note.findChild(QTimer).isActive()
 
 
 def test_while_blind_nothing_tells_the_settings_apart(place: Any, moved: LabView) -> None:
@@ -309,13 +289,6 @@ def test_a_ball_that_grows_leaves_the_glass_where_it_is(place: Any, moved: LabVi
     assert place.tank.grab().toImage() != small
 
 
-def test_entered_and_left(place: Any, still: LabView) -> None:
-    said = heard(place, "entered"), heard(place, "left")
-    place.hide()
-    place.show()
-    assert [len(one) for one in said] == [1, 1]
-
-
 @pytest.mark.variants(3)
 @pytest.mark.parametrize("size", [(928, 560), (952, 640), (1294, 768), (1528, 900), (1848, 1080), (3768, 2160)])
 def test_everything_fits(place: Any, moved: LabView, size: tuple[int, int]) -> None:
@@ -337,15 +310,6 @@ def test_everything_fits(place: Any, moved: LabView, size: tuple[int, int]) -> N
             assert it.fontMetrics().horizontalAdvance(it.text()) <= it.width() + 1, it.text()
 
 
-@pytest.mark.parametrize("width", [980, 1280, 1528])
-def test_parameters_do_not_move_sideways_when_tab_goes_through_them(place: Any, still: LabView, width: int) -> None:
-    place.resize(width, 700)
-    place.show_view(still)
-    QApplication.processEvents()
-    assert place.form.area.verticalScrollBar().maximum() > 0
-    assert place.form.area.horizontalScrollBar().maximum() == 0
-
-
 def test_everything_that_takes_the_keyboard_has_a_name_and_is_reached_by_tab(place: Any, still: LabView) -> None:
     place.show_view(still)
     kinds = (QAbstractButton, QComboBox, QLineEdit, QSlider)
@@ -365,22 +329,3 @@ def test_buttons_can_be_hit(place: Any, still: LabView) -> None:
     for it in shown(place):
         if isinstance(it, QAbstractButton | QComboBox | QLineEdit | QSlider) and it.isEnabled():
             assert min(it.width(), it.height()) >= 24, it
-
-
-def test_both_themes_are_worn_by_every_part(place: Any, moved: LabView) -> None:
-    place.show_view(moved)
-    settle()
-    light = place.grab().toImage()
-    apply_theme(place, DARK)
-    settle()
-    dark = place.grab().toImage()
-    corner = (place.width() - 4, place.height() - 4)
-    assert light.pixelColor(*corner).name().upper() == LIGHT.window
-    assert dark.pixelColor(*corner).name().upper() == DARK.window
-    for card in (place.form, place.force, place.cost, place.limiters):
-        at = card.mapTo(place, QPoint(card.width() // 2, 9))
-        assert light.pixelColor(at).name().upper() == LIGHT.surface
-        assert dark.pixelColor(at).name().upper() == DARK.surface
-    apply_theme(place, LIGHT)
-    settle()
-    assert place.grab().toImage() == light

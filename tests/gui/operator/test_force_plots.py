@@ -1,18 +1,14 @@
 """Force and wake as they are drawn: a scale that follows, a limit that stands, names that do not touch."""
 
-import sys
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication, QLabel
 
 from study_app.gui.operator.force_plots import ForceCard
-from study_app.gui.theme.theme import DARK, LIGHT
-from study_app.gui.theme.themed import apply_theme_within
-from study_app.gui.widgets.live_plots import STROKE, apart, step_for
+from study_app.gui.widgets.live_plots import apart, step_for
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.viewmodels.force_traces import Forces
 
@@ -79,25 +75,6 @@ def test_a_scale_that_fits_stays(card: ForceCard) -> None:
     assert len(seen) == 1
 
 
-def test_force_and_wake_share_their_times(card: ForceCard) -> None:
-    show(card, pushed(3.0))
-    assert card.wake.box.viewRange()[0] == pytest.approx(card.plot.box.viewRange()[0])
-    left = [plot.mapFromScene(plot.box.sceneBoundingRect().topLeft()).x() for plot in (card.plot, card.wake)]
-    assert left[0] == left[1]
-
-
-@pytest.mark.parametrize("height", [210, 240, 280, 400])
-def test_the_four_names_do_not_touch(card: ForceCard, height: int) -> None:
-    card.resize(330, height)
-    show(card, pushed(0.5))
-    card.plot.grab()
-    places = sorted(
-        (end.textItem.mapRectToScene(end.textItem.boundingRect()) for end in card.plot.ends),
-        key=lambda rect: rect.top(),
-    )
-    assert all(upper.bottom() <= lower.top() + 2 for upper, lower in pairwise(places))
-
-
 @pytest.mark.slow
 def test_the_wake_has_a_line_above_zero_at_every_speed(card: ForceCard) -> None:
     for speed in (0.0, 0.05, 0.28, 0.49, 1.3, 6.0):
@@ -106,35 +83,6 @@ def test_the_wake_has_a_line_above_zero_at_every_speed(card: ForceCard) -> None:
         assert rows >= 1
         assert rows * step <= card.wake.reach + 1e-9
         assert max(speed, 0.1) <= card.wake.box.viewRange()[1][1]
-
-
-def test_curves_are_told_apart_by_stroke_and_by_the_field(card: ForceCard) -> None:
-    for theme in (LIGHT, DARK):
-        apply_theme_within(card, theme)
-        pens = [curve.opts["pen"] for curve in card.plot.curves]
-        assert len({(one.color().name(), tuple(one.dashPattern())) for one in pens}) == 4
-        assert card.plot.size_field is not None
-        assert card.plot.size_field.opts["brush"].color().name().upper() == theme.text3
-
-
-def test_strokes_are_as_wide_on_a_screen_of_twice_the_density(card: ForceCard, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert card.plot.curves[0].opts["pen"].widthF() == STROKE * card.plot.devicePixelRatioF()
-    monkeypatch.setattr(type(card.plot), "devicePixelRatioF", lambda _plot: 2.0)
-    QApplication.sendEvent(card.plot, QEvent(QEvent.Type.DevicePixelRatioChange))
-    assert card.plot.curves[0].opts["pen"].widthF() == 2 * STROKE
-
-
-@pytest.mark.slow
-def test_repainting_keeps_no_reference_to_none(card: ForceCard) -> None:
-    forces = pushed(2.0)
-    for _ in range(5):
-        show(card, forces)
-    before = sys.getrefcount(None)
-    for step in range(200):
-        card.show_forces(forces, round((SECONDS + 0.01 * step) * 1e9))
-        card.plot.viewport().repaint()
-        card.wake.viewport().repaint()
-    assert abs(sys.getrefcount(None) - before) < 100
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ from PySide6.QtCore import QRect
 from PySide6.QtWidgets import QAbstractScrollArea, QApplication, QLabel, QPushButton, QWidget
 
 from study_app.gui.operator import OperatorWindow
-from study_app.gui.operator.arrangement import LEAST_BELOW
 from study_app.gui.operator.force_plots import ForceCard
 from study_app.gui.operator.stop_panel import LEAST_HEIGHT, LEAST_WIDTH
 from study_app.gui.widgets.controls import ActionButton
@@ -221,42 +220,6 @@ def test_header_has_room_for_the_way_to_the_participants_window(window: Any, tol
     assert [line.text() for line in lines] == [line.whole for line in lines]
 
 
-def test_the_middle_scrolls_only_where_there_is_no_other_way(window: OperatorWindow, told: Any, health: Any) -> None:
-    filled(window, told, health, running)
-    for size in SIZES:
-        settle(window, size)
-        scrolled = window.arrangement.middle_area.verticalScrollBar().maximum() > 0
-        assert scrolled == (size[0] < 1320 and size[1] < 800), size
-
-
-def test_the_rail_gives_way_to_where_we_are_and_takes_it_back(window: OperatorWindow, told: Any, health: Any) -> None:
-    filled(window, told, health, running)
-    for size, slim in (((1024, 640), True), ((1600, 900), False), ((1024, 640), True), ((1366, 768), False)):
-        settle(window, size)
-        assert window.rail.now.isVisible()
-        assert window.rail.tally.isVisible()
-        assert window.rail.isAncestorOf(window.rail.now) is not slim
-        assert window.rail.lines[0].name.isVisible() is not slim
-        assert window.rail.lines[0].toolTip().startswith("A first look")
-
-
-def test_notes_give_way_first_and_come_back(window: OperatorWindow, told: Any, health: Any) -> None:
-    filled(window, told, health, running)
-    seen = []
-    for size in ((1600, 900), (1366, 768), (1024, LEAST_BELOW - 1), (1600, 900)):
-        settle(window, size)
-        seen.append(sum(line.isVisible() for line in window.notes.lines))
-    assert seen == [2, 2, 0, 2]
-
-
-def test_the_newest_note_has_two_lines_on_a_small_screen(window: OperatorWindow, told: Any, health: Any) -> None:
-    filled(window, told, health, running)
-    settle(window, (1356, 709))  # 1366 × 768 less frame and task bar
-    newest = window.notes.lines[0].text
-    assert newest.text().count("\n") == 1
-    assert newest.text().replace("\n", " ") == newest.whole
-
-
 def test_the_shape_of_the_window_does_not_tell_whether_the_force_is_hidden(qtbot: Any, told: Any, health: Any) -> None:
     places = []
     for limit_n in (None, 6.0):
@@ -272,14 +235,3 @@ def test_the_shape_of_the_window_does_not_tell_whether_the_force_is_hidden(qtbot
         places.append(here)
         window.may_close = True
     assert places[0] == places[1]
-
-
-def test_buttons_have_their_room_again_in_a_window_that_grew(qtbot: Any) -> None:
-    window = OperatorWindow("demo", lateness_limit_s=0.002, reach_m=0.05, pointer=True)
-    qtbot.addWidget(window)
-    window.resize(1024, 640)
-    window.show()
-    qtbot.waitUntil(lambda: window.width() == 1024)
-    window.resize(1600, 900)
-    buttons = (window.buttons.pause, window.buttons.repeat, window.buttons.exclude, window.buttons.end)
-    qtbot.waitUntil(lambda: [button.width() for button in buttons] == [one.sizeHint().width() for one in buttons])

@@ -2,9 +2,7 @@
 
 import sys
 from dataclasses import replace
-from itertools import pairwise
 
-import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QColor, QGuiApplication
@@ -14,7 +12,7 @@ from PySide6.QtWidgets import QApplication
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.current_step import Tally
 from study_app.gui.operator.stop_panel import LEAST_HEIGHT, LEAST_WIDTH
-from study_app.gui.theme.theme import DARK, LIGHT
+from study_app.gui.theme.theme import DARK
 from study_app.gui.widgets.escape_key import HOLD_MS
 
 pytestmark = pytest.mark.slow
@@ -80,15 +78,6 @@ def test_the_bar_is_filled_as_far_as_the_line_below_it_says(window, told, done):
     assert filled == pytest.approx(done / 4, abs=0.08)  # gaps and round ends
 
 
-def test_what_the_buttons_do_is_one_line_below_them(running, told, qtbot):
-    running.resize(1600, 900)
-    for view in (told.view(), told.view(trouble="the disk is full", waits=True)):
-        running.show_view(view)
-        hint = running.buttons.hint
-        qtbot.waitUntil(lambda hint=hint: hint.width() > 0)
-        assert hint.fontMetrics().horizontalAdvance(hint.text()) < hint.width()
-
-
 def test_the_limit_a_trial_broke_can_be_read_in_the_smallest_window(window, told, health, qtbot):
     told.welcome()
     told.start(1)
@@ -130,16 +119,6 @@ def test_stop_force_is_large_and_never_disabled_or_moved(window, told, health):
         assert window.stop.stop.isVisible()
         assert window.stop.stop.mapTo(window, window.stop.stop.rect().topLeft()) == place
         assert window.stop.stop.size() == size
-
-
-def test_stop_force_stays_large_in_the_smallest_window(running):
-    running.resize(running.minimumSize())
-    QApplication.processEvents()
-    button = running.stop.stop
-    assert button.width() >= LEAST_WIDTH
-    assert button.height() >= LEAST_HEIGHT
-    corner = button.mapTo(running, button.rect().bottomRight())
-    assert running.rect().contains(corner)
 
 
 def test_after_a_stop_the_panel_says_so_and_offers_the_way_back(running, told, health, qtbot):
@@ -298,12 +277,6 @@ def test_notes_and_marks_are_listed_newest_first(running, told, health):
     assert running.notes.lines[2].isHidden()
 
 
-def test_the_windows_shape_says_nothing_about_the_force(running):
-    assert running.force.isVisible()
-    assert running.force.height() == running.lateness.height()
-    assert abs(running.force.width() - running.lateness.width()) <= 1
-
-
 def test_closing_is_left_to_who_listens_until_the_session_is_over(running, told, health, qtbot):
     with qtbot.waitSignal(running.close_asked):
         running.close()
@@ -332,24 +305,6 @@ def test_the_theme_changes_everything_at_once(running, qtbot):
     assert running.position.plot.theme is DARK
     assert running.position.plot.backgroundBrush().color().name().upper() == DARK.surface
     assert running.position.plot.curves[0].opts["pen"].color().name().upper() == DARK.trace_x
-
-
-def test_plots_have_no_menu_no_button_and_no_default_colour(running):
-    for plot in (running.position.plot, running.lateness.plot):
-        assert not plot.box.menuEnabled()
-        assert plot.box.state["mouseEnabled"] == [False, False]
-        assert not any(isinstance(item, pg.ButtonItem) for item in plot.scene().items())
-    pens = [curve.opts["pen"] for curve in running.position.plot.curves]
-    assert [pen.color().name().upper() for pen in pens] == [LIGHT.trace_x, LIGHT.trace_y, LIGHT.trace_z]
-    assert [bool(pen.dashPattern()) for pen in pens] == [False, True, True]
-
-
-def test_names_stand_at_the_newest_ends_and_never_touch(running, health):
-    running.show_traces(health, 4.0)
-    plot = running.position.plot
-    heights = sorted(end.pos().y() for end in plot.ends)
-    assert [end.isVisible() for end in plot.ends] == [True, True, True]
-    assert min(b - a for a, b in pairwise(heights)) > 0.1 * plot.reach
 
 
 def test_a_hand_beyond_the_plot_widens_it(running, health):

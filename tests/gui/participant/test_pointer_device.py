@@ -146,11 +146,6 @@ def test_motion_moves_the_hand_right_and_up(hand: Hand) -> None:
     assert hand.places[-1] == pytest.approx((30 * hand.gain, 20 * hand.gain, 0))
 
 
-def test_sixty_percent_of_the_screen_is_the_whole_workspace(hand: Hand) -> None:
-    height = hand.widget.screen().geometry().height()
-    assert hand.gain * SHARE_OF_SCREEN * height == pytest.approx(0.06)
-
-
 def test_shift_and_wheel_are_depth(hand: Hand) -> None:
     hand.move(hand.middle + QPoint(10, -20), Qt.KeyboardModifier.ShiftModifier)
     assert hand.places[-1] == pytest.approx((10 * hand.gain, 0, -20 * hand.gain))

@@ -15,7 +15,7 @@ from study_app.gui.participant.tank_widget import TankWidget
 from study_app.gui.participant.window import LEAST_SIZE, ParticipantWindow
 from study_app.protocol.wording.languages import LANGUAGES, words
 from study_app.session.pages import EndPage, Page, PausePage, TroublePage
-from study_app.session.transitions.events import Chosen, Continue, ItemShown, PauseAsked, ResumeAsked, Submitted
+from study_app.session.transitions.events import Chosen, Continue, PauseAsked, ResumeAsked
 from tests.gui.participant.screens import Opened
 from tests.gui.small import explore, questionnaire, task_page, text_page, view
 
@@ -127,29 +127,6 @@ def test_click_beside_a_button_leaves_the_page_its_keys(opened: Opened, page: Pa
     assert told in opened.kinds
 
 
-def test_events_of_pages_are_passed_on(opened: Opened) -> None:
-    opened.window.show_page(text_page())
-    QTest.keyClick(opened.focus, Qt.Key.Key_Space)
-    assert opened.kinds == [Continue]
-    opened.window.show_page(questionnaire(("One statement.",)))
-    opened.window.grab()
-    QApplication.processEvents()
-    QTest.keyClick(opened.focus, Qt.Key.Key_4)
-    QTest.keyClick(opened.focus, Qt.Key.Key_Return)
-    assert opened.kinds == [Continue, ItemShown, Chosen, Submitted]
-    opened.window.show_page(PausePage(force_off=False))
-    QTest.keyClick(opened.focus, Qt.Key.Key_Return)
-    assert opened.kinds[-1] is ResumeAsked
-
-
-def test_keyboard_is_on_the_first_statement_when_the_questionnaire_comes(opened: Opened) -> None:
-    opened.window.show_page(task_page())
-    opened.window.show_page(questionnaire())
-    widget = opened.window.widget
-    assert isinstance(widget, QuestionnaireWidget)
-    assert opened.focus is widget.fields[0]
-
-
 def test_space_leaves_an_exploration_after_its_least_time(opened: Opened) -> None:
     opened.window.show_page(task_page(explore()))
     opened.window.show_view(view(lit=None, elapsed_s=3))
@@ -173,13 +150,6 @@ def test_a_click_leaves_an_exploration_where_the_mouse_is_the_device(captured: O
     qtbot.mouseClick(tank, Qt.MouseButton.LeftButton)
     assert captured.kinds == [Continue]
     assert not any(bits & 1 for bits in captured.buttons[2:])  # it is no answer to the page that comes next
-
-
-def test_painted_views_are_told(opened: Opened, qtbot: Any) -> None:
-    opened.window.show_page(task_page())
-    with qtbot.waitSignal(opened.window.painted, timeout=2000) as told:
-        opened.window.show_view(view(sample_ns=123_456_789_012))
-    assert told.args == [123_456_789_012]
 
 
 def test_a_late_frame_of_the_tank_before_is_not_told_as_one_of_the_next(opened: Opened, qtbot: Any) -> None:

@@ -6,7 +6,7 @@ from datetime import datetime
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QApplication, QLabel, QScrollArea
+from PySide6.QtWidgets import QApplication, QLabel
 
 from study_app.gui.preflight import PreflightWindow
 from study_app.gui.preflight.window import LEAST
@@ -74,17 +74,6 @@ def test_every_check_has_a_row_with_its_value(window):
 def test_the_button_says_what_is_accepted_by_it(window, facts, passed, words, able):
     window.show_view(view_of(facts))
     assert (window.chip.word, window.start.text(), window.start.isEnabled()) == (passed, words, able)
-
-
-def test_every_check_fits_in_a_small_screen(qtbot):
-    made = PreflightWindow(1000.0)
-    qtbot.addWidget(made)
-    made.show_view(view_of(replace(SCALED, withheld=dict.fromkeys(load("rek2024").liquids, 0.002))))
-    assert len(made.rows) == 12
-    made.resize(1200, 768)
-    made.show()
-    QApplication.processEvents()
-    assert made.findChild(QScrollArea).verticalScrollBar().maximum() == 0
 
 
 def test_a_warning_says_what_to_do(window):

@@ -5,8 +5,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QEvent, QObject, QPoint, QSize, Qt
-from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
+from PySide6.QtCore import QPoint, QSize, Qt
+from PySide6.QtWidgets import QLabel, QPushButton, QWidget
 
 from study_app.gui.home.main_window import LEAST, MainWindow
 from study_app.gui.results.view import STACKED_BELOW, ResultsPlace
@@ -19,19 +19,6 @@ from tests.gui.results.sample import LEFT_OUT, STUDY, SVG, facts, view
 pytestmark = pytest.mark.slow
 
 USUAL = QSize(1366, 768)
-
-
-class Seen(QObject):
-    """Notes that a part is shown."""
-
-    def __init__(self, shown, part):
-        super().__init__(part)
-        self.shown = shown
-
-    def eventFilter(self, part, event):  # noqa: N802 - Qt's name
-        if event.type() == QEvent.Type.Show:
-            self.shown.append(type(part).__name__)
-        return False
 
 
 def opened(qtbot, size=USUAL, shown=None):
@@ -343,20 +330,6 @@ def test_everything_that_can_be_pressed_has_a_name_and_does_something(place):
     for part in place.findChildren(QWidget):
         if part.isVisible() and part.focusPolicy() & Qt.FocusPolicy.TabFocus and not isinstance(part, QPushButton):
             assert part.accessibleName(), part
-
-
-def test_what_comes_and_goes_in_one_turn_is_never_a_window_of_its_own(place, qtbot):
-    before = set(QApplication.topLevelWidgets())
-    third = FigureShown("recognition", "What each liquid was named", "", SVG)
-    place.show_view(replace(view(), figures=(*view().figures, third), sessions=(*view().sessions, facts("P020"))))
-    gone = [place.figures.cards[-1]]
-    place.show_view(view())
-    shown = []
-    for part in gone:
-        part.installEventFilter(Seen(shown, part))
-    QApplication.processEvents()
-    assert shown == []
-    assert {one for one in QApplication.topLevelWidgets() if one.isVisible()} <= before
 
 
 @pytest.mark.parametrize(

@@ -3,10 +3,7 @@
 import threading
 
 from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QApplication
 
-from study_app.gui.lab import lab_tank
-from study_app.gui.lab.lab_tank import LabTank
 from study_app.gui.widgets.background import Background, wait_for_jobs
 
 
@@ -33,21 +30,3 @@ def test_the_end_of_the_program_waits_for_jobs_but_not_for_ever():
     go_on.set()
     wait_for_jobs(10)
     assert ended == [True]
-
-
-def test_the_labs_tank_is_painted_beside_the_window(qtbot, monkeypatch):
-    threads, paint = [], lab_tank.backdrop
-
-    def noted(*arguments):
-        threads.append(threading.current_thread())
-        return paint(*arguments)
-
-    monkeypatch.setattr(lab_tank, "backdrop", noted)
-    tank = LabTank()
-    qtbot.addWidget(tank)
-    tank.resize(500, 301)
-    tank.show()
-    qtbot.waitUntil(lambda: tank.still is not None)
-    QApplication.processEvents()
-    assert threads
-    assert threading.main_thread() not in threads

@@ -1,29 +1,15 @@
 """The plots' names stand apart and inside, whatever is drawn."""
 
-import itertools
 from typing import Any
 
 import numpy as np
-import pyqtgraph as pg
 import pytest
-from PySide6.QtCore import QPointF, QRectF
-from PySide6.QtGui import QFontMetricsF
+from PySide6.QtCore import QRectF
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.widgets.live_plots import LatenessPlot, TracePlot
 
 LIMIT_US = 2000.0
-
-
-def test_axes_lay_out_no_label(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    laid_out = []
-    text_of = pg.AxisItem.labelString
-    monkeypatch.setattr(pg.AxisItem, "labelString", lambda axis: laid_out.append(axis) or text_of(axis))
-    plot = TracePlot(2.5, 1.0)
-    qtbot.addWidget(plot)
-    assert laid_out == []
-    pg.AxisItem("left").setLabel("is counted")
-    assert laid_out
 
 
 def place(name: Any) -> QRectF:
@@ -53,28 +39,6 @@ def test_the_names_of_limit_and_p99_do_not_touch(
     inside = plot.box.mapRectToScene(plot.box.boundingRect()).adjusted(0, -1, 0, 1)
     assert inside.top() <= limit.top() < limit.bottom() <= p99.top() + 1
     assert p99.bottom() <= inside.bottom()
-
-
-@pytest.mark.parametrize("width", [230, 320, 900])
-@pytest.mark.parametrize("decades", [4, 5, 6])
-def test_the_numbers_of_the_decades_do_not_touch(qtbot: Any, width: int, decades: int) -> None:
-    plot = LatenessPlot(LIMIT_US)
-    qtbot.addWidget(plot)
-    plot.resize(900, 420)
-    plot.show()
-    qtbot.waitExposed(plot)
-    plot.show_histogram(np.logspace(0, decades, 10 * decades + 1), np.full(10 * decades, 10), 20.0)
-    plot.resize(width, 200)
-    QApplication.processEvents()
-    axis = plot.axes["bottom"]
-    metrics = QFontMetricsF(axis.style["tickFont"])
-    spans = [
-        (plot.box.mapViewToScene(QPointF(at, 0)).x(), metrics.horizontalAdvance(text))
-        for at, text in plot.ticks["bottom"]
-    ]
-    assert len(spans) >= 3
-    for (left, wide), (right, next_wide) in itertools.pairwise(spans):
-        assert left + wide / 2 < right - next_wide / 2
 
 
 def test_what_was_changed_is_painted_at_once_and_not_again_later(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -129,13 +129,3 @@ def test_undo_is_the_fields_while_something_is_typed_and_the_windows_otherwise(f
     QTest.keyClicks(field, "7")
     QTest.keySequence(field, QKeySequence("Ctrl+Z"))
     assert heard == ["undo"]
-
-
-def test_a_state_is_seen(field: Any) -> None:
-    field.other.setFocus()
-    looks = []
-    for state in ("", "changed", "refused"):
-        field.show_state(state)
-        assert field.state == state
-        looks.append(field.font().weight())
-    assert looks[0] < looks[1] == looks[2]

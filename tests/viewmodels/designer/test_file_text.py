@@ -8,7 +8,6 @@ from study_app.authoring.edited_study import read
 from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.file_text import file_text, retyped, shown
 
-LINES = st.lists(st.sampled_from(["a", "b = 1", "# é😀\u00a0", "", "\t"]), max_size=6)
 ENDS = st.sampled_from(["\n", "\r\n"])
 
 

@@ -7,7 +7,6 @@ from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.edits import Set
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.files import shipped_file
-from study_app.viewmodels.designer.addable import MOST_FIELDS, fields_to_go_to
 from study_app.viewmodels.designer.finding import SENTENCE, found_fields
 from study_app.viewmodels.designer.outline_rows import SECTIONS, outline_rows
 from study_app.viewmodels.designer.problem_rows import element_of, problem_rows
@@ -33,14 +32,6 @@ def test_the_session_comes_in_order_with_its_times(study: Study) -> None:
     assert (counts["Liquids"], counts["Groups"]) == ("4", "none")
 
 
-def test_faults_are_counted_and_said(study: Study) -> None:
-    broken, _ = study.edited(Set(("conditions", "honey", "liquid"), "hony"))
-    rows = outline_rows(broken, {})
-    faulty = {row.path: row for row in rows if row.faults}
-    assert set(faulty) == {("conditions",), ("conditions", "honey")}
-    assert faulty["conditions", "honey"].name == "Honey, condition, 1 problem"
-
-
 @pytest.mark.parametrize("words", ["vloeistof", "  SLIJM ", "delay_150"])
 def test_find_leaves_elements_that_hold_the_words(study: Study, words: str) -> None:
     rows = [row for row in outline_rows(study, {}, words) if row.path]
@@ -48,21 +39,6 @@ def test_find_leaves_elements_that_hold_the_words(study: Study, words: str) -> N
     every = [row for row in outline_rows(study, {}) if row.path]
     assert len(rows) < len(every)
     assert outline_rows(study, {}, "no such words anywhere") == ()
-
-
-@pytest.mark.parametrize(
-    ("words", "titles"),
-    [
-        ("force limit", {"Device · Force limit"}),
-        ("Force Limits", {"Device · Force limit"}),
-        ("item order", {"Liquid · Item order", "Delay · Item order"}),
-        ("square", {"Scene · Knee, Law"}),
-    ],
-)
-def test_find_leaves_elements_with_fields_of_the_words(study: Study, words: str, titles: set[str]) -> None:
-    rows = [row for row in outline_rows(study, {}, words) if row.path]
-    assert {row.title for row in rows} == titles
-    assert all(row.field[: len(row.path)] == row.path and row.name.endswith(row.title.split(" · ")[1]) for row in rows)
 
 
 def test_what_is_chosen_comes_before_what_could_be_chosen(study: Study) -> None:
@@ -75,14 +51,6 @@ def test_what_is_chosen_comes_before_what_could_be_chosen(study: Study) -> None:
     assert fields(chosen) == {("blocks", "liquids", "order")}
     assert {one.label for one in found_fields(chosen, "design")} == {"Trial design"}
     assert {one.rank for one in found_fields(study, "anew in each")} == {SENTENCE}
-
-
-def test_fields_are_offered_with_their_element_those_of_the_selected_one_first(study: Study) -> None:
-    offered = fields_to_go_to(study, "williams design", ("blocks", "delays"))
-    assert [one.words for one in offered][:1] == ["Order of block Delay effect, Williams"]
-    assert len(offered) == len(study.document["blocks"])
-    assert fields_to_go_to(study, "wi", ("study",)) == ()
-    assert len(fields_to_go_to(study, "delay", ("study",))) == MOST_FIELDS
 
 
 def test_problems_are_those_of_check_in_the_order_of_lines(study: Study) -> None:

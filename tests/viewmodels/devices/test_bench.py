@@ -46,7 +46,3 @@ def test_a_report_that_is_gone_is_said_and_not_offered(tmp_path: Path) -> None:
     assert gone.words.endswith(f"The report is missing: {report}.")
     report.write_text("# Bench\n")
     assert benches_shown([bench(report=str(report))])["falcon"].report == report
-
-
-def test_receipts_do_not_hold_the_path_of_the_report(tmp_path: Path) -> None:
-    assert str(tmp_path) not in str(bench(report=str(tmp_path / "bench.md")).entry)

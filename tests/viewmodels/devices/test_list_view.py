@@ -50,15 +50,6 @@ def test_a_falcon_is_as_well_as_the_best_way_to_it(ways, word, ready, why):
     assert (shown.word, shown.ready, shown.why) == (word, ready, why)
 
 
-def test_what_needs_a_path_is_not_chosen_here():
-    (shown,) = devices_shown([SOCKET])
-    assert not shown.choosable
-    assert not shown.ready
-    (mouse,) = devices_shown([MOUSE])
-    assert mouse.choosable
-    assert not mouse.diagnosable
-
-
 def test_the_preferred_device_is_named_before_anybody_looked_and_if_nobody_knows_it():
     shown = devices_shown([MOUSE, falcon("connected: FT1"), SOCKET])
     assert device_named("falcon:FT1", shown).title == "Novint Falcon"

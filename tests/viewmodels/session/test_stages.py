@@ -7,24 +7,6 @@ from study_app.store.progress import Progress
 from study_app.viewmodels.session.stages import stages
 
 
-def test_pages_and_trials_move_the_step_and_keep_their_durations(told):
-    told.welcome()
-    assert told.progress.here == 0
-    told.start(1)
-    assert told.progress.here == 1
-    assert told.progress.durations_s == {0: 10.0}
-    assert told.session.trial(told.progress) == told.schedule.trials[0]
-
-
-def test_answers_are_those_on_disk(told):
-    told.welcome()
-    told.start(1)
-    told.end(1)
-    assert sum(told.progress.answered.values()) == 0
-    told.answer(1)
-    assert sum(told.progress.answered.values()) == 2
-
-
 def test_an_interrupted_trial_is_not_done_and_starts_again_in_place(told):
     told.welcome()
     told.start(1)

@@ -15,7 +15,6 @@ from study_app.viewmodels.designer.requests import (
     DeleteElement,
     DuplicateElement,
     MoveElement,
-    RemoveKey,
     RenameElement,
     SwitchKind,
 )
@@ -168,15 +167,6 @@ def test_one_key_is_given_in_place_of_another_and_back_without_losing_its_value(
     designer.editing.select(("blocks", "liquids"))
     designer.row("blocks", "liquids", "conditions").keys.buttons[1].click()
     assert "nothing that Stimulus can name" in designer.row("blocks", "liquids", "conditions").wrong.sentence.text()
-
-
-def test_an_optional_key_is_written_and_removed(designer: Any) -> None:
-    designer.controller.open("kitchen")
-    before = designer.text
-    designer.editing.ask(AddKey(("blocks", "liquids", "break_every")))
-    assert "break_every" in designer.editing.opened.study.document["blocks"]["liquids"]
-    designer.editing.ask(RemoveKey(("blocks", "liquids", "break_every")))
-    assert designer.text == before
 
 
 def test_every_optional_key_of_a_liquid_can_be_added_and_undone(designer: Any) -> None:

@@ -4,10 +4,8 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication
 
 from study_app.gui.designer.prompts import SeriesCard
-from study_app.viewmodels.designer.prompts import series_plan
 from study_app.viewmodels.designer.requests import AddKey, AskSeries, MakeSeries
 
 pytestmark = pytest.mark.slow
@@ -236,18 +234,6 @@ def test_values_stay_for_another_element_that_has_the_same_number(
     assert (shown.number.currentText(), shown.values.text()) == ("Density [kg/m³]", kept)
 
 
-def test_the_button_of_a_series_stays_where_it_is_while_values_are_typed(qtbot: Any, water: Any) -> None:
-    water.place.series_asked.emit(AskSeries(CONDITION))
-    shown = card(water)
-    bottoms = set()
-    for typed in ("", "0", "0 60 120", "0 6x", " ".join(map(str, range(0, 240, 10)))):
-        shown.values.selectAll()
-        qtbot.keyClicks(shown.values, typed) if typed else None
-        QApplication.processEvents()
-        bottoms.add(shown.make.mapTo(shown.window(), shown.make.rect().bottomRight()).toTuple())
-    assert len(bottoms) == 1
-
-
 @pytest.mark.parametrize("word", ["series", "levels", "delays"])
 @pytest.mark.parametrize("selected", [CONDITION, LISTED[:2]])
 def test_a_series_is_found_in_the_list_of_what_can_be_added(
@@ -284,14 +270,6 @@ def test_ctrl_shift_d_says_why_there_can_be_no_series(
     assert designer.place.prompt is None
 
 
-def test_the_plan_shows_every_digit(water: Any) -> None:
-    density = ("liquids", "thin", "density_kg_m3")
-    plan = series_plan(water.editing.opened.study, density[:2], density, "1000 1000.0001")
-    assert [line.partition(": ")[2] for line in plan.lines] == [
-        "1000 kg/m³  ·  thin", "1000.0001 kg/m³  ·  thin_1000_0001",
-    ]  # fmt: skip
-
-
 def test_blocks_of_a_series_get_letters_titles_and_places_in_the_session(designer: Any) -> None:
     block = ("blocks", "liquids")
     designer.controller.open("rek2024")
@@ -308,13 +286,3 @@ def test_blocks_of_a_series_get_letters_titles_and_places_in_the_session(designe
     assert len(letters) == len(set(letters))
     assert after["blocks"]["liquids_3"]["title"]["nl"] == "Basisinstellingen, 3"
     assert designer.editing.opened.study.faults == faults
-
-
-def test_a_long_series_leaves_its_buttons_free_in_a_low_window(qtbot: Any, water: Any) -> None:
-    water.window.resize(1024, 640)
-    water.place.series_asked.emit(AskSeries(CONDITION))
-    shown = card(water)
-    qtbot.keyClicks(shown.values, " ".join(map(str, range(0, 240, 10))))
-    assert shown.make.text() == "Make 24 conditions"
-    qtbot.waitUntil(shown.area.isVisible)
-    qtbot.waitUntil(lambda: shown.area.geometry().bottom() < shown.make.geometry().top())

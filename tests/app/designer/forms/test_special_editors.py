@@ -8,8 +8,6 @@ from PySide6.QtGui import QGuiApplication, QMouseEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.authoring.fields import rows
-from study_app.authoring.new_study import Answers
-from study_app.gui.designer.form.row_widget import RowWidget
 from study_app.gui.designer.form.special import EDITORS
 from study_app.gui.widgets.controls import IconButton
 from study_app.haptics.model.steady_state import steady
@@ -234,20 +232,6 @@ def test_a_question_without_an_id_says_so_at_its_id_and_gets_one(qtbot: Any, des
     assert not designer.place.form.head.refusal.isVisible()
 
 
-def test_the_form_of_a_questionnaire_without_a_language_fits_its_width(qtbot: Any, designer: Any) -> None:
-    """Many problems of one row neither widen the form nor offer repairs that read the same."""
-    designer.controller.begin("template:compare-liquids", "mine", Answers(languages=("en", "nl")))
-    designer.editing.select(("questionnaires", "liquid"))
-    row = designer.row("questionnaires", "liquid", "items")
-    problems = [one for one in designer.place.view.problems if one.fault.path[: len(ITEMS)] == ITEMS]
-    qtbot.waitUntil(lambda: bool(designer.place.problems.repairs_of(problems[-1])), timeout=10_000)
-    assert row.repairs == []
-    assert row.wrong.sentence.text().count("Is missing") == 1
-    assert row.minimumSizeHint().width() <= row.width()
-    area = designer.place.form.area
-    assert area.widget().width() <= area.viewport().width()
-
-
 def test_the_keyboard_stays_in_a_row_that_is_made_anew(qtbot: Any, designer: Any, editors: None) -> None:
     designer.controller.open("kitchen")
     designer.editing.select(("blocks", "liquids"))
@@ -285,14 +269,3 @@ def test_a_question_is_shown_whole_and_typed_as_one_paragraph(qtbot: Any, design
     assert designer.text != before
     designer.editing.undo()
     assert designer.text == before
-
-
-def test_rows_below_what_is_seen_are_made_when_the_form_is_painted(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.window.resize(1024, 640)
-    designer.select(("pages", "welcome"))
-    designer.editing.select(("blocks", "liquids"))
-    form = designer.place.form
-    assert len(form.inside.findChildren(RowWidget)) < len(form.form.rows)
-    qtbot.waitUntil(lambda: len(form.inside.findChildren(RowWidget)) == len(form.form.rows))
-    assert all(row.isVisible() for row in form.rows)

@@ -8,13 +8,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QShortcut
 from PySide6.QtWidgets import QApplication, QLabel
 
-from study_app.gui.designer.keys_card import HIGHEST
-from study_app.gui.designer.participant.participant_tab import ParticipantTab
 from study_app.gui.designer.play.play_strip import PlayStrip
 from study_app.gui.operator.strip import Strip
 from study_app.gui.widgets.controls import Cap
 from study_app.viewmodels.designer.keys import GROUPS, KEYS
-from study_app.viewmodels.designer.participant_page import ParticipantView
 from study_app.viewmodels.designer.play import under_way
 
 pytestmark = pytest.mark.slow
@@ -53,20 +50,6 @@ def test_the_card_lists_every_key_and_esc_gives_the_keyboard_back(qtbot: Any, de
     assert designer.place.form.isAncestorOf(QApplication.focusWidget())
 
 
-@pytest.mark.parametrize("size", [(1024, 640), (1366, 768)])
-def test_the_card_has_room_in_small_windows(qtbot: Any, designer: Any, size: tuple[int, int]) -> None:
-    designer.window.resize(*size)
-    designer.controller.open("kitchen")
-    qtbot.keyClick(designer.window, Qt.Key.Key_F1, SHIFT)
-    card = designer.place.keys
-    QApplication.processEvents()
-    assert designer.place.rect().contains(card.geometry())
-    assert card.height() <= HIGHEST
-    inside, viewport = card.area.widget(), card.area.viewport()
-    assert inside.minimumSizeHint().width() <= viewport.width()
-    assert inside.height() <= viewport.height(), "every key is seen without scrolling"
-
-
 def test_buttons_say_their_keys(designer: Any) -> None:
     designer.controller.open("kitchen")
     designer.editing.select(("blocks", "liquids"))
@@ -84,25 +67,6 @@ def test_buttons_say_their_keys(designer: Any) -> None:
     assert "Ctrl+F" in outline.words.placeholderText()
     for button in (outline.add, outline.duplicate):
         assert button.width() >= button.minimumSizeHint().width(), "there is room for the cap of its key"
-
-
-def test_the_key_of_the_languages_is_shown_beside_them_where_there_is_room(qtbot: Any) -> None:
-    tab = ParticipantTab()
-    qtbot.addWidget(tab.aside)
-    tab.show_view(ParticipantView(languages=("en", "nl"), language="en"))
-    tab.aside.show()
-    tab.fit_aside(1000)
-    room = tab.aside.sizeHint().width()
-    assert tab.language_key.isVisible()
-    assert tab.language_key.words == "Ctrl L"
-    tab.fit_aside(room)
-    assert tab.language_key.isVisible()
-    tab.fit_aside(room - 1)
-    assert not tab.language_key.isVisible()
-    assert tab.aside.sizeHint().width() < room
-    tab.show_view(ParticipantView(languages=("en",), language="en"))
-    tab.fit_aside(1000)
-    assert not tab.language_key.isVisible()
 
 
 def test_what_stops_playing_shows_its_key(qtbot: Any) -> None:

@@ -8,7 +8,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.gui.designer.tab_order import stops
-from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.viewmodels.designer.requests import ChangeLanguage, SetValue
 
 pytestmark = pytest.mark.slow
@@ -154,21 +153,6 @@ def test_tab_goes_to_the_drafts_to_continue_where_no_study_is_open(qtbot: Any, d
     for expected in (*place.nothing.drafts, place.nothing.new, place.header.study):
         place.focusNextChild()
         assert QApplication.focusWidget() is expected
-
-
-@pytest.mark.parametrize("theme", [LIGHT, DARK])
-def test_a_ring_shows_the_tab_with_the_keyboard_and_its_surface_the_chosen_one(dutch: Any, theme: Any) -> None:
-    dutch.window.show_theme(theme)
-    tabs = dutch.place.pane.tabs
-    chosen, other, third = tabs.buttons[:3]
-    for focused in (chosen, other):
-        focused.setFocus()
-        image = tabs.grab().toImage()
-        for one in (chosen, other, third):
-            middle, top = one.geometry().center().x(), one.geometry().top()
-            at = [image.pixelColor(middle, top + y).name().upper() for y in (-2, 4)]
-            assert (at[0] == theme.accent.upper()) == (one is focused)
-            assert (at[1] == theme.surface.upper()) == (one is chosen)
 
 
 def test_tab_goes_to_what_the_line_above_the_parts_offers_and_then_to_what_closes_it(qtbot: Any, designer: Any) -> None:

@@ -1,6 +1,5 @@
 """The tab Measures in its window: what follows an edit, what is ordered and given up, and the repair of levels."""
 
-import time
 from typing import Any
 
 import pytest
@@ -15,17 +14,8 @@ from study_app.authoring.kept_settings import keep_setting, kept_participants
 from study_app.authoring.writer.edits import Set
 from study_app.gui.designer.measures.card_grid import CardGrid
 from study_app.gui.designer.measures.limit_colours import limit_colour
-from study_app.gui.designer.measures.parts import NumberPart
 from study_app.gui.theme.theme import DARK, LIGHT
-from study_app.protocol.source.files import shipped_file
-from study_app.viewmodels.designer.measures.number_cards import (
-    ON_AVERAGE,
-    UNKNOWN,
-    Line,
-    LinesCard,
-    NumberCard,
-    TextsCard,
-)
+from study_app.viewmodels.designer.measures.number_cards import ON_AVERAGE, UNKNOWN, Line, LinesCard, TextsCard
 from tests.app.designer.measures.conftest import Worker, jnd, shown
 
 pytestmark = pytest.mark.slow
@@ -236,34 +226,6 @@ def test_every_element_has_measures_that_fit(
         qtbot.waitUntil(lambda path=path: page.shown is not None and designer.editing.selected == path)
         designer.controller.measures.show()
         assert page.area.widget().minimumSizeHint().width() <= page.area.viewport().width(), path
-
-
-def test_instant_numbers_of_the_largest_study_take_less_than_100_ms(designer: Any) -> None:
-    text = shipped_file("rek2024").read_text(encoding="utf-8").replace('name = "rek2024"', 'name = "large"')
-    (designer.file.parent / "large.toml").write_text(text, encoding="utf-8")
-    designer.controller.open("large")
-    designer.editing.select(("blocks", "liquids"))
-    designer.place.pane.show_tab("measures")
-    spent = []
-    for number in range(6):
-        designer.editing.make("Change", Set(("device", "force_limit_n"), 4 + 0.1 * number))
-        began = time.perf_counter()
-        designer.controller.measures.show()
-        spent.append(time.perf_counter() - began)
-    assert min(spent) < 0.1
-
-
-@pytest.mark.parametrize(("number", "size_px"), [("5.1 – 60", 26), ("4.8 – 240", 16)])
-def test_a_number_is_never_cut(qtbot: Any, number: str, size_px: int) -> None:
-    part = NumberPart()
-    qtbot.addWidget(part)
-    part.resize(154, 90)
-    part.show_card(NumberCard("JNDs it can measure", number, "%"))
-    part.show()
-    assert part.number.width() >= part.number.sizeHint().width()
-    assert part.number.font().pixelSize() == size_px
-    part.resize(300, 90)
-    assert part.number.font().pixelSize() == 26
 
 
 def test_measures_are_those_of_the_study_that_is_opened(qtbot: Any, designer: Any) -> None:

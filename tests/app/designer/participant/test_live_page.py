@@ -11,7 +11,7 @@ import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QCursor, QImage
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QStackedWidget
+from PySide6.QtWidgets import QApplication
 
 from study_app.authoring.edited_study import read
 from study_app.authoring.writer.edits import Set, Unset
@@ -246,21 +246,6 @@ def test_nothing_moves_while_the_page_is_hidden(qtbot: Any, designer: Any, live:
     designer.select(("pages", "thanks"))
     designer.place.pane.show_tab("participant")
     assert isinstance(live.page_window.page, TextPage)
-
-
-def test_the_tab_is_as_high_as_the_page_its_note_and_its_rows_of_buttons(designer: Any, live: Any) -> None:
-    tab = designer.controller.preview.tab
-    stack = designer.place.pane.findChild(QStackedWidget, options=Qt.FindChildOption.FindDirectChildrenOnly)
-    designer.editing.ask(SetValue(("device", "force_limit_n"), -1.0))
-    assert tab.note.isVisible()
-    assert stack.maximumHeight() == tab.most_px
-    designer.editing.undo()
-    assert not tab.note.isVisible()
-    assert stack.maximumHeight() == tab.most_px
-    designer.controller.begin("template:viscosity-jnd", "thicker")
-    designer.select(("blocks", "viscosity"))
-    assert len(tab.view.moments) > 2
-    assert stack.maximumHeight() == tab.most_px
 
 
 @pytest.mark.variants(4)

@@ -59,15 +59,3 @@ def test_the_language_is_kept_for_the_study(designer: Any, tab: Any) -> None:
     designer.controller.open("kitchen")
     designer.select(ITEM)
     assert (tab.view.language, kept_language(file)) == ("nl", "nl")
-
-
-def test_a_page_at_fit_is_as_wide_as_its_column_in_a_small_window(qtbot: Any, designer: Any) -> None:
-    designer.window.resize(1366, 768)
-    designer.controller.open("thickness")  # read-only: a line above the parts takes height, too
-    designer.select(("study",))
-    tab = designer.controller.preview.tab
-    room = tab.column.contentsMargins()
-    qtbot.waitUntil(
-        lambda: tab.page.page_size.width() * tab.page.scale_now > tab.width() - room.left() - room.right() - 8,
-        timeout=2000,
-    )

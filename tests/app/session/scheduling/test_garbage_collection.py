@@ -67,15 +67,6 @@ def test_a_thread_that_allocates_frees_nothing_of_the_windows(qtbot: Any) -> Non
     assert len(kept) == 20_000
 
 
-def test_without_it_another_thread_would(qapp: QObject) -> None:
-    freed_in: list[int] = []
-    gc.collect()
-    Cycle(freed_in)
-    allocate_elsewhere()
-    assert freed_in
-    assert freed_in != [threading.get_ident()]
-
-
 def test_garbage_of_closed_windows_is_freed_before_another_thread_may(qapp: QObject) -> None:
     freed_in: list[int] = []
     with collecting_here():

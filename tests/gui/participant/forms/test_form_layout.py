@@ -7,12 +7,11 @@ import pytest
 from PySide6.QtWidgets import QLabel, QWidget
 
 from study_app.gui.participant.forms.question_field import LEAST_TARGET
-from study_app.gui.participant.forms.question_form import FormWidget
 from study_app.protocol.questions.choice import ChoiceView
 from study_app.protocol.questions.question import ItemView
 from study_app.protocol.questions.rating import RatingView
 from study_app.protocol.questions.slider import SliderView
-from tests.gui.participant.forms.opened_form import FIVE, QUESTIONS, Opened, form, place_of
+from tests.gui.participant.forms.opened_form import FIVE, QUESTIONS, form, place_of
 
 pytestmark = pytest.mark.slow
 
@@ -89,11 +88,3 @@ def test_scale_keeps_its_order_from_right_to_left_and_all_else_is_mirrored(openi
     for item in ("hand", "comment"):
         words_here, words_there = (place_of(one, one.field(item).statement) for one in (here, there))
         assert words_here.left() == pytest.approx(width - words_there.right() - 1, abs=2)
-
-
-def test_page_of_a_form_comes_in_time(opened: Opened, qtbot: Any) -> None:
-    """No widget is left behind when a form gives way to another."""
-    before = opened.page
-    opened.window.show_page(form(TLX))
-    qtbot.waitUntil(lambda: not any(child is before for child in opened.window.children()), timeout=5000)
-    assert len(opened.window.findChildren(FormWidget)) == 1

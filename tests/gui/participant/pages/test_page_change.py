@@ -13,7 +13,6 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant.pages.text_page import TextWidget
-from study_app.gui.participant.tank import backdrop
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import EndPage, Page, PausePage, TroublePage
@@ -103,18 +102,6 @@ def test_the_screen_shows_the_old_page_and_then_the_new_one(window: ParticipantW
         assert pictures[-1] == whole
 
 
-@pytest.mark.slow
-def test_a_watcher_sees_a_picture_that_is_neither_page(window: ParticipantWindow) -> None:
-    class Hasty(ParticipantWindow):
-        def show_page(self, page: Page) -> None:
-            self.widget.hide()
-            QApplication.processEvents()
-            super().show_page(page)
-
-    window.__class__ = Hasty
-    assert len(change(window, questionnaire())) == 3
-
-
 def test_the_first_view_adds_the_ball_and_nothing_else(window: ParticipantWindow) -> None:
     window.show_page(task_page())
     QApplication.processEvents()
@@ -134,21 +121,6 @@ def test_the_first_view_adds_the_ball_and_nothing_else(window: ParticipantWindow
 
 def pixels(image: QImage) -> Any:
     return np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), image.width(), 4)[..., :3].copy()
-
-
-def test_the_tank_is_painted_while_the_text_before_it_is_read(
-    window: ParticipantWindow, qtbot: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    window.resize(1031, 647)  # a size that no other test has painted
-    window.show_page(text_page(coming=task_page()))
-    qtbot.waitUntil(lambda: window.painting is not None)
-    assert window.painting is not None
-    window.painting.join()
-    again: list[Any] = []
-    monkeypatch.setattr(backdrop.glass, "walls", lambda *arguments: again.append(arguments))
-    window.show_page(task_page())
-    QApplication.processEvents()
-    assert again == []
 
 
 def test_tab_goes_round_on_the_page_and_never_to_the_window(window: ParticipantWindow) -> None:

@@ -4,7 +4,6 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QPixmap
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QScrollArea
 
@@ -85,18 +84,6 @@ def test_title_and_paragraphs_are_shown_as_written(qtbot: Any) -> None:
     assert "Less than < 8 N & more." in widget.accessibleDescription()
 
 
-@pytest.mark.parametrize("size", [(1024, 640), (1366, 768), (1920, 1080), (3840, 2160)], ids=str)
-def test_text_and_button_fit_every_window(qtbot: Any, size: tuple[int, int]) -> None:
-    widget = TextWidget(text_page(paragraphs=("A sentence about the study. " * 12,) * 2), ENGLISH, ManualClock())
-    opened(qtbot, widget, size)
-    assert widget.button is not None
-    column, area = widget.findChild(Column), widget.findChild(QScrollArea)
-    assert column.height() == area.height()  # nothing to scroll
-    assert area.geometry().bottom() < widget.button.geometry().top()
-    assert widget.rect().contains(widget.button.geometry())
-    assert area.verticalScrollBarPolicy() == Qt.ScrollBarPolicy.ScrollBarAlwaysOff
-
-
 def test_text_too_long_for_the_window_scrolls_and_keeps_the_button(qtbot: Any) -> None:
     widget = TextWidget(text_page(paragraphs=("A sentence about the study. " * 30,) * 4), ENGLISH, ManualClock())
     opened(qtbot, widget, (1024, 640))
@@ -139,17 +126,6 @@ def test_what_the_operator_stopped_has_nothing_to_press(qtbot: Any, page: PauseP
     assert told == []
     assert (said.force_held_title in texts(widget)) is (page.held == "force")
     assert (said.force_held_body if page.force_off else said.pause_held_body) in texts(widget)
-
-
-def test_pause_lies_on_the_page_below_as_a_shade(qtbot: Any) -> None:
-    under = QPixmap(1366, 768)
-    under.fill(Qt.GlobalColor.white)
-    widget = PauseWidget(PausePage(force_off=False), ENGLISH, ManualClock(), under=under)
-    opened(qtbot, widget)
-    corner = widget.grab().toImage().pixelColor(4, 4)
-    bare = PauseWidget(PausePage(force_off=False), ENGLISH, ManualClock())
-    opened(qtbot, bare)
-    assert bare.grab().toImage().pixelColor(4, 4).lightness() < corner.lightness() < 100
 
 
 def test_trouble_has_nothing_to_press(qtbot: Any) -> None:

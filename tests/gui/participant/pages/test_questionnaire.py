@@ -1,19 +1,16 @@
 """The questionnaire: what is shown, what keys and clicks tell, and that it fits."""
 
-from itertools import pairwise
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QPoint, QRect, QRectF, Qt
-from PySide6.QtGui import QColor, QFontMetricsF
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication
 
 from study_app.gui.participant.pages.column_labels import Heading
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
-from study_app.gui.participant.pages.questionnaire_grid import LEAST_CELL, POINTS, Asked, grid, parts
-from study_app.gui.participant.pages.statement_field import WRAP_LEFT, StatementField
-from study_app.gui.theme.theme import font
+from study_app.gui.participant.pages.questionnaire_grid import parts
+from study_app.gui.participant.pages.statement_field import StatementField
 from study_app.protocol.questions.question import ItemView
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import QuestionnairePage
@@ -32,7 +29,6 @@ DUTCH_LABELS = (
     "Grotendeels mee eens",
     "Helemaal mee eens",
 )
-LONG = "De gesimuleerde vloeistof gedraagt zich in alle richtingen op de manier die ik er vooraf van verwachtte."
 
 
 class Shown:
@@ -77,12 +73,6 @@ def shown(qtbot: Any) -> Shown:
     return Shown(qtbot, questionnaire(), (1366, 768))
 
 
-def test_nothing_is_preset(shown: Shown) -> None:
-    assert not any(cell.isChecked() for row in shown.rows for cell in row.options)
-    assert shown.told == []
-    assert shown.widget.message == ""
-
-
 def test_every_item_is_told_once_when_it_is_seen_in_order(shown: Shown) -> None:
     seen = [event for event in shown.events if isinstance(event, ItemShown)]
     assert [event.item for event in seen] == [f"item{n}" for n in range(1, 10)]
@@ -90,14 +80,6 @@ def test_every_item_is_told_once_when_it_is_seen_in_order(shown: Shown) -> None:
     shown.widget.repaint()
     QApplication.processEvents()
     assert len(shown.events) == 9
-
-
-def test_key_answers_and_moves_on(shown: Shown) -> None:
-    assert shown.focus is shown.rows[0]
-    shown.press(KEY.Key_6, KEY.Key_5)
-    assert [(e.item, e.value) for e in shown.told] == [("item1", 6), ("item2", 5)]
-    assert shown.focus is shown.rows[2]
-    assert shown.rows[0].options[5].isChecked()
 
 
 def test_nine_keys_and_enter_make_the_whole_exact_sequence(shown: Shown) -> None:
@@ -221,98 +203,9 @@ def test_choices_come_back_after_a_pause_without_being_told_again(qtbot: Any) ->
     assert shown.widget.missing == (2, 4, 5, 6, 7, 8, 9)
 
 
-def test_names_for_a_screen_reader(shown: Shown) -> None:
-    row = shown.rows[4]
-    assert row.accessibleName() == "5. This liquid behaves like honey."
-    assert row.accessibleDescription() == "no answer yet"
-    assert row.options[4].accessibleName() == "5 Somewhat agree"
-    shown.click(4, 4)
-    assert row.accessibleDescription() == "chosen: 5 Somewhat agree"
-
-
 def test_a_screen_reader_hears_that_a_statement_is_optional(qtbot: Any) -> None:
     shown = Shown(qtbot, questionnaire(items=(ItemView("may", 1, "B.", required=False),)), (1366, 768))
     assert shown.rows[0].accessibleDescription() == f"{words('en').optional}, no answer yet"
-
-
-def test_page_of_nine_statements_has_few_widgets(shown: Shown) -> None:
-    """Each takes time when the page comes: 63 cells, 9 rows, their words, and what is around them."""
-    assert len(shown.widget.findChildren(QWidget)) <= 63 + 9 + 9 + 8
-
-
-def place_in(row: StatementField, part: QWidget) -> QRect:
-    return QRect(part.mapTo(row, QPoint(0, 0)), part.size())
-
-
-SIZES = [(1366, 768), (1920, 1080), (1280, 720), (1024, 640), (1280, 1024), (2560, 1440)]
-
-
-@pytest.mark.parametrize("size", SIZES, ids=str)
-@pytest.mark.parametrize("judge", [None, "Cannot judge"])
-def test_nine_statements_fit_without_scrolling(qtbot: Any, size: tuple[int, int], judge: str | None) -> None:
-    shown = Shown(qtbot, questionnaire(cannot_judge=judge), size)
-    area = shown.widget.rect()
-    below = shown.widget.foot.geometry().top()
-    for before, after in pairwise(shown.rows):
-        assert before.geometry().bottom() <= after.geometry().top()
-    for row in shown.rows:
-        assert row.isVisible()
-        assert area.contains(row.geometry())
-        assert row.geometry().bottom() < below
-        places = [place_in(row, cell) for cell in row.options]
-        words = place_in(row, row.statement)
-        for place in places:
-            assert min(place.width(), place.height()) >= LEAST_CELL
-            assert row.rect().contains(place)
-            assert place.left() > words.right()
-        for one, other in pairwise(places):
-            assert one.right() < other.left()
-        assert words.height() >= row.statement.heightForWidth(words.width()) - 1
-
-
-def test_rows_without_an_introduction_do_not_overlap(qtbot: Any) -> None:
-    shown = Shown(qtbot, questionnaire(intro=""), (1024, 640))
-    assert all(before.geometry().bottom() < after.geometry().top() for before, after in pairwise(shown.rows))
-
-
-def test_points_stand_on_the_ground_of_their_row(shown: Shown) -> None:
-    def grounds() -> list[tuple[QColor, QColor]]:
-        image = shown.widget.grab().toImage()
-        corners = [point.mapTo(shown.widget, QPoint(0, 0)) for row in shown.rows for point in row.points]
-        return [(image.pixelColor(corner), image.pixelColor(corner - QPoint(2, 0))) for corner in corners]
-
-    shown.rows[0].point(0)
-    before = grounds()
-    assert all(corner == beside for corner, beside in before)
-    shown.widget.submit()  # every row is marked as missing an answer
-    after = grounds()
-    assert all(corner == beside for corner, beside in after)
-    assert after[-1] != before[-1]
-
-
-@pytest.mark.parametrize("size", [(1366, 768), (1024, 640), (860, 640)], ids=str)
-def test_long_dutch_texts_are_not_clipped(qtbot: Any, size: tuple[int, int]) -> None:
-    page = questionnaire((LONG,) * 9, labels=DUTCH_LABELS, intro="In hoeverre bent u het eens met elke uitspraak?")
-    shown = Shown(qtbot, page, size, "nl")
-    shown.widget.submit()  # the note under each statement takes room as well
-    for row in shown.rows:
-        if not row.isVisible():
-            continue
-        _face, _note, height, note = row.fitted(row.sizes, row.note)
-        assert height + note <= row.height()
-    for column in range(7):
-        heading = shown.widget.findChild(Heading)
-        heading.point(column)
-        for label in heading.columns():
-            place = heading.column_area(label)
-            metrics = QFontMetricsF(font("label", scale=shown.rows[0].sizes.scale, weight=600))
-            bounds = metrics.boundingRect(QRectF(0, 0, place.width(), 1e4), WRAP_LEFT, DUTCH_LABELS[label])
-            assert bounds.height() <= place.height() + 1
-            assert bounds.width() <= place.width() + 1
-            assert place.right() <= heading.width() + 1
-        places = [heading.column_area(c) for c in sorted(heading.columns())]
-        for one, other in pairwise(places):
-            assert one.right() <= other.left() + 1
 
 
 def test_small_window_shows_five_a_page_and_asks_page_by_page(qtbot: Any) -> None:
@@ -340,31 +233,6 @@ def test_growing_window_brings_all_statements_back(qtbot: Any) -> None:
     shown.widget.resize(1366, 768)
     assert all(row.isVisible() for row in shown.rows)
     assert shown.widget.tabs == []
-
-
-def test_cells_lie_side_by_side_after_the_window_has_grown(qtbot: Any) -> None:
-    shown = Shown(qtbot, questionnaire(), (1366, 768))
-    shown.widget.resize(1920, 1080)
-    QApplication.processEvents()
-    for row in shown.rows:
-        for one, other in pairwise(place_in(row, cell) for cell in row.options):
-            assert one.right() < other.left()
-
-
-def test_grid_keeps_cells_large_and_the_row_within_its_width() -> None:
-    for width in range(800, 2600, 60):
-        for height in range(600, 1500, 60):
-            for judge in (0, 60):
-                margin = 40 if width >= 1100 else 24
-                across = grid(width, height, Asked(470, judge), margin)
-                made = (across.with_rows(height - 210, per_page) for per_page in parts(9, width))
-                sizes = next(one for one in made if one.holds)
-                assert min(sizes.cell_width, sizes.cell_height) >= LEAST_CELL
-                assert sizes.cell_height <= sizes.pitch
-                assert sizes.statement_width >= 120
-                scale = POINTS * sizes.cell_pitch - 6 * sizes.scale + 16 * sizes.scale
-                taken = sizes.number_width + sizes.statement_width + scale + sizes.judge_gap + sizes.judge_width
-                assert taken == pytest.approx(width - 2 * margin)
 
 
 def test_parts_are_as_even_as_they_can_be() -> None:

@@ -4,7 +4,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.gui.participant.tank import caustics
 from study_app.gui.participant.tank.camera import Box, Camera
 from study_app.gui.participant.tank.frame import BallPlacer
 
@@ -72,10 +71,3 @@ def test_shadow_is_wider_and_fainter_under_a_high_ball() -> None:
     assert high.spread > low.spread
     assert high.shade < low.shade
     assert len(high.feet) > len(low.feet)
-
-
-def test_caustics_are_the_same_every_time_and_faint_in_the_mean() -> None:
-    light = caustics.brightness()
-    assert light.shape == (caustics.ROWS, caustics.COLUMNS)
-    assert 0 <= light.min() < light.max() <= 1
-    assert light.mean() < 0.2

@@ -3,11 +3,9 @@
 from typing import Any
 
 import pytest
-from PySide6.QtGui import QImage, QPainter, QRegion
 
 from study_app.gui.participant.tank.captions import Captions
 from study_app.protocol.wording.languages import LANGUAGES, words
-from study_app.session.pages import Interval, Progress
 from tests.gui.small import explore, reach, task_page, view
 
 pytestmark = pytest.mark.usefixtures("qapp")
@@ -43,29 +41,3 @@ def test_last_ten_seconds_of_a_limit_are_counted_down(task: Any, elapsed_s: floa
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_every_language_says_that_time_is_up(language: str) -> None:
     assert hint(COUNTING, 60.0, language) == words(language).time_is_up
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("language", ["en", "ar"])
-@pytest.mark.parametrize("size", [(1024, 640), (1366, 768)])
-def test_the_bars_of_settings_leave_room_to_the_marks_of_intervals(language: str, size: tuple[int, int]) -> None:
-    progress = Progress(1, 2, "Pair", 3, 8)
-
-    def drawn(**shown: Any) -> QImage:
-        captions = Captions(task_page(EXPLORING, **shown), words(language))
-        captions.lay_out(*size, 0.84 * size[1])
-        image = QImage(*size, QImage.Format.Format_RGB32)
-        image.fill(0)
-        painter = QPainter(image)
-        captions.draw(painter, QRegion(0, 0, size[0], size[1] // 5), view(elapsed_s=1.0).task)
-        painter.end()
-        return image
-
-    interval = Interval(1, 2, False, "The first")
-    both, marks, neither = drawn(progress=progress, interval=interval), drawn(interval=interval), drawn()
-    rows, columns = range(size[1] // 5), range(size[0])
-    of_marks = {x for x in columns if any(marks.pixel(x, y) != neither.pixel(x, y) for y in rows)}
-    of_bars = {x for x in columns if any(both.pixel(x, y) != marks.pixel(x, y) for y in rows)}
-    assert of_marks
-    assert of_bars
-    assert not of_marks & of_bars

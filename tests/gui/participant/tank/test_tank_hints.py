@@ -29,18 +29,6 @@ def test_reaching_cannot_be_left(tank: TankWidget) -> None:
     assert not tank.may_leave
 
 
-def test_time_that_is_left_is_drawn_where_time_ends_the_task(qtbot: Any) -> None:
-    widget = TankWidget(task_page(reach(count=None, duration_s=30)), words("en"))
-    qtbot.addWidget(widget)
-    widget.resize(960, 640)
-    widget.show_view(view(elapsed_s=10.0))
-    first = shown(widget)
-    widget.show_view(view(elapsed_s=10.0))
-    assert (first == shown(widget)).all()
-    widget.show_view(view(elapsed_s=11.0))
-    assert (first != shown(widget)).any()
-
-
 def hint_at(qtbot, position_m, *, by_mouse=True, language="en", **changed):
     """Return what is said below the tank while the ball is at a place [m]; the lit target is at x = 30 mm."""
     widget = TankWidget(task_page(reach(**changed)), words(language), by_mouse=by_mouse)

@@ -9,7 +9,6 @@ from study_app.authoring.edited_study import Study, read
 from study_app.authoring.new_study import template
 from study_app.authoring.outline import outline
 from study_app.authoring.templates import FOLDER, templates
-from study_app.authoring.writer.edits import Set, Unset
 from study_app.protocol.source.document import value_at
 from study_app.protocol.source.files import shipped, shipped_file
 from study_app.viewmodels.designer.form.form_rows import first_element, form, position_of
@@ -57,16 +56,6 @@ def test_a_row_says_its_place_and_line(study: Study) -> None:
     assert study.text.splitlines()[int(line) - 1].startswith("order = ")
 
 
-def test_a_fault_is_at_its_row(study: Study) -> None:
-    broken, _ = study.edited(Set(("blocks", "liquids", "order"), "shufled"))
-    faulty = [row for row in form(broken, ("blocks", "liquids")).rows if row.faults]
-    assert [row.row.path[-1] for row in faulty] == ["order"]
-    assert 'did you mean "shuffled"?' in faulty[0].faults[0]
-    lacking, _ = study.edited(Unset(("conditions", "honey", "liquid")))
-    made = form(lacking, ("conditions", "honey"))
-    assert made.faults or any(row.faults for row in made.rows)
-
-
 def test_optional_keys_are_offered_not_shown(study: Study) -> None:
     made = form(study, ("blocks", "liquids"))
     absent = {row.path[-1] for section in made.sections for row in section.absent}
@@ -91,13 +80,6 @@ def test_keys_that_do_not_belong_are_neither_offered_nor_shown(
     assert there <= keys
     document = template(name).document["blocks"][block]
     assert set(document) <= keys
-
-
-def test_the_sections_of_a_model_head_its_form(study: Study) -> None:
-    sections = {section.title: section for section in form(study, ("blocks", "liquids")).sections}
-    assert list(sections) == ["Words", "What is presented", "In each trial", "Part and blinding", "Breaks"]
-    assert [row.row.path[-1] for row in sections["Words"].rows] == ["title", "setting_label"]
-    assert [row.path[-1] for row in sections["Breaks"].absent] == ["break_every", "break_page"]
 
 
 def test_texts_have_every_language_and_references_their_target(study: Study) -> None:

@@ -24,8 +24,6 @@ from study_app.viewmodels.designer.measures.number_cards import (
     TextsCard,
 )
 
-SECTIONS = ("study", "device", "blocks", "liquids", "conditions", "tasks", "questionnaires", "pages", "stimuli")
-
 
 def study_of(name: str) -> Study:
     return read(shipped_file(name).read_bytes(), shipped_file(name).parent)
