@@ -1,8 +1,11 @@
+"""Elements that are added, copied, or switched to another kind."""
+
 import pytest
 
 from study_app.authoring.additions import added, duplicated
 from study_app.authoring.changes.initial_values import initial
-from study_app.authoring.edited_study import read
+from study_app.authoring.conversions import left_by, switched
+from study_app.authoring.edited_study import Study, read
 from study_app.authoring.fields import row_at
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.refused import Refused
@@ -112,3 +115,38 @@ def test_a_new_liquid_exerts_a_force_and_a_new_ball_fits_the_tank() -> None:
     assert study.faults == ()
     assert study.document["liquids"][path[1]] == {"density_kg_m3": 1200}
     assert initial(study.document, (*path, "body", "diameter_m")) == 0.068
+
+
+TASK = ("tasks", "explore")
+
+
+def study_of(name: str) -> Study:
+    return read((PROTOCOLS / f"{name}.toml").read_bytes(), PROTOCOLS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["reach", "follow"])
+def test_switched_keeps_what_both_kinds_have_and_gives_back_the_rest(kind: str) -> None:
+    study = study_of("slime")
+    left = left_by(study, TASK, kind)
+    assert set(left) == {"min_s", "max_s"}
+    other, _ = study.edited(*switched(study, TASK, kind, {}))
+    table = other.document["tasks"]["explore"]
+    assert table["kind"] == kind
+    assert table["instruction"] == study.document["tasks"]["explore"]["instruction"]
+    assert not {"min_s", "max_s"} & set(table)
+    assert not [fault for fault in other.faults if "missing" in fault.message or "unknown" in fault.message]
+    back, _ = other.edited(*switched(other, TASK, "explore", left))
+    assert back.document == study.document
+
+
+def test_switched_leaves_the_kind_of_a_statement_out() -> None:
+    study = study_of("viscosityjnd")
+    item = ("questionnaires", "about_you", "items", 0)
+    changed, _ = study.edited(*switched(study, item, None, {}))
+    assert set(changed.document["questionnaires"]["about_you"]["items"][0]) == {"id", "text", "short"}
+
+
+def test_switched_refuses_a_kind_that_does_not_exist() -> None:
+    with pytest.raises(Refused, match="there is no kind 'swim' here: explore, reach, follow"):
+        switched(study_of("demo"), TASK, "swim", {})

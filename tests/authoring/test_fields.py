@@ -1,4 +1,4 @@
-"""Forms from the models of the file format: every key of every model has a row."""
+"""Forms from the models of the file format: every key of every model has a row, every fault a field."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -6,12 +6,14 @@ from typing import Any
 
 import pytest
 
-from study_app.authoring.edited_study import read
+from study_app.authoring.edited_study import Study, read
 from study_app.authoring.fields import UNITS, Row, label_of, row_at, rows, unit_of
 from study_app.protocol.load import shipped
 from study_app.protocol.source.document import Path, entries
 from study_app.protocol.source.json_schema import schema
-from study_app.protocol.source.problems import shown
+from study_app.protocol.source.problems import Fault, shown
+from study_app.viewmodels.designer.form.form_rows import Form, form
+from study_app.viewmodels.designer.problem_rows import element_of
 from tests.authoring.grown import PROTOCOLS
 from tests.protocol.faulty_protocols import CASES, Case
 
@@ -207,3 +209,35 @@ def test_rows_of_which_one_is_given_name_the_other(path: Path, instead: str) -> 
     row = row_at(STUDIES["rek2024"], path)
     assert row is not None
     assert row.instead == instead
+
+
+OF_THE_ELEMENT = {
+    "name of a table", "wake called for but missing", "block left out", "page left out", "page named like a block",
+    "list for tables", "missing format",
+}  # fmt: skip
+"""Faults of an element as a whole, which stand above its rows."""
+
+
+def shown_at(study: Study, fault: Fault) -> str:
+    """Return where the form shows a fault: "row", "section", "id", "element", or "" for nowhere."""
+    found: Form = form(study, element_of(study, fault.path))
+    sentence = f"{fault.message[:1].upper()}{fault.message[1:]}"
+    places = (
+        (
+            "row",
+            [words for row in found.rows if fault.path[: len(row.row.path)] == row.row.path for words in row.faults],
+        ),
+        ("section", [words for section in found.sections for words in section.faults]),
+        ("id", list(found.id_faults)),
+        ("element", list(found.faults)),
+    )
+    return next((place for place, said in places if any(words.startswith(sentence) for words in said)), "")
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_every_fault_is_shown_at_a_field(case: Case) -> None:
+    study = read(case.text.encode())
+    if study.is_toml:
+        places = [shown_at(study, fault) for fault in study.faults]
+        assert "" not in places
+        assert "element" not in places or case.name in OF_THE_ELEMENT

@@ -1,4 +1,4 @@
-"""A session that cannot be opened: zero force first, and everything that was open is closed."""
+"""A session that cannot be opened: zero force first, everything that was open is closed, or no device opens at all."""
 
 import gc
 import sys
@@ -15,13 +15,15 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.app.session import live_session
 from study_app.app.session.live_session import BUG, LiveSession
-from study_app.errors import SessionError
+from study_app.errors import SessionError, StoreError
 from study_app.gui.display.frame_clock import Frames
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.theme.theme import LIGHT
+from study_app.protocol.load import load
 from study_app.session.request import NewSession
 from study_app.session.start import Ready
+from study_app.store.blinded.blinding import open_or_draw_key
 from tests.compiled import needs_servo
 
 CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "scripted", True, None, Path("nowhere"))
@@ -186,3 +188,18 @@ def test_no_window_stays_where_opening_or_starting_fails(
     assert "servo" not in {thread.name for thread in threading.enumerate()}
     (unfinished,) = (tmp_path / "results").rglob("journal.jsonl")
     assert '"session_ended"' not in unfinished.read_text()
+
+
+def test_changed_conditions_are_refused_before_a_device_opens(qtbot, tmp_path, monkeypatch):
+    study = load("demo")
+    unused = next(iter(study.liquids.values())).model_copy(update={"id": "unused"})
+    open_or_draw_key(tmp_path, study.model_copy(update={"liquids": {**study.liquids, "unused": unused}}))
+    opened = []
+    monkeypatch.setattr(live_session, "open_rig", lambda name, *_, **__: opened.append(name))
+    live = LiveSession(NewSession("demo", "P001", 1, 7, "", "en", "mouse", True, None, tmp_path), LIGHT)
+    with qtbot.waitSignal(live.over):
+        live.open()
+    live.wait()
+    assert isinstance(live.error, StoreError)
+    assert "sealed for other conditions" in str(live.error)
+    assert opened == []

@@ -1,13 +1,18 @@
-"""The plots' names stand apart and inside, whatever is drawn."""
+"""Plots' names stand apart and inside; cells of a table; jobs beside the window's thread."""
 
+import threading
 from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QRectF
-from PySide6.QtWidgets import QApplication
+from PySide6.QtCore import QObject, QRect, QRectF, Qt
+from PySide6.QtGui import QImage, QPainter, QStandardItem, QStandardItemModel
+from PySide6.QtWidgets import QApplication, QStyleOptionViewItem
 
+from study_app.gui.theme.theme import LIGHT
+from study_app.gui.widgets.background import Background, wait_for_jobs
 from study_app.gui.widgets.live_plots import LatenessPlot, TracePlot
+from study_app.gui.widgets.row_table import BELOW_ROLE, CHIP_ROLE, ROW_HEIGHT, Table
 
 LIMIT_US = 2000.0
 
@@ -59,3 +64,50 @@ def test_what_was_changed_is_painted_at_once_and_not_again_later(qtbot: Any, mon
         assert len(painted) == turn + 1
         QApplication.processEvents()
     assert len(painted) == 5
+
+
+OUTLINE = 3  # px from the row's edge to within the outline of a chosen row
+
+
+def test_a_chip_with_words_below_keeps_off_the_outline_of_its_row(qtbot: Any) -> None:
+    model, cell = QStandardItemModel(), QStandardItem()
+    cell.setData(("ok", "check", "Complete"), CHIP_ROLE)
+    cell.setData("device reconnected, recording lost", BELOW_ROLE)
+    model.appendRow([cell])
+    table = Table(model, ((1, 200),), "Sessions")
+    qtbot.addWidget(table)
+    table.apply_theme(LIGHT)
+    drawn = QImage(300, ROW_HEIGHT, QImage.Format.Format_ARGB32)
+    drawn.fill(Qt.GlobalColor.transparent)
+    option = QStyleOptionViewItem()
+    option.rect = QRect(0, 0, 300, ROW_HEIGHT)  # type: ignore[attr-defined]  # missing in the stubs
+    painter = QPainter(drawn)
+    table.itemDelegate().paint(painter, option, model.index(0, 0))
+    painter.end()
+    inked = [y for y in range(ROW_HEIGHT) if any(drawn.pixelColor(x, y).alpha() for x in range(drawn.width()))]
+    assert OUTLINE <= inked[0] < inked[-1] < ROW_HEIGHT - OUTLINE
+
+
+def test_only_the_newest_of_what_was_asked_for_comes(qtbot):
+    parent = QObject()
+    background, came, go_on = Background(parent), [], threading.Event()
+    background.done.connect(came.append)
+    background.run(lambda: go_on.wait(10) and "first")
+    background.run(lambda: "second")
+    background.run(lambda: "third")
+    assert background.busy
+    assert came == []
+    go_on.set()
+    qtbot.waitUntil(lambda: not background.busy)
+    assert came == ["third"]
+
+
+def test_the_end_of_the_program_waits_for_jobs_but_not_for_ever():
+    parent = QObject()
+    background, go_on, ended = Background(parent), threading.Event(), []
+    background.run(lambda: ended.append(go_on.wait(10)))
+    wait_for_jobs(0.01)
+    assert ended == []
+    go_on.set()
+    wait_for_jobs(10)
+    assert ended == [True]

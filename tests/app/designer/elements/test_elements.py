@@ -4,20 +4,30 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel
+from PySide6.QtWidgets import QApplication, QLabel
 
+from study_app.app.designer.edit_steps import Steps
+from study_app.authoring.changes.short_texts import short_of
+from study_app.authoring.edited_study import Study, read
+from study_app.authoring.undo_stack import History
+from study_app.authoring.writer.edits import Set
+from study_app.protocol.source.document import value_at
 from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.addable import addable
 from study_app.viewmodels.designer.form.form_rows import position_of
 from study_app.viewmodels.designer.requests import (
     AddElement,
     AddKey,
+    ChangeLanguage,
     DeleteElement,
     DuplicateElement,
     MoveElement,
     RenameElement,
+    SetText,
+    SetValue,
     SwitchKind,
 )
+from tests.authoring.grown import PROTOCOLS
 
 pytestmark = pytest.mark.slow
 
@@ -200,3 +210,183 @@ def test_deleting_with_gaps_leaves_faults_and_undo_takes_them_back(designer: Any
     assert designer.editing.opened.study.faults
     designer.editing.undo()
     assert not designer.editing.opened.study.faults
+
+
+def test_after_a_rename_comments_that_mention_the_old_name_are_listed_and_left(designer: Any, qtbot: Any) -> None:
+    text = designer.file.read_text()
+    designer.file.write_text(f"{text}# No thanks to common words.\n# The pages `thanks` and `thanks_2` are short.\n")
+    designer.controller.open("kitchen")
+    designer.editing.select(("pages", "thanks"))
+    head = designer.place.form.head
+    head.edit_id()
+    qtbot.keyClicks(head.id, "goodbye")
+    qtbot.keyClick(head.id, Qt.Key.Key_Return)
+    assert "[pages.goodbye]" in designer.text
+    assert designer.place.prompt is None  # what is typed next must not go to a card
+    assert head.comments.text() == "1 comment mentions “thanks”"
+    qtbot.mouseClick(head.comments, Qt.MouseButton.LeftButton)
+    card = designer.place.prompt
+    lines = [line.accessibleName() for line in card.lines]
+    count = len(designer.text.splitlines())
+    assert lines == [f"Go to line {count}: # The pages `thanks` and `thanks_2` are short."]
+    qtbot.mouseClick(card.lines[0], Qt.MouseButton.LeftButton)
+    assert designer.place.file.editor.textCursor().blockNumber() == count - 1
+    assert designer.text.endswith("# The pages `thanks` and `thanks_2` are short.\n")
+    designer.editing.select(("pages", "welcome"))
+    assert not head.comments.isVisible()
+
+
+def test_after_a_rename_the_button_of_an_absent_key_is_found_at_its_new_path(designer: Any, qtbot: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.select(("conditions", "thick"))
+    form = designer.place.form
+    path, button = next(iter(form.adds.items()))
+    form.head.edit_id()
+    qtbot.keyClicks(form.head.id, "thicker")
+    qtbot.keyClick(form.head.id, Qt.Key.Key_Return)
+    assert designer.editing.selected == ("conditions", "thicker")
+    assert form.focus(("conditions", "thicker", path[-1]))
+    assert QApplication.focusWidget() is button
+    assert not form.focus(path), "there is no element of the old id"
+
+
+def test_a_rename_says_once_how_many_references_followed(
+    designer: Any, qtbot: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+    monkeypatch.setattr("study_app.gui.designer.form.form_head.say", lambda _head, words: said.append(words))
+    designer.controller.open("kitchen")
+    head = designer.place.form.head
+    for path, name, words in (
+        (("conditions", "thick"), "honey", "1 place updated"),
+        (("tasks", "reach"), "touch", "1 place updated"),
+        (("scales", "agreement"), "likert", "2 places updated"),
+        (("questionnaires", "liquid", "items", 0), "feels", ""),
+    ):
+        designer.select(path)
+        assert head.followed.text() == ""
+        head.edit_id()
+        qtbot.keyClicks(head.id, name)
+        qtbot.keyClick(head.id, Qt.Key.Key_Return)
+        assert head.followed.text() == words
+        assert head.followed.isVisible()
+        assert not words or said.pop() == words
+    designer.editing.undo()
+    assert head.followed.text() == ""
+    assert not said
+
+
+@pytest.mark.parametrize("path", [("conditions", "thick"), ("questionnaires", "liquid", "items", 0)])
+def test_a_refused_rename_is_not_told_after_another_step(designer: Any, qtbot: Any, path: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.ask(SetValue(("study", "version"), "0.7"))
+    designer.select(path)
+    head = designer.place.form.head
+    head.edit_id()
+    qtbot.keyClicks(head.id, "9 no!")
+    qtbot.keyClick(head.id, Qt.Key.Key_Return)
+    assert head.refusal.text()
+    designer.editing.undo()
+    assert head.followed.text() == ""
+
+
+def test_an_id_with_answers_is_not_proposed_while_another_one_is_typed(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    question = ("questionnaires", "liquid", "items", 0)
+    designer.select(question)
+    designer.editing.recorded = lambda _element: frozenset({"cold"})
+    designer.place.id_typed.emit(question, "Cold!")
+    assert '"cold_2" is free' in designer.place.form.head.refusal.text()
+
+
+ITEMS = ("questionnaires", "liquid", "items")
+
+
+def write(qtbot: Any, designer: Any, field: str, words: str) -> None:
+    line = designer.row(*designer.editing.selected, field).field.lines["en"]
+    line.setFocus(Qt.FocusReason.TabFocusReason)
+    line.selectAll()
+    qtbot.keyClicks(line, words)
+    designer.place.flush()
+    QApplication.processEvents()
+
+
+def short(designer: Any) -> Any:
+    return designer.row(*designer.editing.selected, "short").row.row.value
+
+
+def test_copies_in_another_language_follow_a_text_and_its_short_one_until_they_are_edited() -> None:
+    source = (PROTOCOLS / "demo.toml").read_text(encoding="utf-8")
+    study, question = read(source.encode(), PROTOCOLS), (*ITEMS, 0)
+
+    def typed(study: Study, code: str, words: str) -> tuple[Study, Any]:
+        now, _ = study.edited(*Steps().step(study, SetText((*question, "text"), code, words)).edits)
+        return now, [value_at(now.document, (*question, key)) for key in ("text", "short")]
+
+    for code in ("nl", "de"):
+        for how in ("add", "copy"):
+            study, _ = study.edited(*Steps().step(study, ChangeLanguage(how, code)).edits)
+    text = value_at(study.document, (*question, "text"))["en"]
+    study, _ = study.edited(*(Set((*question, "short", code), short_of(text)) for code in ("en", "nl", "de")))
+    study, _ = typed(study, "de", "War es kalt?")
+    _, found = typed(study, "en", "Was it cold?")
+    assert found == [
+        {"en": "Was it cold?", "nl": "Was it cold?", "de": "War es kalt?"},
+        {"en": "Was it cold", "nl": "Was it cold", "de": "War es kalt"},
+    ]
+
+
+@pytest.mark.parametrize(
+    ("first", "typed", "other", "found"),
+    [
+        ("", ("War", "Warm", "Warmth"), "War", "War"),
+        ("Warmth", ("Warmt", "Warm", "War"), "Warm", "Warm"),
+        ("Warm", ("War", "", "New words"), "Warm", "New words"),
+    ],
+)
+def test_which_languages_follow_is_decided_where_typing_begins(
+    first: str, typed: tuple[str, ...], other: str, found: str
+) -> None:
+    text = (*ITEMS, 0, "text")
+    study = read((PROTOCOLS / "demo.toml").read_bytes(), PROTOCOLS)
+    steps = Steps()
+    study, _ = study.edited(*steps.step(study, ChangeLanguage("add", "nl")).edits)
+    begun = History(study).edited("Begin", Set(text, {"en": first, "nl": other}))
+    for _ in range(2):  # and again after an undo in between
+        history = begun
+        for words in typed:
+            history = history.edited("Type", *steps.step(history.study, SetText(text, "en", words)).edits)
+        assert value_at(history.study.document, text) == {"en": typed[-1], "nl": found}
+    back = history.undo()
+    back = back.edited("Type", *steps.step(back.study, SetText(text, "en", "Hot")).edits)
+    assert value_at(back.study.document, text)["nl"] == ("Hot" if found == typed[-1] else other)
+    steps.step(back.study, SetText(text, "nl", "Heet"))
+    copies = back.edited("Copy", Set(text, {"en": "Hot", "nl": "Hot"})).study
+    edits = steps.step(copies, SetText(text, "en", "Hotter")).edits
+    assert value_at(copies.edited(*edits)[0].document, text)["nl"] == "Hotter"
+
+
+def test_the_short_text_follows_the_text_until_it_is_edited(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.ask(AddElement(ITEMS))
+    before = designer.text
+    assert short(designer) == "New question"
+    write(qtbot, designer, "text", "Was it cold?")
+    assert short(designer) == "Was it cold"
+    assert designer.editing.opened.study.faults == ()
+    write(qtbot, designer, "text", "Was it warm?")
+    assert short(designer) == "Was it warm"
+    designer.editing.undo()
+    assert designer.text == before
+    designer.editing.redo()
+    write(qtbot, designer, "short", "Warm")
+    write(qtbot, designer, "text", "Was it warm or cold?")
+    assert short(designer) == "Warm"
+
+
+def test_it_follows_in_the_language_that_is_typed(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.ask(ChangeLanguage("add", "nl"))
+    designer.editing.ask(AddElement(ITEMS))
+    write(qtbot, designer, "text", "Was it cold?")
+    assert short(designer) == {"en": "Was it cold", "nl": "New question"}

@@ -1,9 +1,11 @@
-"""The worker of slow numbers: it answers what the commands answer, and gives up when asked."""
+"""The worker of slow numbers answers what the commands answer; whether the questions fit on one page."""
 
+import time
 from concurrent.futures import Executor, Future
 from typing import Any
 
 import pytest
+from PySide6.QtCore import QSize, Qt
 
 from study_app.analysis.power.threshold_studies import plans, sweep
 from study_app.app.designer.measures.measures_worker import (
@@ -14,13 +16,18 @@ from study_app.app.designer.measures.measures_worker import (
     MeasureOrder,
     carry_out,
 )
+from study_app.app.designer.measures.page_fit import PageFit, _pages
 from study_app.app.designer.measures.wanted import wanted_of
 from study_app.authoring.edited_study import read
 from study_app.authoring.measures.planned import ENOUGH
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
+from study_app.gui.participant.page_parts import parts_of
+from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.protocol.checks.expected_precision import imprecise
+from study_app.protocol.load import load
 from study_app.protocol.source.files import shipped_file
+from study_app.protocol.wording.languages import words
 from study_app.viewmodels.designer.measures.measures_view import Controls, focus_of
 from study_app.workers.messages import Stopped
 
@@ -89,3 +96,32 @@ def test_what_is_wanted_depends_on_forces_and_tasks_and_on_no_text() -> None:
     assert wanted() == same
     assert wanted() != wanted(Set(("liquids", "honey", "density_kg_m3"), 1300))
     assert wanted() != wanted(Set(("tasks", "explore", "max_s"), 61))
+
+
+PATH = ("questionnaires", "liquid")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("size", "expected"), [((1366, 768), 1), ((1024, 560), 2), ((800, 420), 3)])
+def test_a_page_never_shown_has_the_parts_of_one_that_is(qtbot: Any, size: tuple[int, int], expected: int) -> None:
+    protocol = load("rek2024")
+    (page, language), _ = _pages(protocol, focus_of(protocol, PATH), PATH)
+    shown = QuestionnaireWidget(page, words(language), time.monotonic)
+    qtbot.addWidget(shown)
+    shown.setAttribute(Qt.WidgetAttribute.WA_DontShowOnScreen)
+    shown.resize(QSize(*size))
+    shown.show()
+    assert parts_of(page, words(language), size) == len(shown.parts) == expected
+
+
+@pytest.mark.slow
+def test_the_fit_is_found_once_for_each_page_and_language(qtbot: Any, qapp: Any) -> None:
+    protocol = load("rek2024")
+    fit = PageFit(qapp)
+    fit.rest.setInterval(1)
+    focus = focus_of(protocol, PATH)
+    assert fit.parts(protocol, focus, PATH) is None
+    qtbot.waitSignal(fit.found).wait()
+    assert fit.parts(protocol, focus, PATH) == 1
+    assert not fit.rest.isActive()
+    assert fit.parts(protocol, focus_of(protocol, ("study",)), ("study",)) is None

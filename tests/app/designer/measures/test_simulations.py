@@ -1,8 +1,9 @@
-"""Numbers of Measures that take simulations: ordered, given up, kept, counted, failed."""
+"""Numbers of Measures that take simulations, numbers while a part is broken, and the bar of the session."""
 
 from typing import Any
 
 import pytest
+from PySide6.QtCore import QPoint, Qt
 
 from study_app.app.designer.measures.measures_worker import (
     Advising,
@@ -15,8 +16,10 @@ from study_app.app.designer.measures.measures_worker import (
 )
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
+from study_app.gui.designer.measures.parts import SessionPart
 from study_app.protocol.checks.expected_precision import threshold_plan
 from study_app.viewmodels.designer.measures.number_cards import ANEW, FAILED, UNKNOWN
+from study_app.viewmodels.designer.requests import RetypeFile
 from study_app.workers.messages import Crashed
 from tests.app.designer.measures.conftest import Worker, jnd, shown
 
@@ -144,3 +147,75 @@ def test_the_worker_process_simulates_observers_and_studies() -> None:
     assert observed.threshold == 0.2
     assert 0.0 <= group.share <= 1.0
     assert group.more_trials > group.trials == 20
+
+
+def test_numbers_of_what_is_broken_stay_in_grey(qtbot: Any, designer: Any, worker: Worker) -> None:
+    jnd(designer)
+    page = designer.place.measures
+    qtbot.waitUntil(lambda: bool(worker.orders))
+    worker.answer()
+    shown(qtbot, designer, 2, "93")
+    before = [part.number.text() for part in page.numbers.parts]
+    grey, ink = page.theme.text3, lambda part: part.number.palette().color(part.number.foregroundRole()).name().upper()
+    designer.editing.make("Break", Set(("tasks", "stir", "frequency_hz"), -1))
+    qtbot.waitUntil(page.earlier.isVisible)
+    assert [part.number.text() for part in page.numbers.parts] == before
+    assert {ink(part) for part in page.numbers.parts} == {grey}
+    assert page.function.shown.anew  # drawn in grey, too
+    assert "last valid state" in page.earlier.text()
+    designer.editing.undo()
+    qtbot.waitUntil(lambda: not page.earlier.isVisible())
+    designer.editing.ask(RetypeFile(designer.text.replace("[study]", "[study")))
+    qtbot.waitUntil(page.earlier.isVisible)
+    assert [part.number.text() for part in page.numbers.parts] == before
+    designer.editing.undo()
+    qtbot.waitUntil(lambda: not page.earlier.isVisible())
+    assert grey not in {ink(part) for part in page.numbers.parts}
+    assert not page.function.shown.anew
+
+
+def test_numbers_of_what_is_not_broken_continue(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    facts = designer.place.pane.facts
+
+    def forces() -> list[str]:
+        found = [card for card in facts.grid.cards if getattr(card, "title", "") == "Force of each liquid"]
+        return [line.number for card in found for line in card.lines]
+
+    designer.editing.select(("blocks", "delays"))
+    qtbot.waitUntil(lambda: bool(forces()))
+    designer.editing.make("Break", Set(("tasks", "reach", "dwell_s"), -1))
+    qtbot.waitUntil(facts.earlier.isVisible)
+    assert not facts.grid.isEnabled()
+    designer.editing.select(("blocks", "liquids"))
+    qtbot.waitUntil(lambda: not facts.earlier.isVisible())
+    assert facts.grid.isEnabled()
+    before = forces()
+    designer.editing.make("Change", Set(("liquids", "thick", "density_kg_m3"), 1700))
+    qtbot.waitUntil(lambda: forces() != before)
+    designer.editing.undo()
+    designer.editing.undo()
+    qtbot.waitUntil(lambda: UNKNOWN not in str(facts.grid.cards[0]))
+    session = facts.grid.cards[0]
+    designer.editing.make("Break", Set(("device", "force_limit_n"), 60))
+    qtbot.waitUntil(lambda: set(forces()) == {UNKNOWN})
+    assert facts.grid.cards[0] == session  # its length does not depend on the device
+    assert not facts.earlier.isVisible()
+
+
+def test_a_click_on_a_step_of_the_session_bar_opens_the_step(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.select(("pages", "welcome"))
+    facts = designer.place.pane.facts
+
+    def bar() -> Any:
+        return next((one.strip for one in facts.grid.parts if isinstance(one, SessionPart)), None)
+
+    qtbot.waitUntil(lambda: bar() is not None and bar().width() > 100)
+    strip, x = bar(), 0.0
+    for _, share, _, path in strip.segments:
+        if path == ("blocks", "liquids"):
+            break
+        x += share * strip.width()
+    qtbot.mouseClick(strip, Qt.MouseButton.LeftButton, pos=QPoint(round(x + share * strip.width() / 2), 7))
+    assert designer.editing.selected == ("blocks", "liquids")
