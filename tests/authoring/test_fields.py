@@ -9,7 +9,7 @@ import pytest
 from study_app.authoring.edited_study import Study, read
 from study_app.authoring.fields import UNITS, Row, label_of, row_at, rows, unit_of
 from study_app.protocol.load import shipped
-from study_app.protocol.source.document import Path, entries
+from study_app.protocol.source.document import Path
 from study_app.protocol.source.json_schema import schema
 from study_app.protocol.source.problems import Fault, shown
 from study_app.viewmodels.designer.form.form_rows import Form, form
@@ -142,14 +142,6 @@ def test_rows_say_label_unit_bounds_and_reason() -> None:
         assert len(labels) == len(set(labels)), name
 
 
-def test_choices_have_their_sentences() -> None:
-    row = row_at(STUDIES["rek2024"], ("blocks", "liquids", "order"))
-    assert row is not None
-    sentences = {choice.value: choice.sentence for choice in row.choices}
-    assert sentences["shuffled"] == "anew in each repetition"
-    assert sentences["williams"] == sentences["latin"] != ""
-
-
 def test_every_value_that_can_be_chosen_has_its_sentence() -> None:
     lacking = {
         (row.model, row.path[-1])
@@ -159,56 +151,6 @@ def test_every_value_that_can_be_chosen_has_its_sentence() -> None:
         and not all(choice.sentence for choice in row.choices)
     }
     assert lacking == {("Protocol", "format")}
-
-
-def test_a_kind_decides_the_other_rows() -> None:
-    document = STUDIES["viscosityjnd"]
-    kind, *others = rows(document, ("tasks", "stir"))
-    assert (kind.kind, {choice.value for choice in kind.choices}) == ("kind", {"explore", "reach", "follow"})
-    assert "cycles" in {row.path[-1] for row in others}
-    items = [path for path, _ in entries(document, "questionnaires.about_you.items.*")]
-    assert [row.kind for row in rows(document, items[0]) if row.path[-1] == "kind"] == ["kind"]
-    assert "options" in {row.path[-1] for row in rows(document, items[1])}
-    assert "from" not in {row.path[-1] for row in rows(document, items[1])}
-
-
-@pytest.mark.parametrize(
-    ("study", "path", "kind"),
-    [
-        ("rek2024", ("study", "title"), "localised"),
-        ("rek2024", ("pages", "consent", "body"), "paragraphs"),
-        ("rek2024", ("blocks", "liquids", "task"), "reference"),
-        ("rek2024", ("blocks", "liquids", "conditions"), "references"),
-        ("rek2024", ("tasks", "reach", "targets_mm"), "points"),
-        ("rek2024", ("device", "workspace_mm"), "vector"),
-        ("rek2024", ("questionnaires", "liquid", "items"), "list"),
-        ("rek2024", ("liquids",), "tables"),
-        ("rek2024", ("liquids", "water", "wake"), "table"),
-        ("rek2024", ("liquids", "water", "effects"), "either"),
-        ("rek2024", ("blocks", "liquids", "replicates"), "switch"),
-        ("viscosityjnd", ("stimuli", "damping", "standards"), "numbers"),
-        ("viscosityjnd", ("stimuli", "damping", "steps"), "whole number"),
-    ],
-)
-def test_kinds_of_rows(study: str, path: Path, kind: str) -> None:
-    row = row_at(STUDIES[study], path)
-    assert row is not None
-    assert row.kind == kind
-
-
-@pytest.mark.parametrize(
-    ("path", "instead"),
-    [
-        (("tasks", "reach", "count"), "duration_s"),
-        (("tasks", "reach", "duration_s"), "count"),
-        (("conditions", "water", "liquids"), "liquid"),
-        (("tasks", "reach", "radius_mm"), ""),
-    ],
-)
-def test_rows_of_which_one_is_given_name_the_other(path: Path, instead: str) -> None:
-    row = row_at(STUDIES["rek2024"], path)
-    assert row is not None
-    assert row.instead == instead
 
 
 OF_THE_ELEMENT = {

@@ -80,15 +80,6 @@ def test_with_references_leaves_none_that_dangles(thing: Path) -> None:
     assert not [fault for fault in changed.faults if "there is no" in fault.message and '"' in fault.message], thing
 
 
-def test_with_references_lists_what_goes_with_a_liquid() -> None:
-    study = study_of("demo")
-    assert with_references(study.document, ("liquids", "thick"), study.needs) == (
-        ("blocks", "liquids", "conditions", 1),
-        ("conditions", "thick"),
-        ("liquids", "thick"),
-    )
-
-
 @pytest.mark.parametrize(
     ("thing", "place"), [(("tasks", "reach"), ("blocks", "delay", "task")),
                          (("liquids", "water"), ("stimuli", "delay", "condition"))],
@@ -159,14 +150,6 @@ def test_check_id_refuses_what_is_no_id(name: str) -> None:
         check_id(name)
 
 
-def test_renamed_refuses_a_taken_name() -> None:
-    document = study_of("demo").document
-    with pytest.raises(Refused, match='the name "thin" is taken'):
-        renamed(document, ("liquids", "thick"), "thin")
-    with pytest.raises(Refused, match="taken by another item"):
-        renamed(document, ("questionnaires", "liquid", "items", 1), "feels_liquid")
-
-
 @pytest.mark.parametrize(
     ("thing", "name", "free"),
     [
@@ -201,14 +184,6 @@ def test_outline_lists_the_session_its_parts_and_the_study() -> None:
     assert {one.path[0] for one in seen.parts if one.depth == 0} >= {"liquids", "conditions", "pages", "groups"}
     assert ("liquids", "syrup") in [one.path for one in seen.parts]
     assert [one.path for one in seen.study] == [("study",), ("device",), ("scene",), ("limits",), ("analysis",)]
-
-
-def test_elements_count_their_faults_and_those_within_them() -> None:
-    study = read(TEXT.replace('liquid = "syrup"', 'liquid = "sirup"').encode())
-    counts = {one.path: one.faults for one in outline(study).parts}
-    assert counts["conditions", "practice"] == 1
-    assert counts["conditions",] == 1
-    assert counts["liquids",] == 0
 
 
 def test_titles_are_texts_of_the_first_language_or_readable_ids() -> None:

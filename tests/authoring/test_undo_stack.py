@@ -41,15 +41,6 @@ def test_undo_and_redo_restore_text_and_selection() -> None:
     assert first.undo() == first.redo() == first
 
 
-def test_letters_of_one_text_are_one_step() -> None:
-    history = History(DEMO)
-    for end in range(1, 6):
-        history = history.edited("Type", Set(("study", "title"), "Title"[:end]), joins=end > 1)
-    assert len(history.done) == 1
-    assert history.study.document["study"]["title"] == "Title"
-    assert history.undo().study.text == DEMO.text
-
-
 def test_a_step_that_changes_nothing_is_none() -> None:
     same = History(DEMO).edited("Same", Set(("format",), 1), select=("study",))
     assert (same.done, same.selected) == ((), ("study",))

@@ -1,14 +1,11 @@
 """What the results window says in words, and a figure in the colours of a theme."""
 
-from datetime import UTC, datetime
-from pathlib import Path
-
 import pytest
 from PySide6.QtCore import QSize
 
 from study_app.gui.results.figure_view import drawn, themed_svg
 from study_app.gui.theme.theme import DARK, LIGHT
-from study_app.viewmodels.results import Opened, StudyChoice, in_figures
+from study_app.viewmodels.results import in_figures
 from study_app.viewmodels.session.columns import matching, states_of
 from tests.gui.results.sample import COLOURS, SVG, facts
 
@@ -29,17 +26,6 @@ def test_many_that_are_not_are_counted():
 
 def test_an_excluded_session_that_was_not_complete_is_told_once():
     assert in_figures([facts("P001", status="withdrawn", excluded="left")])[1] == "P001 is excluded."
-
-
-def test_who_opened_the_key_is_told_with_day_and_reason():
-    opened = Opened(datetime(2026, 11, 19, tzinfo=UTC), "AK", "collection closed")
-    assert opened.words == "Unblinded 19 Nov by AK: collection closed"
-    assert Opened(None, "AK", "x").words == "Unblinded by AK: x"
-
-
-def test_a_study_says_what_it_is():
-    assert StudyChoice(Path("r/rek2024")).name == "rek2024"
-    assert StudyChoice(Path("r/rek2024"), "pilot").name == "rek2024  ·  pilot"
 
 
 @pytest.mark.parametrize(

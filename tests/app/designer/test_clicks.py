@@ -368,3 +368,20 @@ def test_the_fields_of_a_copy_can_be_edited_at_once(designer: Any) -> None:
     designer.select(title[:2])
     assert designer.row(*title).field.isEnabled()
     assert kept_original(designer.editing.opened.file) == "demo"
+
+
+def test_the_description_grows_to_three_lines(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.select(("study",))
+    line = designer.row("study", "description").field.line
+    heights = []
+    for words in (1, 16, 40, 400):
+        designer.editing.ask(SetValue(("study", "description"), " ".join(["liquid"] * words)))
+        QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest)
+        QApplication.processEvents()
+        heights.append(line.height())
+    assert heights[0] < heights[1] < heights[2] == heights[3]
+    line.selectAll()
+    qtbot.keyClicks(line, "Short")
+    qtbot.keyClick(line, KEY.Key_Return)
+    assert designer.editing.opened.study.document["study"]["description"] == "Short"

@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QEvent, QPoint, QPointF, QSize, Qt
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QGuiApplication, QMouseEvent
 from PySide6.QtWidgets import QApplication
 
@@ -184,23 +184,6 @@ def test_rows_say_what_and_where_they_are_and_contain_the_problems_below_them(de
     assert {("blocks", "liquids"), ("questionnaires", "liquid"), ("questionnaires", "liquid", "items", 1)} <= faulty
     block = next(row for row in rows if row.path == ("blocks", "liquids"))
     assert block.name.endswith(f"step {at} of {count}, {block.faults} problem{'s' * (block.faults > 1)}")
-
-
-def test_another_study_begins_at_the_top(qtbot: Any, designer: Any) -> None:
-    place = designer.place
-    bars = [part.verticalScrollBar() for part in (place.outline.tree, place.form.area, place.measures.area)]
-    designer.window.resize(QSize(1600, 640))
-    designer.controller.open("kitchen")
-    place.show_tab("measures")
-    place.problems.show()
-    place.measures.area.widget().setMinimumHeight(2000)  # the measures of this study fit
-    place.outline.tree.expandAll()
-    qtbot.waitUntil(lambda: all(bar.maximum() > 0 for bar in bars))
-    for bar in bars:
-        bar.setValue(bar.maximum())
-    designer.controller.open("demo")
-    QApplication.processEvents()
-    assert [bar.value() for bar in bars] == [0, 0, 0]
 
 
 def test_what_changes_by_itself_is_said_once(designer: Any, monkeypatch: Any) -> None:

@@ -70,24 +70,6 @@ def test_no_line_moves_while_the_pointer_is_over_the_list(qtbot: Any, designer: 
     assert problems.lines[0].row.fault.path == ("study", "version")
 
 
-def test_a_line_stays_with_its_new_words_while_only_numbers_in_them_change(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.make("Alike", Set(("liquids", "thick", "density_kg_m3"), 1001))
-    qtbot.waitUntil(lambda: "warning" in designer.place.header.problems.words)
-    designer.place.header.problems.click()
-    problems = designer.place.problems
-    (line,) = problems.lines
-    enter(problems)
-    for density in (1010, 1100):
-        before = line.row.message
-        designer.editing.make("Less alike", Set(("liquids", "thick", "density_kg_m3"), density))
-        designer.controller.show_outline()
-        assert problems.lines == [line]
-        assert (line.isEnabled(), line.mark.name) == (True, "warning")
-        assert line.said.whole == line.row.message != before
-        assert line.row in problems.rows
-
-
 def test_a_problem_keeps_its_line_mark_and_repair_while_its_number_changes(qtbot: Any, designer: Any) -> None:
     designer.file.write_text(designer.file.read_text().replace("force_limit_n = 6", "force_limit_n = 60"))
     designer.controller.open("kitchen")

@@ -1,6 +1,5 @@
 """A session that cannot be opened: zero force first, everything that was open is closed, or no device opens at all."""
 
-import gc
 import sys
 import threading
 from collections.abc import Iterator
@@ -119,15 +118,6 @@ def test_a_device_that_fails_between_two_steps_ends_the_session(qtbot: Any) -> N
     session.hear(SessionError("the device sends nothing"))
     qtbot.wait(20)
     assert (session.taken, ended, str(session.error)) == ([0], [True], "the device sends nothing")
-
-
-@pytest.mark.usefixtures("qapp")
-def test_a_session_that_never_began_leaves_no_garbage_frozen() -> None:
-    session = Stepped()
-    session.hear(READY)
-    gc.freeze()
-    session.cancel()
-    assert gc.get_freeze_count() == 0
 
 
 class Measured(Ready):

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from study_app.authoring.changes.languages import filled_in, following, texts_of, with_language
+from study_app.authoring.changes.languages import filled_in, texts_of, with_language
 from study_app.authoring.changes.short_texts import followed, short_of
 from study_app.authoring.edited_study import Study, read
 from study_app.authoring.measures.participant_texts import copied_texts, missing_texts
@@ -61,16 +61,6 @@ def test_a_text_without_letters_is_the_same_in_every_language(copied: History) -
     assert copied_texts(plain) == counts | {"nl": counts["nl"] - 1, "de": counts["de"] - 1}
 
 
-def test_a_copy_follows_the_first_language_and_nothing_else_does(copied: History) -> None:
-    assert following(copied.study, TITLE, "en") == ("nl", "de")
-    assert following(copied.study, TITLE, "nl") == ()
-    own, _ = copied.study.edited(Set((*TITLE, "de"), "Ein erster Blick"))
-    assert following(own, TITLE, "en") == ("nl",)
-    new, _ = own.edited(*(Set((*TITLE, code), "New question") for code in ("nl", "de")))
-    assert following(new, TITLE, "en") == ()
-    assert following(DEMO, TITLE, "en") == ()
-
-
 ITEM = ("questionnaires", "liquid", "items", 0)
 
 
@@ -96,12 +86,6 @@ def study_of(text: str, short: str) -> Study:
 def test_a_short_text_that_says_what_the_text_says_follows_it(text: str, short: str, found: dict[Any, str]) -> None:
     edits = followed(study_of(text, short), (*ITEM, "text"), "en", "Was it cold?")
     assert {edit.path[len(ITEM) :]: edit.value for edit in edits} == found  # type: ignore[union-attr]
-
-
-def test_other_texts_have_no_short_one() -> None:
-    study = study_of('"Was"', '"Was"')
-    assert followed(study, (*ITEM, "short"), "en", "Cold") == ()
-    assert followed(study, ("pages", "consent", "title"), "en", "Cold") == ()
 
 
 def test_a_short_text_has_no_stop_and_at_most_forty_letters() -> None:

@@ -163,34 +163,6 @@ def test_whoever_goes_on_before_a_prepared_place_is_shown_gets_where_they_asked_
     window.close()
 
 
-def test_a_place_that_is_not_prepared_never_freezes_the_window(qtbot):
-    ready, made = [], []
-
-    def make():
-        made.append("lab")
-        return Place()
-
-    window = MainWindow({"home": Place, "lab": make}, prepares={"lab": lambda: iter((None,)) if ready else None})
-    qtbot.addWidget(window)
-    window.show()
-    window.go("lab")
-    assert (window.here, made) == ("lab", [])
-    waits = window.stack.currentWidget()
-    window.go("home")
-    window.prepared("lab")
-    assert (window.here, made) == ("home", []), "nobody waits for it any more"
-    window.go("lab")
-    ready.append(True)
-    window.prepared("lab")
-    assert made == ["lab"]
-    assert window.stack.currentWidget() is waits, "it is made by one event and shown by the next"
-    qtbot.waitUntil(lambda: window.stack.currentWidget() is window.place("lab"))
-    window.go("home")
-    window.rest()
-    window.come_back()
-    window.close()
-
-
 @pytest.mark.parametrize("fails", ["make", "fill"])
 @pytest.mark.parametrize("waits", [True, False])
 def test_a_place_whose_step_fails_says_so_and_a_second_entry_tries_again(qtbot, fails, waits):
@@ -255,22 +227,4 @@ def test_a_place_that_cannot_be_made_says_why_and_is_tried_again(qtbot, error, s
     window.notice.go_on.click()
     assert window.here == "results"
     assert not window.notice.isVisible()
-    window.close()
-
-
-def test_a_place_that_is_asked_for_twice_is_filled_once(qtbot):
-    tried = []
-
-    def fill():
-        tried.append("fill")
-        yield
-
-    window = MainWindow({"home": Place, "lab": Place}, prepares={"lab": fill})
-    qtbot.addWidget(window)
-    window.show()
-    window.go("lab")
-    window.go("lab")
-    qtbot.waitUntil(lambda: window.here == "lab")
-    qtbot.wait(20)
-    assert tried == ["fill"]
     window.close()

@@ -69,12 +69,6 @@ def test_no_more_points_than_can_be_seen_and_none_left_out_that_could() -> None:
         assert min(np.hypot(drawn[:, 0] - at.x(), drawn[:, 1] - at.y())) < 1.5 * STEP_PX
 
 
-def test_the_shadow_lies_on_the_floor() -> None:
-    places = tail_places(tail([(-40, 20, 0), (40, 20, 0)]), CAMERA, BOX)
-    floor_mm = BOX.floor * 1000
-    assert apart(places.floor[0].first(), pixel((-40, floor_mm, 0))) < 1e-6
-
-
 @pytest.mark.parametrize("count", [0, 1])
 def test_nothing_yet(count: int) -> None:
     made = Made(np.zeros((count, 3)), np.ones(count, bool), np.zeros(count), alive=count, segments=count)

@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication, QLabel
 
 from study_app.gui.operator.force_plots import ForceCard
-from study_app.gui.widgets.live_plots import apart, step_for
+from study_app.gui.widgets.live_plots import STROKE, apart, step_for
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.viewmodels.force_traces import Forces
 
@@ -102,3 +103,10 @@ def test_steps_are_even_and_few(reach: float, most: int) -> None:
     assert reach / step <= most + 0.02
     assert reach / step > most / 2.6
     assert round(step / 10 ** np.floor(np.log10(step) + 1e-9), 9) in {1, 2, 5}
+
+
+def test_strokes_are_as_wide_on_a_screen_of_twice_the_density(card: ForceCard, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert card.plot.curves[0].opts["pen"].widthF() == STROKE * card.plot.devicePixelRatioF()
+    monkeypatch.setattr(type(card.plot), "devicePixelRatioF", lambda _plot: 2.0)
+    QApplication.sendEvent(card.plot, QEvent(QEvent.Type.DevicePixelRatioChange))
+    assert card.plot.curves[0].opts["pen"].widthF() == 2 * STROKE

@@ -208,18 +208,6 @@ def test_nothing_is_clipped(window: OperatorWindow, told: Any, health: Any, stat
     assert {size: found for size, found in problems.items() if found} == {}
 
 
-@pytest.mark.variants(3)
-@pytest.mark.parametrize("size", [*FEW, (1356, 709)])  # the last: 1366 × 768 less frame and task bar
-def test_header_has_room_for_the_way_to_the_participants_window(window: Any, told: Any, health: Any, size: Any) -> None:
-    window.header.page.show()  # as where both windows share a screen
-    filled(window, told, health, running)
-    settle(window, size)
-    assert (window.width(), window.height()) == size
-    assert cut(window) == []
-    lines = [tile.line for tile in window.tiles.cards]
-    assert [line.text() for line in lines] == [line.whole for line in lines]
-
-
 def test_the_shape_of_the_window_does_not_tell_whether_the_force_is_hidden(qtbot: Any, told: Any, health: Any) -> None:
     places = []
     for limit_n in (None, 6.0):

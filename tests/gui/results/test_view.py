@@ -47,12 +47,6 @@ def click(qtbot, button):
     qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
 
 
-def test_a_blinded_study_says_so_and_can_be_unblinded(place):
-    assert chips(place) == ["Simulated participants", "Blinded: shown by code"]
-    assert place.unblind.isVisible()
-    assert place.figures.cards[0].figure.title == "Agreement for each setting"
-
-
 def test_an_open_study_says_by_whom_and_why_and_cannot_be_unblinded_again(place):
     by = Opened(datetime(2026, 11, 19, tzinfo=UTC), "AK", "collection closed, " + "and so on " * 20)
     place.show_view(replace(view(), sealed=False, opened=by))
@@ -247,17 +241,6 @@ def test_trouble_is_one_sentence_and_one_button(place, qtbot, remedy):
     assert asked.args == [remedy]
     place.show_view(view())
     assert not trouble.isVisible()
-
-
-def test_with_no_study_there_is_a_way_home_and_nothing_to_press_in_vain(qtbot):
-    empty = replace(view(), studies=(), chosen=None, sessions=(), figures=(), sealed=None)
-    place = opened(qtbot, shown=replace(empty, trouble=Trouble("No studies yet", "The first …", "Go to Home", "home")))
-    assert not place.export.isEnabled()
-    assert not place.report.isEnabled()
-    assert not place.study.isVisible()
-    assert chips(place) == []
-    click(qtbot, place.figures.trouble.button)
-    assert place.main.here == "home"
 
 
 def test_reading_says_how_far_it_is_and_can_be_stopped(place, qtbot):

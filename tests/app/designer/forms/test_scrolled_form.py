@@ -49,15 +49,6 @@ def test_a_row_below_the_fold_of_another_element_is_scrolled_to(qtbot: Any, desi
     assert form.area.verticalScrollBar().value() > 0
 
 
-def test_another_element_is_shown_from_its_top(qtbot: Any, designer: Any, form: Any) -> None:
-    designer.select(BLOCK)
-    form.focus(form.form.rows[-1].row.path)
-    qtbot.wait(50)
-    designer.select(("liquids", "thin"))
-    qtbot.wait(50)
-    assert form.area.verticalScrollBar().value() == 0
-
-
 def test_tab_goes_from_the_rows_seen_at_first_to_those_made_later(qtbot: Any, designer: Any, form: Any) -> None:
     designer.editing.select(BLOCK)
     assert 0 < rows_made(form) < len(form.form.rows)

@@ -151,15 +151,6 @@ def test_a_repair_that_is_pressed_right_after_an_edit_is_made(qtbot: Any, broken
     assert [problem.fault.path for problem in broken.place.view.problems] == [first.fault.path]
 
 
-def test_a_repair_that_is_clicked_after_tab_led_to_it_shows_what_was_repaired(qtbot: Any, broken: Any) -> None:
-    first, _second = broken.place.view.problems
-    repair = press(qtbot, KEY.Key_F8)
-    qtbot.mouseClick(repair, Qt.MouseButton.LeftButton)
-    assert len(broken.place.view.problems) == 1
-    assert broken.editing.selected == first.element
-    assert broken.row(*first.fault.path).isAncestorOf(QApplication.focusWidget())
-
-
 def test_repairs_that_are_found_later_leave_the_keyboard_at_the_repairs(
     qtbot: Any, designer: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

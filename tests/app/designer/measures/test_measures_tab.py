@@ -14,8 +14,16 @@ from study_app.authoring.kept_settings import keep_setting, kept_participants
 from study_app.authoring.writer.edits import Set
 from study_app.gui.designer.measures.card_grid import CardGrid
 from study_app.gui.designer.measures.limit_colours import limit_colour
+from study_app.gui.designer.measures.parts import NumberPart
 from study_app.gui.theme.theme import DARK, LIGHT
-from study_app.viewmodels.designer.measures.number_cards import ON_AVERAGE, UNKNOWN, Line, LinesCard, TextsCard
+from study_app.viewmodels.designer.measures.number_cards import (
+    ON_AVERAGE,
+    UNKNOWN,
+    Line,
+    LinesCard,
+    NumberCard,
+    TextsCard,
+)
 from tests.app.designer.measures.conftest import Worker, jnd, shown
 
 pytestmark = pytest.mark.slow
@@ -256,3 +264,16 @@ def test_no_card_moves_while_the_pointer_is_over_the_cards(qtbot: Any) -> None:
     assert grid.parts[2].pos() == before
     QApplication.sendEvent(grid, QEvent(QEvent.Type.Leave))
     qtbot.waitUntil(lambda: grid.parts[2].y() < before.y())
+
+
+@pytest.mark.parametrize(("number", "size_px"), [("5.1 – 60", 26), ("4.8 – 240", 16)])
+def test_a_number_is_never_cut(qtbot: Any, number: str, size_px: int) -> None:
+    part = NumberPart()
+    qtbot.addWidget(part)
+    part.resize(154, 90)
+    part.show_card(NumberCard("JNDs it can measure", number, "%"))
+    part.show()
+    assert part.number.width() >= part.number.sizeHint().width()
+    assert part.number.font().pixelSize() == size_px
+    part.resize(300, 90)
+    assert part.number.font().pixelSize() == 26

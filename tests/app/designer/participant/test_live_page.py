@@ -1,4 +1,4 @@
-"""The tab Participant: which page it shows, and how keys, mouse and edits reach it."""
+"""The tab Participant: which page and texts it shows, and how keys, mouse and edits reach it."""
 
 import os
 import subprocess
@@ -14,11 +14,12 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from study_app.authoring.edited_study import read
+from study_app.authoring.kept_settings import kept_language
 from study_app.authoring.writer.edits import Set, Unset
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import QuestionnairePage, TaskPage, TextPage
-from study_app.viewmodels.designer.requests import RetypeFile, SetText, SetValue
+from study_app.viewmodels.designer.requests import ChangeLanguage, DuplicateElement, RetypeFile, SetText, SetValue
 
 pytestmark = pytest.mark.slow
 
@@ -325,3 +326,54 @@ def test_a_program_that_ends_with_a_page_open_ends_without_an_error(tmp_path: Pa
     )
     assert ended.returncode == 0, ended.stderr.decode()
     assert b"Error" not in ended.stderr
+
+
+COPY = (*ITEM[:-1], 2)
+
+
+@pytest.fixture
+def tab(designer: Any) -> Any:
+    designer.controller.open("kitchen")
+    designer.select(ITEM)
+    return designer.controller.preview.tab
+
+
+def statements(tab: Any) -> list[tuple[str, str]]:
+    """Return id and text of each question of the page as they are read."""
+    return [(item.id, item.text.strip("\u200b")) for item in tab.view.page.items]
+
+
+def test_a_copied_question_has_the_text_of_its_original_and_the_others_keep_theirs(designer: Any, tab: Any) -> None:
+    before = statements(tab)
+    designer.editing.ask(DuplicateElement(ITEM))
+    designer.select(COPY)
+    copied = dict(before)["like_honey"]
+    assert sorted(statements(tab)) == sorted([*before, ("like_honey_2", copied)])
+    assert tab.view.note.endswith("(reads as an earlier item does): the text as it is written is shown.")
+    designer.editing.ask(SetText((*COPY, "text"), "en", "Another statement"))
+    assert dict(statements(tab))["like_honey_2"] == "Another statement"
+
+
+def test_a_missing_text_is_said_in_the_language_that_lacks_it(designer: Any, tab: Any) -> None:
+    designer.editing.ask(ChangeLanguage("add", "nl"))
+    assert tab.view.language == "en"
+    assert not tab.view.note
+    designer.controller.preview.show_language("nl")
+    assert tab.view.note == "Like honey has no Dutch text; the text of another language is shown."
+    designer.select(("device",))
+    assert tab.view.note.endswith(" texts missing in Dutch: shown in another language.")
+    designer.editing.ask(SetText((*ITEM, "text"), "en", ""))
+    designer.controller.preview.show_language("en")
+    assert "Dutch" not in tab.view.note
+
+
+def test_the_language_is_kept_for_the_study(designer: Any, tab: Any) -> None:
+    designer.editing.ask(ChangeLanguage("add", "nl"))
+    file = designer.editing.opened.file
+    designer.controller.preview.show_language("nl")
+    designer.controller.open("demo")
+    designer.select(("pages", "welcome"))
+    assert tab.view.language == "en"
+    designer.controller.open("kitchen")
+    designer.select(ITEM)
+    assert (tab.view.language, kept_language(file)) == ("nl", "nl")

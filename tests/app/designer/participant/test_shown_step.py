@@ -1,6 +1,12 @@
-"""Which step shows an element, in studies whose sessions differ, and for what is in no session."""
+"""Which step shows an element, in studies whose sessions differ, for what is in no session, and which is the first."""
+
+import pytest
 
 from study_app.app.designer.participant.shown_step import STANDALONE, same_step, showing, step_name
+from study_app.app.designer.play.first_step import first_step
+from study_app.protocol.load import load
+from study_app.protocol.orders.schedule import PageStep, Trial
+from study_app.session.simulated.preview import preview
 from tests.protocol.groups.grouped import grouped
 
 
@@ -35,3 +41,27 @@ def test_a_page_that_is_in_no_session_is_shown_on_its_own() -> None:
     assert found is not None
     assert found.session == STANDALONE
     assert step_name(found.shown.schedule.steps[found.index]) == "unused"
+
+
+@pytest.mark.parametrize("name", ["rek2024", "thickness", "delayjnd"])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_every_table_leads_to_the_first_step_that_shows_it(name: str, seed: int) -> None:
+    study = load(name)
+    shown = preview(study, seed)
+    steps = shown.schedule.steps
+    for page in study.pages:
+        step = steps[first_step(shown, ("pages", page, "body", "en"))]
+        assert step == PageStep(page) or PageStep(page) not in steps
+    for block in study.blocks:
+        step = steps[first_step(shown, ("blocks", block))]
+        assert isinstance(step, Trial)
+        assert (step.block, step.index) == (block, 1)
+    for questionnaire in study.questionnaires:
+        step = steps[first_step(shown, ("questionnaires", questionnaire, "items", 0))]
+        assert getattr(step, "form", None) == questionnaire or study.blocks[step.block].questionnaire == questionnaire
+    presented = {shown.codes[trial.block][trial.code]: at for at, trial in reversed([*enumerate(steps)])
+                 if isinstance(trial, Trial)}  # fmt: skip
+    for condition in study.conditions:
+        if condition in presented:
+            assert first_step(shown, ("conditions", condition)) == presented[condition]
+    assert first_step(shown, ("study",)) == 0
