@@ -199,6 +199,7 @@ def test_a_session_open_in_a_program_is_running_until_that_ends(tmp_path):
     assert (running.status, status_chip(running)[2], running.needs_care) == ("running", "Running", False)
     assert ("running", "Running") in states_of([running])
     assert validity_chip(replace(running, validity="valid"))[2] == "Open"
+    assert status_chip(replace(running, status="moved")) == ("neutral", "ring", "Moved")
     opening.release()
     (stopped,) = sessions(tmp_path, {})
     assert (stopped.status, status_chip(stopped)[2]) == ("unfinished", "Interrupted")
