@@ -9,15 +9,11 @@ from pathlib import Path
 import pytest
 
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.export.export import export
-from study_app.analysis.figures.plotting import plot
 from study_app.analysis.report.json_values import plain
 from study_app.analysis.tables.study_tables import load_study
 from study_app.store import receipt
 from study_app.store.blinded.blinding import read_key
 from study_app.store.blinded.sealing import opened
-from study_app.store.blinded.unblinding import unblind
-from study_app.store.exclusions import exclude
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.tables.columns import LATER
@@ -30,7 +26,6 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLE = StudyFolder(ROOT / "results" / "sample-rek2024")
 MAKE_AGAIN = "make the sample again, by the command in results/README.md"
-PEOPLE = tuple(f"P{number:03d}" for number in range(1, 13))
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -51,10 +46,6 @@ def known(session: SessionFolder, folder: Path) -> list[dict[str, float]]:
         for line in opened(journal.read(session.journal), read_key(folder))
         if line["event"] == "trial_ended"
     ]
-
-
-def captions(folder: Path, to: Path) -> str:
-    return "".join(path.read_text(encoding="utf-8") for path in plot(folder, to) if path.suffix == ".txt")
 
 
 @pytest.fixture
@@ -88,36 +79,6 @@ def test_its_answers_and_forces_are_those_of_a_rehearsal_today(rehearsal_of: Cal
         for kept, made in zip(known(sample, SAMPLE.path), known(again, folder), strict=True):
             assert len(made) > 10
             assert kept == pytest.approx(made, rel=1e-3), MAKE_AGAIN
-
-
-@pytest.mark.nightly
-def test_it_is_exported_and_drawn_by_code_and_not_touched(tmp_path: Path) -> None:
-    before = files(SAMPLE.path)
-    tables = export(SAMPLE.path, tmp_path / "tables")
-    assert all(path.stat().st_size > 0 for path in tables)
-    told = captions(SAMPLE.path, tmp_path / "figures")
-    assert told.count("SIMULATED participants, no people; n = 12 participants, every setting rated by all") == 2
-    assert "(simulated" not in told
-    assert files(SAMPLE.path) == before
-    study = load_study(SAMPLE.path)
-    assert (study.people, study.simulated, study.revealed) == (PEOPLE, True, False)
-    assert len(study.responses) == 12 * 62
-    assert all((study.aggregate(block)["n"] == 12).all() for block in study.blocks)
-
-
-@pytest.mark.nightly
-def test_a_copy_can_be_excluded_from_and_unblinded(copy: Path, tmp_path: Path) -> None:
-    exclude(copy, "P003", 1, by="AB", reason="fell asleep")
-    exclude(copy, "P004", 1, trial=2, by="AB", reason="the phone rang")
-    assert unblind(copy, by="AB", reason="trying the analysis").left == ()
-    assert verify(copy).errors == ()
-    told = captions(copy, tmp_path / "figures")
-    assert told.count("1 session is excluded (fell asleep).") == 2
-    assert told.count("1 trial is excluded, its answers missing here (the phone rang).") == 1
-    study = load_study(copy)
-    assert study.people == tuple(one for one in PEOPLE if one != "P003")
-    assert [setting.condition for setting in study.blocks[0].settings] == ["water", "honey", "light_oil"]
-    assert len(export(copy, tmp_path / "tables")) == 4
 
 
 def test_git_keeps_the_sample_and_ignores_other_results() -> None:

@@ -32,7 +32,7 @@ from study_app.analysis.worker_messages import (
     WriteReport,
     WriteTables,
 )
-from study_app.errors import AnalysisError, StoreError, StudyError
+from study_app.errors import AnalysisError, StoreError
 from study_app.protocol.load import load
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import exclusions
@@ -210,10 +210,6 @@ def test_the_process_answers_stops_and_is_gone_when_closed(study: Path, tmp_path
     end_s = time.monotonic() + SOON_S
     while any(child.name == "analysis" for child in multiprocessing.active_children()):
         assert time.monotonic() < end_s
-
-
-def test_stopped_is_a_failure_the_user_understands() -> None:
-    assert issubclass(Stopped, StudyError)
 
 
 def test_a_merged_study_is_found_read_decided_on_and_opened(whole: Path, tmp_path: Path) -> None:

@@ -52,13 +52,6 @@ def assert_one_line(finished: Finished, *parts: str) -> None:
         assert part in lines[0]
 
 
-def test_help_names_every_command(tmp_path: Path) -> None:
-    finished = in_a_process("--help", cwd=tmp_path)
-    assert finished.returncode == 0
-    for command in ("check", "simulate", "run", "rehearse", "export", "plot", "unblind"):
-        assert f"\n  {command} " in finished.stdout
-
-
 def test_help_loads_neither_qt_nor_the_compiler_nor_multiprocessing(tmp_path: Path) -> None:
     program = (
         "import sys; sys.argv=['liquid-study','--help']\n"

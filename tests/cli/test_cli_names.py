@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.cli.options import GROUPS
-from study_app.protocol.load import load, shipped, source_bytes
+from study_app.protocol.load import load, source_bytes
 from study_app.store.exclusions import exclusions
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.workstation import load as load_settings
@@ -60,11 +60,6 @@ def test_help_lists_every_command_once_under_its_heading_with_its_whole_sentence
         part = shown.split(f"\n{heading}:\n")[1].split("\n\n")[0]
         assert [line.split()[0] for line in part.splitlines() if not line.startswith("   ")] == names.split()
         assert "..." not in part, "a command's first sentence is cut off"
-
-
-def test_help_names_every_shipped_protocol() -> None:
-    listed = said("--help").split("shipped (")[1].split(")")[0]
-    assert sorted(listed.replace(",", " ").split()) == list(shipped())
 
 
 def test_every_command_writes_to_to_and_names_who_decides_by() -> None:

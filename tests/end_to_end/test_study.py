@@ -3,7 +3,6 @@
 import csv
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -13,8 +12,6 @@ from typing import Any
 
 import pytest
 
-from study_app.analysis.export.export import export
-from study_app.analysis.figures.plotting import plot
 from study_app.errors import StoreError
 from study_app.evaluation.replay import replay
 from study_app.protocol.load import load, shipped
@@ -30,16 +27,10 @@ from tests.compiled import needs_servo
 
 pytestmark = [pytest.mark.slow, needs_servo]
 
-CLOCK_COLUMNS = {"answered_at", "trial_started_at", "session_started_at", "session_ended_at"}
-
 
 def table(folder: SessionFolder, study: str, name: str) -> list[dict[str, str]]:
     with folder.table(study, name).open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
-
-
-def without_clock(rows: list[dict[str, str]]) -> list[dict[str, str]]:
-    return [{name: cell for name, cell in row.items() if name not in CLOCK_COLUMNS} for row in rows]
 
 
 FIXED = [name for name in shipped() if not load(name).stimuli]
@@ -127,57 +118,6 @@ def test_answers_follow_what_was_seen(rehearsal_of: Callable[[str], Path]) -> No
         assert different[of["delay_200"]] > different[of["delay_0"]]
 
 
-@pytest.mark.nightly
-def test_a_rehearsed_study_can_be_exported_and_plotted(rehearsal_of: Callable[[str], Path], tmp_path: Path) -> None:
-    folder = rehearsal_of("rek2024")
-    written = [*export(folder, tmp_path / "tables"), *plot(folder, tmp_path / "figures")]
-    assert len(written) >= 3
-    assert all(path.stat().st_size > 0 for path in written)
-
-
-def test_the_thesis_study_leaves_62_responses() -> None:
-    assert orders_of(load("rek2024")).answers == 62
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("rehearsed", besides("physical2", "slime"), indirect=True)
-def test_the_same_call_into_another_folder_gives_the_same_tables_but_for_wall_clock_times(
-    rehearsed: tuple[str, StudyFolder], tmp_path: Path
-) -> None:
-    """For protocols of format 1 `test_format_1` compares every table with those of the first release.
-
-    One study is enough for P002, whose order differs from that of P001.
-    """
-    name, first = rehearsed
-    study = load(name).study.name
-    participants = 2 if name == "slime" else 1
-    again = StudyFolder(rehearse(name, participants=participants, seed=1, results=tmp_path / "again"))
-    for one, other in zip(first.sessions()[:participants], again.sessions(), strict=True):
-        for kind in ("responses", "trials"):
-            assert without_clock(table(one, study, kind)) == without_clock(table(other, study, kind))
-
-
-@pytest.mark.parametrize("rehearsed", besides("demo"), indirect=True)
-def test_another_seed_gives_another_study(rehearsed: tuple[str, StudyFolder], tmp_path: Path) -> None:
-    name, first = rehearsed
-    study = load(name).study.name
-    other = StudyFolder(rehearse(name, participants=1, seed=2, results=tmp_path / "other"))
-    one, two = (table(folder.sessions()[0], study, "responses") for folder in (first, other))
-    assert [row["response"] for row in one] != [row["response"] for row in two]
-
-
-def test_a_used_id_is_refused_and_nothing_is_touched(rehearsed: tuple[str, StudyFolder]) -> None:
-    name, folder = rehearsed
-
-    def everything() -> dict[str, bytes]:
-        return {str(path): path.read_bytes() for path in sorted(folder.path.rglob("*")) if path.is_file()}
-
-    before = everything()
-    with pytest.raises(StoreError, match="P001 already has session 1"):
-        rehearse(name, participants=3, seed=1, results=folder.path)
-    assert everything() == before
-
-
 def test_ids_are_checked_before_the_first_session_begins(tmp_path: Path) -> None:
     rehearse("demo", participants=1, seed=1, results=tmp_path / "demo")
     used = tmp_path / "demo" / "data" / "sub-P001"
@@ -185,48 +125,6 @@ def test_ids_are_checked_before_the_first_session_begins(tmp_path: Path) -> None
     with pytest.raises(StoreError, match="P002 already has session 1"):
         rehearse("demo", participants=2, seed=1, results=tmp_path / "demo")
     assert not used.exists()
-
-
-ODD = {
-    "liquids.thin": "liquids.qaxilium",
-    "liquids.thick": "liquids.vorbent",
-    '"thin"': '"qaxilium"',
-    '"thick"': '"vorbent"',
-    "conditions.thin": "conditions.qaxilium",
-    "conditions.thick": "conditions.vorbent",
-    "conditions.prompt": "conditions.zwiftan",
-    "conditions.late": "conditions.drovelm",
-    '"prompt"': '"zwiftan"',
-    '"late"': '"drovelm"',
-    "delay_ms = 200": "delay_ms = 137.25",
-    "density_kg_m3 = 1000": "density_kg_m3 = 1013.7",
-    "density_kg_m3 = 1400": "density_kg_m3 = 1450.3",
-    "length = 1700": "length = 17391",
-    "scaling = 1700": "scaling = 17392",
-}
-
-
-def test_a_finished_folder_names_no_condition_liquid_parameter_or_delay(tmp_path: Path) -> None:
-    text = (Path(__file__).parents[2] / "protocols" / "demo.toml").read_text(encoding="utf-8")
-    for plain, odd in ODD.items():
-        text = text.replace(plain, odd)
-    odd_file = tmp_path / "odd.toml"
-    odd_file.write_text(text, encoding="utf-8")
-    assert {condition.delay_ms for condition in load(odd_file).conditions.values()} == {0, 137.25}
-    folder = rehearse(odd_file, participants=1, seed=3, results=tmp_path / "results")
-    names = ("qaxilium", "vorbent", "zwiftan", "drovelm")
-    secrets = (*names, "137.25", "0.13725", "137250000", "1013.7", "1450.3", "17391", "17392")
-    searched = {
-        secret: re.compile(rf"(?<![0-9A-Za-z]){re.escape(secret)}(?![0-9A-Za-z])".encode()) for secret in secrets
-    }
-    found = [
-        (path.name, secret)
-        for path in folder.rglob("*")
-        if path.is_file()
-        for secret, pattern in searched.items()
-        if pattern.search(path.read_bytes())
-    ]
-    assert found == []
 
 
 KILLED = """

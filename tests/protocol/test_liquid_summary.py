@@ -9,7 +9,6 @@ from study_app.haptics.model.slope_limits import slope_limit
 from study_app.protocol.describe import describe
 from study_app.protocol.liquid_summary import effects, warnings
 from study_app.protocol.load import load, load_scene, load_scenes, parse
-from study_app.protocol.orders.block_orders import orders_of
 from tests.protocol.sound import SOUND
 
 PHYSICAL = load("physical_liquids")
@@ -126,27 +125,6 @@ def test_named_effects_are_told_too():
     drag, wake = (line.split() for line in told[2:4])
     assert (drag[0], drag[3], wake[0], wake[3]) == ("drag", "in", "wake", "in")
     assert any(line.split()[0] == "added_mass" and line.endswith("not named") for line in told if line)
-
-
-def test_the_physical_liquids_are_the_handbooks():
-    numbers = {name: (it.density_kg_m3, it.viscosity_pa_s) for name, it in PHYSICAL.liquids.items()}
-    assert numbers["water"] == (998.2, 1.0016e-3)
-    assert numbers["glycerin"] == (1261, 1.41)
-    assert numbers["honey"] == (1420, 10)
-    assert 911 <= numbers["olive_oil"][0] <= 916
-    assert 0.081 <= (numbers["olive_oil"][1] or 0) <= 0.084
-    assert 30 <= (numbers["tar"][1] or 0) <= 100
-
-
-def test_the_physical_study():
-    assert (PHYSICAL.study.name, PHYSICAL.scene.scale) == ("physicalliquids", 3)
-    (block,) = PHYSICAL.main_blocks
-    assert sorted(block.conditions) == ["glycerin", "honey", "water"]
-    assert block.code_prefix == "L"
-    assert all(liquid.effects == "auto" for liquid in PHYSICAL.liquids.values())
-    presented = {name for condition in PHYSICAL.conditions.values() for name in condition.liquid_ids}
-    assert set(PHYSICAL.liquids) - presented == {"olive_oil", "tar"}
-    assert orders_of(PHYSICAL).answers == 42
 
 
 def test_the_scene_of_a_liquid_has_all_that_the_file_says():

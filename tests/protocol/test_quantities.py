@@ -10,23 +10,6 @@ OF_THE_LOOP = {"format", "rate_hz", "fade_s"}
 """Numbers of a scene that hold for a whole session."""
 
 
-@pytest.mark.parametrize(
-    ("name", "words", "unit"),
-    [
-        ("viscosity_pa_s", "viscosity", "Pa·s"),
-        ("density_kg_m3", "density", "kg/m³"),
-        ("body.density_kg_m3", "body density", "kg/m³"),
-        ("damping_nspm", "damping at the hand", "N·s/m"),
-        ("drag.damping_nspm", "damping at the hand", "N·s/m"),
-        ("wake.scaling", "wake scaling", "ticks"),
-        ("local_wake.scaling", "local wake scaling", "ticks"),
-        ("delay_ms", "visual delay", "ms"),
-    ],
-)
-def test_quantity_has_words_and_a_unit(name: str, words: str, unit: str) -> None:
-    assert (quantity_words(name), quantity(name).unit) == (words, unit)
-
-
 @pytest.mark.parametrize("study", ["rek2024", "demo", "physical2"])
 def test_every_number_of_a_liquid_has_words(study: str) -> None:
     protocol = load(study)

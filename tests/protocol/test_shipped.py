@@ -3,15 +3,12 @@
 import re
 import shutil
 import subprocess
-import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from study_app.haptics.model.scene import Body, Ewma, Knee
 from study_app.protocol.load import load
-from study_app.protocol.model import Explore, Reach
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule
 from study_app.protocol.source import files
@@ -20,7 +17,6 @@ from study_app.viewmodels.home import is_shipped
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 NAMES = sorted(path.stem for path in PROTOCOLS.glob("*.toml"))
-REK = load("rek2024")
 
 
 def test_what_ships_is_listed():
@@ -102,121 +98,6 @@ def test_every_kind_of_key_is_commented_there_or_in_a_file_that_it_names(name: s
     assert kinds - commented == set()
 
 
-def test_the_thesis_asks_62_times():
-    assert orders_of(REK).answers == 62
-    assert REK.parts == 2
-
-
-@pytest.mark.parametrize(
-    ("name", "density", "wake"),
-    [("water", 1000, (1700, 1700, 0.75)), ("honey", 1400, None), ("light_oil", 4500, (125, 250, 0.25))],
-)
-def test_the_thesis_liquids(name: str, density: float, wake: tuple[int, float, float] | None):
-    scene = REK.scene_for(name)
-    (liquid,) = scene.liquids
-    assert liquid.density_kg_m3 == density
-    assert liquid.region.kind == "everywhere"
-    assert liquid.effects == (("drag",) if wake is None else ("drag", "wake"))
-    if wake is None:
-        assert liquid.wake is None
-    else:
-        assert liquid.wake is not None
-        assert (liquid.wake.length, liquid.wake.scaling, liquid.wake.exponent) == wake
-        assert (liquid.wake.breaking_angle_deg, liquid.wake.breaking_span_m) == (45, 0.068)
-        assert (liquid.wake.decay, liquid.wake.resolution_m, liquid.wake.axes) == (0.999975, 0, "xz")
-
-
-def test_the_thesis_scene():
-    scene = REK.scene_for("water")
-    assert (scene.scale, scene.rate_hz, scene.force_limit_n) == (10, 1000, 8)
-    assert scene.body == Body(diameter_m=0.068, drag_coefficient=0.47)
-    assert scene.velocity == Ewma(alpha=0.1)
-    assert scene.knee == Knee(law="sqrt", threshold_mps=5)
-
-
-def test_the_thesis_parts():
-    liquids, delays = REK.main_blocks
-    assert (liquids.part, delays.part) == (1, 2)
-    assert sorted(liquids.conditions) == ["honey", "light_oil", "water"]
-    assert [REK.delay_s(name) for name in liquids.conditions] == [0, 0, 0]
-    assert [round(REK.delay_s(name) * 1000) for name in delays.conditions] == [0, 50, 75, 100, 125, 150, 200]
-    assert {REK.conditions[name].liquid for name in delays.conditions} == {"water"}
-    assert liquids.order == delays.order == "shuffled"
-    explore, reach = REK.tasks[liquids.task], REK.tasks[delays.task]
-    assert isinstance(explore, Explore)
-    assert (explore.min_s, explore.max_s) == (30, 120)
-    assert isinstance(reach, Reach)
-    assert reach.targets_m == ((-0.03, 0, 0), (0.03, 0, 0))
-    assert (reach.radius_m, reach.dwell_s, reach.count) == (0.006, 0.5, 12)
-
-
-def test_part_two_begins_with_30_s_of_its_own_task_in_time():
-    order = [step for step in REK.sequence if step in REK.blocks]
-    assert order == ["practice", "liquids", "baseline", "delays"]
-    baseline, reach = REK.tasks["reach_for_30_s"], REK.tasks["reach"]
-    assert isinstance(baseline, Reach)
-    assert isinstance(reach, Reach)
-    assert baseline.duration_s == 30
-    assert (baseline.targets_mm, baseline.radius_mm, baseline.dwell_s) == (
-        reach.targets_mm,
-        reach.radius_mm,
-        reach.dwell_s,
-    )
-    (condition,) = REK.blocks["baseline"].conditions
-    assert REK.delay_s(condition) == 0
-    assert REK.conditions[condition].liquid == "water"
-    page = REK.pages[REK.sequence[REK.sequence.index("baseline") - 1]]
-    assert "baseline" in REK.text(page.body, "en")
-    assert "nulmeting" in REK.text(page.body, "nl")
-
-
-def test_practice_is_in_a_liquid_of_its_own():
-    (practised,) = REK.scene_for("practice").liquids
-    others = [REK.conditions[name].liquid for name in REK.conditions if name != "practice"]
-    assert practised.id not in others
-    assert REK.questionnaire_of("practice") is None
-
-
-ITEMS = {
-    "liquid": [
-        "I think this feels like interacting with a liquid.",
-        "Interacting with this application feels immersive.",
-        "The strength of the force feedback is adequate.",
-        "The simulated liquid behaves in a way I expect.",
-        "This liquid behaves like honey.",
-        "This liquid behaves like water.",
-        "This liquid behaves like slime.",
-        "This liquid behaves like oil.",
-        "This liquid behaves like tar.",
-    ],
-    "delay": [
-        "The visual feedback is different from the baseline performance.",
-        "The difference in visual feedback makes the task harder.",
-        "The difference in visual feedback detracts from my experience.",
-        "The difference in visual feedback makes the system unusable.",
-        "I feel comfortable interacting with this application.",
-    ],
-}
-LABELS = (
-    "Completely disagree",
-    "Mostly disagree",
-    "Somewhat disagree",
-    "Neutral",
-    "Somewhat agree",
-    "Mostly agree",
-    "Completely agree",
-)
-
-
-@pytest.mark.parametrize("name", ITEMS)
-def test_the_thesis_statements_word_for_word(name: str):
-    questionnaire = REK.questionnaires[name]
-    assert [REK.text(item.text, "en") for item in questionnaire.items] == ITEMS[name]
-    assert questionnaire.item_order == "fixed"
-    assert REK.labels(questionnaire.scale, "en") == LABELS
-    assert REK.scales[questionnaire.scale].cannot_judge is None
-
-
 def texts(node: Any):
     """Yield every pair of English and Dutch texts."""
     if isinstance(node, dict):
@@ -227,17 +108,3 @@ def texts(node: Any):
     elif isinstance(node, list):
         for value in node:
             yield from texts(value)
-
-
-def test_every_dutch_text_is_a_translation():
-    document = tomllib.loads((PROTOCOLS / "rek2024.toml").read_text(encoding="utf-8"))
-    pairs = list(texts(document))
-    assert len(pairs) > 50
-    assert all(english != dutch for english, dutch in pairs)
-    assert all(0.6 < len(dutch) / len(english) < 1.7 for english, dutch in pairs if len(english) > 20)
-
-
-def test_the_demo_needs_little():
-    demo = load("demo")
-    assert orders_of(demo).answers == 8
-    assert demo.parts == 2

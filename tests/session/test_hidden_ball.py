@@ -12,8 +12,7 @@ from study_app.session.tasks import TaskView
 from study_app.session.transitions.commands import StartTrial
 from study_app.session.trial import SETTLED_S, RunningTrial
 from study_app.session.trial_recording import Recording
-from tests.session import small
-from tests.session.fakes import FakeServo, at_block
+from tests.session.fakes import FakeServo
 
 SWING = Follow(kind="follow")
 DELAY_S = 0.1
@@ -78,18 +77,3 @@ def test_the_target_is_drawn_where_it_was() -> None:
     drawn: TaskView = trial.view(servo.now_ns()).task
     assert drawn.target_m == pytest.approx(SWING.target_m(drawn.elapsed_s))
     assert trial.task.elapsed_s - drawn.elapsed_s == pytest.approx(DELAY_S + SETTLED_S, abs=0.0011)
-
-
-def test_the_session_asks_the_condition_whether_its_ball_is_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[bool] = []
-    monkeypatch.setattr(
-        "study_app.session.runner.RunningTrial",
-        lambda *words, hides_ball, **names: (asked.append(hides_ball), RunningTrial(*words, **names))[1],
-    )
-    is_thick = small.TABLES["conditions"]["is_thick"]
-    monkeypatch.setitem(small.TABLES["conditions"], "is_thick", is_thick | {"ball": "hidden"})
-    world = at_block("seeing")
-    plan = world.state.plan
-    presented = [plan.condition(trial) for trial in plan.schedule.trials[: len(asked)]]
-    assert asked == [condition == "is_thick" for condition in presented]
-    assert set(asked) == {True, False}

@@ -50,26 +50,6 @@ def test_a_target_is_reached_by_the_first_sample_that_completes_the_dwell() -> N
     assert feed(tracker, (5.3, 5.301, LEFT)) == [TargetReached(0, pytest.approx(0.3))]
 
 
-def test_leaving_for_one_sample_starts_the_dwell_anew() -> None:
-    tracker = track(reach())
-    feed(tracker, (0.0, 0.099, LEFT), (0.099, 0.1, AWAY), (0.1, 0.2, LEFT))
-    assert tracker.now().reached == 0
-    assert feed(tracker, (0.2, 0.201, LEFT)) == [TargetReached(0, pytest.approx(0.2))]
-
-
-def test_targets_alternate_and_come_round() -> None:
-    tracker = track(reach())
-    found = feed(tracker, (0, 0.2, LEFT), (0.2, 0.4, RIGHT), (0.4, 0.6, LEFT))
-    assert [reached.target for reached in found] == [0, 1, 0]
-    assert [reached.t_task_s for reached in found] == pytest.approx([0.1, 0.3, 0.5])
-
-
-def test_the_other_target_does_not_count() -> None:
-    tracker = track(reach())
-    assert feed(tracker, (0, 5, RIGHT)) == []
-    assert tracker.now().lit == 0
-
-
 def test_the_border_of_a_target_belongs_to_it_and_what_lies_beyond_does_not() -> None:
     inside, outside = (-0.02, 0.0, 0.005), (-0.02, 0.0, np.nextafter(0.005, 1))
     assert len(feed(track(reach()), (0, 0.2, inside))) == 1
@@ -109,23 +89,6 @@ def test_a_task_that_runs_out_of_time_says_so() -> None:
     tracker = track(reach(timeout_s=2))
     feed(tracker, (0, 5, AWAY))
     assert (tracker.outcome, tracker.end_ns) == ("timeout", ns(2))
-
-
-def test_a_target_that_is_reached_by_the_last_permitted_sample_counts() -> None:
-    tracker = track(reach(count=1, timeout_s=2))
-    feed(tracker, (0, 1.9, AWAY), (1.9, 3, LEFT))
-    assert (tracker.outcome, tracker.end_ns) == ("complete", ns(2))
-
-
-def test_a_target_that_would_be_reached_after_the_last_permitted_sample_does_not() -> None:
-    tracker = track(reach(count=1, timeout_s=2))
-    feed(tracker, (0, 1.901, AWAY), (1.901, 3, LEFT))
-    assert tracker.outcome == "timeout"
-
-
-def test_without_dwell_entering_is_reaching() -> None:
-    tracker = track(reach(dwell_s=0))
-    assert feed(tracker, (0, 0.01, AWAY), (0.01, 0.02, LEFT)) == [TargetReached(0, pytest.approx(0.01))]
 
 
 def test_a_position_that_is_no_number_is_outside() -> None:

@@ -2,8 +2,6 @@ import codecs
 import csv
 import io
 import json
-import subprocess
-import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from datetime import datetime, timedelta, timezone
@@ -161,49 +159,6 @@ def test_a_list_that_a_spreadsheet_saved_is_read(folder: Path) -> None:
     exclude(folder, "P007", 1, by="AB", reason="withdrew")
     assert exclusions(folder)[0] == decided[0]
     assert not path.read_bytes().startswith(codecs.BOM_UTF8)
-
-
-EXCLUDER = """
-import sys
-from pathlib import Path
-from study_app.errors import StoreError
-from study_app.store.exclusions import exclude
-print("ready", flush=True)
-for line in sys.stdin:
-    participant, by = line.split()
-    try:
-        exclude(Path(sys.argv[1]), participant, 1, by=by, reason="tired")
-    except StoreError as error:
-        print("refused", error, flush=True)
-    else:
-        print("excluded", flush=True)
-"""
-
-
-@pytest.mark.slow
-def test_of_two_people_at_once_no_decision_is_lost(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
-    """Whoever is told that it was written finds it in the list; the other is told to try again."""
-    for number in range(40):
-        start(f"P{number:03d}").finish("completed")
-    command = [sys.executable, "-c", EXCLUDER, str(tmp_path / "study")]
-    people = [subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) for _ in range(2)]
-    done = []
-    try:
-        assert [one.stdout.readline() for one in people if one.stdout] == ["ready\n"] * 2
-        for number in range(0, 40, 2):
-            for which, one in enumerate(people):
-                assert one.stdin
-                one.stdin.write(f"P{number + which:03d} {'AB'[which]}\n")
-                one.stdin.flush()
-            for which, one in enumerate(people):
-                assert one.stdout
-                told = one.stdout.readline()
-                assert told == "excluded\n" or "is open in another program" in told
-                done += [f"P{number + which:03d}"] if told == "excluded\n" else []
-    finally:
-        for one in people:
-            one.communicate()
-    assert sorted(row.participant for row in exclusions(tmp_path / "study")) == sorted(done)
 
 
 def test_an_exclusion_is_taken_back_and_stays_on_record(folder: Path) -> None:

@@ -1,4 +1,3 @@
-import re
 from pathlib import Path
 
 import pytest
@@ -13,35 +12,6 @@ def with_sessions(path: Path, *names: str) -> StudyFolder:
         (path / "data" / name).mkdir(parents=True)
         (path / "data" / name / "checksums.sha256").touch()  # something that comes after a session's beginning
     return StudyFolder(path)
-
-
-def test_every_file_has_its_name() -> None:
-    folder = study_folder(Path("results"), "rek2024")
-    session = folder.session("P007", 1)
-    inside = "results/rek2024/data/sub-P007/ses-01"
-    assert {path.as_posix() for path in (folder.description, folder.exclusions, folder.key, folder.reveals)} == {
-        "results/rek2024/dataset_description.json",
-        "results/rek2024/exclusions.csv",
-        "results/rek2024/blinding/key.sealed",
-        "results/rek2024/blinding/reveals.jsonl",
-    }
-    assert folder.participants("rek2024").as_posix() == (
-        "results/rek2024/data/study-rek2024_description-participants_data.csv"
-    )
-    assert session.journal.as_posix() == f"{inside}/journal.jsonl"
-    assert session.receipt.as_posix() == f"{inside}/receipt.json"
-    assert session.recordings.as_posix() == f"{inside}/recordings"
-    assert session.table("rek2024", "responses").as_posix() == (
-        f"{inside}/subject-P007_session-01_task-rek2024_description-responses_data.csv"
-    )
-
-
-def test_tables_are_named_as_psych_ds_asks() -> None:
-    folder = study_folder(Path("results"), "rek2024")
-    rule = re.compile(r"([a-z]+-[a-zA-Z0-9]+)(_[a-z]+-[a-zA-Z0-9]+)*_data\.csv")
-    tables = [folder.session("p7X", 12).table("rek2024", name) for name in ("responses", "trials")]
-    for path in (folder.participants("rek2024"), *tables):
-        assert rule.fullmatch(path.name)
 
 
 def test_pilot_sessions_have_a_folder_of_their_own() -> None:

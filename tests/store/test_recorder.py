@@ -235,15 +235,6 @@ def test_any_failure_loses_one_recording_and_tells_it_at_once(
     assert recorder.lost == (lost,)
 
 
-def test_a_folder_that_cannot_be_made_loses_every_recording(tmp_path: Path, samples_of: Make) -> None:
-    (tmp_path / "recordings").write_text("a file is in the way")
-    recorder = Recorder(tmp_path / "recordings", FACTS)
-    record(recorder, samples_of(200), trial=1)
-    record(recorder, samples_of(200), trial=2)
-    recorder.close()
-    assert recorder.kept() == (Lost(1, 1, "File exists"), Lost(2, 1, "File exists"))
-
-
 def test_the_end_of_a_session_does_not_wait_for_ever(tmp_path: Path, samples_of: Make, disk: Disk) -> None:
     recorder = Recorder(tmp_path / "recordings", FACTS)
     record(recorder, samples_of(40_000), chunk=5_000)
@@ -295,11 +286,6 @@ def test_after_its_end_it_keeps_nothing(recorder: Recorder, samples_of: Make) ->
     record(recorder, samples_of(10))
     recorder.close()
     assert recorder.kept() == ()
-
-
-def test_a_session_without_trials_starts_no_thread(recorder: Recorder) -> None:
-    recorder.close()
-    assert recorder.thread is None
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")

@@ -1,7 +1,5 @@
 import json
 import struct
-import subprocess
-import sys
 import zlib
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -269,26 +267,3 @@ def test_a_newer_format_is_told(tmp_path: Path, samples_of: Make, monkeypatch: p
         path = write(tmp_path / "trial-003.parquet", samples_of(10)).path
     with pytest.raises(StoreError, match="has format 5, this version reads 1 to 4: use a newer version"):
         read_samples(path)
-
-
-RECORDING = """
-import sys
-from pathlib import Path
-import numpy as np
-from study_app.haptics.model.layout import SAMPLE
-from study_app.store import recording_files, recording_writer
-path = Path(sys.argv[1])
-file = recording_writer.SamplesFile(path, {}, 1000.0)
-file.write(np.zeros(2000, SAMPLE))
-file.finish()
-recording_files.read_samples(path)
-frames = path.with_name("frames.parquet")
-recording_files.read_frames(recording_writer.write_frames(frames, np.zeros((3, 5), np.int64), {}).path)
-print([name for name in ("pandas", "numba", "scipy", "PySide6") if name in sys.modules])
-"""
-
-
-@pytest.mark.slow
-def test_neither_the_compiler_nor_the_analysts_libraries_are_loaded(tmp_path: Path) -> None:
-    command = [sys.executable, "-c", RECORDING, str(tmp_path / "trial-001.parquet")]
-    assert json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout) == []

@@ -14,7 +14,7 @@ from study_app.store.output_files import write_files
 from study_app.store.tables.column import Column, header, unsealed
 from study_app.store.tables.columns import RESPONSES, SEALED, TRIALS
 from study_app.store.tables.formulas import unguarded
-from tests.analysis.conftest import CANNOT_JUDGE, DELAY_ERROR_MS, HIDDEN, Results
+from tests.analysis.conftest import CANNOT_JUDGE, DELAY_ERROR_MS, Results
 
 pytestmark = pytest.mark.slow
 
@@ -101,16 +101,6 @@ def test_the_aggregate_counts_all_levels_and_what_is_missing(small: Results, to:
     assert found[1]["missing"] == "2"
 
 
-def test_of_a_repeated_trial_both_attempts_are_exported_and_one_counted(rek: Results, to: Path) -> None:
-    rek.add("P001", lambda *_: 6, repeated={"L3": lambda *_: 1})
-    export(rek.folder, to)
-    found = [row for row in rows(to, "responses") if row["code"] == "L3" and row["item"] == "immersive"]
-    assert [(row["attempt"], row["response"], row["counted"]) for row in found] == [
-        ("1", "1", "false"),
-        ("2", "6", "true"),
-    ]
-
-
 def test_what_is_excluded_is_exported_with_its_reason_and_not_counted(rek: Results, to: Path) -> None:
     for participant in ("P001", "P002", "P003"):
         rek.add(participant, lambda *_: 6)
@@ -156,17 +146,6 @@ def test_a_text_is_no_formula_in_a_spreadsheet_and_a_negative_number_a_number(re
     assert table_bytes(Delivered("numbers", columns, frame)) == b"text,number\n'-1,-1.5\n"
 
 
-def test_nothing_hidden_is_in_any_blinded_file(small: Results, to: Path) -> None:
-    small.add("A", lambda *_: 3)
-    for path in export(small.folder, to):
-        content = path.read_text().lower()
-        for word in HIDDEN:
-            assert word not in content, path.name
-    codebook = json.loads((to / "codebook.json").read_text())
-    assert codebook["blinded"] is True
-    assert codebook["key_opened"] == []
-
-
 def test_opened_rows_say_condition_liquid_and_delay_asked_for_and_achieved(rek: Results, to: Path) -> None:
     rek.add("P001", lambda *_: 6)
     rek.open()
@@ -194,28 +173,6 @@ def test_a_delay_that_was_not_measured_is_not_claimed(rek: Results, to: Path) ->
     assert {row["delay_achieved_ms"] for row in rows(to, "responses")} == {"n/a"}
 
 
-@pytest.mark.parametrize("opened", [False, True])
-def test_the_codebook_describes_every_column_of_every_file(rek: Results, to: Path, opened: bool) -> None:
-    rek.add("P001", lambda *_: 6)
-    if opened:
-        rek.open()
-    export(rek.folder, to)
-    codebook = json.loads((to / "codebook.json").read_text())
-    for name in ("responses", "trials", "aggregate"):
-        described = codebook["files"][f"study-rek2024_description-{name}_data.csv"]
-        assert [column["name"] for column in described] == list(rows(to, name)[0])
-        assert all(column["description"] and column["type"] for column in described)
-    liquids = codebook["blocks"][0]
-    assert liquids["items"][0]["text"] == "I think this feels like interacting with a liquid."
-    assert liquids["levels"]["7"] == "Completely agree"
-
-
-def test_the_same_results_give_the_same_bytes(rek: Results, to: Path, tmp_path: Path) -> None:
-    rek.add("P001", lambda *_: 6)
-    first = [path.read_bytes() for path in export(rek.folder, to)]
-    assert [path.read_bytes() for path in export(rek.folder, tmp_path / "again")] == first
-
-
 def test_an_export_replaces_the_one_before_it_and_leaves_other_files(rek: Results, to: Path) -> None:
     rek.add("P001", lambda *_: 6)
     export(rek.folder, to)
@@ -224,14 +181,6 @@ def test_an_export_replaces_the_one_before_it_and_leaves_other_files(rek: Result
     export(rek.folder, to)
     assert len(rows(to, "responses")) == 124
     assert (to / "mine.txt").read_text() == "kept"
-
-
-def test_results_without_a_completed_session_are_exported_and_count_nothing(rek: Results, to: Path) -> None:
-    rek.add("P001", lambda *_: 6, status="unfinished", trials=2)
-    export(rek.folder, to)
-    assert len(rows(to, "responses")) == 9
-    assert {row["n"] for row in rows(to, "aggregate")} == {"0"}
-    assert {row["median"] for row in rows(to, "aggregate")} == {"n/a"}
 
 
 def test_a_broken_folder_leaves_no_export(rek: Results, to: Path) -> None:

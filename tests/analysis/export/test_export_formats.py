@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from click.testing import CliRunner
 from pyarrow import parquet
 
 from study_app.analysis.export import spss
@@ -18,7 +17,6 @@ from study_app.analysis.export.export import export
 from study_app.analysis.export.psychds_dataset import FOLDER
 from study_app.analysis.export.spss import CANNOT_JUDGE, NOT_ANSWERED, names_of
 from study_app.analysis.export.table_files import Extra
-from study_app.cli import commands
 from study_app.errors import AnalysisError
 from study_app.protocol.load import parse
 from study_app.store.verification.psychds import validate
@@ -56,11 +54,6 @@ def half_answered(small: Results) -> Results:
     small.add("B", lambda condition, item: {"smooth": "cannot judge", "warm": 4}[item], changes={"notes": None})
     small.add("C", lambda condition, item: 3 if condition == "heavyzembla" else 6)
     return small
-
-
-def test_without_being_asked_nothing_else_is_written(rek: Results, to: Path) -> None:
-    rek.add("P001", lambda *_: 6)
-    assert {path.suffix for path in export(rek.folder, to)} == {".csv", ".json"}
 
 
 def test_wide_has_a_row_a_participant_and_a_column_an_item_and_setting(small: Results, to: Path) -> None:
@@ -263,15 +256,6 @@ def test_a_study_without_anybody_who_counts_is_exported_too(small: Results, to: 
     export(small.folder, to, extras=ALL)
     assert cells(table(to, "small", "wide", "csv")) == []
     assert len(sav(table(to, "small", "wide", "sav"))[0]) == 0
-
-
-@pytest.mark.nightly
-def test_the_command_takes_every_format(small: Results, to: Path) -> None:
-    half_answered(small)
-    asked = ["export", str(small.folder), "--to", str(to), "--wide", "--parquet", "--sav", "--psych-ds"]
-    result = CliRunner().invoke(commands, asked)
-    assert result.exit_code == 0, result.output
-    assert {path.suffix for path in to.iterdir()} == {".csv", ".json", ".parquet", ".sav", ""}
 
 
 def test_a_folder_that_cannot_be_written_leaves_nothing_of_any_format(small: Results, to: Path) -> None:

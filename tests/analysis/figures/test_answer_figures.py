@@ -34,22 +34,6 @@ def test_levels_that_never_occur_are_not_drawn_and_do_not_shift_colours(rek: Res
     assert [found[level][2] for level in (4, 5, 6, 7)] == list(style.LEVEL_COLOURS[3:])
 
 
-def test_counts_stand_in_the_segments_in_a_colour_that_can_be_read(rek: Results) -> None:
-    by_person(rek, [1, 1, 5])
-    axes = panel(answer_figures.liquids(load_study(rek.folder)), "L1")
-    first = [text for text in axes.texts if text.get_position()[1] == 0]
-    assert [(text.get_text(), text.get_color()) for text in first] == [("2", "#ffffff"), ("1", "#000000")]
-    assert [text.get_position()[0] for text in first] == [-1, 0.5]
-
-
-def test_rows_follow_the_questionnaire_and_use_the_short_texts(rek: Results) -> None:
-    by_person(rek, [4])
-    figure = answer_figures.liquids(load_study(rek.folder))
-    items = [item.short for item in load_study(rek.folder).blocks[0].items]
-    height = {text.get_text(): text.get_position()[1] for text in shown(figure)}
-    assert [height[item] for item in items] == sorted((height[item] for item in items), reverse=True)
-
-
 def test_blinded_panels_are_titled_by_code_and_opened_ones_by_name(rek: Results) -> None:
     by_person(rek, [4, 5])
     blinded = words(answer_figures.liquids(load_study(rek.folder)))
@@ -77,19 +61,6 @@ def test_real_participants_are_not_called_simulated(real: Results) -> None:
     by_person(real, [4])
     for draw in (answer_figures.liquids, answer_figures.delays):
         assert not any("SIMULATED" in word for word in words(draw(load_study(real.folder))))
-
-
-def test_n_is_on_the_figure(rek: Results) -> None:
-    by_person(rek, [4, 5, 6])
-    for draw in (answer_figures.liquids, answer_figures.delays):
-        assert any(word.startswith("n = 3 participants") for word in words(draw(load_study(rek.folder))))
-
-
-def test_one_participant_is_one_participant(rek: Results) -> None:
-    by_person(rek, [6])
-    study = load_study(rek.folder)
-    assert "n = 1 participant" in words(answer_figures.liquids(study))
-    assert "n = 1 participant" in words(answer_figures.delays(study))
 
 
 def test_a_row_with_missing_answers_tells_its_own_n(small: Results) -> None:
@@ -220,15 +191,6 @@ def test_the_legend_shortens_what_the_labels_share() -> None:
         "Grotendeels",
     ]
     assert diverging_bars.legend_labels(list("abcdefg")) == list("abcdefg")
-
-
-def test_many_settings_go_on_in_another_row(rek: Results) -> None:
-    by_person(rek, [2, 6])
-    study = load_study(rek.folder)
-    figure = answer_figures.liquids(study, study.blocks[1])
-    tops = [round(axes.get_position().y1, 3) for axes in figure.axes]
-    assert len(tops) == 7
-    assert len(set(tops)) == 3
 
 
 def test_a_study_without_delays_says_so(small: Results) -> None:

@@ -1,6 +1,5 @@
 """Figures written as files: captions, exclusions, the same bytes each time, nothing hidden."""
 
-import logging
 import subprocess
 import sys
 from pathlib import Path
@@ -75,16 +74,6 @@ def test_of_many_reasons_a_caption_tells_the_most_frequent(rek: Results) -> None
     assert expected in captions.caption(study, study.blocks[0])
 
 
-def test_an_excluded_session_is_in_no_figure(rek: Results) -> None:
-    by_person(rek, [1, 6, 7])
-    rek.exclude("P001")
-    study = load_study(rek.folder)
-    found = segments(panel(answer_figures.liquids(study), "L1"), 1)
-    assert {level: width for level, (_, width, _) in found.items()} == {6: 1, 7: 1}
-    (dots,) = gids(panel(answer_figures.delays(study), "item1"), "D1")
-    assert sorted(np.round(dots.get_ydata())) == [6, 7]
-
-
 def test_an_excluded_trial_is_an_empty_cell_and_shows_in_n(rek: Results) -> None:
     by_person(rek, [3, 4])
     rek.exclude("P002", trial=rek.trial("P002", "delay_75"))
@@ -101,13 +90,6 @@ def test_an_excluded_trial_is_an_empty_cell_and_shows_in_n(rek: Results) -> None
     water = rek.code("water", "liquids")
     assert sorted(segments(panel(figure, water), 1)) == [3]
     assert words(figure).count("n 1") == len(study.blocks[0].items)
-
-
-def test_where_everybody_is_excluded_plot_says_so(rek: Results, tmp_path: Path) -> None:
-    by_person(rek, [4])
-    rek.exclude("P001")
-    with pytest.raises(AnalysisError, match="P001 session 1 excluded"):
-        plotting.plot(rek.folder, tmp_path / "out")
 
 
 def test_the_caption_of_opened_delays_says_how_late_they_really_were(rek: Results) -> None:
@@ -130,14 +112,6 @@ def test_the_same_results_give_the_same_bytes_in_another_process_too(rek: Result
         [sys.executable, "-W", "error", "-c", code], check=True, env={"PYTHONHASHSEED": "7", "HOME": str(tmp_path)}
     )
     assert {path.name: path.read_bytes() for path in (tmp_path / "second").iterdir()} == first
-
-
-@pytest.mark.nightly
-def test_plotting_logs_nothing(rek: Results, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    by_person(rek, [4])
-    with caplog.at_level(logging.WARNING):
-        plotting.plot(rek.folder, tmp_path / "out")
-    assert caplog.records == []
 
 
 def test_nothing_hidden_is_in_any_blinded_file(small: Results, tmp_path: Path) -> None:

@@ -1,9 +1,5 @@
 """Figures of a report: what stands in the recognition matrix, over which delays, and where the step-down mark is."""
 
-import colorsys
-from itertools import pairwise
-
-import matplotlib.colors as colours
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -56,23 +52,6 @@ def test_the_right_name_is_framed_in_every_row() -> None:
         if patch.get_linewidth() > 1
     }
     assert framed == {("name2", "name2-setting1"), ("name1", "name1-setting2"), ("name4", "name4-setting3")}
-
-
-def test_counts_are_legible_on_the_darkest_ground_and_grounds_stay_apart_in_grey() -> None:
-    def luminance(share: float) -> float:
-        ground = np.array(recognition_matrix.GROUND) * recognition_matrix.DARKEST * share
-        red, green, blue = ground + 1 - recognition_matrix.DARKEST * share
-        linear = [
-            value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4 for value in (red, green, blue)
-        ]
-        return float(np.dot([0.2126, 0.7152, 0.0722], linear))
-
-    ink = colours.to_rgb(style.TEXT)
-    dark = np.dot([0.2126, 0.7152, 0.0722], [((value + 0.055) / 1.055) ** 2.4 for value in ink])
-    assert (luminance(1.0) + 0.05) / (dark + 0.05) > 5
-    greys = [luminance(share) for share in (0.0, 0.25, 0.5, 0.75, 1.0)]
-    assert all(lighter - darker > 0.1 for lighter, darker in pairwise(greys))
-    assert colorsys.rgb_to_hls(*recognition_matrix.GROUND)[1] < 0.5
 
 
 @pytest.mark.parametrize("lowest_ms", [50.0, 200.0])

@@ -1,7 +1,6 @@
 """The tables of intervals and tracks: what is in them before and after the key is opened."""
 
 import csv
-import importlib
 import json
 from collections import Counter
 from pathlib import Path
@@ -99,27 +98,3 @@ def test_intervals_say_what_each_presented_and_a_track_has_neither_liquid_nor_de
     assert {row["liquid"] for row in trials if row["block"] == "viscosity"} == {"n/a"}
     assert {row["delay_ms"] for row in trials if row["block"] == "viscosity"} == {"n/a"}
     assert {row["liquid"] for row in trials if row["block"] == "pairs"} == {"thin", "thick"}
-
-
-def test_codebook_describes_every_column_and_spss_has_labels(exported: Path) -> None:
-    codebook = json.loads((exported / "codebook.json").read_text())
-    for name in ("intervals", "tracks"):
-        file = f"study-levels_description-{name}_data.csv"
-        described = next(columns for one, columns in codebook["files"].items() if one == file)
-        assert [column["name"] for column in described] == list(rows(exported, name)[0])
-        assert all(len(column["description"]) > 10 for column in described)
-    viscosity = codebook["levels"][0]
-    assert viscosity == {
-        "block": "viscosity", "title": "Viscosity", "phase": "main", "design": "2ifc", "item": "choice_2ifc",
-        "vary": "viscosity_pa_s", "level": "weber", "direction": "up",
-    }  # fmt: skip
-    sav = importlib.import_module("pyreadstat").read_sav(exported / "study-levels_description-tracks_data.sav")
-    labels = dict(zip(sav[1].column_names, sav[1].column_labels, strict=True))
-    assert labels["level_asked"].startswith("level_asked: ") or "level" in labels["level_asked"]
-    assert all(labels.values())
-    assert len(sav[0]) == 3 * 54
-    assert (exported / "psych-ds" / "data" / "study-levels_description-tracks_data.csv").exists()
-
-
-def test_wide_table_leaves_levels_to_the_tracks(exported: Path) -> None:
-    assert list(rows(exported, "wide")[0]) == ["participant", "simulated"]

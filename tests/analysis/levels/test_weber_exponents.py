@@ -7,8 +7,7 @@ import pytest
 from scipy import stats
 
 from study_app.analysis.designs.weber_exponents import jnd_slope, weber_exponents
-from study_app.analysis.report.answers import threshold_section
-from study_app.analysis.results.level_results import LevelsFound, PublishedValue, ThresholdFound
+from study_app.analysis.results.level_results import ThresholdFound
 
 STANDARDS = (4.0, 8.0, 16.0, 32.0)
 
@@ -50,22 +49,3 @@ def test_the_exponent_of_one_participant_has_no_interval() -> None:
     group, own = weber_exponents(observers(1.0), "weber")
     assert (group.n, group.low, group.high) == (1, None, None)
     assert own.participant == "P001"
-
-
-def test_the_report_states_exponents_and_the_published_one() -> None:
-    published = (
-        PublishedValue("exponent", 0.9, None, 0.8, 1.0, None, 12, "Doe 2001"),
-        PublishedValue("weber", 0.19, None, None, None, 71.0, 10, "Jones 1997"),
-    )
-    ones = observers(1.0, 0.5)
-    found = LevelsFound(
-        "b", "Block", "2ifc", True, (), "share", "correct", level_kind="weber", quantity="damping", unit="N·s/m",
-        spacing="log", family="weibull", thresholds=tuple(ones), exponents=tuple(weber_exponents(ones, "weber")),
-        published=published,
-    )  # fmt: skip
-    page = "".join(threshold_section.section(found, {}))
-    thresholds, exponents = page.split("Weber exponent", maxsplit=1)
-    assert "Published: Jones 1997: weber 0.19 (at 71 % correct, n = 10)." in thresholds
-    assert "Published: Doe 2001: exponent 0.9 (0.8 to 1, n = 12)." in exponents
-    assert "group of 2" in exponents
-    assert "0.75" in exponents

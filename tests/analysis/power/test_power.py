@@ -251,12 +251,6 @@ def test_tables_and_figures_are_written_and_say_simulated(found: Powers, tmp_pat
     assert "SIMULATED participants" in (tmp_path / "power" / "power-delays.svg").read_text(encoding="utf-8")
 
 
-@pytest.mark.nightly
-def test_the_same_numbers_give_the_same_files(found: Powers, tmp_path: Path) -> None:
-    one, other = (write(found, tmp_path / name) for name in ("one", "other"))
-    assert [path.read_bytes() for path in one] == [path.read_bytes() for path in other]
-
-
 def test_what_was_ended_early_says_so(counted: tuple[int, Counts]) -> None:
     studies, counts = counted
     found = powers(planned(), SIZES, studies, 1000, 1, counts)

@@ -1,6 +1,5 @@
 """A study with every kind of question, from its rehearsal to tables, verification, export, SPSS and report."""
 
-import csv
 import json
 import shutil
 from pathlib import Path
@@ -9,7 +8,6 @@ from typing import Any
 import pytest
 
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.export.export import export
 from study_app.analysis.report.write_report import report
 from study_app.analysis.study_worker import carry_out
 from study_app.analysis.tables.study_tables import Study, load_study
@@ -46,11 +44,6 @@ def study(folder: Path) -> Study:
     return load_study(folder)
 
 
-def table(path: Path) -> list[dict[str, str]]:
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
 def test_rehearsed_study_is_sound(folder: Path) -> None:
     found = verify(folder)
     assert [str(one) for one in found.errors] == []
@@ -68,43 +61,6 @@ def test_order_is_reproduced_where_answers_hid_questions(tmp_path: Path) -> None
     assert 0 < asked < 2 * len(sessions)  # hidden from some
     assert [reproduced(session.path).differences for session in sessions] == [[]] * 8
     assert verify(folder).errors == ()
-
-
-def test_tables_say_form_kind_answer_and_value(folder: Path) -> None:
-    (path,) = (folder / "data" / "sub-P001" / "ses-01").glob("*responses_data.csv")
-    rows = {(row["form"], row["item"], row["trial"]): row for row in table(path)}
-    age = rows["start", "age", "n/a"]
-    assert (age["kind"], age["block"], age["phase"]) == ("number", "n/a", "n/a")
-    assert 16 <= float(age["value"]) == float(age["response"]) <= 99
-    assert rows["start", "hand", "n/a"]["response"] in ("left", "right", "both")
-    assert rows["start", "hand", "n/a"]["value"] == "n/a"
-    assert rows["n/a", "thickness", "1"]["kind"] == "rating"
-    assert int(rows["n/a", "pleasant", "2"]["value"]) % 5 == 0
-    assert rows["end", "comment", "n/a"]["response"] == "Simulated answer."
-
-
-def test_statements_alone_are_compared_as_in_format_1(study: Study) -> None:
-    (block,) = study.blocks
-    assert [item.id for item in block.items] == ["feels_liquid"]
-    assert set(study.responses["item"]) == {"feels_liquid"}
-    assert study.responses["response"].between(1, 7).all()
-    assert len(study.answers(block)) == 2 * PEOPLE
-
-
-def test_measures_count_every_answer(study: Study) -> None:
-    results = evaluate(study, planning=False)
-    assert results.failures == ()
-    found = {(one.where, one.item): one for one in results.questions}
-    assert [group.code for group in found["stir", "thickness"].groups] == ["A1", "A2"]
-    for group in found["stir", "thickness"].groups:
-        assert sum(group.numbers["counts"].values()) == group.numbers["n"] == PEOPLE
-    (hands,) = found["start", "hand"].groups
-    assert sum(hands.numbers["counts"].values()) == PEOPLE
-    (age,) = found["start", "age"].groups
-    assert len(age.numbers["values"]) == PEOPLE
-    assert age.numbers["smallest"] <= age.numbers["median"] <= age.numbers["largest"]
-    (comments,) = found["end", "comment"].groups
-    assert comments.numbers["texts"] == [f"P{n:03d}: Simulated answer." for n in range(1, PEOPLE + 1)]
 
 
 def test_scores_are_those_of_the_answers(study: Study) -> None:
@@ -159,35 +115,3 @@ def test_results_window_is_told_of_every_figure(folder: Path) -> None:
     assert drawn["question-start-hand"] == "Start: Hand"
     assert "liquids" in drawn
     assert not any("comment" in name for name in drawn)  # texts are not drawn
-
-
-@pytest.mark.parametrize(
-    "extras", [("wide", "sav"), pytest.param(("psych-ds", "sav", "wide"), marks=pytest.mark.nightly)]
-)
-def test_export_holds_all_answers_wide_and_described(folder: Path, tmp_path: Path, extras: tuple[str, ...]) -> None:
-    export(folder, tmp_path, extras=extras)
-    rows = table(next(tmp_path.glob("*wide_data.csv")))
-    assert len(rows) == PEOPLE
-    first = rows[0]
-    assert first["start__hand"] in ("left", "right", "both")
-    assert {"stir__thickness__A1", "stir__pleasant__A2", "load__raw", "usability__sus", "end__comment"} <= set(first)
-    assert float(first["usability__sus"]) % 2.5 == 0
-    book = json.loads((tmp_path / "codebook.json").read_text(encoding="utf-8"))
-    hand = next(one for one in book["questions"] if one["id"] == "hand")
-    assert hand["levels"] == {"left": "Left", "right": "Right", "both": "Both"}
-    since = next(one for one in book["questions"] if one["id"] == "since")
-    assert since["show_if"]["is"] == "both"
-    assert {one["name"] for one in book["scores"]} == {"raw", "sus"}
-
-
-def test_spss_file_has_levels_of_ratings_and_choices(folder: Path, tmp_path: Path) -> None:
-    pyreadstat: Any = pytest.importorskip("pyreadstat")
-    export(folder, tmp_path, extras={"sav"})
-    (path,) = tmp_path.glob("*wide_data.sav")
-    frame, meta = pyreadstat.read_sav(str(path))
-    labels = meta.variable_value_labels
-    assert labels["start__hand"] == {1: "Left", 2: "Right", 3: "Both", 98: "Cannot judge", 99: "No answer"}
-    assert labels["stir__thickness__A1"][5] == "Very"
-    assert "start__used" not in labels
-    assert frame["start__hand"].between(1, 3).all()
-    assert frame["load__raw"].notna().all()

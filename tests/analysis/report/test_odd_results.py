@@ -118,19 +118,6 @@ def test_sessions_without_a_completed_one_give_a_report_without_findings(rek: Re
     assert not (tmp_path / "report" / "liquids.png").exists()
 
 
-def test_a_hand_edited_answer_of_nine_is_one_clear_error(rek: Results, tmp_path: Path) -> None:
-    twelve(rek, people=2)
-    path = rek.responses("P001")
-    lines = path.read_text(encoding="utf-8").splitlines()
-    place = lines[0].split(",").index("response")
-    cells = lines[3].split(",")
-    cells[place] = "9"
-    path.write_text("\n".join([*lines[:3], ",".join(cells), *lines[4:]]) + "\n", encoding="utf-8")
-    with pytest.raises(AnalysisError, match="row 3, column response: '9' is not a whole number from 1 to 7"):
-        report(rek.folder, tmp_path / "report")
-    assert not (tmp_path / "report").exists()
-
-
 def test_another_study_mixed_in_or_an_empty_folder_is_one_clear_error(
     rek: Results, small: Results, tmp_path: Path
 ) -> None:

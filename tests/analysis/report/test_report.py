@@ -15,7 +15,7 @@ from study_app.analysis.tables.study_tables import load_study
 from study_app.cli import commands
 from study_app.errors import AnalysisError
 from tests.analysis.conftest import HIDDEN, Results, twelve
-from tests.analysis.report.read_report import answered_by_two, numbers, read, rows
+from tests.analysis.report.read_report import answered_by_two, numbers, read
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
@@ -57,10 +57,6 @@ def test_the_contents_lead_to_every_section(of_twelve: Path) -> None:
         assert heading.startswith(title.split()[0])
 
 
-def test_the_page_says_when_the_sessions_took_place(of_twelve: Path) -> None:
-    assert "Twelve participants. Sessions on 2026-01-05." in read(of_twelve)
-
-
 def test_the_typeface_is_in_the_page_with_every_sign(of_twelve: Path) -> None:
     page = (of_twelve / "report.html").read_text(encoding="utf-8")
     fonts = re.findall(r"font-weight: (\d+); src: url\(data:font/woff;base64,([^)]+)\)", page)
@@ -69,20 +65,6 @@ def test_the_typeface_is_in_the_page_with_every_sign(of_twelve: Path) -> None:
     signs = {sign for sign in read(of_twelve) if sign.isprintable()}
     for _, data in fonts:
         assert signs <= {chr(code) for code in TTFont(io.BytesIO(base64.b64decode(data))).getBestCmap()}
-
-
-def test_every_test_is_a_row_with_what_a_reader_needs(of_twelve: Path) -> None:
-    tests = rows(of_twelve, "tests.csv")
-    assert {row["question"] for row in tests} >= {"settings differ", "liquids are recognised", "a delay is noticed"}
-    for row in tests:
-        assert row["n"] != "n/a"
-        assert "n/a" not in (row["p"], row["effect"]) or {row["note"], row["interval"]} != {"n/a"}
-        assert row["interval"] != "n/a"
-        assert (row["family"] == "n/a") == (row["question"] == "a delay is noticed")
-    found = numbers(of_twelve)
-    omnibus = found["results"]["blocks"][0]["omnibus"]
-    listed_ps = [row["p_adjusted"] for row in tests if row["family"] == "liquids: settings differ"]
-    assert [float(p) for p in listed_ps] == pytest.approx([one["p_adjusted"] for one in omnibus])
 
 
 @pytest.mark.nightly
@@ -148,20 +130,6 @@ def test_what_progress_raises_ends_the_report_at_every_step_and_nothing_is_writt
             report(small.folder, tmp_path / "not", progress=cancel)
         assert len(asked) == step + 1
         assert not (tmp_path / "not").exists()
-
-
-def test_what_a_block_cannot_have_is_said_and_validity_stands_beside_what_was_measured(of_twelve: Path) -> None:
-    told = read(of_twelve)
-    sections = re.search(r".*Motion and force (.*?) Delay effect (.*?) Reaches:", told)
-    assert sections is not None
-    assert "No reaching task in this block" in sections[1]
-    assert "No reaching task in this block" not in sections[2]
-    assert "none of its recordings could be read" in sections[2]
-    for section in sections.groups():
-        assert "trials within limits" in section
-        assert "12 of 12" in section
-    for row in rows(of_twelve, "motion.csv"):
-        assert (row["trials"], row["judged"], row["valid"]) == ("12", "12", "12")
 
 
 def test_the_command_writes_it_and_tells_errors_in_one_line(small: Results, tmp_path: Path) -> None:

@@ -5,10 +5,8 @@ import re
 import pytest
 
 from study_app.analysis.report import typeface
-from study_app.analysis.report.html_page import LONG, SHORT, page, picture, table
+from study_app.analysis.report.html_page import page
 from study_app.analysis.report.typeface import font_faces
-
-PNG = b"\x89PNG\r\n\x1a\n" + (13).to_bytes(4) + b"IHDR" + (2148).to_bytes(4) + (1000).to_bytes(4)
 
 
 def style(media: str = "") -> str:
@@ -17,28 +15,6 @@ def style(media: str = "") -> str:
     assert rules is not None
     everywhere, *special = rules[1].split("@media ")
     return next(part for part in special if part.startswith(media)) if media else everywhere
-
-
-def test_only_sentences_are_broken_into_lines() -> None:
-    cells = ["Statement", "Feels like a liquid", "x" * (LONG + 1), "x" * LONG, "x" * SHORT, "0.5"]
-    made = table(cells, [cells], words=5)
-    row = re.findall(r"<td([^>]*)>", made)
-    assert row == ["", ' class="words"', ' class="long"', ' class="words"', "", ' class="n"']
-    assert re.search(r"th, td \{ white-space: nowrap; \} td\.long \{ white-space: normal; \}", style())
-    assert "width: max-content" in style()
-    assert ".scroll { overflow-x: auto; }" in style()
-    assert re.search(r"th, td\.words \{ white-space: normal; \}", style("print"))
-
-
-def test_heads_of_tables_come_again_on_the_next_sheet_of_paper() -> None:
-    assert re.match(r'<div class="scroll"><table><thead><tr><th>A</th></tr></thead><tbody><tr>', table("A", ["b"]))
-
-
-def test_a_figure_keeps_its_width_on_a_narrow_window_and_is_moved_sideways() -> None:
-    made = picture(PNG, "A figure.")
-    assert '<div class="scroll"><img width="859" ' in made  # 8 points are 13 pixels
-    assert "figure img { max-width: none; }" in style("(max-width: 600px)")
-    assert "img { max-width: 100%; height: auto; }" in style()
 
 
 @pytest.mark.slow

@@ -82,19 +82,6 @@ def test_statsmodels_models() -> None:
     assert fitted.statistic == pytest.approx(binomial.deviance, rel=1e-6)
 
 
-@pytest.mark.filterwarnings("ignore")
-def test_scikit_posthocs() -> None:
-    posthocs = vendor("scikit_posthocs")
-    values = np.array([[4, 6, 3, 5, 4, 5], [7, 8, 6, 7, 9, 6], [6, 9, 7, 8, 8, 9]]).T
-    nemenyi = posthocs.posthoc_nemenyi_friedman(values).to_numpy()
-    assert (nemenyi[0, 1], nemenyi[0, 2], nemenyi[1, 2]) == pytest.approx((0.0545, 0.0109, 0.8322), abs=1e-4)
-    conover = posthocs.posthoc_conover_friedman(values).to_numpy()
-    assert (conover[0, 1], conover[0, 2], conover[1, 2]) == pytest.approx((0.001193, 0.000231, 0.289692), abs=1e-5)
-    # Those who differ most there are those whose mean ranks differ most here.
-    ranks = friedman(values).mean_ranks
-    assert abs(ranks[0] - ranks[2]) > abs(ranks[0] - ranks[1]) > abs(ranks[1] - ranks[2])
-
-
 def test_scipy_page_is_our_untied_p() -> None:
     from scipy.stats import page_trend_test
 

@@ -41,26 +41,6 @@ def test_false_discoveries_are_scipys() -> None:
     assert false_discovery(ps) == pytest.approx(false_discovery_control(ps))
 
 
-@pytest.mark.parametrize(
-    ("n", "three", "twenty_seven"),
-    [
-        (4, False, False),
-        (5, False, False),
-        (6, False, False),
-        (7, True, False),
-        (8, True, False),
-        (10, True, False),
-        (11, True, True),
-    ],
-)
-def test_what_pairs_can_reach_in_a_family(n: int, three: bool, twenty_seven: bool) -> None:
-    smallest = 2 * 0.5**n
-    for tests, reached in ((3, three), (27, twenty_seven)):
-        best = holm([smallest] + [1.0] * (tests - 1))[0]
-        assert best is not None
-        assert (best <= 0.05) == reached
-
-
 @pytest.mark.parametrize("p", [-0.1, 1.1, float("nan")])
 def test_what_is_no_p_is_refused(p: float) -> None:
     with pytest.raises(AnalysisError, match="cannot be adjusted"):

@@ -74,13 +74,6 @@ def test_a_table_of_an_earlier_version_is_read_as_if_its_later_columns_held_noth
     assert "does not begin with the columns" in refusal(rek.folder)
 
 
-def test_a_torn_table_is_refused(rek: Results) -> None:
-    rek.add("P001", lambda *_: 4)
-    path = rek.trials("P001")
-    path.write_bytes(path.read_bytes()[:-40])
-    assert "cells instead of" in refusal(rek.folder)
-
-
 def test_bytes_that_are_no_text_are_refused(rek: Results) -> None:
     rek.add("P001", lambda *_: 4)
     rek.responses("P001").write_bytes(b"\xff\xfe\x00")
@@ -114,13 +107,6 @@ def test_sessions_that_were_asked_other_statements_are_not_pooled(rek: Results) 
     path = rek.responses("P002")
     path.write_text(path.read_text().replace("like_tar", "like_glue"))
     assert "other statements" in refusal(rek.folder)
-
-
-def test_another_study_in_the_folder_is_refused(rek: Results, small: Results) -> None:
-    rek.add("P001", lambda *_: 4)
-    other = small.add("Q001", lambda *_: 4)
-    other.path.parent.rename(rek.folder / "data" / "sub-Q001")
-    assert "of the study 'small'" in refusal(rek.folder)
 
 
 def test_an_opened_key_that_was_changed_is_refused(rek: Results) -> None:

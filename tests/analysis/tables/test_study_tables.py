@@ -156,18 +156,6 @@ def test_two_sessions_of_one_participant_are_one_participant(rek: Results) -> No
     assert (study.n, row["n"], row["participants"], row["presented"]) == (1, 2, 1, 2)
 
 
-def test_an_excluded_session_is_kept_and_does_not_count(rek: Results) -> None:
-    for participant, level in (("P001", 6), ("P002", 1), ("P003", 6)):
-        rek.add(participant, lambda *_, level=level: level)
-    rek.exclude("P002")
-    study = load_study(rek.folder)
-    assert (study.n, study.people, study.left_out) == (2, ("P001", "P003"), 0)
-    assert list(study.excluded_sessions["participant"]) == ["P002"]
-    assert len(study.responses) == 3 * 62
-    row = cell(study, "L1", "immersive")
-    assert (row["n"], row["count_1"], row["presented"], row["presented_excluded"], row["missing"]) == (2, 0, 2, 0, 0)
-
-
 def test_of_two_sessions_only_the_excluded_one_is_left_out(rek: Results) -> None:
     rek.add("P001", lambda *_: 6)
     rek.add("P001", lambda *_: 2, session=2)
@@ -176,18 +164,6 @@ def test_of_two_sessions_only_the_excluded_one_is_left_out(rek: Results) -> None
     assert (study.people, len(study.excluded_sessions)) == (("P001",), 1)
     row = cell(study, "L1", "immersive")
     assert (row["n"], row["median"], row["presented"]) == (1, 6, 1)
-
-
-def test_an_excluded_trial_takes_its_setting_from_that_participant_alone(rek: Results) -> None:
-    rek.add("P001", by_condition)
-    rek.add("P002", by_condition)
-    rek.exclude("P002", trial=rek.trial("P002", "honey"))
-    study = load_study(rek.folder)
-    assert study.n == 2
-    for condition, expected in (("honey", (1, 1, 1)), ("water", (2, 2, 0))):
-        row = cell(study, rek.code(condition, "liquids"), "immersive")
-        assert (row["n"], row["presented"], row["presented_excluded"]) == expected
-        assert row["missing"] == 0
 
 
 def test_an_excluded_trial_takes_all_its_attempts_and_is_one_presentation(rek: Results) -> None:

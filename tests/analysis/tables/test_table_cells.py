@@ -92,9 +92,3 @@ def test_a_damaged_file_is_refused_with_its_row(tmp_path: Path, quoted: bool, ol
     with pytest.raises(AnalysisError, match=r"a\.csv") as refused:
         tables([written(tmp_path / "b.csv", drawn(4, 1)), tmp_path / "a.csv"], COLUMNS)
     assert says in str(refused.value)
-
-
-def test_bytes_that_are_not_utf_8_are_refused(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_bytes(",".join(NAMES).encode() + b"\n\xff,n/a,1,2,true\n")
-    with pytest.raises(AnalysisError, match="is damaged"):
-        tables([tmp_path / "a.csv"], COLUMNS)

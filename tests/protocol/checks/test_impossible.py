@@ -17,7 +17,6 @@ from tests.protocol.sound import DECIDED, SOUND
 
 THICK = "[liquids.thick]\ndensity_kg_m3 = 1400\n"
 THIN = 'effects = ["drag", "wake"]\nwake = { length = 100, scaling = 200, exponent = 0.5 }'
-OTHER = "[liquids.other]\ndensity_kg_m3 = 1200\n"
 COUNT = "count = 4\ntimeout_s = 60"
 ITEM = 'text = { en = "It is cold.", nl = "Het is koud." }'
 SHORT = 'short = { en = "Cold", nl = "Koud" }'
@@ -198,20 +197,11 @@ def test_an_impossible_value_of_a_study_of_levels_is_refused(old: str, new: str,
     assert any(one.place.endswith(place) for one in caught.value.problems), caught.value.problems
 
 
-def test_the_table_is_long() -> None:
-    assert len({case[1] for case in IMPOSSIBLE}) >= 51
-
-
 def test_a_range_gives_its_reason() -> None:
     with pytest.raises(
         ProtocolError, match=r"viscosity_pa_s: is 1e\+308, must be at most 1e\+06 \(gases have 1e-5 Pa·s"
     ):
         parse(SOUND.replace(THICK, THICK + "viscosity_pa_s = 1e308\n").encode(), "file.toml")
-
-
-@pytest.mark.parametrize("name", shipped())
-def test_shipped_studies_are_possible(name: str) -> None:
-    assert load(name)
 
 
 def test_equal_delays_that_are_meant_are_replicates_and_equal_liquids_are_not() -> None:

@@ -1,7 +1,6 @@
 """Adaptive methods in a study: the next level is a pure function of the answers, in any order, at presented levels."""
 
 import math
-import time
 from itertools import pairwise
 
 import numpy as np
@@ -285,20 +284,6 @@ def test_questplus_counts_answers_at_a_level_of_zero(method: str) -> None:
     heard = [Heard(one.number, one.code, 0.0, False, False) for one in schedule.trials[:6]]
     due = next_level(protocol, key, schedule, schedule.trials[6], heard)
     assert due is None if "stop" in method else due is not None and due.level != 0
-
-
-@pytest.mark.slow
-def test_choosing_a_level_takes_at_most_two_milliseconds() -> None:
-    """Processor time at the 99th percentile, whatever the number of answers; the tables are made before."""
-    protocol = adaptive('kind = "questplus"\ntrials = 200', ONE_STANDARD)
-    key, schedule = key_of(protocol), build_schedule(protocol, "P001", 1)
-    heard = answers_of(protocol, 0.4)
-    taken = []
-    for trial in schedule.trials * 3:
-        began = time.thread_time_ns()
-        next_level(protocol, key, schedule, trial, heard)
-        taken.append(time.thread_time_ns() - began)
-    assert np.percentile(taken, 99) <= 2e6
 
 
 @pytest.mark.parametrize("kind", ["questplus", "updown"])

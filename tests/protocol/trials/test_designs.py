@@ -4,19 +4,12 @@ import pytest
 
 from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.designs.rating_of_interval import Rated
-from study_app.protocol.trials.kinds import DESIGN_KINDS, METHOD_KINDS, default_design
+from study_app.protocol.trials.kinds import DESIGN_KINDS, default_design
 from tests.protocol.trials.level_studies import key_of, run, study
 
 
 def design(kind: str) -> Design:
     return Rated(scale="agreement") if kind == "rating" else default_design(kind)
-
-
-def test_every_kind_of_the_folder_is_known():
-    assert set(DESIGN_KINDS) == {
-        "2ifc", "3ifc", "4ifc", "abx", "oddity", "samedifferent", "yesno", "rating", "estimation", "adjustment",
-    }  # fmt: skip
-    assert set(METHOD_KINDS) == {"constant", "questplus", "updown", "adjustment"}
 
 
 @pytest.mark.parametrize(

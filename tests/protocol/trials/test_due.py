@@ -1,5 +1,3 @@
-import subprocess
-import sys
 from collections import Counter
 
 import pytest
@@ -158,21 +156,6 @@ def test_what_comes_does_not_depend_on_the_order_of_answers_or_on_later_ones():
         assert next_level(protocol, key, schedule, trial, shuffled) == next_level(
             protocol, key, schedule, trial, earlier
         )
-
-
-PROGRAM = """
-from tests.protocol.trials.level_studies import key_of, run, study
-protocol = study()
-print([(due.level, due.arrangement) for due in run(protocol, key_of(protocol))])
-"""
-
-
-@pytest.mark.slow
-def test_another_process_finds_the_same():
-    protocol = study()
-    ours = [(due.level, due.arrangement) for due in run(protocol, key_of(protocol))]
-    theirs = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=True)
-    assert theirs.stdout.strip() == str(ours)
 
 
 @pytest.mark.parametrize("different", ["secret", "participant", "seed"])

@@ -202,13 +202,6 @@ def test_a_force_stop_reaches_the_servo_even_where_the_session_cannot_take_it(wo
     assert world.log == ["stop_force"]
 
 
-def test_resuming_after_a_force_stop_fades_the_force_in(practising: World) -> None:
-    practising.run(0.1, buttons=BUTTON_STOP)
-    practising.runner.post(ResumeAsked(1.0, "operator"))
-    assert practising.servo.force_is_on
-    assert practising.log.index("fade_in") < practising.log.index("load")
-
-
 def test_the_first_button_goes_on_neither_from_a_consent_nor_from_a_task(world: World) -> None:
     world.runner.post(Begin(0.0))
     world.run(0.1, buttons=CONTINUE)

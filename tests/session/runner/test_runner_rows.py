@@ -3,7 +3,7 @@
 import pytest
 
 from study_app.haptics.model.layout import LIMITER_GLITCH
-from study_app.session.transitions.events import Begin, PauseAsked, RepeatAsked, ResumeAsked
+from study_app.session.transitions.events import Begin, PauseAsked, ResumeAsked
 from study_app.session.trial import SETTLED_S
 from tests.session.fakes import LEFT, RIGHT, World, at_block, step
 
@@ -112,15 +112,6 @@ def test_an_interrupted_attempt_keeps_what_was_measured_and_the_trial_starts_aga
     practising.run(3.2)
     second = practising.journal.of("trial_ended")[-1]
     assert (second["attempt"], second["outcome"], second["ticks"]) == (2, "complete", 3001)
-
-
-def test_a_repeated_trial_keeps_both_attempts(practising: World) -> None:
-    practising.run(0.5)
-    practising.runner.post(RepeatAsked(0.5, "a sneeze"))
-    practising.run(3.2)
-    ended = practising.journal.of("trial_ended")
-    assert [(line["attempt"], line["outcome"]) for line in ended] == [(1, "interrupted"), (2, "complete")]
-    assert practising.journal.of("repeat") == [{"event": "repeat", "t_s": 0.5, "trial": 1, "reason": "a sneeze"}]
 
 
 def test_a_trial_with_a_late_screen_or_a_late_servo_says_so(practising: World) -> None:

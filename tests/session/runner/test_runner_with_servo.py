@@ -13,7 +13,7 @@ from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
-from study_app.session.pages import PausePage, TaskPage, TroublePage
+from study_app.session.pages import PausePage, TaskPage
 from study_app.session.ports import Ports
 from study_app.session.runner import Runner
 from study_app.session.transitions.events import (
@@ -127,16 +127,6 @@ def test_a_pause_and_an_end_take_the_liquid_away(bench: Bench) -> None:
     bench.runner.post(EndAsked(bench.clock(), "withdrawn", ""))
     bench.run(60)
     assert (bench.run(500) == 0).all()
-
-
-def test_a_pulled_cable_calls_the_operator(bench: Bench) -> None:
-    bench.run(500)
-    bench.device.unplug()
-    bench.run(100)
-    assert bench.runner.state.phase is Phase.TROUBLE
-    assert isinstance(bench.pages[-1], TroublePage)
-    assert "stopped responding" in bench.journal.of("broke")[0]["what"]
-    assert not bench.servo.force_is_on
 
 
 def test_a_task_is_followed_on_the_device_and_drawn_from_its_history(bench: Bench) -> None:

@@ -6,8 +6,6 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.export.export import export
-from study_app.analysis.figures.plotting import plot
 from study_app.analysis.tables.study_tables import load_study
 from study_app.cli import commands
 from study_app.errors import StoreError
@@ -17,9 +15,6 @@ from study_app.session.simulated import answers_only
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.session.simulated.trial_features import ConditionFeatures, condition_features
-from study_app.store.blinded.blinding import reveal
-from study_app.store.folders import StudyFolder
-from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 
@@ -69,24 +64,6 @@ def test_the_folder_is_sound_and_every_row_says_simulated(twelve: Path) -> None:
     for name, held in tables(twelve).items():
         assert held, name
         assert {row["simulated"] for row in held} == {"true"}, name
-
-
-def test_everybody_answers_every_statement_and_nothing_is_said_to_have_been_measured(twelve: Path) -> None:
-    study = load_study(twelve)
-    assert (study.n, len(study.responses), study.doubts) == (12, 12 * 62, ())
-    assert study.responses["response"].between(1, 7).all()
-    measured = study.trials[["ticks", "force_mean_n", "path_length_m", "delay_error_mean_ms", "valid", "recording"]]
-    assert measured.isna().all().all()
-    assert set(study.trials["outcome"]) == {"complete"}
-
-
-@pytest.mark.nightly
-def test_export_plot_unblind_and_reproduce_take_it(twelve: Path, tmp_path: Path) -> None:
-    for session in StudyFolder(twelve).sessions():
-        assert reproduced(session.path).differences == []
-    assert export(twelve, tmp_path / "tables")
-    reveal(twelve, by="AB", reason="a test")
-    assert plot(twelve, tmp_path / "figures")
 
 
 def test_the_same_call_gives_the_same_answers_and_another_seed_others(twelve: Path, tmp_path: Path) -> None:

@@ -21,10 +21,9 @@ from study_app.protocol.load import load, source_bytes
 from study_app.protocol.model import Protocol, Reach
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.questions.rating import RatingView
-from study_app.session.pages import TextPage
 from study_app.session.simulated import rehearsal
 from study_app.session.simulated.exploration import RATE_HZ, exploration
-from study_app.session.simulated.observers import Reacher, SensedTrial, choices, reading_s
+from study_app.session.simulated.observers import Reacher, SensedTrial, choices
 from study_app.session.simulated.rehearsed_session import RehearsedSession
 from study_app.session.simulated.trial_features import condition_features
 from study_app.session.tasks import TaskView
@@ -47,26 +46,6 @@ def test_an_exploration_stays_in_the_tank_moves_without_jumps_and_lasts(seed: in
     assert t_s[-1] >= duration_s - 1 / RATE_HZ
     assert (np.abs(position_m) <= HALF_M).all()
     assert np.linalg.norm(np.diff(position_m, axis=0), axis=1).max() * RATE_HZ < 0.6  # m/s
-
-
-def test_an_exploration_is_drawn_from_its_randomness_alone() -> None:
-    one, other, third = (exploration(stream(seed, "test").random, HALF_M, 20)[1] for seed in (1, 1, 2))
-    assert np.array_equal(one, other)
-    assert one.shape != third.shape or not np.array_equal(one, third)
-
-
-def test_an_exploration_is_varied() -> None:
-    """Within half a minute every direction is moved in, and there are stops to feel what goes on."""
-    _, position_m = exploration(stream(3, "test").random, HALF_M, 30)
-    speed = np.linalg.norm(np.diff(position_m, axis=0), axis=1)
-    assert (np.ptp(position_m, axis=0) > np.asarray(HALF_M) * 0.5).all()
-    assert 0.05 < (speed == 0).mean() < 0.6
-
-
-def test_reading_takes_longer_the_more_there_is_to_read() -> None:
-    short = TextPage("a", "break", "Title", ("one two",), "Continue")
-    long = TextPage("b", "break", "Title", ("one two", "three " * 100), "Continue")
-    assert reading_s(long) - reading_s(short) == pytest.approx(12.0)
 
 
 def test_senses_tell_drag_from_a_push_and_half_of_each() -> None:
@@ -108,10 +87,6 @@ def test_senses_measure_force_speed_of_the_hand_roughness_and_delay() -> None:
     assert felt.speed_rms_mps == pytest.approx(0.2)
     assert felt.roughness_n == pytest.approx(5)
     assert felt.delay_s == pytest.approx(0.105)
-
-
-def test_who_felt_nothing_has_senses_all_the_same() -> None:
-    assert SensedTrial(scale=1.0).features().force_peak_n == 0.0
 
 
 class StillHand:

@@ -16,7 +16,6 @@ from study_app.session.transitions.events import (
     Begin,
     Broke,
     Chosen,
-    Continue,
     ForceStopped,
     PauseAsked,
     Reconnected,
@@ -132,13 +131,6 @@ def test_force_stop_and_failures_stop_a_rest_and_a_feedback(phase: Phase) -> Non
     stalled, commands = advance(state, WriteFailed(1.0, "disk full", ()))
     assert commands[0] == StopForce()
     assert advance(stalled, WriteCompleted(2.0))[0].phase is Phase.PAUSED
-
-
-@pytest.mark.parametrize("event", [Continue(9.0), Chosen(9.0, "choice_2ifc", "first"), DONE])
-def test_no_answer_and_no_task_ends_a_rest(event: object) -> None:
-    state = pairs.walk(pairs.opened(), Phase.RESTING)
-    with pytest.raises(SessionError, match="cannot happen while resting"):
-        advance(state, event)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("right", [True, False])

@@ -24,7 +24,7 @@ from study_app.session.transitions.events import (
 from study_app.session.transitions.state import Phase, SessionState
 from study_app.session.transitions.table import advance, open_session
 from tests.protocol.trials.level_studies import key_of
-from tests.protocol.trials.matching import ALONE, DELAY, matching
+from tests.protocol.trials.matching import ALONE, matching
 from tests.session.transitions.states import shown, written
 
 DONE = TaskDone(30.0, "complete", {"duration_s": 20.0})
@@ -130,14 +130,6 @@ def test_confirming_ends_the_task_and_its_end_is_the_answer() -> None:
     assert (heard.trial, heard.success, heard.correct) == (1, None, None)
 
 
-def test_the_end_of_the_time_is_an_answer_too() -> None:
-    state, _ = setting()
-    after, commands = advance(state, replace(DONE, outcome="timeout"))
-    assert line(commands, "interval_ended")["outcome"] == "timeout"
-    assert line(commands, "responses")["items"][0]["value"] == 0
-    assert after.heard
-
-
 def test_what_was_not_delivered_is_presented_again_from_the_same_start_and_is_no_answer() -> None:
     state, _ = setting()
     state, _ = advance(state, Stepped(6.0, 2))
@@ -160,15 +152,6 @@ def test_a_pause_ends_the_attempt_and_the_next_starts_where_it_did(event: Any) -
     assert (back.phase, back.attempt, back.interval, back.steps) == (Phase.TASK, 2, 1, 0)
     repeated, _ = advance(state, RepeatAsked(9.0, "a call"))
     assert (repeated.attempt, repeated.due, repeated.steps) == (2, state.due, 0)
-
-
-def test_a_delay_is_set_with_the_picture_alone() -> None:
-    state, _ = setting(ALONE, DELAY)
-    state, commands = advance(state, Stepped(6.0, -1))
-    command = adjusted(commands)
-    assert command is not None
-    assert command.delay_s == pytest.approx(command.presented.value / 1000)
-    assert command.presented.vary == "delay_ms"
 
 
 def test_without_the_standard_the_first_interval_is_set() -> None:

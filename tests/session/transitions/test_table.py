@@ -37,27 +37,9 @@ from study_app.session.transitions.events import (
 )
 from study_app.session.transitions.moves import STOPPABLE
 from study_app.session.transitions.state import FINAL, Phase
-from study_app.session.transitions.table import TRANSITIONS, advance, open_session
+from study_app.session.transitions.table import advance, open_session
 from tests.session import small
-from tests.session.transitions.states import EVENTS, LEFT, event_of, shown, state_in, written
-
-
-@pytest.mark.parametrize("kind", EVENTS, ids=lambda kind: kind.__name__)
-@pytest.mark.parametrize("phase", Phase, ids=lambda phase: phase.value)
-def test_every_pair_is_a_row_of_the_table_or_is_refused_and_changes_nothing(phase: Phase, kind: type[Any]) -> None:
-    state = state_in(phase)
-    before = replace(state)
-    if (phase, kind) in TRANSITIONS:
-        advance(state, event_of(kind))
-    else:
-        with pytest.raises(SessionError, match=rf"{kind.__name__} cannot happen while {phase.value}"):
-            advance(state, event_of(kind))
-    assert state == before
-
-
-def test_every_row_of_the_table_is_for_an_event_and_a_phase_that_exist() -> None:
-    assert all(phase in Phase and kind in EVENTS for phase, kind in TRANSITIONS)
-    assert len(TRANSITIONS) == len(set(TRANSITIONS))
+from tests.session.transitions.states import LEFT, event_of, shown, state_in, written
 
 
 def test_a_session_goes_through_its_schedule_and_ends_complete() -> None:

@@ -69,12 +69,6 @@ def test_an_interval_that_was_not_delivered_is_rested_after_and_comes_again_from
     assert (state.phase, page.interval.announced) == (Phase.RESTING, "Next: the second")
 
 
-def test_the_first_interval_that_fails_ends_the_attempt() -> None:
-    state, commands = advance(in_main(pairs.opened()), done(10.0, "pace_error_percent"))
-    assert written(commands) == ["interval_ended", "trial_ended", "trial_started"]
-    assert (state.phase, state.interval, state.attempt) == (Phase.RESTING, 1, 2)
-
-
 def gives_up(state: SessionState) -> tuple[SessionState, list[str]]:
     """Let every attempt at the present trial fail; return the state and the events written."""
     number, events = state.trial.number, []

@@ -86,13 +86,6 @@ def test_the_file_is_encoded_and_its_sha256_is_the_keys_hash(tmp_path: Path, pro
     assert "quagmire" not in repr(key)
 
 
-def test_the_key_is_drawn_once_and_then_shared(tmp_path: Path, protocol: Protocol) -> None:
-    first = open_or_draw_key(tmp_path, protocol)
-    raw = sealed(tmp_path).read_bytes()
-    assert all(open_or_draw_key(tmp_path, protocol) == first for _ in range(5))
-    assert sealed(tmp_path).read_bytes() == raw
-
-
 def test_who_comes_second_reads_what_the_first_drew(
     tmp_path: Path, protocol: Protocol, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -292,12 +285,6 @@ def test_a_reveal_that_cannot_be_recorded_tells_nothing(start: Callable[..., Ses
     (tmp_path / "study" / "blinding" / "reveals.jsonl").mkdir()
     with pytest.raises(StoreError, match=r"reveals\.jsonl cannot be"):
         reveal(tmp_path / "study", "AB", "analysis")
-
-
-def test_a_torn_reveal_reveals_nothing(tmp_path: Path, protocol: Protocol) -> None:
-    open_or_draw_key(tmp_path, protocol)
-    (tmp_path / "blinding" / "reveals.jsonl").write_bytes(b'{"at": "2026-0')
-    assert revealed_key(tmp_path) is None
 
 
 @pytest.mark.parametrize("line", [b"5", b"null", b'"by AB"', b"[1]", b"xat: 2026"])

@@ -10,9 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
-from study_app.errors import StoreError
 from study_app.protocol.model import Protocol, StudyHead
-from study_app.store import receipt
 from study_app.store.blinded import unblinding as module
 from study_app.store.blinded.blinding import open_or_draw_key, reveal
 from study_app.store.blinded.sealing import opened
@@ -247,17 +245,6 @@ def test_a_study_of_an_earlier_version_stays_sound_sealed_and_opened(
     assert store.folder.table("brackish", "trials").read_bytes() == held
     assert names(later.folder.table("brackish", "trials")) == set(header(TRIALS))
     assert sound(folder)
-
-
-def test_without_a_reason_nothing_is_opened(tmp_path: Path, start: Start, attend: Attend) -> None:
-    store = start()
-    attend(store)
-    store.finish("completed")
-    held = tables_in(tmp_path / "study")
-    with pytest.raises(StoreError, match="--reason is empty"):
-        unblind(tmp_path / "study", "AB", " ")
-    assert tables_in(tmp_path / "study") == held
-    assert receipt.read(store.folder.receipt)["status"] == "completed"
 
 
 def test_a_table_of_an_earlier_version_is_opened_without_the_column_that_it_did_not_know(

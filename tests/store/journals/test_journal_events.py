@@ -3,7 +3,7 @@ from typing import Any
 
 import pytest
 
-from study_app.store.journals.journal_events import EVENTS, problem, unknown_events
+from study_app.store.journals.journal_events import problem, unknown_events
 from study_app.store.sessions.open_session import SessionStore
 
 OF_ALL = {"n": 1, "t_s": 0.0, "at": "2026-03-01T10:00:00.000+01:00"}
@@ -11,11 +11,6 @@ OF_ALL = {"n": 1, "t_s": 0.0, "at": "2026-03-01T10:00:00.000+01:00"}
 
 def line(event: str, **fields: Any) -> dict[str, Any]:
     return {**OF_ALL, "event": event, **fields}
-
-
-def test_names_are_unique_and_described_in_a_sentence() -> None:
-    assert len({event.name for event in EVENTS}) == len(EVENTS)
-    assert all(event.description.endswith(".") for event in EVENTS)
 
 
 def test_whatever_the_store_writes_is_in_the_dictionary(

@@ -157,19 +157,6 @@ def test_the_folder_of_another_study_is_refused_untouched(
     assert every_byte(tmp_path / "study") == before
 
 
-def test_a_session_under_way_is_used_too(start: Callable[..., SessionStore]) -> None:
-    with start(), pytest.raises(StoreError, match="participant P007 already has session 1"):
-        start()
-
-
-def test_a_new_session_number_and_another_id_are_welcome(start: Callable[..., SessionStore]) -> None:
-    key_hashes = set()
-    for name, number in [("P007", 1), ("P007", 2), ("P008", 1)]:
-        with start(name, session=number) as store:
-            key_hashes.add(store.key.hash)
-    assert len(key_hashes) == 1
-
-
 def test_an_unwritable_results_folder_is_one_line(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
     (tmp_path / "file").write_text("no folder")
     with pytest.raises(StoreError) as refusal:
@@ -195,37 +182,6 @@ def test_a_disk_that_fills_while_beginning_leaves_no_session(
     with files_up_to(1000), pytest.raises(StoreError, match=r"receipt\.json cannot be written \(File too large\)"):
         start("P002")
     assert every_byte(tmp_path / "study") == before
-
-
-def test_a_rehearsal_says_so_in_every_row(
-    tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
-) -> None:
-    store = start(simulated=True)
-    attend(store)
-    store.finish("completed")
-    for path in (tmp_path / "study" / "data").rglob("*.csv"):
-        _, *rows = path.read_text(encoding="utf-8").splitlines()
-        assert rows
-        assert all(",true,false," in row for row in rows)
-
-
-def test_the_same_rehearsal_writes_the_same_tables(
-    tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
-) -> None:
-    hashes = set()
-    for name in ("one", "two"):
-        store = start(results=tmp_path / name, simulated=True, clock=None)
-        attend(store)
-        hashes.add(store.key.hash)
-        store.finish("completed")
-    assert len(hashes) == 1
-    name = "subject-P007_session-01_task-brackish_description-responses_data.csv"
-    one, two = (
-        (tmp_path / results / "data" / "sub-P007" / "ses-01" / name).read_text(encoding="utf-8").splitlines()
-        for results in ("one", "two")
-    )
-    assert len(one) == 13
-    assert [row.rsplit(",", 1)[0] for row in one] == [row.rsplit(",", 1)[0] for row in two]
 
 
 RACER = """

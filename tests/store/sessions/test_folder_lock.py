@@ -104,11 +104,6 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
         open_alone(tmp_path / "gone")
 
 
-def test_a_process_that_runs_began_once_and_one_that_ended_is_none() -> None:
-    assert process_began(os.getpid()) == process_began(os.getpid())
-    assert process_began(ended_process()) is None
-
-
 def test_a_process_of_which_nothing_may_be_known_is_taken_for_a_living_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

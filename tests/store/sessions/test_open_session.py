@@ -5,8 +5,6 @@ import errno
 import hashlib
 import io
 import os
-import shutil
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -70,15 +68,6 @@ def test_after_its_end_a_session_takes_nothing(start: Callable[..., SessionStore
         with pytest.raises(StoreError, match="came after the session's end"):
             late()
     assert receipt.read(store.folder.receipt)["status"] == "completed"
-
-
-def test_an_answer_is_in_the_table_after_every_page(
-    start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
-) -> None:
-    with start() as store:
-        attend(store)
-        content = store.folder.table("brackish", "responses").read_text(encoding="utf-8")
-    assert content.count("\n") == 1 + 4 * 3
 
 
 def trial_of(number: int, **changes: Any) -> dict[str, Any]:
@@ -148,11 +137,6 @@ def test_a_session_that_is_left_has_its_recordings_linked_too(
     assert [line["event"] for line in journal.read(store.folder.journal)][-1] == "recorded"
 
 
-def test_a_session_without_recordings_has_no_recorder(start: Callable[..., SessionStore]) -> None:
-    with start() as store:
-        assert store.recorder is None
-
-
 def test_checksums_of_a_finished_session_are_those_of_its_files(
     start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
 ) -> None:
@@ -165,14 +149,6 @@ def test_checksums_of_a_finished_session_are_those_of_its_files(
     )
     for name, digest in listed.items():
         assert hashlib.sha256((store.folder.path / name).read_bytes()).hexdigest() == digest
-
-
-@pytest.mark.skipif(shutil.which("sha256sum") is None, reason="sha256sum is not on this machine")
-def test_any_tool_can_check_the_checksums(start: Callable[..., SessionStore]) -> None:
-    store = start()
-    store.finish("completed")
-    command = ["sha256sum", "--check", "--strict", "--quiet", store.folder.checksums.name]
-    subprocess.run(command, cwd=store.folder.path, check=True)
 
 
 def test_a_session_is_open_in_one_program_until_its_end(start: Callable[..., SessionStore]) -> None:

@@ -188,17 +188,3 @@ def test_a_session_that_had_not_begun_cannot_go_on(
     with pytest.raises(StoreError, match=r"journal\.jsonl has no line: .* use a new session number"):
         again()
     assert every_byte(tmp_path) == before
-
-
-def test_a_damaged_journal_is_refused_untouched(
-    tmp_path: Path, start: Callable[..., SessionStore], again: Again
-) -> None:
-    with start() as store:
-        for text in ("one", "two"):
-            store.append("note", kind="note", text=text)
-    lines = store.folder.journal.read_bytes().split(b"\n")
-    store.folder.journal.write_bytes(b"\n".join([lines[0], lines[1][:20], *lines[2:]]))
-    before = every_byte(tmp_path)
-    with pytest.raises(StoreError, match="line 2: damaged; restore it from a copy"):
-        again()
-    assert every_byte(tmp_path) == before

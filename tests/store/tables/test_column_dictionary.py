@@ -1,46 +1,6 @@
-import re
-
 import pytest
 
-from study_app.store.journals.journal_events import EVENTS
-from study_app.store.tables.column_dictionary import SECTIONS, dictionary_markdown
-from study_app.store.tables.columns import EXCLUSIONS, GROUP, INTERVALS, RESPONSES_2, TABLES, TRIALS_2, VIDEO
-from study_app.store.tables.level_columns import EXPONENTS, OF_TRACKS, SETTINGS, THRESHOLDS
-from study_app.store.tables.recorded_columns import FRAMES, SAMPLES
-
-OF_FORMAT_2 = tuple(column for column in TRIALS_2 if column not in TABLES["trials"])
-
-
-def test_every_column_of_every_file_has_its_line() -> None:
-    text = dictionary_markdown()
-    sections = {title: columns for title, _, _, columns in SECTIONS}
-    responses, trials, participants = TABLES.values()
-    tables = [responses, RESPONSES_2, trials, INTERVALS, participants]
-    outcome, *video, intervals, group = OF_FORMAT_2
-    assert tuple(video) == VIDEO
-    assert (outcome.levels[-1][0], intervals.name, group) == ("invalid", "intervals", GROUP)
-    opened = (OF_TRACKS, THRESHOLDS, SETTINGS, EXPONENTS)
-    assert list(sections.values()) == [*tables, OF_FORMAT_2, *opened, EXCLUSIONS, SAMPLES, FRAMES]
-    parts = re.split(r"^## ([\w, ]+)$", text, flags=re.MULTILINE)
-    assert parts[1::2] == [*sections, "Journal"]
-    for title, part in zip(parts[1::2], parts[2::2], strict=True):
-        names = re.findall(r"^\| `(\w+)` \|", part, flags=re.MULTILINE)
-        expected = EVENTS if title == "Journal" else sections[title]
-        assert names == [one.name for one in expected]
-
-
-def test_every_table_is_one_that_renders() -> None:
-    """A header, its rule and rows of as many cells, with a line free before and after, below its heading and file."""
-    text = dictionary_markdown()
-    tables = [block for block in text.split("\n\n") if block.startswith("| ")]
-    assert len(tables) == len(SECTIONS) + 1
-    for table in tables:
-        header, rule, *rows = table.rstrip("\n").split("\n")
-        assert set(rule) <= set("| -")
-        assert rows
-        assert {row.count(" | ") for row in (header, *rows)} == {2}
-    headed = r"^## .+\n\n`.+`: .+\n\n(?:[^|].*\n\n)?\| "
-    assert len(re.findall(headed, text, re.MULTILINE)) == len(tables)
+from study_app.store.tables.column_dictionary import dictionary_markdown
 
 
 @pytest.mark.parametrize(

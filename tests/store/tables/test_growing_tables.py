@@ -1,11 +1,9 @@
 """Tables of a running session: each page writes the rows that changed, and a kill leaves the beginning of a table."""
 
-import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Any, BinaryIO
 
-import numpy as np
 import pytest
 
 from study_app.store import atomic
@@ -162,21 +160,3 @@ def test_on_a_disk_that_fills_a_table_keeps_its_rows(
         store.write_tables()
         assert store.behind is None
         assert path.read_bytes() == dict(table_files(store.place, store.lines, None))[path]
-
-
-@pytest.mark.nightly
-@pytest.mark.slow
-def test_a_page_takes_as_long_after_5000_pages_as_at_the_beginning(start: Start, summary: dict[str, Any]) -> None:
-    took_s = np.empty(PAGES)
-    with start() as store:
-        for number in range(1, PAGES + 1):
-            start_trial(store, number)
-            end_trial(store, number, summary)
-            answer(store, number)
-            began = time.perf_counter()
-            store.write_tables()
-            took_s[number - 1] = time.perf_counter() - began
-        assert store.behind is None
-        for path, content in table_files(store.place, store.lines, None):
-            assert path.read_bytes() == content
-    assert np.median(took_s[-500:]) < 2 * np.median(took_s[:500])

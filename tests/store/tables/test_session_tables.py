@@ -1,43 +1,19 @@
 import csv
 import io
 import math
-import re
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
-import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from study_app.errors import StoreError
-from study_app.store.journals.journal import read
 from study_app.store.progress import progress_of
-from study_app.store.sessions.open_session import SessionStore
-from study_app.store.tables.cells import cell_pattern
-from study_app.store.tables.column import MISSING, Column, header, unsealed
+from study_app.store.tables.column import MISSING, Column, header
 from study_app.store.tables.columns import RESPONSES, TABLES, TRIALS
 from study_app.store.tables.csv_files import csv_bytes, in_columns_of, read_table
 from study_app.store.tables.formulas import guarded
 from study_app.store.tables.session_tables import latest, participant, responses, trials
-
-NASTY = [
-    "plain",
-    "comma, inside",
-    'a "quoted" word',
-    '"',
-    "two\nlines",
-    "windows\r\nlines",
-    "old\rmac",
-    "tab\tinside",
-    "emoji 🌊👩‍🔬",
-    "=SUM(A1:A9)",
-    "-1+1",
-    " spaces around ",
-    "x" * 10_000,
-    "N,A\"\n'; é",
-]
 
 TEXT = (Column("first", "text", "One."), Column("second", "text", "Two."))
 
@@ -68,17 +44,6 @@ class Script:
             for n, v in enumerate(values, start=1)
         ]
         self.add("responses", trial=trial, attempt=attempt, items=items)
-
-
-@pytest.mark.parametrize("text", NASTY)
-def test_text_comes_back_through_the_csv_module_and_pandas(text: str) -> None:
-    content = csv_bytes(TEXT, [{"first": text, "second": "end"}, {"first": "next", "second": text}])
-    read_back = list(csv.reader(io.StringIO(content.decode("utf-8"), newline="")))
-    cell = guarded(text)
-    assert read_back == [["first", "second"], [cell, "end"], ["next", cell]]
-    frame = pd.read_csv(io.BytesIO(content), dtype=str, keep_default_na=False)
-    assert frame["first"].to_list() == [cell, "next"]
-    assert frame["second"].to_list() == ["end", cell]
 
 
 @pytest.mark.slow
@@ -284,57 +249,6 @@ def test_cannot_judge_is_an_answer_and_a_statement_left_out_is_none() -> None:
     script.lines[-1]["items"][2] |= {"first_s": None, "last_s": None, "changes": 0}
     assert [row["cannot_judge"] for row in responses(script.lines)] == [False, True, False]
     assert participant(script.lines)["responses"] == 2
-
-
-def test_headers_are_the_same_bytes_for_every_participant(
-    start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
-) -> None:
-    """Whether one answered everything, another nothing and a third stopped at once."""
-    heads: dict[str, set[bytes]] = {"responses": set(), "trials": set()}
-    for name in ("P001", "P002", "P003"):
-        store = start(name)
-        if name == "P001":
-            attend(store)
-        if name == "P002":
-            store.append(
-                "trial_started", trial=1, attempt=1, block="b", phase="main", part=None, index=1, of=1, code="L1"
-            )
-        store.finish("completed")
-        for table, seen in heads.items():
-            seen.add(store.folder.table("brackish", table).read_bytes().split(b"\n")[0])
-    assert heads == {table: {",".join(header(unsealed(TABLES[table]))).encode()} for table in heads}
-
-
-def test_every_cell_of_a_session_matches_its_columns_pattern(
-    start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
-) -> None:
-    store = start()
-    attend(store)
-    store.append("note", kind="note", text="a\nb")
-    store.finish("completed")
-    for name, path in {
-        "participants": store.place.study_folder.participants("brackish"),
-        "responses": store.folder.table("brackish", "responses"),
-        "trials": store.folder.table("brackish", "trials"),
-    }.items():
-        rows = list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8"), newline="")))
-        assert rows
-        for column in unsealed(TABLES[name]):
-            for row in rows:
-                assert re.fullmatch(cell_pattern(column), row[column.name]), (column.name, row)
-
-
-def test_tables_come_from_the_journal_alone(
-    tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
-) -> None:
-    store = start()
-    attend(store)
-    store.finish("completed")
-    lines = read(store.folder.journal)
-    for name, rows in (("responses", responses(lines)), ("trials", trials(lines))):
-        path = store.folder.table("brackish", name)
-        assert path.read_bytes() == csv_bytes(unsealed(TABLES[name]), rows)
-    assert len(responses(lines)) == 12
 
 
 def test_the_language_is_the_one_that_was_read_in_last() -> None:

@@ -272,13 +272,6 @@ def test_a_marker_of_another_machine_hides_no_forgery_from_the_fingerprints_kept
     assert f"{P007}: is not the session that" in told(study, tmp_path / "kept.txt")
 
 
-@pytest.mark.parametrize("record", [{}, {"by": "AB"}, {"at": "now", "by": "AB", "reason": "done", "key_hash": "0"}])
-def test_a_line_that_records_no_reveal_opens_no_key(study: Path, record: dict[str, str]) -> None:
-    StudyFolder(study).reveals.write_text(json.dumps(record) + "\n")
-    assert blinding.revealed_key(study) is None
-    assert "reveals.jsonl: line 1 is not a reveal: it was changed" in told(study)
-
-
 def test_a_torn_reveal_is_a_warning_and_opens_no_key(study: Path) -> None:
     blinding.reveal(study, "AB", "done")
     path = StudyFolder(study).reveals

@@ -7,11 +7,8 @@ from typing import Any
 
 import pytest
 
-from study_app.protocol.forms.simulated_observer import TrialFeatures
-from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
@@ -54,16 +51,6 @@ def rehearse_short(study: Path, protocol: Path, _enough: Any) -> None:
     rehearse(protocol, participants=1, seed=7, results=study)
 
 
-def answer_only(study: Path, _enough: Any) -> None:
-    protocol = load("demo")
-    felt = {
-        (block.id, condition): (TrialFeatures(0.5, 4.0, 0.1, 0.02, 0.03, 0.0),)
-        for block in protocol.blocks.values()
-        for condition in block.conditions
-    }
-    rehearse_answers("demo", participants=150, seed=1, results=study, felt=felt)
-
-
 def look_beside(study: Path, *programs: tuple[Callable[..., None], tuple[Any, ...]]) -> tuple[int, int, list[str]]:
     """Verify until the programs have ended; return how often, how often a session ran, and every error."""
     forking = multiprocessing.get_context("fork")
@@ -102,15 +89,6 @@ def test_a_rehearsal_with_recordings_beside_it_is_never_called_unsound(tmp_path:
     _, running, errors = look_beside(tmp_path / "study", (rehearse_short, (short.write(tmp_path),)))
     assert errors == []
     assert running > 0
-    assert verify(tmp_path / "study").sound
-
-
-@pytest.mark.nightly
-@needs_fork
-def test_answers_that_are_written_beside_it_are_never_called_unsound(tmp_path: Path) -> None:
-    looks, _, errors = look_beside(tmp_path / "study", (answer_only, ()))
-    assert errors == []
-    assert looks > 1
     assert verify(tmp_path / "study").sound
 
 
