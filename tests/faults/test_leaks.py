@@ -2,11 +2,12 @@
 
 import logging
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QLabel
 
 from study_app import app
 from study_app.gui.operator import OperatorWindow
@@ -17,11 +18,15 @@ from study_app.protocol.load import load, source_bytes
 from study_app.session import start
 from study_app.session.pages import TaskPage
 from study_app.store import receipt
+from study_app.store.blinded.blinding import read_key
+from study_app.store.blinded.sealing import opened
 from study_app.store.folders import StudyFolder
-from study_app.store.verification.leaks import Telltales, find_leaks, telltales
+from study_app.store.journals import journal
+from study_app.store.verification.leaks import Telltales, find_leaks, presented_numbers, recorded_numbers, telltales
 from tests.compiled import needs_servo
 from tests.faults.support import short
 from tests.faults.support.watched_program import Person, traces_of, words_of
+from tests.protocol.trials.level_studies import BLOCK, HEAD
 
 pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("qapp")]
 
@@ -114,3 +119,94 @@ def test_nothing_seen_written_or_logged_tells_a_condition(
         blinding
     ]
     assert len(said) > 100
+
+
+# Levels, standards and parameters that occur nowhere by chance.
+EDITS = (
+    ("viscosity_pa_s = 1\n", "viscosity_pa_s = 1.3717\n"),
+    ("viscosity_pa_s = 4\n", "viscosity_pa_s = 4.1213\n"),
+    ("density_kg_m3 = 1000\n", "density_kg_m3 = 1013.7\n"),
+    ("density_kg_m3 = 1260\n", "density_kg_m3 = 1261.9\n"),
+    ("delay_ms = 100", "delay_ms = 137.31"),
+    ("standards = [1, 2]", "standards = [1.3717, 2.1193]"),
+    ("levels = [0.1, 0.8]", "levels = [0.1131, 0.8173]"),
+    ("levels = [0.2, 0.4, 0.8]\nrepetitions = 8", "levels = [0.2371, 0.7793]\nrepetitions = 1"),
+    ("min_s = 1\nmax_s = 3", "min_s = 0.2\nmax_s = 0.5"),
+    ("liquids.thin", "liquids.quagmire"),
+    ("liquids.thick", "liquids.mildew"),
+    ('liquid = "thin"', 'liquid = "quagmire"'),
+    ('liquid = "thick"', 'liquid = "mildew"'),
+    ("conditions.oil", "conditions.feel_quagmire"),
+    ('condition = "oil"', 'condition = "feel_quagmire"'),
+    ("conditions.other", "conditions.feel_mildew"),
+    ("conditions.late", "conditions.see_tardy"),
+)
+STAIRCASE = (
+    'kind = "constant"\nlevels = [0.2371, 0.7793]\nrepetitions = 1',
+    'kind = "updown"\ntrials = 4\nbegin = 0.6917\nstep_up = 1.2131',
+)
+CATCH = ('method = "few"', 'method = "few"\ncatch = { share = 0.25 }')
+KNOWN = {0.2371, 2.1193, 1.3717 + 1.3717 * 0.2371}
+
+
+@pytest.mark.parametrize(
+    ("edits", "known"),
+    [
+        pytest.param((), KNOWN, id="constant"),
+        pytest.param(
+            (STAIRCASE, CATCH), {0.6917, 2.1193, 1.3717 + 1.3717 * 0.6917}, id="staircase", marks=pytest.mark.nightly
+        ),
+    ],
+)
+def test_nothing_seen_written_or_logged_tells_a_level(
+    edits: Sequence[tuple[str, str]],
+    known: set[float],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    monkeypatch.setattr(start, "MEASURED_S", 0.1)
+    caplog.set_level(logging.DEBUG)
+    text = HEAD + BLOCK
+    for old, new in (*EDITS, *edits):
+        assert old in text, old
+        text = text.replace(old, new)
+    path = tmp_path / "levels.toml"
+    path.write_text(text)
+    said: set[str] = set()
+
+    def watch(participant: ParticipantWindow, operator: OperatorWindow) -> bool:
+        for top in QApplication.topLevelWidgets():
+            said.update(words_of(top))
+        said.update(traces_of(operator))
+        said.add(repr(participant.page))
+        return False
+
+    told: list[str] = []
+    person = Person(watch)
+    code = app.run(
+        str(path),
+        participant="P001",
+        device="scripted",
+        windowed=True,
+        seed=3,
+        operator="AK",
+        results=tmp_path / "results",
+        progress=told.append,
+    )
+    person.leave()
+    assert code == 0
+    protocol = load(str(path))
+    (place,) = StudyFolder(tmp_path / "results").sessions()
+    recorded = recorded_numbers(protocol, opened(journal.read(place.journal), read_key(tmp_path / "results")))
+    assert known <= presented_numbers(protocol) | recorded
+    words = telltales(protocol, recorded)
+    for line in (*said, *told, *(record.getMessage() for record in caplog.records)):
+        assert words.in_text(line) == [], line
+    assert find_leaks(tmp_path / "results", words) == []
+    assert any("answered" in line for line in said), "the operator saw how the track is doing"
+
+    planted = QLabel("Pair 1")
+    level = min(known)
+    planted.setAccessibleName(f"Pair 1, level {level}")
+    assert [word for line in words_of(planted) for word in words.in_text(line)] == [str(level)]

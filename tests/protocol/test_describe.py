@@ -1,9 +1,23 @@
+"""What [analysis] plans of a study with levels: participants, precision and published values."""
+
+import json
+from pathlib import Path
+
 import pytest
 
+from study_app.errors import ProtocolError
 from study_app.protocol.describe import describe
+from study_app.protocol.formats import newer_keys
 from study_app.protocol.load import load, parse
 from study_app.protocol.orders.durations import expected_duration_s
+from study_app.protocol.orders.schedule import draw_key
+from study_app.protocol.streams import stream
+from study_app.store.blinded.blinding import open_or_draw_key, read_key
+from study_app.store.blinded.whole_protocol import whole_protocol
+from study_app.store.receipt import without_conditions
 from tests.protocol.sound import ORDER, SOUND
+from tests.protocol.trials.level_studies import study, text_of
+from tests.protocol.trials.test_due import CONDITIONS
 
 REK = load("rek2024")
 
@@ -164,3 +178,99 @@ def test_a_new_study_that_accepts_trials_without_a_target_is_warned_of():
     limits = demo.limits.model_copy(update={"targets_percent": 50})
     assert "without any target" not in describe(later.model_copy(update={"limits": limits}))
     assert "Warnings" not in describe(demo)
+
+
+PLANNED = """
+[analysis]
+participants = 20
+precision = 0.15
+
+[[analysis.published]]
+block = "viscosity"
+measure = "weber"
+value = 0.1937
+standard = 2
+percent = 71
+n = 10
+source = "Jones et al. 1997"
+"""
+
+
+def test_the_plan_is_described() -> None:
+    said = describe(study(more=PLANNED))
+    assert "Participants     20 planned" in said
+    assert "Precision        group mean ±15 % (half its 95 % interval)" in said
+    assert "viscosity: weber 0.1937, standard 2, at 71 % correct, n = 10, Jones et al. 1997" in said
+
+
+def test_published_values_are_in_the_key_and_not_in_the_receipt(tmp_path: Path) -> None:
+    protocol = study(more=PLANNED)
+    shown = without_conditions(protocol)
+    assert "0.1937" not in json.dumps(shown)
+    assert shown["analysis"]["participants"] == 20
+    open_or_draw_key(tmp_path, protocol, random=stream(1, "key").random)
+    whole = whole_protocol(shown, read_key(tmp_path))
+    assert whole.analysis == protocol.analysis
+
+
+def test_a_plan_of_format_1_keeps_its_bytes() -> None:
+    plan = study(more="\n[analysis]\nalpha = 0.01\n").analysis
+    assert plan is not None
+    assert set(plan.model_dump(mode="json")).isdisjoint({"participants", "precision", "published"})
+    faults = newer_keys({"analysis": {"participants": 20, "published": [{"block": "a"}]}})
+    assert [fault.path for fault in faults] == [("analysis", "participants"), ("analysis", "published")]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('block = "viscosity"', 'block = "viscosities"', 'there is no block of levels "viscosities".*viscosity'),
+        ("standard = 2", "standard = 9", "the block has no standard 9.*these: 1, 2"),
+        ("standard = 2", "low = 0.3", "low, value and high must ascend"),
+        ("precision = 0.15", "precision = 0", "precision"),
+        ("participants = 20", "participants = 0", "participants"),
+        ("percent = 71", "percent = 171", "percent"),
+    ],
+)
+def test_what_is_wrong_is_named(old: str, new: str, said: str) -> None:
+    assert draw_key(study(more=PLANNED), stream(1, "key").random)
+    with pytest.raises(ProtocolError, match=said):
+        study(more=PLANNED.replace(old, new))
+    assert old in text_of(more=PLANNED)
+
+
+def test_a_block_of_levels_is_described_by_design_levels_and_comparisons() -> None:
+    lines = describe(study()).splitlines()
+    rows = {line.split("  ")[1].strip(): " ".join(line.split()) for line in lines if line.startswith("  ")}
+    assert rows["Design"] == "Design 2IFC of viscosity_pa_s, standard 1, 2: 2 intervals, 0.6 s apart"
+    assert rows["Levels"] == "Levels Weber fraction 0.2 to 0.8 (constant), 24 trials per standard"
+    assert rows["Comparisons"] == "Comparisons viscosity_pa_s from 1.2 to 3.6 Pa·s"
+    assert "None" not in describe(study())
+
+
+def test_a_paced_damper_is_described_by_its_strongest_force_and_the_slope_limit_of_the_device() -> None:
+    protocol = load("viscosityjnd")
+    assert protocol.blocks["viscosity"].stimulus == "damping"
+    said = " ".join(describe(protocol).split())
+    assert "Force at the pace 0.5 to 6.4 N at 0.126 m/s, at most 7.7 N at 1.2 times the pace" in said
+    assert "Damping at most 51.2 N·s/m at the hand; the slope limit is 53 " in said
+    assert "the slope limit is 20.6 " in " ".join(describe(protocol, delay_ticks=2).split())
+
+
+def test_compared_conditions_are_described_by_their_standard() -> None:
+    assert "ABX against oil: 3 intervals, 0.6 s apart" in describe(study(CONDITIONS))
+
+
+def test_levels_that_are_values_have_no_standard() -> None:
+    text = """
+format = 2
+study.name = "thickness"
+scene.scale = 3
+liquids.oil = { density_kg_m3 = 1260, viscosity_pa_s = 4, drag.law = "haider-levenspiel" }
+tasks.stir.kind = "follow"
+stimuli.viscosity = { vary = "viscosity_pa_s", level = "value", levels = [0.5, 20] }
+methods.nine = { kind = "constant", levels = 9, repetitions = 4 }
+blocks.thickness = { stimulus = "viscosity", design = "estimation", method = "nine" }
+"""
+    said = " ".join(describe(parse(text.encode(), "thickness")).split())
+    assert "Levels value 0.5 to 20 (constant), 36 trials Comparisons" in said

@@ -1,11 +1,25 @@
+"""The first use of a model builds its validator; several threads may use it first at the same time."""
+
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
 import pytest
-from pydantic import ValidationError
+from pydantic import BaseModel, GetCoreSchemaHandler, ValidationError
 
 from study_app.errors import ProtocolError
-from study_app.protocol.load import load, parse
+from study_app.haptics.model.overrides import number_names
+from study_app.haptics.model.ranges import Frozen
+from study_app.protocol.describe import describe
+from study_app.protocol.load import load, parse, source_bytes
 from study_app.protocol.model import Limits, Protocol
 from study_app.protocol.orders.block_orders import orders_of
+from study_app.protocol.quantities import quantity, quantity_words
+from study_app.protocol.source.json_schema import schema
+from study_app.protocol.table import Table
 from study_app.protocol.texts import tidy
+from study_app.store.receipt import without_conditions
 from tests.protocol.sound import SOUND
 
 SMALL = parse(SOUND.encode(), "small.toml")
@@ -85,3 +99,83 @@ def test_a_language_the_program_cannot_speak_is_refused():
     with pytest.raises(ProtocolError, match=r'line 8: study.languages.2: the program has no words in "fi"') as caught:
         parse(text.encode(), "small.toml")
     assert len(caught.value.problems) == 1
+
+
+THREADS = 8
+
+
+@pytest.mark.parametrize("base", [Table, Frozen])
+def test_threads_that_use_a_model_first_build_its_validator_once(base: type[BaseModel]) -> None:
+    begin = threading.Barrier(THREADS)
+    builders: list[str] = []
+
+    class Model(base):  # type: ignore[valid-type, misc]
+        value: int
+
+        @classmethod
+        def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> Any:
+            builders.append(threading.current_thread().name)
+            time.sleep(0.05)
+            return handler(source)
+
+    def validate(value: int) -> Any:
+        begin.wait(10.0)
+        return Model.model_validate({"value": value})
+
+    with ThreadPoolExecutor(THREADS) as threads:
+        values = list(threads.map(validate, range(THREADS)))
+    assert [(type(one), one.value) for one in values] == [(Model, value) for value in range(THREADS)]
+    assert len(builders) == 1, "a second builder deletes the validator that others use"
+
+
+DEMO = source_bytes("demo").decode()
+SAYS = 'blinding = "double"'
+
+
+def told(line: str) -> bytes:
+    assert DEMO.count(SAYS) == 1
+    return DEMO.replace(SAYS, line).encode()
+
+
+def test_a_study_is_double_blind_unless_it_says_otherwise() -> None:
+    assert parse(told(""), "demo").study.blinding == "double"
+    assert parse(told(SAYS), "demo").study.blinding == "double"
+    assert parse(told('blinding = "single"'), "demo").study.blinding == "single"
+
+
+@pytest.mark.parametrize("word", ['"none"', '"Double"', "false"])
+def test_nothing_but_the_two_is_taken(word: str) -> None:
+    with pytest.raises(ProtocolError, match=r"study\.blinding"):
+        parse(told(f"blinding = {word}"), "demo")
+
+
+@pytest.mark.parametrize("blinding", ["double", "single"])
+def test_the_receipt_keeps_which_it_was(blinding: str) -> None:
+    protocol = parse(told(f'blinding = "{blinding}"'), "demo")
+    assert without_conditions(protocol)["study"]["blinding"] == blinding
+    assert f"{blinding}-blind" in describe(protocol)
+
+
+def test_editors_are_told_both_and_the_default() -> None:
+    node = schema()["$defs"]["StudyHead"]["properties"]["blinding"]
+    assert (node["enum"], node["default"]) == (["double", "single"], "double")
+    assert "the participant does not know" in node["description"]
+
+
+OF_THE_LOOP = {"format", "rate_hz", "fade_s"}
+"""Numbers of a scene that hold for a whole session."""
+
+
+@pytest.mark.parametrize("study", ["rek2024", "demo", "physical2"])
+def test_every_number_of_a_liquid_has_words(study: str) -> None:
+    protocol = load(study)
+    names = {name for condition in protocol.conditions for name in number_names(protocol.scene_for(condition))}
+    assert len(names) > 15
+    for name in names - OF_THE_LOOP:
+        assert quantity_words(name)
+        assert "_" not in quantity_words(name)
+
+
+def test_unknown_quantity_is_refused() -> None:
+    with pytest.raises(KeyError):
+        quantity("rate_hz")

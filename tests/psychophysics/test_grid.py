@@ -5,9 +5,14 @@ import math
 
 import numpy as np
 import pytest
+from scipy.special import ndtr
+from scipy.stats import t as student
 
-from study_app.psychophysics.families import CLIP, success
+from study_app.analysis.statistics.psychometrics.posterior import fitted
+from study_app.psychophysics.families import CLIP, KAPPA, level_at, position, rise, success
 from study_app.psychophysics.grid import FREE_GUESSES, Grid, evenly, geometric, quantile
+from study_app.psychophysics.precision import AT_ONCE, Expected, estimated, student_975
+from study_app.psychophysics.updown import RATIOS, Staircase, converges_to
 
 LEVELS = evenly(-1.5, 0.0, 6)
 
@@ -75,3 +80,200 @@ def test_quantiles_are_interpolated_between_the_edges_of_the_cells():
     assert quantile(centres, weights, 0.3) == pytest.approx(1.0)
     assert quantile(centres, weights, 0.0) == pytest.approx(-0.5)
     assert quantile(centres, weights, 1.0) == pytest.approx(3.5)
+
+
+FAMILIES = ("weibull", "normal", "logistic")
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_threshold_is_the_middle_and_the_width_reaches_from_5_to_95_percent(family):
+    assert rise(family, -0.7, -0.7, 1.3) == pytest.approx(0.5, abs=1e-12)
+    low, high = (-0.7 + 1.3 * position(family, share) for share in (0.05, 0.95))
+    assert high - low == pytest.approx(1.3, abs=1e-12)
+    assert rise(family, [low, high], -0.7, 1.3) == pytest.approx([0.05, 0.95], abs=1e-12)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_success_goes_from_guessing_to_lapsing_and_stays_finite(family):
+    found = success(family, [-1e6, 1e6], 0.0, 0.5, 0.25, 0.04)
+    assert found == pytest.approx([0.25, 0.96], abs=1e-12)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_the_level_at_a_percentage_is_where_the_function_has_it(family):
+    u = level_at(family, 75.0, -0.5, 1.4, 0.5, 0.02)
+    assert success(family, u, -0.5, 1.4, 0.5, 0.02) == pytest.approx(0.75, abs=1e-12)
+    assert math.isnan(level_at(family, 99.0, -0.5, 1.4, 0.5, 0.02))
+    assert math.isnan(level_at(family, 50.0, -0.5, 1.4, 0.5, 0.02))
+
+
+def test_a_linear_observer_is_a_weibull_of_a_known_width():
+    """A difference of ln(1 + w) with normal noise: the Weibull function has the same threshold within 2.4 %."""
+    from scipy.optimize import curve_fit
+    from scipy.special import ndtr
+
+    w75 = 0.2
+    u = np.linspace(math.log10(0.02), math.log10(0.6), 31)
+    spread = math.log1p(w75) / 0.6744897501960817
+    shown = ndtr(np.log1p(10.0**u) / spread)
+    (threshold, width), _ = curve_fit(
+        lambda at, middle, wide: success("weibull", at, middle, wide, 0.5, 0.0), u, shown, (-0.7, 1.4)
+    )
+    assert 10.0**threshold == pytest.approx(w75, rel=0.024)
+    assert 1.4 <= width <= 1.7
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_forward_and_inverse_agree_to_rounding_and_are_those_of_scipy(family):
+    from scipy import stats
+
+    shares = np.linspace(0.001, 0.999, 201)
+    x = np.array([position(family, float(share)) for share in shares])
+    assert rise(family, -0.7 + 1.3 * x, -0.7, 1.3) == pytest.approx(shares, abs=1e-12)
+    theirs = {
+        "weibull": stats.weibull_min.cdf(10 ** (KAPPA * x), 1, scale=1 / math.log(2)),
+        "normal": stats.norm.cdf(2 * stats.norm.ppf(0.95) * x),
+        "logistic": stats.logistic.cdf(2 * math.log(19) * x),
+    }
+    assert theirs[family] == pytest.approx(shares, abs=1e-12)
+
+
+GRID = Grid("weibull", evenly(-1.9, 0.0, 41), geometric(0.4, 4.0, 7), (1.4, 1.5), (0.0, 0.02), (0.5, 0.5), (0.5,))
+
+
+def test_estimates_of_many_observers_are_those_of_each():
+    levels, rng = evenly(-1.7, -0.2, 7), np.random.default_rng(1)
+    counts = rng.integers(0, 9, (2, AT_ONCE + 5, 7)).astype(float)
+    found = estimated(GRID, levels, *counts)
+    for row in (0, 7, AT_ONCE, AT_ONCE + 4):
+        one = fitted(levels, counts[0, row], counts[1, row], GRID)
+        assert found.medians[row] == pytest.approx(one.threshold, abs=1e-12)
+        assert found.lows[row] == pytest.approx(one.low, abs=1e-12)
+        assert found.highs[row] == pytest.approx(one.high, abs=1e-12)
+        assert found.variances[row] == pytest.approx(one.variance, rel=1e-9)
+
+
+@pytest.mark.parametrize("freedom", [1, 2, 3, 9, 19, 99, 2000, 2001, 50_000])
+def test_students_quantile_is_scipys(freedom):
+    assert student_975(freedom) == pytest.approx(student.ppf(0.975, freedom), rel=1e-6)
+
+
+def log10_of(percent):
+    return math.log10(1 + percent / 100)
+
+
+@pytest.mark.parametrize(
+    ("participants", "trials", "percent"), [(10, 60, 27), (20, 60, 17), (20, 100, 15)]
+)  # thresholds of people who differ by a factor of 1.2, with a standard deviation of 28 % at 60 trials
+def test_a_groups_interval_is_students_over_errors_and_people(participants, trials, percent):
+    one = Expected("log", 60, 1, log10_of(90), 0.28 / math.log(10), 0.2)
+    assert 100 * one.of_group(participants, trials) == pytest.approx(percent, abs=1.5)
+
+
+def test_standards_average_the_errors_but_not_the_people():
+    one, four = (Expected("log", 60, standards, 0.3, 0.12, 0.2) for standards in (1, 4))
+    errors = 0.12**2 * np.array([1, 0.25]) + math.log10(1.2) ** 2
+    halves = np.log10([1 + one.of_group(20), 1 + four.of_group(20)])
+    assert halves == pytest.approx(student.ppf(0.975, 19) * np.sqrt(errors / 20))
+
+
+def test_linear_spacing_gives_a_share_of_the_threshold():
+    one = Expected("linear", 60, 1, 8.0, 4.0, 50.0)
+    half = student.ppf(0.975, 9) * math.sqrt((4.0**2 + (50 * math.log(1.2)) ** 2) / 10)
+    assert one.of_group(10) == pytest.approx(half / 50)
+    assert one.factor is None
+
+
+def test_the_fewest_participants_and_trials_for_a_precision():
+    one = Expected("log", 20, 1, 0.5, 0.2, 0.2)
+    people = one.participants_for(0.15)
+    assert one.of_group(people) <= 0.15 < one.of_group(people - 1)
+    trials = one.trials_for(0.15, 20)
+    assert one.of_group(20, trials) <= 0.15 < one.of_group(20, trials - 10)
+    assert one.trials_for(0.05, 10) is None  # people differ by more
+    assert one.participants_for(0.001) is None
+    assert one.of_group(1) == math.inf
+
+
+def staircase(down_after=2, step_up=0.2, ratio=0.5, low=-1.0, high=1.0, begin=1.0):
+    return Staircase(down_after, step_up, ratio, low, high, begin)
+
+
+def climb(one, successes):
+    answers = []
+    for outcome in successes:
+        answers.append((one.next(answers), outcome))
+    return answers
+
+
+def test_the_level_falls_after_successes_in_a_row_and_rises_after_each_failure():
+    one = staircase()
+    answers = climb(one, [True, True, True, True, True, False, True, True])
+    assert [level for level, _ in answers] == pytest.approx([1.0, 1.0, 0.9, 0.9, 0.8, 0.8, 1.0, 1.0])
+    assert one.next(answers) == pytest.approx(0.9)
+
+
+def test_levels_stay_within_the_domain():
+    one = staircase(down_after=1, step_up=1.5, ratio=1.0)
+    assert [level for level, _ in climb(one, [False, True, True, True])] == [1.0, 1.0, -0.5, -1.0]
+
+
+def test_the_next_level_starts_from_the_level_that_was_presented():
+    assert staircase().next([(0.37, False)]) == pytest.approx(0.57)
+
+
+def test_reversals_are_the_levels_at_which_the_direction_changed():
+    one = staircase(down_after=1, step_up=0.2, ratio=1.0)
+    answers = climb(one, [True, True, False, False, True, False])
+    assert [level for level, _ in answers] == pytest.approx([1.0, 0.8, 0.6, 0.8, 1.0, 0.8])
+    assert one.reversals(answers) == pytest.approx([0.6, 1.0, 0.8])
+
+
+def test_a_reversal_counts_across_successes_that_are_too_few_for_a_step():
+    one = staircase(down_after=2, begin=0.0)
+    answers = climb(one, [True, True, True, False, True, True])  # down, nothing, up, nothing, down
+    assert one.reversals(answers) == pytest.approx([answers[3][0], answers[5][0]])
+
+
+def test_the_mean_leaves_out_the_first_two_reversals_and_those_at_an_end_of_the_domain():
+    one = staircase(down_after=1, step_up=0.2, ratio=1.0)
+    answers = climb(one, [True, False] * 3)  # reversals 0.8, 1.0, 0.8, 1.0, 0.8: those at 1.0 lie at the end
+    assert one.reversals(answers) == pytest.approx([0.8, 1.0, 0.8, 1.0, 0.8])
+    assert one.mean_of_reversals(answers, 8) == pytest.approx(0.8)
+    assert one.mean_of_reversals(answers[:-2], 8) is None
+
+
+def test_percentages_are_those_of_garcia_perez():
+    found = [100 * converges_to(n, ratio) for n, ratio in RATIOS.items()]
+    assert found == pytest.approx([77.85, 80.35, 83.15, 85.84], abs=0.005)
+    assert 100 * converges_to(2, 1.0) == pytest.approx(70.7, abs=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("down_after", "ratio", "reached"),
+    [
+        (1, RATIOS[1], (78.1, 78.3, 78.7, 79.5)),
+        (2, RATIOS[2], (80.4, 80.5, 80.7, 81.3)),
+        (3, RATIOS[3], (83.2, 83.2, 83.3, 83.6)),
+        (4, RATIOS[4], (85.8, 85.9, 86.0, 86.2)),
+        (2, 1.0, (69.6, 68.5, 66.0, 61.0)),
+        (3, 1.0, (79.0, 78.5, 77.7, 75.0)),
+    ],
+)
+def test_percent_correct_at_the_mean_of_reversals_in_the_long_run(down_after, ratio, reached):
+    """By the step up in standard deviations of the observer: equal steps depend on it, weighted ones hardly."""
+    draw = np.random.default_rng(down_after)
+    for step_up, percent in zip((0.25, 0.5, 1.0, 2.0), reached, strict=True):
+        one = staircase(down_after, step_up, ratio, low=-50.0, high=50.0, begin=0.5)
+        u, run, before, reversals = 0.5, 0, 0, []
+        for chance in draw.random(40_000):  # the rule itself, since `next` looks at all answers each time
+            success = chance < 0.5 + 0.5 * ndtr(u)
+            run = run + 1 if success else 0
+            move = 1 if not success else -1 if run == down_after else 0
+            run = 0 if move else run
+            if move * before < 0:
+                reversals.append(u)
+            before = move or before
+            u += one.step_up * move * (ratio if move < 0 else 1.0)
+        assert 100 * (0.5 + 0.5 * ndtr(np.mean(reversals[2:]))) == pytest.approx(percent, abs=0.75)

@@ -1,29 +1,39 @@
 """What the report says of thresholds in words: what they cannot show, and the methods paragraph."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
+from study_app.analysis.designs.level_conduct import catch_answers, level_conduct
 from study_app.analysis.designs.level_summaries import levels_found
+from study_app.analysis.report.answers import level_conduct_section
 from study_app.analysis.report.answers.level_limits import level_limits
 from study_app.analysis.report.answers.level_methods import level_methods
 from study_app.analysis.report.answers.threshold_section import section
+from study_app.analysis.report.answers.withheld_section import withheld
 from study_app.analysis.report.findings_summary import level_findings
 from study_app.analysis.results.level_results import (
+    CatchAnswers,
     ExponentFound,
     LevelAnswers,
+    LevelConduct,
     LevelsFound,
     OwnDynamics,
     ThresholdFound,
+    WithheldForce,
 )
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.study_tables import load_study
+from study_app.analysis.tables.tracks import tracks
 from study_app.protocol.trials.kinds import DESIGN_KINDS, default_design
 from study_app.protocol.trials.methods.constant import Constant
 from study_app.protocol.trials.methods.questplus import QuestPlus
 from study_app.protocol.trials.methods.updown import UpDown
 from study_app.protocol.trials.stimuli import Stimulus
+from tests.analysis.levels.test_thresholds import block
 from tests.compiled import needs_servo
 
 GOOD = ThresholdFound(
@@ -171,3 +181,116 @@ def test_every_design_has_a_name_for_a_paper() -> None:
 def test_a_sealed_block_says_nothing_of_its_levels(sealed_levels: Path) -> None:
     study = load_study(sealed_levels)
     assert list(level_methods(study.levels, levels_found(study))) == []
+
+
+def page(*rows: tuple[float | None, float, float]) -> str:
+    """Return the section of comparisons in which at most so many percent were withheld, by standard and level."""
+    found = tuple(WithheldForce(standard, level, level, 4, most / 2, most) for standard, level, most in rows)
+    levels = LevelsFound(
+        "b", "Block", "2ifc", True, (), "share", "correct", unit="ms", level_kind="difference", withheld=found
+    )
+    return re.sub(r"<[^>]+>", " ", "".join(withheld(levels)))
+
+
+@pytest.mark.parametrize(
+    ("most", "words"),
+    [
+        ((1.0, 4.9, 5.0), "in every comparison up to 80 ms."),
+        ((1.0, 5.1, 0.0), "in every comparison up to 20 ms."),
+        ((6.0, 0.0, 0.0), "in every comparison at no level presented."),
+    ],
+)
+def test_the_longest_delay_ends_before_the_first_level_that_loses_more(most: tuple[float, ...], words: str) -> None:
+    text = page(*((None, level, share) for level, share in zip((20.0, 40.0, 80.0), most, strict=True)))
+    assert f"At most 5 % was withheld {words}" in text
+
+
+def test_each_standard_has_its_own() -> None:
+    text = page((0.0, 20.0, 1.0), (0.0, 40.0, 9.0), (50.0, 20.0, 7.0))
+    assert "up to 20 ms at the standard of 0 ms." in text
+    assert "at no level presented at the standard of 50 ms." in text
+
+
+TRIALS = [  # participant, session, trial, standard, level, level_delivered, analysed, catch, right
+    ("P001", 1, 1, 8.0, 0.2, 0.21, True, False, True),
+    ("P001", 1, 2, 8.0, 0.4, 0.38, True, False, False),
+    ("P001", 1, 3, 8.0, 0.6, None, True, True, False),
+    ("P001", 1, 4, 8.0, 0.6, 0.6, True, True, True),
+    ("P002", 1, 1, 8.0, 0.6, 0.9, False, True, False),
+]
+COLUMNS = ["participant", "session", "trial", "standard", "level", "level_delivered", "analysed", "catch", "right"]
+INTERVALS = [  # participant, session, trial, attempt, interval, counted, invalid_reasons, pace_mps, apparent_mass_kg
+    ("P001", 1, 1, 1, 1, False, "pace_error_percent", 0.9, 0.9),
+    ("P001", 1, 1, 2, 1, False, "level_error_percent pace_error_percent", 0.9, 0.9),
+    ("P001", 1, 1, 3, 1, True, None, 0.08, -0.01),
+    ("P001", 1, 2, 1, 1, True, None, 0.1, -0.03),
+    ("P002", 1, 1, 1, 1, False, "pace_error_percent", 0.9, 0.9),
+]
+
+
+@pytest.fixture
+def opened() -> pd.DataFrame:
+    frame = pd.DataFrame(TRIALS, columns=COLUMNS).assign(block="b")
+    return frame.astype({"level_delivered": "Float64", "catch": "boolean", "right": "boolean"})
+
+
+@pytest.fixture
+def intervals() -> pd.DataFrame:
+    names = ["participant", "session", "trial", "attempt", "interval", "counted", "invalid_reasons"]
+    frame = pd.DataFrame(INTERVALS, columns=[*names, "pace_mps", "apparent_mass_kg"]).assign(block="b")
+    return frame.astype({"pace_mps": "Float64", "apparent_mass_kg": "Float64", "invalid_reasons": "string"})
+
+
+def test_conduct_is_that_of_the_trials_that_are_analysed(opened: pd.DataFrame, intervals: pd.DataFrame) -> None:
+    (found,) = level_conduct(block(), opened, intervals)
+    assert found == LevelConduct(
+        standard=8.0,
+        trials=4,
+        repeated=2,
+        reasons={"level_error_percent": 1, "pace_error_percent": 2},
+        measured=3,
+        error_mean=pytest.approx((0.01 - 0.02) / 3),
+        error_largest=pytest.approx(0.02),
+        pace_mps=pytest.approx(0.09),
+        apparent_mass_kg=pytest.approx(-0.02),
+    )
+
+
+def test_catch_trials_are_counted_where_they_exclude_a_session_too(opened: pd.DataFrame) -> None:
+    assert list(catch_answers(block(), opened)) == []
+    kept, excluded = catch_answers(replace(block(), wrong_most=0.5), opened)
+    assert kept == CatchAnswers("P001", 1, 2, 1, 0.5)
+    assert excluded == CatchAnswers("P002", 1, 1, 1, 0.5)
+    assert (kept.excludes, excluded.excludes) == (False, True)
+
+
+def test_the_report_states_errors_reasons_estimator_and_the_rule(opened: pd.DataFrame, intervals: pd.DataFrame) -> None:
+    found = LevelsFound(
+        "b", "Block", "2ifc", True, (), "share", "correct", vary="damping_nspm", unit="N·s/m", level_kind="weber",
+        conduct=tuple(level_conduct(block(), opened, intervals)),
+        catches=tuple(catch_answers(replace(block(), wrong_most=0.5), opened)),
+    )  # fmt: skip
+    page = "".join(level_conduct_section.section(found, "kalman"))
+    for words in (
+        "Standard [N·s/m]", "−0.0033", "0.0200", "0.090", "−0.020", "with the velocity estimator kalman",
+        "Limits that intervals did not keep: pace error in two intervals and level error in 1 interval.",
+        "kept: at most 50 %", "excluded: above 50 %",
+    ):  # fmt: skip
+        assert words in page
+    clean = replace(found, conduct=(replace(found.conduct[0], reasons={}, apparent_mass_kg=None),), catches=())
+    page = "".join(level_conduct_section.section(clean, None))
+    assert "Every interval kept its limits." in page
+    assert "estimator" not in page
+    assert "Catch trials" not in page
+
+
+@pytest.mark.slow
+def test_a_study_with_catch_trials_has_them_in_its_results(opened_catch: Path) -> None:
+    study = load_study(opened_catch)
+    staircase = next(found for found in levels_found(study) if found.block == "staircase")
+    rows = tracks(study)
+    caught = rows[(rows["block"] == "staircase") & rows["catch"].astype(bool)]
+    assert sum(one.n for one in staircase.catches) == len(caught)
+    assert sum(one.wrong for one in staircase.catches) == (~caught["right"].astype(bool)).sum()
+    assert {one.most for one in staircase.catches} == {1.0}
+    assert [(one.standard, one.measured, one.repeated) for one in staircase.conduct] == [(4.0, 0, 0), (8.0, 0, 0)]

@@ -9,7 +9,9 @@ from scipy.stats import friedmanchisquare, studentized_range
 from scipy.stats import t as t_distribution
 
 from study_app.analysis.statistics import friedman as module
+from study_app.analysis.statistics.agreement import kappa
 from study_app.analysis.statistics.friedman import friedman
+from study_app.analysis.statistics.global_permutation import global_permutation
 from study_app.analysis.statistics.multiple_comparisons import holm
 from study_app.errors import AnalysisError
 
@@ -21,16 +23,12 @@ TIMES = (
     "5.50 5.45 5.25 5.65 5.60 5.40 5.70 5.65 5.55 6.30 6.30 6.25"
 )
 BASES = np.array(TIMES.split(), dtype=float).reshape(22, 3)
-
 # scipy's documentation: ten people, three conditions, whole scores with ties.
 SCORES = np.array([[4, 6, 3, 4, 3, 2, 2, 7, 6, 5], [5, 6, 8, 7, 7, 8, 4, 6, 4, 5], [2, 4, 4, 3, 2, 2, 1, 4, 3, 2]]).T
-
 # R package rstatix, issues 264 and 265: six people, A, B, C.
 POST_HOC = np.array([[4, 6, 3, 5, 4, 5], [7, 8, 6, 7, 9, 6], [6, 9, 7, 8, 8, 9]]).T
-
 # Twenty people, three tasks done or not (pingouin, "cochran").
 COCHRAN = "111 101 100 001 010 101 101 100 101 001 011 111 000 110 101 001 100 101 110 101"
-
 # Upper tails of Friedman's statistic without ties: participants, settings, statistic, P.
 TAILS = [
     (3, 3, 6.0, 0.02778),
@@ -55,7 +53,6 @@ TAILS = [
     (5, 4, 7.8, 0.04434),
     (5, 4, 9.96, 0.00874),
 ]
-
 answers = st.integers(2, 4).flatmap(
     lambda n: st.lists(st.lists(st.integers(1, 7), min_size=3, max_size=3), min_size=n, max_size=n)
 )
@@ -241,3 +238,119 @@ def test_the_approximation_is_near_the_drawn_p_where_it_takes_over(k: int) -> No
     drawn = friedman(values)
     assert drawn.p_chi2 is not None
     assert drawn.p == pytest.approx(drawn.p_chi2, abs=3 * np.sqrt(drawn.p_chi2 / 9999) + 0.002)
+
+
+# R package irr, "anxiety": three raters, twenty people.
+ANXIETY = ["33345523522615221243", "36462424332333221334", "21443216111233113322"]
+
+
+def test_published_agreement_of_three_raters() -> None:
+    result = friedman([[int(digit) for digit in row] for row in ANXIETY])
+    assert result.effect == pytest.approx(0.5396568760, abs=1e-10)
+    assert (result.statistic, result.df) == (pytest.approx(30.7604419, abs=1e-7), 19)
+    assert result.p_chi2 == pytest.approx(0.0428835, abs=1e-7)
+
+
+def test_raters_who_agree_or_contradict_each_other() -> None:
+    assert friedman([[1, 2, 3, 4]] * 3).effect == pytest.approx(1.0)
+    assert friedman([[1, 2, 3], [3, 2, 1]]).effect == pytest.approx(0.0)
+
+
+def test_published_kappa() -> None:
+    result = kappa([[20, 5], [10, 15]])
+    assert (result.kappa, result.n) == (pytest.approx(0.4), 50)
+    assert (result.agreement, result.expected) == pytest.approx((0.7, 0.5))
+
+
+def test_kappa_of_nothing_and_of_one_name_is_none() -> None:
+    assert kappa(np.zeros((3, 3))).note == "nothing was named"
+    one = kappa([[4, 0], [0, 0]])
+    assert one.kappa is None
+    assert one.note.startswith("no variation")
+    perfect = kappa([[4, 0], [0, 3]])
+    assert (perfect.kappa, perfect.interval) == (pytest.approx(1.0), None)
+
+
+@pytest.mark.parametrize("table", [[[1, 2, 3], [1, 2, 3]], [[1, -2], [1, 1]], [[1, np.nan], [1, 1]]])
+def test_what_is_no_table_of_counts_is_refused(table: list[list[float]]) -> None:
+    with pytest.raises(AnalysisError, match="square table of counts"):
+        kappa(table)
+
+
+def made_up(items: int, n: int, k: int, seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).integers(1, 8, (items, n, k)).astype(float)
+
+
+def test_one_statement_is_friedmans_test() -> None:
+    values = made_up(1, 5, 3)
+    both = global_permutation(values), friedman(values[0])
+    assert both[0].statistic == pytest.approx(both[1].statistic)
+    assert both[0].p == pytest.approx(both[1].p)
+    assert both[0].smallest_p == pytest.approx(both[1].smallest_p)
+    assert both[0].effect == pytest.approx(both[1].effect)
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+def test_the_exact_p_is_that_of_relabelling_whole_participants() -> None:
+    values = made_up(3, 4, 3)
+    orders = list(permutations(range(3)))
+
+    def statistic(chosen: tuple[tuple[int, ...], ...]) -> float:
+        moved = np.stack([values[:, person][:, list(order)] for person, order in enumerate(chosen)], axis=1)
+        return float(sum(friedmanchisquare(*item.T).statistic for item in moved))
+
+    every = np.array([statistic(chosen) for chosen in product(orders, repeat=4)])
+    result = global_permutation(values)
+    assert result.method == "exact permutation"
+    assert result.statistic == pytest.approx(every[0])
+    assert result.p == pytest.approx((every >= every[0] - 1e-9).mean())
+    assert result.smallest_p == pytest.approx((every >= every.max() - 1e-9).mean())
+
+
+def test_statements_that_say_the_same_give_one_answer_and_not_a_stronger_one() -> None:
+    one = made_up(1, 5, 3, seed=4)
+    assert global_permutation(np.repeat(one, 9, axis=0)).p == pytest.approx(global_permutation(one).p)
+
+
+def test_small_shifts_in_all_statements_add_up() -> None:
+    rng = np.random.default_rng(5)
+    values = np.clip(rng.integers(2, 6, (9, 12, 3)) + np.array([0, 0, 1]), 1, 7).astype(float)
+    result = global_permutation(values)
+    singles = [friedman(item).p for item in values]
+    assert result.p is not None
+    assert result.p < min(p for p in singles if p is not None)
+    assert result.method.startswith("Monte Carlo")
+    assert result == global_permutation(values)
+
+
+def test_relabelling_the_settings_changes_nothing() -> None:
+    values = made_up(4, 6, 3, seed=2)
+    assert global_permutation(values).p == pytest.approx(global_permutation(values[:, :, [2, 0, 1]]).p)
+
+
+def test_a_missing_answer_leaves_out_one_row_and_not_the_participant() -> None:
+    values = made_up(3, 5, 3)
+    values[1, 2, 0] = np.nan
+    values[:, 4] = np.nan
+    result = global_permutation(values)
+    assert (result.n, result.dropped, result.incomplete, result.items) == (4, 1, 1, 3)
+    kept = [values[0, :4], values[1, [0, 1, 3]], values[2, :4]]
+    assert result.statistic == pytest.approx(sum(friedmanchisquare(*rows.T).statistic for rows in kept))
+
+
+def test_a_statement_without_variation_does_not_count() -> None:
+    values = made_up(2, 5, 3)
+    values[1] = 4
+    result = global_permutation(values)
+    assert result.items == 1
+    assert result.p == pytest.approx(friedman(values[0]).p)
+    flat = global_permutation(np.full((2, 5, 3), 4.0))
+    assert (flat.statistic, flat.p, flat.effect) == (None, None, None)
+    assert flat.note.startswith("no variation")
+    assert global_permutation(np.full((2, 5, 3), np.nan)).note == "no participant completed a statement"
+
+
+def test_one_setting_is_refused() -> None:
+    with pytest.raises(AnalysisError, match="at least 2"):
+        global_permutation(np.ones((2, 5, 1)))

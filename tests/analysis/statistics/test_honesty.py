@@ -3,9 +3,13 @@
 import dataclasses
 import math
 from collections.abc import Callable, Iterator
+from itertools import permutations, product
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import binom
 
 from study_app.analysis.statistics.equivalence.tost import tost
 from study_app.analysis.statistics.friedman import friedman
@@ -14,14 +18,14 @@ from study_app.analysis.statistics.ordinal import ordinal
 from study_app.analysis.statistics.outcome import Outcome
 from study_app.analysis.statistics.paired import paired
 from study_app.analysis.statistics.psychometrics.threshold import noticed
-from study_app.analysis.statistics.recognition import named, recognition
+from study_app.analysis.statistics.recognition import UNANSWERED, UNDECIDED, Recognition, named, recognition
 from study_app.analysis.statistics.skillings_mack import skillings_mack
 from study_app.analysis.statistics.trend import page, step_down
+from study_app.errors import AnalysisError
 
 RNG = np.random.default_rng(11)
 ANSWERS = RNG.integers(1, 8, (12, 3)).astype(float)
 GAPS = np.where(RNG.random((12, 3)) < 0.2, np.nan, ANSWERS)
-
 TABLES = {
     "twelve people": ANSWERS,
     "five people": ANSWERS[:5],
@@ -36,7 +40,6 @@ TABLES = {
     "one answers": np.vstack([[1.0, np.nan, np.nan], np.full((2, 3), np.nan)]),
     "one setting missing": np.column_stack([ANSWERS[:, 0], np.full(12, np.nan), ANSWERS[:, 2]]),
 }
-
 TESTS: dict[str, Callable[[np.ndarray], Outcome]] = {
     "friedman": friedman,
     "global": lambda values: global_permutation(values[None]),
@@ -91,3 +94,145 @@ def test_the_order_of_people_does_not_matter(test: str) -> None:
     there, back = TESTS[test](ANSWERS[:7]), TESTS[test](ANSWERS[:7][::-1])
     assert (there.statistic, there.effect) == pytest.approx((back.statistic, back.effect))
     assert there.p == pytest.approx(back.p, abs=0.02 if "Monte" in there.method else 1e-12)
+
+
+# Fewest hits in all with p ≤ .05: participants, by matching, by the binomial distribution (too liberal).
+CRITICAL = [
+    (3, 7, 6),
+    (4, 9, 8),
+    (5, 10, 9),
+    (6, 11, 10),
+    (8, 14, 13),
+    (10, 16, 15),
+    (12, 19, 18),
+    (16, 24, 22),
+    (20, 29, 27),
+    (24, 33, 32),
+    (30, 40, 38),
+]
+
+
+def hits_of(n: int, total: int) -> list[int]:
+    """Return hits (0, 1 or 3 of each of n people) that add up to ``total``."""
+    threes = next(threes for threes in range(n + 1) if 0 <= total - 3 * threes <= n - threes)
+    ones = total - 3 * threes
+    return [3] * threes + [1] * ones + [0] * (n - threes - ones)
+
+
+def matching(hits: list[int]) -> Recognition:
+    """Return the test of people who gave three names out once each, with so many ``hits``."""
+    names = {3: [0, 1, 2], 1: [0, 2, 1], 0: [1, 2, 0]}
+    return recognition([names[one] for one in hits], [0, 1, 2], 3)
+
+
+def test_the_name_is_the_single_highest_rating() -> None:
+    ratings = [[[7, 1, 2], [3, 3, 4], [1, 6, 5]], [[4, 4, 4], [5, 5, 1], [1, np.nan, 7]]]
+    assert named(ratings).tolist() == [[0, 2, 1], [UNDECIDED, UNDECIDED, UNANSWERED]]
+
+
+@pytest.mark.slow
+@given(st.lists(st.lists(st.integers(1, 7), min_size=5, max_size=5), min_size=1, max_size=20))
+def test_relabelling_the_labels_relabels_the_names(ratings: list[list[int]]) -> None:
+    names = named([ratings])
+    order = [3, 1, 4, 0, 2]
+    moved = named([[[row[place] for place in order] for row in ratings]])
+    assert [order[name] if name >= 0 else name for name in moved[0]] == names[0].tolist()
+
+
+@pytest.mark.parametrize(("n", "fewest", "binomial"), CRITICAL)
+def test_published_critical_numbers_of_hits(n: int, fewest: int, binomial: int) -> None:
+    enough, short = matching(hits_of(n, fewest)), matching(hits_of(n, fewest - 1))
+    assert enough.p is not None
+    assert short.p is not None
+    assert enough.p <= 0.05 < short.p
+    assert binom.sf(binomial - 1, 3 * n, 1 / 3) <= 0.05 < binom.sf(binomial - 2, 3 * n, 1 / 3)
+    assert enough.expected == pytest.approx(n)
+
+
+def test_published_matching_of_five_people() -> None:
+    result = matching(hits_of(5, 10))
+    assert result.p == pytest.approx(0.0303, abs=5e-5)
+    assert binom.sf(9, 15, 1 / 3) == pytest.approx(0.0085, abs=5e-5)
+    best = matching([3] * 5)
+    assert best.p == pytest.approx((1 / 6) ** 5)
+    assert best.p == best.smallest_p
+
+
+@pytest.mark.slow
+@given(st.lists(st.lists(st.integers(-2, 3), min_size=3, max_size=3), min_size=1, max_size=3))
+@settings(max_examples=40, deadline=None)
+def test_the_exact_p_is_that_of_all_exchanges_of_answered_settings(names: list[list[int]]) -> None:
+    truth = [0, 1, 3]
+    each = []
+    for row in names:
+        there = [place for place in range(3) if row[place] != UNANSWERED]
+        orders = permutations([row[place] for place in there])
+        each.append([sum(truth[p] == name for p, name in zip(there, order, strict=True)) for order in orders])
+    every = np.array([sum(chosen) for chosen in product(*each)])
+    result = recognition(names, truth, 4)
+    if result.n == 0:
+        assert result.p is None
+        return
+    assert result.p == pytest.approx((every >= result.statistic).mean())
+    assert result.smallest_p == pytest.approx((every == every.max()).mean())
+    assert result.expected == pytest.approx(every.mean())
+
+
+def test_always_naming_the_same_is_a_third_right_and_shows_nothing() -> None:
+    result = recognition([[1, 1, 1]] * 20, [0, 1, 2], 3)
+    assert (result.statistic, result.p, result.expected) == (20, pytest.approx(1.0), pytest.approx(20))
+    assert result.note.startswith("no variation")
+
+
+def test_the_table_counts_everything_once() -> None:
+    names = [[0, 1, 2], [0, 1, 3], [1, 1, 1], [0, UNDECIDED, 2], [2, UNANSWERED, 0], [UNANSWERED] * 3]
+    result = recognition(names, [0, 1, 3], 5)
+    assert result.table == ((3, 1, 1, 0, 0, 0, 1), (0, 3, 0, 0, 0, 1, 2), (1, 1, 2, 1, 0, 0, 1))
+    assert (result.n, result.dropped, result.statistic) == (5, 1, 7)
+    assert (result.decided, result.undecided, result.unanswered) == (13, 1, 4)
+    assert result.note == "1 undecided answer counts as no hit"
+    assert [(rate.hits, rate.n) for rate in result.rates] == [(3, 5), (3, 4), (1, 5)]
+
+
+def test_a_setting_without_a_label_of_its_own_cannot_be_hit() -> None:
+    result = recognition([[0, 1, 2], [2, 1, 0], [0, 2, 1]], [0, None, 2], 3)
+    assert result.statistic == 3
+    assert [rate.setting for rate in result.rates] == [0, 2]
+
+
+def test_hit_rates_have_exact_intervals() -> None:
+    rate = recognition([[0, 1]] * 10, [0, 1], 2).rates[0]
+    assert rate.interval is not None
+    assert (rate.rate, rate.interval.high) == (1.0, 1.0)
+    assert rate.interval.low == pytest.approx(0.025 ** (1 / 10))
+
+
+def test_kappa_has_an_interval_from_ten_people() -> None:
+    rng = np.random.default_rng(0)
+    names = np.where(rng.random((24, 3)) < 0.6, [0, 1, 2], rng.integers(0, 3, (24, 3)))
+    result = recognition(names, [0, 1, 2], 3)
+    assert result.interval is not None
+    assert result.effect is not None
+    assert result.interval.low < result.effect < result.interval.high
+    assert result == recognition(names, [0, 1, 2], 3)
+    few = recognition(names[:9], [0, 1, 2], 3)
+    assert few.interval is None
+    assert "below 10" in few.no_interval
+    assert (
+        recognition([[0, 1, 2]] * 12, [0, 1, 2], 3).no_interval == "no interval: all participants gave the same names"
+    )
+
+
+@pytest.mark.parametrize(
+    ("names", "truth"),
+    [([[0, 1]], [0, 1, 2]), ([[0, 5, 1]], [0, 1, 2]), ([[0, 1, 1.5]], [0, 1, 2]), ([[0, 1, 2]], [0, 1, 9])],
+)
+def test_names_and_truth_that_do_not_fit_are_refused(names: list[list[float]], truth: list[int]) -> None:
+    with pytest.raises(AnalysisError, match="name"):
+        recognition(names, truth, 3)
+
+
+def test_nobody_answered_is_said() -> None:
+    result = recognition([[UNANSWERED] * 3], [0, 1, 2], 3)
+    assert (result.p, result.effect, result.dropped) == (None, None, 1)
+    assert result.note == "no participant rated all labels of a setting"

@@ -1,10 +1,18 @@
+"""Published percentages of answers (R package likert): what the figures and the exported table count."""
+
+from itertools import permutations
+
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import false_discovery_control
+from scipy.stats import false_discovery_control, kruskal, rankdata
 
+from study_app.analysis.statistics import independent_groups as module
+from study_app.analysis.statistics.independent_groups import groups_differ
 from study_app.analysis.statistics.multiple_comparisons import false_discovery, holm
+from study_app.analysis.tables import measures
 from study_app.errors import AnalysisError
 
 
@@ -47,3 +55,148 @@ def test_what_is_no_p_is_refused(p: float) -> None:
         holm([p, 0.5])
     with pytest.raises(AnalysisError, match="cannot be adjusted"):
         false_discovery([p])
+
+
+MATH_ANXIETY = {
+    "interesting": ("25544544513441522435", 25, 10, 65),
+    "uptight": ("51145224452425343353", 30, 20, 50),
+    "use in future": ("35555555534353454445", 0, 20, 80),
+    "blank": ("41223113253215224151", 60, 15, 25),
+    "relates": ("24443554224352454415", 25, 10, 65),
+    "worry": ("41233125454314134242", 40, 20, 40),
+    "sinking": ("41234114453311144241", 45, 15, 40),
+    "challenging": ("51334535454425244444", 15, 15, 70),
+    "nervous": ("51224214453315134242", 45, 15, 40),
+    "more classes": ("44231323311241522334", 45, 30, 25),
+    "uneasy": ("51224214453315134341", 40, 20, 40),
+    "favourite": ("14331442311241512313", 50, 25, 25),
+    "enjoy": ("24332443311241522335", 40, 30, 30),
+    "confused": ("41234124254415245343", 35, 15, 50),
+}
+# What 66,690 pupils read: counts of five levels, answered; low, neutral, high.
+READING = {
+    "magazines": ((6682, 13143, 13995, 20353, 11436), 30.21689, 21.33091, 48.45219),
+    "newspapers": ((12317, 12141, 10314, 15645, 15165), 37.29377, 15.72688, 46.97935),
+    "fiction": ((11131, 16164, 12818, 14569, 10658), 41.77380, 19.61739, 38.60882),
+    "comic books": ((24019, 16789, 10317, 9489, 4751), 62.43096, 15.78368, 21.78536),
+    "non-fiction": ((20145, 19961, 12768, 8797, 3622), 61.42466, 19.55493, 19.02042),
+}
+PUPILS = 66690
+
+
+def row_of(levels: list[float], people: int) -> pd.Series:
+    """Aggregate answers on 1 to 5, put on 2 to 6 of our seven so that the middle stays the middle."""
+    frame = pd.DataFrame(
+        {
+            "participant": [f"P{number}" for number in range(people)],
+            "code": "L1",
+            "item": "a",
+            "response": pd.array(
+                [*(int(level) + 1 for level in levels), *[None] * (people - len(levels))], dtype="Int64"
+            ),
+            "cannot_judge": False,
+        }
+    )
+    return measures.aggregate(frame, {"L1": people}, ["L1"], ["a"]).iloc[0]
+
+
+def shares(row: pd.Series) -> tuple[float, float, float]:
+    low = row["count_1"] + row["count_2"] + row["count_3"]
+    return 100 * low / row["n"], 100 * row["count_4"] / row["n"], row["agree_percent"]
+
+
+@pytest.mark.parametrize("item", MATH_ANXIETY)
+def test_twenty_students(item: str) -> None:
+    digits, *expected = MATH_ANXIETY[item]
+    assert shares(row_of([float(digit) for digit in digits], 20)) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("item", READING)
+def test_many_pupils_some_of_whom_did_not_answer(item: str) -> None:
+    counts, *expected = READING[item]
+    row = row_of(list(np.repeat(np.arange(1, 6), counts)), PUPILS)
+    assert (row["n"], row["missing"]) == (sum(counts), PUPILS - sum(counts))
+    assert shares(row) == pytest.approx(expected, abs=5e-6)
+
+
+ANSWERS = np.array([3, 5, 5, 6, 2, 2, 4, 1, 7], dtype=float)
+GROUPS = tuple("AAAABBBCC")
+
+
+def brute_force(values: np.ndarray, groups: tuple[str, ...]) -> float:
+    """Return p from every order of the participants."""
+    centred = values - values.mean(axis=0)
+
+    def between(order: tuple[str, ...]) -> float:
+        names = np.array(order)
+        return sum(
+            (centred[names == name].mean(axis=0) ** 2).sum() * (names == name).sum() for name in sorted(set(groups))
+        )
+
+    found = between(groups)
+    return float(np.mean([between(order) >= found - 1e-9 for order in permutations(groups)]))
+
+
+def test_h_and_its_approximate_p_are_scipys() -> None:
+    found = groups_differ(ANSWERS[:, None], GROUPS)
+    h, p = kruskal(ANSWERS[:4], ANSWERS[4:7], ANSWERS[7:])
+    assert (found.statistic, found.p_chi2) == (pytest.approx(h), pytest.approx(p))
+    assert (found.n, found.df, found.sizes) == (9, 2, (4, 3, 2))
+    assert found.effect == pytest.approx(h / 8)
+
+
+@pytest.mark.parametrize("groups", ["AAABBB", "AABBCC", "ABBBBC"])
+def test_p_is_exact(groups: str) -> None:
+    answers = np.array([1, 2, 2, 5, 6, 4], dtype=float)
+    found = groups_differ(answers[:, None], tuple(groups))
+    assert found.method == "exact permutation of participants"
+    assert found.p == pytest.approx(brute_force(rankdata(answers)[:, None], tuple(groups)))
+
+
+def test_p_of_profiles_is_exact() -> None:
+    ranks = np.array([[1, 2, 3], [1, 2, 3], [2, 1, 3], [3, 2, 1], [3, 1, 2], [1.5, 1.5, 3]])
+    found = groups_differ(ranks, tuple("AAABBB"), test="profiles")
+    assert found.p == pytest.approx(brute_force(ranks, tuple("AAABBB")))
+    assert found.p_chi2 is None
+
+
+def test_the_smallest_p_is_that_of_groups_without_overlap() -> None:
+    found = groups_differ(np.arange(8.0)[:, None], tuple("AAAABBBB"))
+    assert found.p == found.smallest_p == pytest.approx(2 / 70)
+    assert groups_differ(np.arange(6.0)[:, None], tuple("ABABAB")).smallest_p == pytest.approx(2 / 20)
+
+
+def test_a_drawn_p_is_near_the_exact_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    exact = groups_differ(ANSWERS[:, None], GROUPS).p
+    monkeypatch.setattr(module, "EXACT_UP_TO", 1)
+    drawn = groups_differ(ANSWERS[:, None], GROUPS, seed=3)
+    assert drawn.p == pytest.approx(exact, abs=4 * np.sqrt(0.25 / 9999))
+    assert drawn.method == "Monte Carlo permutation of participants, 9999 draws, seed 3"
+    assert drawn.p == groups_differ(ANSWERS[:, None], GROUPS, seed=3).p
+
+
+def test_missing_answers_and_what_cannot_be_tested() -> None:
+    answers = ANSWERS.copy()
+    answers[0] = np.nan
+    found = groups_differ(answers[:, None], GROUPS)
+    assert (found.n, found.dropped, found.sizes) == (8, 1, (3, 3, 2))
+    for values, groups, note in (
+        ([1.0, 2, 3], "AAA", "fewer than two groups"),
+        ([1.0, np.nan], "AB", "fewer than two groups"),
+        ([1.0, 2], "AB", "each group has one participant"),
+        ([4.0, 4, 4], "AAB", "no variation"),
+        ([], "", "fewer than two groups"),
+    ):
+        none = groups_differ(np.array(values, dtype=float)[:, None], tuple(groups))
+        assert none.p is None
+        assert none.note.startswith(note)
+    with pytest.raises(AnalysisError, match="2 participants and 1 groups"):
+        groups_differ(np.ones((2, 1)), ("A",))
+
+
+@pytest.mark.slow
+def test_p_is_uniform_at_most_where_groups_are_alike() -> None:
+    rng = np.random.default_rng(5)
+    ps = [groups_differ(rng.integers(1, 8, (10, 1)).astype(float), tuple("AAAAABBBBB")).p or 1.0 for _ in range(300)]
+    for alpha in (0.05, 0.2):
+        assert np.mean(np.array(ps) <= alpha) <= alpha + 3 * np.sqrt(alpha * (1 - alpha) / len(ps))

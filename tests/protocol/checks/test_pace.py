@@ -2,14 +2,19 @@
 
 from collections.abc import Iterable
 
+import numpy as np
 import pytest
 
 from study_app.errors import ProtocolError
-from study_app.haptics.model.scene import Scene
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Ewma, Foaw, Given, Kalman, Line, Raw, Scene
 from study_app.haptics.model.steady_state import steady
+from study_app.haptics.runtime.offline import simulate
+from study_app.protocol.checks.estimator_response import fastest_hz, passed_share
 from study_app.protocol.levels.presented_levels import FASTER
 from study_app.protocol.load import parse
 from study_app.protocol.model import Follow, Protocol
+from tests.haptics.scenes import UNBENT, scene
 
 STUDY = """\
 format = 2
@@ -186,3 +191,38 @@ def test_new_keys_and_values_belong_to_format_2(line: str, place: str) -> None:
     with pytest.raises(ProtocolError) as refused:
         parse(f'format = 1\nstudy.name = "old"\n{line}\n'.encode(), "old.toml")
     assert any(place in str(problem) for problem in refused.value.problems)
+
+
+SWINGS = 4
+
+
+def measured_share(velocity, rate_hz, frequency_hz):
+    """Return Σ v̂v / Σ v² over whole swings, once the estimator has settled."""
+    t_s = np.arange(round(rate_hz * (SWINGS + 2) / frequency_hz)) / rate_hz
+    omega = 2 * np.pi * frequency_hz
+    still = np.zeros_like(t_s)
+    path = Motion(t_s, np.column_stack([0.1 * np.sin(omega * t_s), still, still]))
+    seen = simulate(scene(velocity=velocity, rate_hz=rate_hz, knee=UNBENT), path).vx_mps
+    true = 0.1 * omega * np.cos(omega * t_s)
+    whole = slice(round(2 * rate_hz / frequency_hz), None)
+    return np.sum(seen[whole] * true[whole]) / np.sum(true[whole] ** 2)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("frequency_hz", [0.5, 1.0, 4.0])
+@pytest.mark.parametrize("rate_hz", [500.0, 1000.0])
+@pytest.mark.parametrize("velocity", [Ewma(), Ewma(alpha=0.02), Line(), Line(samples=4), Raw()], ids=str)
+def test_the_share_is_that_of_the_estimator(velocity, rate_hz, frequency_hz):
+    found = passed_share(velocity, rate_hz, frequency_hz)
+    assert found == pytest.approx(measured_share(velocity, rate_hz, frequency_hz), abs=1e-3)
+
+
+def test_the_usual_estimator_passes_99_percent_up_to_1_6_hz():
+    assert passed_share(Ewma(), 1000, 3) == pytest.approx(0.969, abs=5e-4)
+    assert fastest_hz(Ewma(), 1000, 0.99) == pytest.approx(1.68, abs=0.02)
+
+
+def test_a_known_velocity_is_passed_whole_and_a_window_is_judged_at_its_full_length():
+    assert passed_share(Given(), 1000, 5) == 1
+    assert passed_share(Foaw(samples=8), 1000, 5) == passed_share(Line(samples=8), 1000, 5)
+    assert 0.99 < passed_share(Kalman(), 1000, 5) < 1

@@ -1,9 +1,20 @@
+"""The target that is followed: where it is, how fast, and how long."""
+
+from collections import Counter
 from typing import Any
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.designs.rating_of_interval import Rated
+from study_app.protocol.trials.kinds import DESIGN_KINDS, default_design
 from study_app.protocol.trials.stimuli import Stimulus
+from study_app.protocol.trials.tasks.follow import Follow
+from tests.protocol.trials.level_studies import key_of, run, study
 
 
 def stimulus(**keys: Any) -> Stimulus:
@@ -61,3 +72,140 @@ def test_what_is_refused(keys: dict[str, Any], place: str, message: str):
     with pytest.raises(ValidationError, match=message) as caught:
         stimulus(**keys)
     assert caught.value.errors()[0]["ctx"]["place"] == place
+
+
+amplitudes, frequencies, leads = st.floats(1, 100), st.floats(0.2, 5), st.floats(0.1, 5)
+
+
+def test_the_usual_swing_lasts_four_seconds() -> None:
+    task = Follow(kind="follow")
+    assert (task.amplitude_mm, task.frequency_hz, task.cycles, task.radius_mm, task.lead_s) == (20, 1, 3, 6, 1)
+    assert task.limit_s == task.expected_s == 4
+    assert task.target_m(0) == task.target_m(-1) == (0, 0, 0)
+    assert task.target_m(1.25) == pytest.approx((0.02, 0, 0))
+    assert task.target_m(0.25)[0] == pytest.approx(0.02 * (1 - np.cos(np.pi / 4)) / 2)
+    assert task.fastest_stroke((0.1, 0.06, 0.06)).speed_mps == pytest.approx(2 * np.pi * 0.02)
+
+
+@given(amplitude=amplitudes, frequency=frequencies, lead=leads, share=st.floats(0, 1))
+def test_the_target_stays_within_its_amplitude(amplitude: float, frequency: float, lead: float, share: float) -> None:
+    task = Follow(kind="follow", amplitude_mm=amplitude, frequency_hz=frequency, lead_s=lead)
+    assert abs(task.target_m(share * task.limit_s)[0]) <= task.amplitude_m
+
+
+@pytest.mark.slow
+@given(amplitude=amplitudes, frequency=frequencies, lead=leads)
+def test_the_pace_is_the_rms_speed_after_the_lead(amplitude: float, frequency: float, lead: float) -> None:
+    task = Follow(kind="follow", amplitude_mm=amplitude, frequency_hz=frequency, lead_s=lead)
+    step_s = (task.limit_s - task.lead_s) / 1200
+    places_m = np.array([task.target_m(task.lead_s + n * step_s)[0] for n in range(1201)])
+    assert np.sqrt(np.mean((np.diff(places_m) / step_s) ** 2)) == pytest.approx(task.rms_speed_mps, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"axis": "y"}, {"amplitude_mm": 0.5}, {"frequency_hz": 0}, {"cycles": 0}, {"lead_s": 0}]
+)
+def test_what_no_hand_follows_is_refused(wrong: dict[str, object]) -> None:
+    with pytest.raises(ValidationError):
+        Follow.model_validate({"kind": "follow", **wrong})
+
+
+def design(kind: str) -> Design:
+    return Rated(scale="agreement") if kind == "rating" else default_design(kind)
+
+
+@pytest.mark.parametrize(
+    ("kind", "intervals", "arrangements", "guess_rate"),
+    [
+        ("2ifc", 2, 2, 1 / 2),
+        ("3ifc", 3, 3, 1 / 3),
+        ("4ifc", 4, 4, 1 / 4),
+        ("abx", 3, 4, 1 / 2),
+        ("oddity", 3, 6, 1 / 3),
+        ("samedifferent", 2, 4, None),
+        ("yesno", 1, 2, None),
+        ("rating", 1, 1, None),
+        ("estimation", 1, 1, None),
+    ],
+)
+def test_intervals_arrangements_and_guess_rate(kind: str, intervals: int, arrangements: int, guess_rate: float | None):
+    built = design(kind)
+    assert built.intervals == intervals
+    assert len(built.arrangements) == len(set(built.arrangements)) == arrangements
+    assert {len(one) for one in built.arrangements} == {intervals}
+    assert built.guess_rate == guess_rate
+
+
+@pytest.mark.parametrize("kind", [kind for kind in DESIGN_KINDS if design(kind).has_correct_answer])
+def test_every_arrangement_has_a_correct_answer_and_each_is_correct_equally_often(kind: str):
+    built = design(kind)
+    correct = [built.correct(number) for number in range(len(built.arrangements))]
+    assert set(correct) == set(built.answers)
+    assert len(set(Counter(correct).values())) == 1
+
+
+@pytest.mark.parametrize(
+    ("kind", "arrangement", "correct"),
+    [
+        ("2ifc", (True, False), "first"),
+        ("2ifc", (False, True), "second"),
+        ("4ifc", (False, False, False, True), "fourth"),
+        ("abx", (False, True, False), "like_first"),
+        ("abx", (True, False, False), "like_second"),
+        ("oddity", (True, True, False), "third"),
+        ("oddity", (True, False, False), "first"),
+        ("samedifferent", (True, True), "same"),
+        ("samedifferent", (False, True), "different"),
+        ("yesno", (True,), "yes"),
+        ("yesno", (False,), "no"),
+    ],
+)
+def test_the_correct_answer(kind: str, arrangement: tuple[bool, ...], correct: str):
+    built = design(kind)
+    assert built.correct(built.arrangements.index(arrangement)) == correct
+
+
+class Sharp:
+    """Notices every difference; the strongest is asked for."""
+
+    smallest = False
+
+    def distinct(self, difference: float, about: float) -> bool:
+        return difference != 0
+
+
+@pytest.mark.parametrize("kind", [kind for kind in DESIGN_KINDS if design(kind).reply == "choice"])
+def test_simulated_observer_without_noise_answers_correctly(kind: str):
+    built = design(kind)
+    for number, arrangement in enumerate(built.arrangements):
+        taken = [2.0 if comparison else 1.0 for comparison in arrangement]
+        assert built.simulated(taken, 1.5, Sharp()) == built.correct(number)
+
+
+def test_yes_counts_as_success_whatever_was_presented():
+    built = design("yesno")
+    assert [built.success(0, "yes"), built.success(1, "yes"), built.success(0, "no")] == [True, True, False]
+
+
+@pytest.mark.parametrize("kind", ["2ifc", "3ifc", "4ifc", "abx", "oddity", "samedifferent"])
+@pytest.mark.parametrize("seed", range(3))
+def test_arrangements_are_counterbalanced_in_every_run_of_a_track(kind: str, seed: int):
+    protocol = study(('design = "2ifc"', f'design = "{kind}"'), ("standards = [1, 2]", "standards = [2]"))
+    presented = [due.arrangement for due in run(protocol, key_of(protocol), seed=seed)]
+    run_length = 2 * len(design(kind).arrangements)
+    assert len(presented) == 24
+    for first in range(0, len(presented) - run_length + 1, run_length):
+        assert set(Counter(presented[first : first + run_length]).values()) == {2}
+
+
+@pytest.mark.parametrize(
+    ("when", "practice", "main"), [("never", False, False), ("practice", True, False), ("always", True, True)]
+)
+def test_feedback_is_shown_when_the_study_says(when: str, practice: bool, main: bool):
+    built = design("2ifc").model_copy(update={"feedback": when})
+    assert (built.shows_feedback(True), built.shows_feedback(False)) == (practice, main)
+
+
+def test_feedback_defaults_to_practice_and_to_never_where_no_answer_is_correct():
+    assert (design("2ifc").shows_feedback(True), design("2ifc").shows_feedback(False)) == (True, False)
+    assert not design("estimation").shows_feedback(True)

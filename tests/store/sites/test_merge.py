@@ -5,6 +5,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -12,13 +13,20 @@ from click.testing import CliRunner, Result
 
 from study_app.cli import commands
 from study_app.errors import StoreError
+from study_app.store.blinded.blinding import reveals
+from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.folder_lock import open_alone
+from study_app.store.sessions.rebuild import rebuild
 from study_app.store.sites.merge import merge
-from study_app.store.sites.merged import own_place, read_merged
+from study_app.store.sites.merged import all_exclusions, own_place, read_merged
 from study_app.store.sites.merged_rows import participants_of
+from study_app.store.sites.unblind_sites import all_opened, reveals_of
 from study_app.store.sites.verify_sites import verify_folder
+from study_app.store.tables.study_description import check_study
 from study_app.store.verification.verify_study import verify
+from study_app.store.withdrawals.output_log import write_output
+from study_app.store.withdrawals.withdraw import withdraw
 
 pytestmark = pytest.mark.slow
 
@@ -186,3 +194,187 @@ def test_a_killed_merge_leaves_the_old_state_or_the_new_one(exists: bool, labs: 
         if done.returncode == 0:
             break
     assert {"C" in listed for listed in states} == {False, True}
+
+
+def test_keys_stay_sealed_and_are_opened_each(labs: dict[str, Path], pooled: Path) -> None:
+    assert reveals_of(pooled) == ()
+    one = run("unblind", pooled / "sites/B", "--by", "AK", "--reason", "closed")
+    assert one.exit_code == 0
+    assert not all_opened(pooled)
+    done = run("unblind", pooled, "--by", "AK", "--reason", "closed")
+    assert done.exit_code == 0
+    assert all_opened(pooled)
+    assert [(one["site"], one["by"]) for one in reveals_of(pooled)] == [("A", "AK"), ("B", "AK"), ("B", "AK")]
+    assert {line.split()[1].partition("-")[0] for line in done.output.splitlines()} == {"A", "B"}
+    assert reveals(labs["A"]) == ()
+    assert verify_folder(pooled).sound
+
+
+def test_exclusions_go_to_the_site(pooled: Path) -> None:
+    assert run("exclude", pooled, "--participant", "B-P001", "--by", "AK", "--reason", "x").output == (
+        "participant B-P001, session 1\n"
+    )
+    assert [row.participant for row in all_exclusions(pooled)] == ["B-P001"]
+    assert [row.participant for row in exclusions(pooled / "sites/B")] == ["P001"]
+    assert exclusions(pooled / "sites/A") == ()
+    assert run("include", pooled, "--participant", "B-P001", "--by", "AK", "--reason", "x").exit_code == 0
+    assert all_exclusions(pooled) == ()
+
+
+def test_no_session_runs_in_a_merged_study(pooled: Path) -> None:
+    for folder in (pooled, pooled / "sites/A"):
+        with pytest.raises(StoreError, match=r"run sessions in (the folder of a site|the site's own)"):
+            check_study(StudyFolder(folder), "demo")
+
+
+def test_a_withdrawal_reaches_the_merged_copy_of_that_site_alone(
+    labs: dict[str, Path], pooled: Path, results: Path, tmp_path: Path
+) -> None:
+    lab = Path(shutil.copytree(labs["A"], tmp_path / "lab"))
+    write_output(pooled, results / "tables", {"table.csv": b"of A-P001"})
+    done = withdraw(lab, "P001", by="AK", reason="asked", also=[results])
+    assert done.folders == (lab, pooled / "sites/A")
+    assert (pooled / "sites/B/data/sub-P001/ses-01/journal.jsonl").is_file()
+    assert [path.name for path in done.outputs] == ["table.csv"]
+    assert list((results / "tables").iterdir()) == []
+    assert [row["participant"] for row in participants_of(pooled)] == ["A-P002", "B-P001", "B-P002"]
+    assert verify_folder(pooled).sound
+
+
+def test_a_participant_of_a_merged_study_withdraws_from_copy_and_site(
+    labs: dict[str, Path], pooled: Path, tmp_path: Path
+) -> None:
+    lab = Path(shutil.copytree(labs["B"], tmp_path / "lab"))
+    words = ("--participant", "B-P002", "--by", "AK", "--reason", "asked", "--also", lab)
+    done = run("withdraw", pooled, *words)
+    assert done.exit_code == 0, done.exception
+    assert not (pooled / "sites/B/data/sub-P002").exists()
+    assert not (lab / "data/sub-P002").exists()
+    assert (pooled / "sites/A/data/sub-P002").is_dir()
+    assert verify_folder(pooled).sound
+    assert run("withdraw", pooled, "--participant", "P002", "--by", "AK", "--reason", "asked").exit_code != 0
+
+
+def test_studies_and_sessions_list_a_merged_study(pooled: Path) -> None:
+    listed = (pooled / "sites.json").read_bytes()
+    assert "  pooled  4 sessions, sites A, B" in run("studies").output
+    names = [line.split()[0] for line in run("sessions", "pooled").output.splitlines()]
+    assert names == ["pooled/A-P001/1", "pooled/A-P002/1", "pooled/B-P001/1", "pooled/B-P002/1"]
+    (pooled / "sites.json").write_text("{")
+    assert "pooled  cannot be used: " in run("studies").output
+    (pooled / "sites.json").write_bytes(listed)
+    for name in names:
+        assert "reproduced" in run("reproduce", name).output
+
+
+def test_what_is_no_listed_site_does_not_count_and_is_named(labs: dict[str, Path], pooled: Path) -> None:
+    shutil.copytree(labs["C"], pooled / "sites/C")
+    assert len(participants_of(pooled)) == 4
+    assert "sites/C: is not a site that sites.json lists" in "\n".join(map(str, verify_folder(pooled).warnings))
+
+
+def test_verify_finds_what_was_changed_after_merging(labs: dict[str, Path], pooled: Path) -> None:
+    response = next((pooled / "sites/B").glob("data/sub-P001/ses-01/*responses*"))
+    response.write_bytes(response.read_bytes() + b"x")
+    assert any(str(one).startswith("sites/B/data/sub-P001/ses-01/") for one in verify_folder(pooled).errors)
+    (pooled / "sites/A/dataset_description.json").rename(pooled / "sites/A/aside.json")
+    found = list(map(str, verify_folder(pooled).errors))
+    assert any(one.startswith("sites/A: is not a study folder") for one in found)
+    assert any(one.startswith("sites/B/data/sub-P001/ses-01/") for one in found)  # the other sites are checked, too
+    (pooled / "sites/A/aside.json").rename(pooled / "sites/A/dataset_description.json")
+    shutil.rmtree(pooled / "sites/A/data/sub-P001")
+    assert "is missing, but fingerprints.txt lists it" in "\n".join(map(str, verify_folder(pooled).errors))
+    shutil.rmtree(pooled / "sites/B")
+    assert "sites/B: is missing" in "\n".join(map(str, verify_folder(pooled).errors))
+    shutil.copytree(labs["C"], pooled / "sites/B")
+    assert "is not the key that site B was merged with" in "\n".join(map(str, verify_folder(pooled).errors))
+
+
+def test_a_damaged_list_of_sites_is_refused(pooled: Path) -> None:
+    for text in ("{", "[]", '{"format": 1}', '{"format": 1, "study": "demo", "protocol_hash": "", "sites": [{}]}'):
+        (pooled / "sites.json").write_text(text)
+        with pytest.raises(StoreError, match="does not list the sites"):
+            read_merged(pooled)
+    (pooled / "sites.json").write_text('{"format": 2}')
+    with pytest.raises(StoreError, match="format 2"):
+        read_merged(pooled)
+
+
+def test_a_site_elsewhere_is_not_read(pooled: Path, tmp_path: Path) -> None:
+    (pooled / "sites/B").rename(tmp_path / "elsewhere")
+    (pooled / "sites/B").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(
+        StoreError,
+        match=r"sites/B leads by a link out of .*pooled, to .*elsewhere: replace the link by the folder itself",
+    ):
+        read_merged(pooled)
+
+
+def test_a_site_that_is_a_loop_of_links_is_missing(pooled: Path) -> None:
+    shutil.rmtree(pooled / "sites/B")
+    (pooled / "sites/B").symlink_to("B")
+    assert "sites/B: is missing, but sites.json lists site B" in "\n".join(map(str, verify_folder(pooled).errors))
+    with pytest.raises(StoreError, match="is the copy of a site in the merged study"):
+        check_study(StudyFolder(pooled / "sites/B"), "demo")
+
+
+def test_a_list_of_sites_that_was_changed_is_an_error(pooled: Path) -> None:
+    path = pooled / "sites.json"
+    held = json.loads(path.read_text())
+    path.write_text(json.dumps(held | {"study": "another"}))
+    found = list(map(str, verify_folder(pooled).errors))
+    assert found == [f"sites/{name}: is of study demo, but sites.json lists sites of another" for name in "AB"]
+    path.write_text(json.dumps(held | {"format": "x" * 5000}))
+    with pytest.raises(StoreError, match=r"has format 'x{199}…, this version reads 1"):
+        read_merged(pooled)
+
+
+def test_an_unfinished_session_that_was_deleted_at_a_site_is_missed(labs: dict[str, Path], results: Path) -> None:
+    lab = Path(shutil.copytree(labs["A"], results / "lab"))
+    session = lab / "data/sub-P002/ses-01"
+    unfinished(session)
+    assert verify(lab).sound
+    pooled = merge({"A": lab, "B": labs["B"]}, results / "pooled").path
+    assert verify_folder(pooled).sound
+    shutil.rmtree(pooled / "sites/A/data/sub-P002")
+    said = "sites/A: has 1 of the 2 sessions that sites.json lists: restore the others from a copy"
+    assert said in list(map(str, verify_folder(pooled).errors))
+
+
+def test_a_withdrawal_before_merging_excuses_no_session_that_was_deleted_later(
+    labs: dict[str, Path], results: Path
+) -> None:
+    lab = Path(shutil.copytree(labs["A"], results / "lab"))
+    before = datetime.now().astimezone() - timedelta(hours=1)
+    withdraw(lab, "P001", by="AK", reason="asked", now=before)
+    unfinished(lab / "data/sub-P002/ses-01")
+    pooled = merge({"A": lab, "B": labs["B"]}, results / "pooled").path
+    assert verify_folder(pooled).sound
+    shutil.rmtree(pooled / "sites/A/data/sub-P002")
+    said = "sites/A: has 0 of the 1 sessions that sites.json lists: restore the others from a copy"
+    assert said in list(map(str, verify_folder(pooled).errors))
+
+
+def test_a_withdrawal_that_reaches_an_older_copy_after_merging_is_no_error(
+    labs: dict[str, Path], results: Path, tmp_path: Path
+) -> None:
+    """The site withdrew the participant, then a copy from before was merged, and then withdrawn from."""
+    lab, older = (Path(shutil.copytree(labs["A"], tmp_path / name)) for name in ("lab", "older"))
+    withdraw(lab, "P001", by="AK", reason="asked", now=datetime.now().astimezone() - timedelta(hours=1))
+    pooled = merge({"A": older, "B": labs["B"]}, results / "pooled").path
+    assert withdraw(lab, "P001", by="AK", reason="asked", also=[results]).folders == (pooled / "sites/A",)
+    assert verify_folder(pooled).sound
+
+
+def unfinished(session: Path) -> None:
+    """Take the end of a session away, and what follows from it."""
+    path = session / "journal.jsonl"
+    path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:-1]))
+    (session / "checksums.sha256").unlink()
+    receipt = json.loads((session / "receipt.json").read_text())
+    held = receipt | {"status": "unfinished", "reason": "", "ended_at": None}
+    (session / "receipt.json").write_text(json.dumps(held))
+    fingerprints = session.parents[2] / "fingerprints.txt"
+    kept = [line for line in fingerprints.read_text().splitlines(keepends=True) if session.parent.name not in line]
+    fingerprints.write_text("".join(kept))
+    rebuild(session)
