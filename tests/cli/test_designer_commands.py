@@ -9,8 +9,11 @@ from click.testing import CliRunner
 
 from study_app import app
 from study_app.authoring.writer.refused import Refused
-from study_app.cli import commands
-from study_app.errors import ProtocolError, StudyError
+from study_app.cli import commands, main
+from study_app.errors import OutletError, ProtocolError, StudyError
+from study_app.store.workstation import DEFAULTS, MachineSettings, load, save
+from study_app.user_folder import settings_file
+from tests.compiled import needs_servo
 
 
 class Visit:
@@ -62,3 +65,95 @@ def test_what_cannot_be_is_refused_before_a_window_opens(
 ) -> None:
     assert isinstance(CliRunner().invoke(commands, words).exception, error)
     assert visit.asked == []
+
+
+OFF = ["markers over LSL: off", "samples over LSL: off", "triggers: off"]
+
+
+def outlets(*words: str) -> list[str]:
+    found = CliRunner().invoke(commands, ["outlets", *words], catch_exceptions=False)
+    assert found.exit_code == 0
+    return found.output.splitlines()
+
+
+def test_without_options_it_prints_what_is_set_and_writes_nothing() -> None:
+    assert outlets() == OFF
+    assert not settings_file().exists()
+
+
+def test_options_are_kept_and_others_stay() -> None:
+    save(MachineSettings(viewing_distance_mm=600))
+    assert outlets("--markers", "on", "--triggers", "serial:/dev/ttyUSB0") == [
+        "markers over LSL: on",
+        "samples over LSL: off",
+        "triggers: serial:/dev/ttyUSB0",
+    ]
+    assert outlets("--samples", "single-blind")[1] == "samples over LSL: single-blind"
+    assert load() == MachineSettings(
+        viewing_distance_mm=600, lsl_markers=True, lsl_samples="single-blind", triggers="serial:/dev/ttyUSB0"
+    )
+    assert load().marker_addresses == ("lsl", "serial:/dev/ttyUSB0")
+    assert outlets("--markers", "off", "--samples", "off", "--triggers", "off") == OFF
+    assert load().marker_addresses == ()
+
+
+@pytest.mark.parametrize("port", ["COM3", "usb:1", "serial:", "lsl", "", "serial:/dev/\x00"])
+def test_a_port_that_is_none_is_refused_in_a_line(port: str) -> None:
+    with pytest.raises(
+        OutletError, match="use one like parallel:/dev/parport0 or serial:/dev/ttyUSB0, or off"
+    ) as found:
+        CliRunner().invoke(commands, ["outlets", "--triggers", port], catch_exceptions=False)
+    assert isinstance(found.value, StudyError)
+    assert load() == DEFAULTS
+
+
+FAR = "t_s,x_m,y_m,z_m\n0,0,0,0\n0.001,1e308,0,0\n0.002,-1e308,0,0\n"
+FAST = "t_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps\n0,0,0,0,0,0,0\n0.001,0,0,0,1e308,1e308,0\n"
+SIMULATE = ("simulate", "rek2024", "--liquid", "water")
+CURRENT = 'current={kind="uniform", velocity_mps=[1e308, 0, 0]}'
+SAMPLE = str(Path(__file__).parents[2] / "results" / "sample-rek2024")
+LONG = tuple(
+    (*command, "--to", "far.csv")
+    for command in (("power", "demo"), ("stability",), ("validate",), ("validate-report",))
+)
+"""Commands that would find out minutes later."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((*SIMULATE, "--path", "circle", "--to", ""), "--to': is empty"),
+        ((*SIMULATE, "--path", "circle", "--to", "o.csv", "--set", CURRENT), "velocity_mps: must be less than"),
+        ((*SIMULATE, "--path", "circle", "--to", "o.csv", "--set", f"alpha={'9' * 6000}"), "alpha"),
+        (("export", SAMPLE, "--to", ""), "--to': is empty"),
+        (("rehearse", "demo", "--results", ""), "--results': is empty"),
+        (("run", "demo", "--participant", "P001", "--results", ""), "--results': is empty"),
+        (("validate-report", "--to", ""), "--to': is empty"),
+        (("check", "x" * 5000), f"{'x' * 200}…: the file name is too long"),
+        (("verify", "x" * 5000), "…: the file name is too long"),
+        (("merge", "--site", f"A={'x' * 5000}", "--to", "m"), "… cannot be read (File name too long)"),
+        (("rehearse", "demo", "--results", "r", "--seed", "9" * 5000), "… is not a valid integer"),
+        *((words, "far.csv (it is a file, not a folder)") for words in LONG),
+        pytest.param((*SIMULATE, "--path", "far.csv", "--to", "o.csv"), "must be finite", marks=needs_servo),
+        pytest.param((*SIMULATE, "--path", "fast.csv", "--to", "o.csv"), "must be finite", marks=needs_servo),
+    ],
+)
+def test_bad_input_is_one_short_line_and_nothing_is_written(
+    words: tuple[str, ...],
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "far.csv").write_text(FAR, encoding="utf-8")
+    (tmp_path / "fast.csv").write_text(FAST, encoding="utf-8")
+    monkeypatch.setattr("sys.argv", ["liquid-study", *words])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert said in line
+    assert len(line) < 600
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["far.csv", "fast.csv"]

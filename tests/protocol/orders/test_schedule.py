@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import order_of, orders_of
+from study_app.protocol.orders.latin_squares import Square, assigned_row, borders_even, enrolment, row, row_count
 from study_app.protocol.orders.order_constraint import Constraint
 from study_app.protocol.orders.schedule import (
     PageStep,
@@ -24,27 +25,12 @@ from tests.protocol.sound import ORDER, SOUND
 
 REK = load("rek2024")
 SMALL = parse(SOUND.encode(), "small.toml")
-
 seeds = st.integers(min_value=0, max_value=2**64)
 participants = st.text(st.sampled_from("ABCP0123456789"), min_size=1, max_size=6)
 
 
 def codes(schedule: Schedule, block: str) -> list[str]:
     return [trial.code for trial in schedule.trials if trial.block == block]
-
-
-@pytest.mark.parametrize(
-    ("participant", "seed", "liquids", "delays"),
-    [
-        ("P001", 1, "L2 L1 L3", "D5 D4 D3 D6 D7 D2 D1"),
-        ("P002", 1, "L1 L3 L2", "D7 D4 D2 D1 D5 D3 D6"),
-        ("P007", 20240601, "L2 L1 L3", "D7 D6 D3 D4 D5 D1 D2"),
-    ],
-)
-def test_the_order_is_the_same_on_every_machine(participant: str, seed: int, liquids: str, delays: str):
-    schedule = build_schedule(REK, participant, seed)
-    assert codes(schedule, "liquids") == liquids.split()
-    assert codes(schedule, "delays") == delays.split()
 
 
 @pytest.mark.parametrize(
@@ -83,14 +69,6 @@ def test_the_key_of_a_rehearsal_is_the_same_on_every_machine():
         "D6": "delay_100",
         "D7": "delay_50",
     }
-
-
-def test_streams_are_pinned():
-    assert [stream(1, "a").random(), stream(1, "b").random(), stream(2, "a").random()] == [
-        0.31728946267335123,
-        0.17021420984483582,
-        0.08061825961078872,
-    ]
 
 
 @pytest.mark.slow
@@ -167,12 +145,6 @@ def test_a_draw_more_in_one_stream_moves_no_other(seed: int):
     assert [trial.code for trial in shuffled_items.trials] == [trial.code for trial in before.trials]
     assert {trial.items for trial in before.trials} == {(), ("warm", "cold")}
     assert {tuple(sorted(trial.items)) for trial in shuffled_items.trials} == {(), ("cold", "warm")}
-
-
-def test_item_orders_vary_between_trials_where_they_are_shuffled():
-    shuffled = edited('scale = "agreement"', 'scale = "agreement"\nitem_order = "shuffled"')
-    orders = {trial.items for number in range(10) for trial in build_schedule(shuffled, f"P{number}", 1).trials}
-    assert orders == {(), ("warm", "cold"), ("cold", "warm")}
 
 
 def test_a_fixed_order_is_as_written():
@@ -322,3 +294,105 @@ def test_a_page_of_breaks_can_stand_in_the_sequence_too():
 def test_a_schedule_needs_no_more_than_its_orders(seed: int, participant: str):
     for protocol in (REK, SMALL):
         assert build_schedule(orders_of(protocol), participant, seed) == build_schedule(protocol, participant, seed)
+
+
+SIZES = range(2, 13)
+
+
+def rows(square: Square, codes: int, repetitions: int = 1) -> list[tuple[int, ...]]:
+    return [row(square, codes, number, repetitions) for number in range(row_count(square, codes))]
+
+
+def positions(orders: list[tuple[int, ...]]) -> set[int]:
+    """Return how often codes come in positions: one number if they do so equally often."""
+    counts = Counter((position, code) for order in orders for position, code in enumerate(order))
+    codes, length = len(set(orders[0])), len(orders[0])
+    return {counts[position, code] for position in range(length) for code in range(codes)}
+
+
+def follows(orders: list[tuple[int, ...]]) -> set[int]:
+    """Return how often codes follow others: one number if they do so equally often."""
+    counts = Counter(pair for order in orders for pair in pairwise(order))
+    codes = len(set(orders[0]))
+    return {counts[first, then] for first in range(codes) for then in range(codes) if first != then}
+
+
+@pytest.mark.parametrize("codes", SIZES)
+def test_a_williams_design_is_exact(codes: int):
+    orders = rows("williams", codes)
+    squares = 1 + codes % 2
+    assert len(orders) == len(set(orders)) == squares * codes
+    assert all(sorted(order) == list(range(codes)) for order in orders)
+    assert positions(orders) == {squares}
+    assert follows(orders) == {squares}
+
+
+def test_williams_designs_as_they_are_printed_in_books():
+    assert rows("williams", 4) == [(0, 1, 3, 2), (1, 2, 0, 3), (2, 3, 1, 0), (3, 0, 2, 1)]
+    assert rows("williams", 3) == [(0, 1, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0), (0, 2, 1), (1, 0, 2)]
+    assert rows("williams", 2) == [(0, 1), (1, 0)]
+
+
+@pytest.mark.parametrize("codes", SIZES)
+def test_a_latin_square_is_even_in_position_alone(codes: int):
+    orders = rows("latin", codes)
+    assert len(orders) == codes
+    assert positions(orders) == {1}
+    assert follows(orders) == ({1} if codes == 2 else {0, codes - 1})
+
+
+@pytest.mark.parametrize("codes", SIZES)
+@pytest.mark.parametrize("square", ["williams", "latin"])
+def test_repetitions_are_as_even_as_the_first_and_no_code_follows_itself(square: Square, codes: int):
+    for repetitions in (2, 3, codes + 1):
+        orders = rows(square, codes, repetitions)
+        assert len(positions(orders)) == 1
+        for order in orders:
+            assert all(first != then for first, then in pairwise(order))
+            for start in range(0, len(order), codes):
+                assert sorted(order[start : start + codes]) == list(range(codes))
+
+
+@pytest.mark.parametrize("codes", SIZES)
+def test_the_borders_of_repetitions_are_even_exactly_where_it_is_said(codes: int):
+    told = [repetitions for repetitions in range(1, 2 * codes) if borders_even(codes, repetitions)]
+    found = [
+        repetitions for repetitions in range(1, 2 * codes) if len(follows(rows("williams", codes, repetitions))) == 1
+    ]
+    assert told == found
+    assert codes in told
+
+
+def test_a_single_code_has_a_single_row():
+    assert row_count("williams", 1) == row_count("latin", 1) == 1
+    assert row("williams", 1, 0, 3) == (0, 0, 0)
+    assert borders_even(1, 3)
+
+
+@pytest.mark.parametrize(
+    ("participant", "number"),
+    [("P007", 7), ("P120", 120), ("7", 7), ("S2P07", 7), ("A1B", 1), ("anna", None), ("P000", 0)],
+)
+def test_the_number_in_an_id(participant: str, number: int | None):
+    assert enrolment(participant) == number
+
+
+@given(st.integers(1, 30), st.integers(0, 40), st.text("abcxyz", min_size=1, max_size=5))
+def test_every_round_deals_every_row(rows: int, rounds: int, study: str):
+    numbers = range(1 + rounds * rows, 1 + (rounds + 1) * rows)
+    assert sorted(assigned_row(study, "block", rows, f"P{number:03d}") for number in numbers) == list(range(rows))
+
+
+def test_rounds_blocks_and_studies_deal_in_orders_of_their_own():
+    def assigned(study: str, block: str, rounds: int) -> tuple[int, ...]:
+        return tuple(assigned_row(study, block, 12, f"P{1 + 12 * rounds + place}") for place in range(12))
+
+    orders = [assigned("a", "x", 0), assigned("a", "x", 1), assigned("a", "y", 0), assigned("b", "x", 0)]
+    assert len(set(orders)) == 4
+
+
+def test_an_id_without_a_number_draws_its_row():
+    names = [first + second + third for first in "abcdefghij" for second in "abcdefghij" for third in "abcdef"]
+    counts = Counter(assigned_row("study", "block", 6, name) for name in names)
+    assert sum((counts[row] - 100) ** 2 / 100 for row in range(6)) < 20.5  # χ², 5 degrees of freedom, p = 0.001
+    assert assigned_row("study", "block", 6, "anna") == assigned_row("study", "block", 6, "anna")

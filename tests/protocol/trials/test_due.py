@@ -188,12 +188,6 @@ def test_a_secret_draws_what_it_drew_in_earlier_versions(design: str, presented:
     assert " ".join(f"{due.level:g}{of}" for due, of in zip(drawn, letters, strict=True)) == presented
 
 
-def test_the_standard_is_written_s_and_the_comparison_c():
-    protocol = study(('design = "2ifc"', 'design = "abx"'))
-    design = design_of(protocol, protocol.blocks["viscosity"])
-    assert [arrangement_text(design, number) for number in range(4)] == ["SCS", "SCC", "CSC", "CSS"]
-
-
 @pytest.mark.parametrize(("direction", "longest_s"), [("up", 0.18), ("down", 0.1)])
 def test_pictures_linger_for_the_longest_delay_of_any_trial(direction: str, longest_s: float):
     edits = ('"viscosity_pa_s"', f'"delay_ms"\ndirection = "{direction}"'), ("standards = [1, 2]", "standards = [100]")

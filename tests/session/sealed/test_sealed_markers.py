@@ -8,7 +8,6 @@ import pytest
 
 from study_app.protocol.load import load, source_bytes
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.blinded.blinding import read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.verification.leaks import telltales
@@ -68,13 +67,3 @@ def test_markers_are_the_journals_events_with_their_codes(rehearsed: tuple[Path,
 
 def test_no_marker_tells_a_condition(rehearsed: tuple[Path, Collector], protocol: Path) -> None:
     assert words_found(rehearsed[1], protocol) == []
-
-
-def test_a_planted_condition_is_found(rehearsed: tuple[Path, Collector], protocol: Path) -> None:
-    folder, collector = rehearsed
-    codes = read_key(folder).codes["liquids"]
-    planted = Collector()
-    for marker in collector.markers:
-        said = tuple((name, codes.get(value, value) if name == "code" else value) for name, value in marker.said)
-        planted.mark(type(marker)(marker.event, marker.time_ns, marker.t_s, said))
-    assert set(words_found(planted, protocol)) >= {"feel_quagmire", "feel_mildew"}

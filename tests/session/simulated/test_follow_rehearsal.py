@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study_app.analysis.report.write_report import report
 from study_app.evaluation.replay import replay
 from study_app.haptics.model.layout import LIMITER_FADE
 from study_app.protocol.describe import describe
@@ -105,10 +104,6 @@ def test_replay_finds_no_difference(results: Path) -> None:
     found = [replay(session.path) for session in StudyFolder(results).sessions()]
     assert found
     assert {(one.differences, one.uncompared, one.recordings) for one in found} == {((), (), 4)}
-
-
-def test_the_report_is_written(results: Path, tmp_path: Path) -> None:
-    assert report(results, tmp_path / "report")[0].name == "report.html"
 
 
 def test_check_says_what_is_done(study_file: Path) -> None:

@@ -1,4 +1,5 @@
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.tables.cells import cell_pattern, variable
 from study_app.store.tables.column import Column
-from study_app.store.tables.column_dictionary import dictionary_markdown
+from study_app.store.tables.column_dictionary import SECTIONS, dictionary_markdown
 from study_app.store.tables.formulas import guarded, unguarded
 from study_app.store.tables.study_description import check_study, described_study, description_bytes, write_description
 from study_app.store.verification.psychds import validate
@@ -48,6 +49,20 @@ def test_a_variable_is_a_property_value_with_unit_range_and_levels() -> None:
 )
 def test_a_line_says_kind_unit_range_and_meaning(line: str) -> None:
     assert line in dictionary_markdown().splitlines()
+
+
+def test_every_table_is_one_that_renders() -> None:
+    """A header, its rule and rows of as many cells, with a line free before and after, below its heading and file."""
+    text = dictionary_markdown()
+    tables = [block for block in text.split("\n\n") if block.startswith("| ")]
+    assert len(tables) == len(SECTIONS) + 1
+    for table in tables:
+        header, rule, *rows = table.rstrip("\n").split("\n")
+        assert set(rule) <= set("| -")
+        assert rows
+        assert {row.count(" | ") for row in (header, *rows)} == {2}
+    headed = r"^## .+\n\n`.+`: .+\n\n(?:[^|].*\n\n)?\| "
+    assert len(re.findall(headed, text, re.MULTILINE)) == len(tables)
 
 
 def test_levels_are_explained() -> None:

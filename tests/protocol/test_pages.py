@@ -1,0 +1,61 @@
+"""The examples of the documentation are studies, and its tables name what there is."""
+
+import re
+from pathlib import Path
+
+from study_app.protocol.forms.kinds import KINDS, STATEMENT
+from study_app.protocol.groups.own_protocol import variants
+from study_app.protocol.instruments.instrument import instrument, instruments
+from study_app.protocol.load import parse
+from study_app.protocol.orders.block_orders import orders_of
+from study_app.protocol.trials.kinds import DESIGN_KINDS
+from study_app.protocol.trials.tracks import design_of
+from tests.protocol.groups.grouped import grouped
+
+TRIALS, QUESTIONS, GROUPS = (
+    (Path(__file__).parents[2] / "docs" / f"{name}.md").read_text(encoding="utf-8")
+    for name in ("trials", "questions", "groups")
+)
+
+
+def examples(page: str) -> list[str]:
+    return re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+
+
+def test_examples_of_trials_are_studies_and_replace_parts_of_the_first() -> None:
+    example, estimation, adjustment = examples(TRIALS)
+    assert orders_of(parse(example.encode(), "example")).answers == 140
+    start, method, end = (example.index(table) for table in ("[stimuli", "[methods", "[blocks"))
+    study = parse((example[:start] + example[method:end] + estimation).encode(), "example")
+    assert orders_of(study).answers == 140
+    assert design_of(study, study.blocks["thickness"]).reply == "number"
+    study = parse((example[:start] + adjustment).encode(), "example")
+    assert orders_of(study).answers == 10
+    assert design_of(study, study.blocks["matching"]).adjusts
+
+
+def test_example_of_questions_is_a_study() -> None:
+    (example,) = (one for one in examples(QUESTIONS) if one.startswith("format = 2"))
+    study = parse(example.encode(), "example")
+    assert list(study.forms) == ["about_you", "comment"]
+    assert [item.kind_id for item in study.questionnaires["after"].items] == ["rating", "slider"]
+
+
+def test_example_of_groups_gives_the_steps_that_it_names() -> None:
+    (example,) = examples(GROUPS)
+    study = grouped(("[pages.hello]", "[pages.consent]"), groups=example)
+    assert [(one.name, one.protocol.sequence) for one in variants(study)] == [
+        ("group thin_first", ("consent", "thin", "thick")),
+        ("group thick_first, session 1", ("consent", "thick")),
+        ("group thick_first, session 2", ("thin",)),
+    ]
+
+
+def test_tables_name_every_design_kind_and_instrument() -> None:
+    rows = [line for line in TRIALS.splitlines() if line.startswith("| `")]
+    assert set(DESIGN_KINDS) <= {name for row in rows for name in re.findall(r"`(\w+)`", row.split("|")[1])}
+    named = set(re.findall(r"^\| `([\w-]+)` \|", QUESTIONS, re.MULTILINE))
+    assert (set(KINDS) - {STATEMENT}) | set(instruments()) <= named
+    for name in instruments():
+        (line,) = (line for line in QUESTIONS.splitlines() if line.startswith(f"| `{name}` |"))
+        assert set(re.findall(r"`(\w+)`", line.split("|")[3])) == set(instrument(name)["scores"])
