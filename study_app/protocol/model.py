@@ -261,10 +261,6 @@ class Protocol(ExtendedTable):
         """Return the paragraphs of a localised text."""
         return tuple(text_in(value, language).split("\n\n"))
 
-    def labels(self, scale_id: str, language: str) -> tuple[str, ...]:
-        """Return the names of a scale's points, lowest first."""
-        return self.scales[scale_id].labels[language]
-
     @property
     def steps(self) -> tuple[str, ...]:
         """The pages, blocks and forms in the order of the session; of all groups and sessions where these differ."""
