@@ -226,7 +226,7 @@ def test_a_jump_during_a_gap_is_no_motion(velocity):
     assert max(abs(sample.velocity_mps[1]) for sample in found) < 0.5
     assert np.linalg.norm(found[520].device_force_n) < 0.5
     assert np.linalg.norm(found[-1].device_force_n) == pytest.approx(np.linalg.norm(found[499].device_force_n), rel=0.1)
-    assert withheld(found[520:]) < 1e-3
+    assert withheld(found[520:]) == pytest.approx(withheld(found[:500]), abs=1e-2)  # only the slope limit takes any
 
 
 @pytest.mark.compiled
