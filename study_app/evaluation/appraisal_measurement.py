@@ -119,7 +119,7 @@ def withheld_share(scene: Scene, stroke: Stroke, dynamics: Dynamics) -> float:
     """Return Σ|F_a - F_b| / Σ|F_a| along a stroke that is imposed on the position, from rest; 0 without a force.
 
     The stroke is centred on the device's origin, and the loop is that of a device of these ``dynamics``.
-    F_a is the force after slope limit and norm clamp, F_b the force after passivity controller and slew limit.
+    F_a is the force after norm clamp and fades, F_b the force after slope limits, passivity controller and slew limit.
     """
     t_s = np.arange(round(LASTS_S * scene.rate_hz)) / scene.rate_hz
     along_m = scene.scale * stroke.amplitude_m * np.cos(2.0 * math.pi * stroke.frequency_hz * t_s)

@@ -337,7 +337,10 @@ def limit_rows(protocol: Protocol) -> list[tuple[str, str]]:
         (f"{limits.worst_gap_ms:g} ms", "between two ticks"),
         (f"{limits.delay_error_ms:g} ms", "error of the delay (95th percentile)"),
         (f"{limits.frame_gap_ms:g} ms", "before the first frame, and between two"),
-        (f"{limits.withheld_percent:g} %", "of the force withheld by the passivity controller and the slew limit"),
+        (
+            f"{limits.withheld_percent:g} %",
+            "of the force withheld by slope limits, passivity controller and slew limit",
+        ),
         *([] if least is None else [(f"{least:g} %", "of the targets reached, at least")]),
         *_delivered(limits),
     ]

@@ -61,7 +61,7 @@ class Facts:
     of the study's sealed key, None before its first session. ``lateness_ns`` (n,) is that of every tick [ns],
     ``grant`` what the system lets the servo's thread do. ``dynamics`` are the device's, with its measured
     delay, ``delay_ticks`` is the delay that the servo uses now. ``withheld`` is the share of
-    the force that passivity controller and slew limit are expected to withhold in the fastest stroke of a task, by
+    the force that limits and passivity controller are expected to withhold in the fastest stroke of a task, by
     liquid; None where it was not computed. ``velocity_errors`` are the relative error of the velocity and what it would
     be if all of the device's dynamics were known; None where all is. ``outlets`` are the streams and ports to other
     programs; ``video`` is what was found of the study's videos, None without any.

@@ -28,7 +28,7 @@ FORCE, SIZE, WAKE = slice(0, 3), 3, 4
 class ForceFigures:
     """Of the trial under way, or the last: the force's share of its limit (now, most), and ticks by limiter.
 
-    ``withheld`` is the share of the force so far that passivity controller, slew limit and device withheld.
+    ``withheld`` is the share of the force so far that limits, passivity controller and device withheld.
     """
 
     share: float

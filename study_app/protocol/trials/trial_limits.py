@@ -28,7 +28,7 @@ class Limits(ExtendedTable):
         default=250, description="Longest time before the first frame or between two, or before the trial's end [ms]."
     )
     withheld_percent: Annotated[float, within(0.01, 100, "a share of the force; none withheld at all is rare")] = Field(
-        default=5, description="Share of the force that passivity controller and slew limit withhold [%]."
+        default=5, description="Share of the force that slope limits, passivity controller and slew limit withhold [%]."
     )
     targets_percent: Annotated[float, within(0.01, 100, "a share of the targets; left out, any is enough")] | None = (
         Field(default=None, description="Least share of a reaching task's targets that must be reached [%].")

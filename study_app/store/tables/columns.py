@@ -122,7 +122,7 @@ TRIALS: tuple[Column, ...] = (
     _measure("force_peak_n", "Largest magnitude of the force sent to the device.", "N", sealed=True),
     _measure(
         "withheld_share",
-        "Share of the force that passivity controller, slew limit and device withheld during the task; 0.05 is 5 %.",
+        "Share of the force that limits, passivity controller and device withheld during the task; 0.05 is 5 %.",
         sealed=True,
     ),
     _measure(

@@ -8,8 +8,8 @@ from study_app.analysis.results.level_results import LevelsFound
 from study_app.protocol.checks.delayed_force import WITHHELD_PERCENT
 
 EXPLAINED = (
-    "Share of the requested force that passivity controller, slew limit and device withheld in the comparisons, those "
-    "of trials that were presented again included: a late force pushes the hand, and the passivity controller limits "
+    "Share of the requested force that limits, passivity controller and device withheld in the comparisons, those of "
+    "trials that were presented again included: a late force pushes the hand, and the passivity controller limits "
     "the energy that it returns. What is withheld is not the force that the study is about."
 )
 
