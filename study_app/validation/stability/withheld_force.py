@@ -150,8 +150,8 @@ def _lines(found: Sequence[Withheld]) -> Iterator[str]:
     yield ""
     for most in sorted({one.most for one in counted}):
         quick = max(one.quick for one in counted if one.most == most)
-        rows = "tar aside" if most == MOST else " with ".join(REVERSED)
-        yield f"at most {most:.0%} in every stroke, {rows}: {_goal(quick <= most)} ({quick:.1%})"
+        which = "tar aside" if most == MOST else " with ".join(REVERSED)
+        yield f"at most {most:.0%} in every stroke, {which}: {_goal(quick <= most)} ({quick:.1%})"
     yield f"nothing (< {MOST_AFTER:.1%}) from one second after a shake on, tar aside: " + (
         f"{_goal(lasting < MOST_AFTER)} ({lasting:.1%})"
     )
