@@ -15,10 +15,11 @@ class ForceRules(NamedTuple):
     """The rules of one version.
 
     Added mass and history that exceed their limit are scaled to it up to ``kept_excess`` times the limit, beyond that
-    to less in proportion, at least to ``cut_inertia_share`` of the drag limit: with more, released handles of 50 g
-    oscillated for 0.6 s. With "kalman" they are first smoothed for up to ``longest_smoothing`` times as long, until
-    that took ``smoothed_excess`` of the excess (of its logarithm): each alone distorts the force more. At 1 kHz the
-    limit of "kalman" is ``inertia_of_drag`` times that of drag, at most ``most_inertia_nspm`` (0: that of the table).
+    to less, with the cube of the ratio, at least to ``cut_inertia_share`` of the drag limit: with more, released
+    handles oscillated. With "kalman" they are first smoothed for up to ``longest_smoothing`` times as long, until that
+    took ``smoothed_excess`` of the excess (of its logarithm): each alone distorts the force more. At 1 kHz the limit of
+    "kalman" is ``most_inertia_nspm`` (0: that of the table), less with the cube of a drag limit below
+    ``inertia_drag_nspm``: so no loop of the sweep oscillated whose delay was one tick longer than assumed. [choice]
     ``smoothing_lead`` is 1 if the smoothing does not lag with "kalman" (`kernels.effects.added_mass`), else 0, and
     ``jerk_of_speed_ps3`` the growth of its model's jerk with speed.
     ``fade_out_s`` is how long the force takes to fade out without usable samples, ``hand_mps2`` the greatest
@@ -31,7 +32,7 @@ class ForceRules(NamedTuple):
     kept_excess: float = 0.0
     smoothed_excess: float = 0.0
     longest_smoothing: float = 1.0
-    inertia_of_drag: float = 0.0
+    inertia_drag_nspm: float = 0.0
     most_inertia_nspm: float = 0.0
     smoothing_lead: float = 0.0
     jerk_of_speed_ps3: float = 4000.0
@@ -51,7 +52,7 @@ VERSIONS: Final = {
             kept_excess=1.75,
             smoothed_excess=0.5,
             longest_smoothing=1.6,
-            inertia_of_drag=1.35,
+            inertia_drag_nspm=21.8,
             most_inertia_nspm=33.0,
             smoothing_lead=1.0,
             jerk_of_speed_ps3=2200.0,

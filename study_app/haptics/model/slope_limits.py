@@ -105,7 +105,7 @@ def handle_limits(
     lighter = min(mass_kg / MEASURED_KG, 1.0) ** LIGHTER
     drag_nspm, inertia_nspm = damping_limits(period_s, delay_ticks, velocity)
     if isinstance(velocity, Kalman) and rules.most_inertia_nspm > 0.0 and abs(period_s - NOMINAL_S) < _SAME:
-        inertia_nspm = min(rules.inertia_of_drag * drag_nspm, rules.most_inertia_nspm)
+        inertia_nspm = rules.most_inertia_nspm * min(drag_nspm / rules.inertia_drag_nspm, 1.0) ** 3
     return DampingLimits(lighter * drag_nspm, lighter * inertia_nspm)
 
 

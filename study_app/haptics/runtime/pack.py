@@ -269,5 +269,5 @@ def _inertia_fit(record: layout.Record, limits: DampingLimits, scene: Scene, rul
             middle = 0.5 * (rate + high)
             rate, high = (middle, high) if damping_nspm(middle) < smoothed_nspm else (rate, middle)
     least_nspm = min(limits.inertia_nspm, rules.cut_inertia_share * limits.drag_nspm)
-    kept_nspm = limits.inertia_nspm * min(rules.kept_excess * limits.inertia_nspm / whole_nspm, 1.0)
+    kept_nspm = limits.inertia_nspm * min(rules.kept_excess * limits.inertia_nspm / whole_nspm, 1.0) ** 3
     return rate, max(least_nspm, kept_nspm) / damping_nspm(rate)

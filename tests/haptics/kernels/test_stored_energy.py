@@ -93,7 +93,7 @@ def test_no_more_energy_is_stored_than_the_hand_put_in():
 def test_the_force_has_no_cliff_where_inertia_exceeds_its_limit(velocity):
     """Of ever greater scales, the share of damping that is sent changes little from one to the next."""
     sent_nspm, before = [], None
-    for scale in np.geomspace(0.5, 40, 400):
+    for scale in np.geomspace(0.1, 40, 600):
         scene = inert(velocity).model_copy(update={"scale": float(scale)})
         found = pack(scene, dynamics=MEASURED).liquids[0]
         rates = found.smoothing_rate
@@ -101,7 +101,7 @@ def test_the_force_has_no_cliff_where_inertia_exceeds_its_limit(velocity):
         history_nspm = 0.7 * found.history.factor_kg_rs * np.sqrt(found.history.filter_per_s * rates)
         sent_nspm.append(scale * found.inertia_share * (mass_nspm + history_nspm))
         delivered = found.inertia_share, rates
-        assert before is None or np.abs(np.subtract(delivered, before)).max() < 0.02
+        assert before is None or np.abs(np.subtract(delivered, before)).max() < 0.05
         before = delivered
     limits = [handle_limits(1e-3, delay, velocity) for delay in range(5)]
     most_nspm = np.array([limit.inertia_nspm for limit in limits])

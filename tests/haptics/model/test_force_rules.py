@@ -9,7 +9,7 @@ RELEASED = {
     "kept_excess": 0.0,
     "smoothed_excess": 0.0,
     "longest_smoothing": 1.0,
-    "inertia_of_drag": 0.0,
+    "inertia_drag_nspm": 0.0,
     "most_inertia_nspm": 0.0,
     "smoothing_lead": 0.0,
     "jerk_of_speed_ps3": 4000.0,
