@@ -58,10 +58,10 @@ SINGLE: Final = {
     **dict.fromkeys(("physical_tar", "physical2_tar", "slime_toothpaste", "slime_cornstarch"), STEEP),
 }
 LIMITS: Final[Mapping[tuple[str, str], tuple[Limit, Limit, Limit]]] = {
-    (HONEY, "kalman"): (Limit(15, 13), Limit(18, 18), Limit(50, 50)),
-    (BOUNDED, "kalman"): (Limit(1.6, 1), Limit(1.6, 5), Limit(2, 20)),
+    (HONEY, "kalman"): (Limit(15, 13), Limit(18, 18), Limit(72, 75)),
+    (BOUNDED, "kalman"): (Limit(1.6, 1), Limit(1.6, 5), Limit(12, 80)),
     (THESIS, "kalman"): (Limit(9, 2), Limit(42, 36), Limit(70, 65)),
-    ("physical_liquids", "kalman"): (Limit(18, 13), Limit(20, 21), Limit(50, 55)),
+    ("physical_liquids", "kalman"): (Limit(18, 13), Limit(20, 21), Limit(75, 77)),
     ("slime", "kalman"): (Limit(13, 5), Limit(67, 66), Limit(82, 81)),
     ("dampers", "kalman"): (Limit(3, 1), Limit(3, 1), Limit(3, 1)),
     (STEEP, "kalman"): (Limit(85, 87), Limit(92, 92), Limit(95, 95)),
