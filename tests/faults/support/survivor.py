@@ -159,12 +159,13 @@ class Scene:
 
     def lose_recording(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
         lost = operator.rail.tally.beyond.text()
-        if "lost" in lost:
+        notices = [one.text() for one in operator.findChildren(QLabel) if "recorder" in one.text()]
+        if "lost" in lost and notices:  # the tally may be shown first
             recording_writer.SamplesFile = self.samples_file
             self.told["recording"] = lost
             self.told["page at the loss"] = type(participant.page).__name__
             self.told["force without a recording"] = self.rig.servo.force_is_on
-            self.told["notices"] = [one.text() for one in operator.findChildren(QLabel) if "recorder" in one.text()]
+            self.told["notices"] = notices
             operator.come_forward()
             self.step = self.see_loss
         return False
