@@ -106,12 +106,14 @@ def _plausible(parameters: Record, state: Record, safety: Record, sample: Record
         return True
     if not can_have_moved(state.hand_m, hand_m, interval_s):
         return False
+    if is_gap(parameters, interval_s) or _within_reach(parameters, state, 0.0, 0.0, hand_m, interval_s):
+        return True
     square_n2 = 0.0
     for row in range(safety.passivity.sent_n.shape[0]):
         square_n2 = max(square_n2, square(safety.passivity.sent_n[row]))
     force_n = math.sqrt(square_n2)
     late_m = 2.0 * state.fastest_mps * parameters.period_s
-    return is_gap(parameters, interval_s) or _within_reach(parameters, state, force_n, late_m, hand_m, interval_s)
+    return _within_reach(parameters, state, force_n, late_m, hand_m, interval_s)
 
 
 @part
