@@ -214,7 +214,7 @@ def follow_delay(safety: Any, sample: Any, measured: int) -> None:
     safety.slower = safety.slower + 1 if measured > safety.delay_ticks else 0
     safety.faster = safety.faster + 1 if measured < safety.delay_ticks else 0
     if safety.slower >= SLOWER_SAMPLES:
-        safety.delay_ticks = min(measured, MOST_DELAY)
+        safety.delay_ticks = min(safety.delay_ticks + 1, MOST_DELAY)
         safety.slower = 0
     elif safety.faster >= FASTER_SAMPLES:
         safety.delay_ticks -= 1

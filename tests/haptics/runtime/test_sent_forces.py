@@ -128,14 +128,15 @@ def test_a_device_too_slow_for_any_stable_force_is_refused():
         Servo(Probe(dynamics=Dynamics(4.2e-3)), clock=VirtualClock())
 
 
-def test_a_delay_that_grows_is_followed_at_once_and_one_that_shrinks_slowly():
+def test_a_delay_that_grows_is_followed_tick_by_tick_and_one_that_shrinks_slowly():
     probe = Probe(dynamics=UNKNOWN)
     servo = Servo(probe, clock=VirtualClock())
     servo.load(HONEY)
     reader = servo.telemetry.reader()
     probe.state.delay_ticks = 3
     servo.advance(10)
-    assert reader.read().delay_ticks.tolist() == [1] * (SLOWER_SAMPLES - 1) + [3] * (11 - SLOWER_SAMPLES)
+    expected = [1] * (SLOWER_SAMPLES - 1) + [2] * SLOWER_SAMPLES + [3] * (11 - 2 * SLOWER_SAMPLES)
+    assert reader.read().delay_ticks.tolist() == expected
     probe.state.delay_ticks = 1
     servo.advance(2 * FASTER_SAMPLES + 1)
     followed = reader.read().delay_ticks
