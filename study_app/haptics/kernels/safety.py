@@ -42,7 +42,7 @@ from study_app.haptics.model.layout import (
 START_FADE_S = 0.5
 LATE_S = 0.045
 LEAST_SLEW = 1.0 / 3.0
-"""Share of the slew limit during a fade, and least share after a great energy debt."""
+"""Share of the slew limit during a fade in, and least share after a great energy debt."""
 
 
 def new_safety(device_limit_n: float = math.inf, delay_ticks: int = BELIEVED_TICKS) -> Any:
@@ -204,10 +204,13 @@ def _fade(force_n: Any, lift_n: Any, parameters: Record, safety: Record, sample:
 def _limit_slew(force_n: Any, parameters: Record, state: Record, safety: Record, sample: Record) -> None:
     """Limit the change of the force from tick to tick (`slope_limits.slew_limit_n`), without pushing the hand on.
 
-    After an energy debt the limit is reduced by the controller's gain; it is least during a fade. A force that falls
+    After an energy debt the limit is reduced by the controller's gain; it is least during a fade in. A force that falls
     too slowly at a reversal would do work on the hand: its unwanted part along the motion is dropped at once.
     """
-    most_n = parameters.slew_n * (LEAST_SLEW if safety.fade < 1.0 else max(safety.passivity.gain, LEAST_SLEW))
+    of_limit = max(safety.passivity.gain, LEAST_SLEW)
+    if safety.fade < 1.0:
+        of_limit = parameters.rules.fade_out_slew if safety.withheld else LEAST_SLEW
+    most_n = parameters.slew_n * of_limit
     if square_distance(force_n, safety.slewed_n) <= most_n * most_n:
         return
     sample.limiters |= LIMITER_SLEW

@@ -20,9 +20,12 @@ class ForceRules(NamedTuple):
     took ``smoothed_excess`` of the excess (of its logarithm): each alone distorts the force more. At 1 kHz the limit of
     "kalman" is ``most_inertia_nspm`` (0: that of the table), less with the cube of a drag limit below
     ``inertia_drag_nspm``: so no loop of the sweep oscillated whose delay was one tick longer than assumed. [choice]
+    "ewma" has at least ``ewma_share`` of it, up to its limit at one tick of delay: with all of it, one loop of 27,000
+    exceeded the permitted force above 40 Hz.
     ``smoothing_lead`` is 1 if the smoothing does not lag with "kalman" (`kernels.effects.added_mass`), else 0, and
     ``jerk_of_speed_ps3`` the growth of its model's jerk with speed.
-    ``fade_out_s`` is how long the force takes to fade out without usable samples, ``hand_mps2`` the greatest
+    ``fade_out_s`` is how long the force takes to fade out without usable samples, ``fade_out_slew`` the share of the
+    slew limit meanwhile: with a third, a handle of 50 g released in a gap gained 6.5 mJ. ``hand_mps2`` is the greatest
     acceleration by a hand, ``gap_ticks`` the time between two samples, in nominal periods, above which it is a gap
     (`sample_validation`), ``quiet_s`` how long a hand must be quiet for its energy debt to be forgiven (`passivity`).
     """
@@ -34,9 +37,11 @@ class ForceRules(NamedTuple):
     longest_smoothing: float = 1.0
     inertia_drag_nspm: float = 0.0
     most_inertia_nspm: float = 0.0
+    ewma_share: float = 0.0
     smoothing_lead: float = 0.0
     jerk_of_speed_ps3: float = 4000.0
     fade_out_s: float = 0.045
+    fade_out_slew: float = 1.0 / 3.0
     hand_mps2: float = math.inf
     gap_ticks: float = math.inf
     quiet_s: float = math.inf
@@ -54,9 +59,11 @@ VERSIONS: Final = {
             longest_smoothing=1.6,
             inertia_drag_nspm=21.8,
             most_inertia_nspm=33.0,
+            ewma_share=0.9,
             smoothing_lead=1.0,
             jerk_of_speed_ps3=2200.0,
             fade_out_s=0.01,
+            fade_out_slew=1.0,
             hand_mps2=50.0,
             gap_ticks=4.5,
             quiet_s=0.3,

@@ -100,12 +100,17 @@ def handle_limits(
 ) -> DampingLimits:
     """Return the limits of `damping_limits` for a handle of this mass, by the rules of a version.
 
-    With "kalman" at 1 kHz, those of inertia follow from the limits of drag (`ForceRules`).
+    With "kalman" and "ewma" at 1 kHz, those of inertia follow from the limits of drag (`ForceRules`).
     """
     lighter = min(mass_kg / MEASURED_KG, 1.0) ** LIGHTER
     drag_nspm, inertia_nspm = damping_limits(period_s, delay_ticks, velocity)
-    if isinstance(velocity, Kalman) and rules.most_inertia_nspm > 0.0 and abs(period_s - NOMINAL_S) < _SAME:
-        inertia_nspm = rules.most_inertia_nspm * min(drag_nspm / rules.inertia_drag_nspm, 1.0) ** 3
+    if rules.most_inertia_nspm > 0.0 and abs(period_s - NOMINAL_S) < _SAME:
+        of_drag_nspm = rules.most_inertia_nspm * min(drag_nspm / rules.inertia_drag_nspm, 1.0) ** 3
+        if isinstance(velocity, Kalman):
+            inertia_nspm = of_drag_nspm
+        elif isinstance(velocity, Ewma):
+            at_one_tick = damping_limits(period_s, 1, velocity)
+            inertia_nspm = max(inertia_nspm, min(rules.ewma_share * of_drag_nspm, at_one_tick.inertia_nspm))
     return DampingLimits(lighter * drag_nspm, lighter * inertia_nspm)
 
 

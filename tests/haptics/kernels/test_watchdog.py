@@ -84,6 +84,15 @@ def test_the_fade_is_the_one_that_silence_of_the_device_gets():
     assert late.fade == pytest.approx(silent.fade, abs=0.03)
 
 
+def test_the_slew_limit_does_not_prolong_the_fade_out(bench):
+    bench.probe.state.velocity_mps *= 2.0
+    felt(bench.servo)
+    assert force_n(bench.servo.telemetry) > 7.0
+    bench.probe.state.silent_from_read = bench.probe.state.reads + 1
+    bench.servo.advance(16)
+    assert is_zero(bench.servo.telemetry.latest().device_force_n)
+
+
 @pytest.mark.parametrize("late_ms", [50.0, 300.0])
 def test_after_fifty_milliseconds_without_a_tick_the_force_is_zero_and_returns_as_at_a_start(bench, late_ms):
     felt(bench.servo)

@@ -4,8 +4,9 @@ import pytest
 
 from study_app.haptics.model.estimators import ESTIMATORS, NAMED
 from study_app.haptics.model.estimators.device import MOST_LAG_TICKS, DeviceVelocity
+from study_app.haptics.model.force_rules import VERSIONS
 from study_app.haptics.model.scene import Ewma, Foaw, Given, Lead, Line, Raw
-from study_app.haptics.model.slope_limits import damping_limits, table
+from study_app.haptics.model.slope_limits import damping_limits, handle_limits, table
 
 
 @pytest.mark.parametrize("kind", [it for it in ESTIMATORS if it.of_device], ids=lambda it: it.name)
@@ -56,3 +57,15 @@ def test_velocity_of_a_device_has_the_limits_of_a_line_that_lags_as_much():
     assert limit(DeviceVelocity(lag_s=3e-3)) == limit(Line(samples=7)) == min(entry("line", 5), entry("line", 8))
     assert limit(DeviceVelocity()) == limit(Line(samples=2))
     assert DeviceVelocity(lag_s=MOST_LAG_TICKS * 1e-3).window(1e-3) == Line(samples=16)
+
+
+@pytest.mark.parametrize(
+    ("alpha", "delay_ticks", "inertia_nspm"),
+    [(0.1, 1, 45.0), (0.1, 2, 28.491), (0.1, 3, 10.470), (0.3, 2, 18.6), (1.0, 3, 1.9)],
+)
+def test_inertia_keeps_its_limit_at_long_delays_of_ewma(alpha, delay_ticks, inertia_nspm):
+    assert handle_limits(1e-3, delay_ticks, Ewma(alpha=alpha)).inertia_nspm == pytest.approx(inertia_nspm, abs=0.001)
+
+
+def test_released_rules_have_the_inertia_limits_of_the_table():
+    assert handle_limits(1e-3, 2, Ewma(), rules=VERSIONS[2]).inertia_nspm == 6.4
