@@ -79,8 +79,8 @@ class OperatorView:
     ``elapsed_s`` is the time that was worked: not the gap before a session was resumed. ``main_trials`` has a pair for
     each part, of its main trials left behind and of all. ``trial`` is the number of the trial under way or answered.
     ``waits`` says that the trouble is a disk that takes nothing: the session goes on when it does again. ``beyond``
-    says which outlets and recordings were lost, then of each trial out of limits which it broke, the newest first.
-    ``may_reconnect`` says that the trouble is a device that can be
+    says whether the device is slower than at the start, which outlets and recordings were lost, then of each trial out
+    of limits which it broke, the newest first. ``may_reconnect`` says that the trouble is a device that can be
     connected again, ``reconnects`` that it is being so, ``reconnection`` how far that is, or why it failed. ``track``
     says how the track of the latest trial with a design is doing, without a level.
     """
@@ -226,6 +226,7 @@ def operator_view(
         trial=None if trial is None else trial.number,
         waits=waits,
         beyond=(
+            *_slower(vitals),
             *(f"{title}: {reason}" for title, reason in {**progress.outlets_lost, **(outlets_lost or {})}.items()),
             *_lost(session, progress, {**progress.lost, **(lost or {})}),
             *_lacking(session, progress, {trial.number: dropped} if trial is not None and dropped else {}),
@@ -354,6 +355,16 @@ def _counts(session: Session, progress: Progress) -> tuple[tuple[str, str], ...]
         ("Answers on disk", f"{sum(progress.answered.values())} of {session.answers_of}"),
         ("Trials within limits", f"{sum(not one for one in broken)} of {len(broken)}"),
         ("Marks, repeats", f"{sum(note.kind == 'mark' for note in progress.notes)}, {progress.repeats}"),
+    )
+
+
+def _slower(vitals: Vitals) -> tuple[str, ...]:
+    """Return a sentence while the device's delay is longer than at the start."""
+    if vitals.delay_ticks <= vitals.first_delay_ticks:
+        return ()
+    return (
+        f"The device answers after {vitals.delay_ticks} ticks, after {vitals.first_delay_ticks} at the start: the "
+        "force is limited to what is stable with this delay",
     )
 
 

@@ -24,6 +24,7 @@ class Vitals:
     """Figures of the tiles; a rate or percentile is None while too little has been measured.
 
     ``refreshes_missed`` are those of the participant's screen, out of so many, that brought no new frame of the tank.
+    ``delay_ticks`` is the delay of a force that the servo assumes now, ``first_delay_ticks`` the one at the start.
     """
 
     rate_hz: float | None = None
@@ -33,6 +34,8 @@ class Vitals:
     refreshes: int = 0
     refreshes_missed: int = 0
     frame_rate_hz: float | None = None
+    delay_ticks: int = 0
+    first_delay_ticks: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +63,7 @@ class ServoHealth:
         self._recent = np.zeros((RATE_WINDOW_TICKS, 2), np.int64)  # tick, time [ns]
         self._ticks = 0
         self.overruns = 0
+        self._delay_ticks = self._first_delay_ticks = 0
         self._frame_gaps_ns = np.zeros(240, np.int64)
         self._last_frame_ns = 0
         self._frames = 0
@@ -76,6 +80,9 @@ class ServoHealth:
             return
         _into_ring(self.lateness_ns, self._latenesses, np.asarray(samples.lateness_ns))
         _into_ring(self._recent, self._ticks, np.column_stack((samples.tick, samples.time_ns)))
+        if self._ticks == 0:
+            self._first_delay_ticks = int(samples.delay_ticks[0])
+        self._delay_ticks = int(samples.delay_ticks[-1])
         self._latenesses += count
         self._ticks += count
 
@@ -115,6 +122,8 @@ class ServoHealth:
             refreshes=self._refreshes,
             refreshes_missed=self._missed,
             frame_rate_hz=1e9 / float(np.median(gaps)) if len(gaps) else None,
+            delay_ticks=self._delay_ticks,
+            first_delay_ticks=self._first_delay_ticks,
         )
 
     def lateness_histogram(self) -> tuple[Floats, NDArray[np.int64]]:

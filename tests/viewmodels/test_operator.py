@@ -4,6 +4,7 @@ import dataclasses
 
 import pytest
 
+from study_app.haptics.model.layout import SAMPLE, records
 from study_app.protocol.model import Limits
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.store.broken_limits import beyond_limits
@@ -11,6 +12,7 @@ from study_app.store.tables.column import header
 from study_app.store.tables.columns import TRIALS
 from study_app.viewmodels.number_words import duration, duration_range, duration_words, grouped, minutes
 from study_app.viewmodels.operator import MEASURES
+from study_app.viewmodels.servo_health import ServoHealth
 from study_app.viewmodels.session.stages import stages
 from tests.protocol.trials.level_studies import study
 
@@ -117,6 +119,18 @@ def test_a_failed_outlet_is_shown_by_the_outlets_or_the_journal(told):
     told.tell("outlet_lost", outlet="Serial port", reason="it was unplugged")
     assert told.view().beyond == (line,)
     assert told.view(outlets_lost={"Serial port": "it was unplugged"}).beyond == (line,)
+
+
+def test_a_device_slower_than_at_the_start_is_named_until_it_recovers(told):
+    health = ServoHealth(1000.0)
+    said = []
+    for delay_ticks in (1, 3, 1):
+        samples = records(SAMPLE, 5)
+        samples.delay_ticks = delay_ticks
+        health.take(samples)
+        said.append(told.view(health).beyond)
+    assert said[0] == said[2] == ()
+    assert said[1][0].startswith("The device answers after 3 ticks, after 1 at the start: ")
 
 
 def test_a_paused_session_can_resume_but_not_repeat(told):
