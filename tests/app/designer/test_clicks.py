@@ -6,15 +6,13 @@ import pytest
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPushButton
+from PySide6.QtWidgets import QApplication, QLabel, QLineEdit
 from shiboken6 import isValid
 
 from study_app.authoring.kept_settings import begin_settings, kept_original
-from study_app.gui.designer.measures.parts import Strip
 from study_app.gui.designer.outline.rows import ROW_ROLE
-from study_app.gui.designer.study_list import cut_title
 from study_app.protocol.source.files import shipped
-from study_app.viewmodels.designer.requests import SetText, SetValue
+from study_app.viewmodels.designer.requests import SetValue
 
 pytestmark = pytest.mark.slow
 
@@ -31,9 +29,9 @@ def type_id(qtbot: Any, designer: Any, path: tuple[str, str], name: str) -> None
 
 
 def test_a_list_that_is_clicked_after_an_id_was_typed_stays_open(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     type_id(qtbot, designer, ("conditions", "thick"), "honey")
-    liquids = designer.row("conditions", "thick", "liquid").field.list
+    liquids = designer.field("conditions", "thick", "liquid").list
     qtbot.mouseClick(liquids, LEFT)
     qtbot.wait(100)
     assert isValid(liquids)
@@ -42,20 +40,6 @@ def test_a_list_that_is_clicked_after_an_id_was_typed_stays_open(qtbot: Any, des
     liquids.hidePopup()
     qtbot.waitUntil(lambda: "[conditions.honey]" in designer.text)
     assert designer.place.view.form.path == ("conditions", "honey")
-
-
-def test_a_click_on_a_block_in_the_drawer_closes_it(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.window.resize(1366, 768)
-    outline, tree = designer.place.outline, designer.place.outline.tree
-    for path, closes in ((("blocks", "liquids"), True), (("conditions",), False)):
-        designer.place.parts.focus_outline()
-        QApplication.processEvents()
-        index = next(one for one in outline.indexes() if one.data(ROW_ROLE).path == path)
-        tree.scrollTo(index)
-        qtbot.mouseClick(tree.viewport(), LEFT, pos=tree.visualRect(index).center())
-        assert designer.place.view.form.path == path
-        assert outline.isVisible() is not closes
 
 
 def test_arrow_keys_walk_the_whole_outline_of_the_empty_study(qtbot: Any, designer: Any) -> None:
@@ -72,60 +56,30 @@ def test_arrow_keys_walk_the_whole_outline_of_the_empty_study(qtbot: Any, design
     assert {("questionnaires",), ("groups",), ("scene",), ("limits",), ("analysis",)} <= set(seen)
     designer.editing.select(("limits",))
     designer.editing.ask(SetValue(("limits", "lateness_ms"), 3))
-    assert designer.editing.opened.study.document["limits"] == {"lateness_ms": 3}
-
-
-def test_arrow_keys_walk_the_outline_after_a_number_was_typed(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.window.resize(1366, 768)
-    designer.editing.select(("conditions", "thick"))
-    (delay,) = designer.row("conditions", "thick", "delay_ms").findChildren(QLineEdit)
-    qtbot.mouseClick(delay, LEFT)
-    qtbot.keyClicks(delay, "5")
-    qtbot.keyClick(delay, Qt.Key.Key_Return)
-    text = designer.text
-    qtbot.keyClick(designer.window, Qt.Key.Key_1, Qt.KeyboardModifier.ControlModifier)
-    for _ in range(4):
-        qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Up)
-        QApplication.processEvents()
-        assert designer.place.outline.tree.hasFocus()
-    assert designer.text == text
-
-
-def test_a_field_that_is_clicked_after_an_id_was_typed_keeps_the_keyboard(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    type_id(qtbot, designer, ("liquids", "thick"), "honey")
-    (density,) = designer.row("liquids", "thick", "density_kg_m3").findChildren(QLineEdit)
-    qtbot.mouseClick(density, LEFT)
-    qtbot.waitUntil(lambda: "[liquids.honey]" in designer.text)
-    field = QApplication.focusWidget()
-    assert designer.row("liquids", "honey", "density_kg_m3").isAncestorOf(field)
-    field.selectAll()
-    qtbot.keyClicks(field, "1402")
-    qtbot.waitUntil(lambda: "1402" in designer.text)
+    assert designer.value("limits") == {"lateness_ms": 3}
 
 
 def test_a_field_that_is_clicked_thrice_after_an_id_was_typed_takes_what_is_typed(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     type_id(qtbot, designer, ("liquids", "thick"), "honey")
-    (density,) = designer.row("liquids", "thick", "density_kg_m3").findChildren(QLineEdit)
+    (density,) = designer.form_row("liquids", "thick", "density_kg_m3").findChildren(QLineEdit)
     at = density.mapTo(designer.window, density.rect().center())
     QTest.mouseClick(designer.window.windowHandle(), LEFT, pos=at)
     qtbot.waitUntil(lambda: "[liquids.honey]" in designer.text)
     QTest.mouseDClick(designer.window.windowHandle(), LEFT, pos=at)
     QTest.mouseClick(designer.window.windowHandle(), LEFT, pos=at)
-    assert QApplication.focusWidget() is density, "the form was made anew under the click"
+    assert designer.keyboard is density, "the form was made anew under the click"
     assert density.selectedText() == density.text()
     qtbot.keyClicks(density, "1402")
     qtbot.waitUntil(lambda: "density_kg_m3 = 1402" in designer.text)
     qtbot.mouseClick(next(one for one in designer.place.form.adds.values() if one.isVisible()), LEFT)
-    assert designer.editing.opened.study.document["liquids"]["honey"]["density_kg_m3"] == 1402
-    assert "thick" not in designer.editing.opened.study.document["liquids"]
+    assert designer.value("liquids", "honey", "density_kg_m3") == 1402
+    assert "thick" not in designer.value("liquids")
 
 
 def test_a_difference_that_is_reverted_outlives_the_click(qtbot: Any, designer: Any) -> None:
     """Qt still handles the click on its button; content that a scroll area drops is deleted at once."""
-    designer.controller.open("kitchen")
+    designer.open()
     designer.editing.ask(SetValue(("blocks", "liquids", "repetitions"), 3))
     designer.place.show_tab("changes")
     shown = designer.controller.changes.card.list
@@ -141,21 +95,10 @@ def test_a_difference_that_is_reverted_outlives_the_click(qtbot: Any, designer: 
     qtbot.waitUntil(lambda: gone == [True])
 
 
-def test_the_arrow_of_an_entry_opens_what_it_names(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.select(("blocks", "liquids"))
-    field = designer.row("blocks", "liquids", "conditions").field
-    words = f"Open {field.row.entries[1].title}"
-    (arrow,) = (one for one in field.rows[1].findChildren(QPushButton) if one.accessibleName() == words)
-    qtbot.mouseClick(arrow, LEFT)
-    assert designer.editing.selected == ("conditions", field.row.row.value[1])
-
-
 @pytest.mark.parametrize("way", ["Enter", "double click"])
 def test_an_entry_opens_by_enter_and_a_double_click(qtbot: Any, designer: Any, way: str) -> None:
-    designer.controller.open("kitchen")
-    designer.select(("blocks", "liquids"))
-    field = designer.row("blocks", "liquids", "conditions").field
+    designer.open("kitchen", "blocks", "liquids")
+    field = designer.field("blocks", "liquids", "conditions")
     qtbot.mouseClick(field.rows[1], LEFT)
     assert designer.editing.selected == ("blocks", "liquids")
     if way == "Enter":
@@ -165,44 +108,16 @@ def test_an_entry_opens_by_enter_and_a_double_click(qtbot: Any, designer: Any, w
     assert designer.editing.selected == ("conditions", field.row.row.value[1])
 
 
-def test_a_row_of_a_section_opens_by_a_click(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.select(("liquids",))
-    qtbot.mouseClick(designer.row("liquids").field.rows[1], LEFT)
-    assert designer.editing.selected == ("liquids", "thick")
-
-
-def test_a_step_of_the_session_bar_opens_by_the_left_button_alone(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    strip, asked = Strip(), list[object]()
-    strip.resize(100, 14)
-    strip.show_segments((("Welcome", 1.0, False, ("pages", "welcome")),))
-    strip.open_asked.connect(asked.append)
-    qtbot.mouseClick(strip, Qt.MouseButton.RightButton)
-    assert asked == []
-    qtbot.mouseClick(strip, LEFT)
-    assert asked == [("pages", "welcome")]
-
-
 def test_the_question_before_a_delete_says_what_goes(designer: Any) -> None:
     designer.controller.begin("template:compare-liquids", "liquids")
-    designer.select(("liquids", "syrup"))
+    designer.go_to("liquids", "syrup")
     designer.place.form.head.delete.click()
     said = [one.text() for one in designer.place.prompt.findChildren(QLabel)]
     assert "Condition Practice: Liquid" in said
     assert "Also deletes: Block Practice, Condition Practice." in said
     designer.place.prompt.all.click()
-    assert "practice" not in designer.editing.opened.study.document["blocks"]
-    assert not designer.editing.opened.study.faults
-
-
-def test_the_question_before_a_delete_names_elements_and_no_places_of_lists(designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.select(("liquids", "thick"))
-    designer.place.form.head.delete.click()
-    said = [one.text() for one in designer.place.prompt.findChildren(QLabel)]
-    (besides,) = (words for words in said if words.startswith("Also deletes"))
-    assert besides == "Also deletes: Condition Thick."
+    assert "practice" not in designer.value("blocks")
+    assert not designer.study.faults
 
 
 def listed(designer: Any) -> list[str]:
@@ -221,7 +136,7 @@ def test_studies_are_listed_by_title_with_their_files_whatever_was_opened_last(d
     for name, title in (("zeta", "apples"), ("beta", "Melons"), ("alpha", "Melons")):
         add_study(designer, name, title)
     begin_settings(designer.file.with_name("beta.toml"), "alpha")
-    designer.controller.open("kitchen")
+    designer.open()
     own = [words for words in listed(designer) if "(shipped)" not in words][:-2]
     assert own[:2] == ["A first look  ·  kitchen.toml", "apples  ·  zeta.toml"]
     assert [words for words in own if words.startswith("Melons")] == [
@@ -233,7 +148,7 @@ def test_studies_are_listed_by_title_with_their_files_whatever_was_opened_last(d
     assert len(shipped_ones) == len(shipped())
     assert listed(designer)[len(own) : len(own) + len(shipped_ones)] == sorted(shipped_ones, key=str.casefold)
     before = listed(designer)
-    designer.controller.open("beta")
+    designer.open("beta")
     designer.place.save_asked.emit()
     designer.controller.enter()
     assert listed(designer) == before
@@ -245,53 +160,9 @@ def test_studies_are_listed_by_title_with_their_files_whatever_was_opened_last(d
     )
 
 
-def test_the_field_shows_the_file_of_a_study_whose_title_another_one_has(designer: Any) -> None:
-    for name in ("beta", "alpha"):
-        add_study(designer, name, "Which of two liquids is the thicker one?")
-    add_study(designer, "zeta", "Which of two liquids is the warmer one?")
-    begin_settings(designer.file.with_name("beta.toml"), "alpha")
-    box = designer.place.header.study
-    for name in ("alpha", "beta"):
-        designer.controller.open(name)
-        shown = box.fitted(box.currentText(), 240)
-        assert shown.startswith("Which of")
-        assert shown.endswith(f"…  ·  {name}.toml")
-        assert box.fontMetrics().horizontalAdvance(shown) <= 240
-    designer.controller.open("zeta")
-    assert box.fitted(box.currentText(), 240).endswith("…")
-
-
-def test_the_list_cuts_a_long_title_and_not_the_file(qtbot: Any, designer: Any) -> None:
-    add_study(designer, "alpha", "Which of two liquids is the thicker one? " * 9)
-    designer.controller.open("alpha")
-    box = designer.place.header.study
-    box.setFocus()
-    qtbot.keyClick(box, Qt.Key.Key_Down)
-    assert box.view().width() < designer.window.width()
-    words, length = box.currentText(), len(designer.editing.opened.title)
-    cut = cut_title(words, length, box.fontMetrics(), 600)
-    assert cut.endswith("…")
-    assert box.fontMetrics().horizontalAdvance(cut + words[length:]) <= 600
-    assert cut_title("Melons  ·  a.toml", 6, box.fontMetrics(), 600) == "Melons"
-
-
-def test_the_list_shows_a_title_as_it_is_edited(designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.ask(SetText(("study", "title"), "en", "Zest"))
-    assert designer.place.header.study.currentText() == "Zest  ·  kitchen.toml"
-    designer.editing.undo()
-    assert not designer.place.header.study.currentText().startswith("Zest")
-
-
-def test_a_file_that_cannot_be_read_is_listed_by_its_name(designer: Any) -> None:
-    (designer.file.parent / "odd.toml").write_text("this is not TOML")
-    designer.controller.open("kitchen")
-    assert "odd  ·  odd.toml" in listed(designer)
-
-
 def test_keys_open_the_list_and_no_other_study(qtbot: Any, designer: Any) -> None:
     add_study(designer, "zeta", "Zebra")
-    designer.controller.open("kitchen")
+    designer.open()
     box, opened = designer.place.header.study, designer.editing.opened
     qtbot.keyClick(box, Qt.Key.Key_Escape)
     assert not box.view().isVisible()
@@ -314,33 +185,7 @@ def test_keys_open_the_list_and_no_other_study(qtbot: Any, designer: Any) -> Non
     assert designer.editing.opened.name == "zeta"
 
 
-def test_the_first_line_is_marked_where_no_study_is_open(qtbot: Any, designer: Any) -> None:
-    box = designer.place.header.study
-    box.setFocus()
-    qtbot.keyClick(box, Qt.Key.Key_Down)
-    assert [index.row() for index in box.view().selectedIndexes()] == [0]
-    qtbot.keyClick(box.view(), Qt.Key.Key_Return)
-    QApplication.processEvents()
-    assert designer.editing.opened.name == "kitchen"
-
-
-def test_another_study_has_the_keyboard_at_its_selected_element(designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.place.header.play.setFocus()
-    designer.controller.open("rek2024")
-    assert designer.place.outline.tree.hasFocus(), "not at a button that would start a session"
-
-
 CONTROL, KEY = Qt.KeyboardModifier.ControlModifier, Qt.Key
-
-
-def test_tab_goes_first_to_a_new_study_where_none_is_open(qtbot: Any, designer: Any) -> None:
-    place = designer.place
-    place.setFocus()
-    place.focusNextChild()
-    assert place.nothing.new.hasFocus()
-    qtbot.keyClick(place.nothing.new, KEY.Key_Tab)
-    assert place.header.study.hasFocus()
 
 
 @pytest.mark.parametrize("opened", [False, True])
@@ -348,10 +193,10 @@ def test_ctrl_n_begins_a_study_anywhere_and_keeps_what_is_typed_for_one(
     qtbot: Any, designer: Any, opened: bool
 ) -> None:
     if opened:
-        designer.controller.open("kitchen")
+        designer.open()
         designer.place.parts.focus_outline()
     for _ in range(2):
-        qtbot.keyClick(QApplication.focusWidget() or designer.window, KEY.Key_N, CONTROL)
+        designer.key("ctrl+n")
         assert designer.place.stack.currentWidget() is designer.place.new_page
         title = designer.place.new_page.card.questions.title
         assert title.hasFocus()
@@ -361,27 +206,23 @@ def test_ctrl_n_begins_a_study_anywhere_and_keeps_what_is_typed_for_one(
 
 def test_the_fields_of_a_copy_can_be_edited_at_once(designer: Any) -> None:
     title = ("pages", "welcome", "title")
-    designer.controller.open("demo")
-    designer.select(title[:2])
-    assert not designer.row(*title).field.isEnabled()
+    designer.open("demo", *title[:2])
+    assert not designer.field(*title).isEnabled()
     designer.controller.begin("demo", "mine")
-    designer.select(title[:2])
-    assert designer.row(*title).field.isEnabled()
+    designer.go_to(*title[:2])
+    assert designer.field(*title).isEnabled()
     assert kept_original(designer.editing.opened.file) == "demo"
 
 
-def test_the_description_grows_to_three_lines(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.select(("study",))
-    line = designer.row("study", "description").field.line
-    heights = []
-    for words in (1, 16, 40, 400):
-        designer.editing.ask(SetValue(("study", "description"), " ".join(["liquid"] * words)))
-        QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest)
-        QApplication.processEvents()
-        heights.append(line.height())
-    assert heights[0] < heights[1] < heights[2] == heights[3]
-    line.selectAll()
-    qtbot.keyClicks(line, "Short")
-    qtbot.keyClick(line, KEY.Key_Return)
-    assert designer.editing.opened.study.document["study"]["description"] == "Short"
+def test_the_list_of_studies_is_no_wider_than_the_window_and_begins_at_its_first_line(designer: Any) -> None:
+    add_study(designer, "alpha", "Which of two liquids is the thicker one? " * 9)
+    designer.controller.enter()
+    box = designer.place.header.study
+    box.setFocus()
+    designer.hit("Down")
+    assert box.view().width() < designer.window.width()
+    assert [index.row() for index in box.view().selectedIndexes()] == [0]
+    cut = box.fitted(box.itemText(1), 240)
+    assert "…" in cut
+    assert box.fontMetrics().horizontalAdvance(cut) <= 240
+    box.hidePopup()

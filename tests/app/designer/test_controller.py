@@ -1,6 +1,5 @@
 """The designer's controller: opening, drafts, saving, versions, and what another program does to the file."""
 
-import json
 import os
 from typing import Any
 
@@ -8,7 +7,7 @@ import pytest
 
 from study_app.authoring.drafts import draft_of
 from study_app.protocol.source.files import shipped, shipped_file
-from study_app.viewmodels.designer.requests import RenameElement, RetypeFile, SetText, SetValue
+from study_app.viewmodels.designer.requests import RetypeFile, SetText, SetValue
 
 pytestmark = pytest.mark.slow
 
@@ -17,7 +16,7 @@ MOMENT = "2026-11-21T12:00:00+00:00"
 
 def test_opening_and_looking_at_every_form_changes_neither_file_nor_its_time(designer: Any) -> None:
     before = (designer.file.read_bytes(), designer.file.stat().st_mtime_ns)
-    designer.controller.open("kitchen")
+    designer.open()
     for row in designer.place.outline.rows:
         if row.path:
             designer.editing.select(row.path)
@@ -28,7 +27,7 @@ def test_opening_and_looking_at_every_form_changes_neither_file_nor_its_time(des
 
 def test_an_edit_changes_its_bytes_alone_is_undone_redone_and_saved(designer: Any) -> None:
     before = designer.file.read_text()
-    designer.controller.open("kitchen")
+    designer.open()
     designer.editing.ask(SetValue(("study", "version"), "0.7"))
     assert "Change Version" in designer.place.header.undo.accessibleName()
     changed = [line for line in designer.text.splitlines() if line not in before.splitlines()]
@@ -46,7 +45,7 @@ def test_an_edit_changes_its_bytes_alone_is_undone_redone_and_saved(designer: An
 
 def test_typing_in_one_field_is_one_step(designer: Any) -> None:
     before = designer.file.read_text()
-    designer.controller.open("kitchen")
+    designer.open()
     page = designer.editing.opened.history.selected
     for text in ("H", "He", "Hel", "Hello"):
         designer.editing.ask(SetText((*page, "title"), "en", text))
@@ -55,41 +54,18 @@ def test_typing_in_one_field_is_one_step(designer: Any) -> None:
     assert designer.text == before
 
 
-def test_an_edit_without_effect_joins_no_later_edit_to_the_step_before(designer: Any) -> None:
-    designer.controller.open("kitchen")
-    title = (*designer.editing.opened.history.selected, "title")
-    designer.editing.ask(RenameElement(("liquids", "thin"), "thinner"))
-    renamed = designer.text
-    designer.editing.select(title[:-1])
-    designer.editing.ask(SetText(title, "en", designer.editing.opened.study.document["pages"][title[1]]["title"]))
-    assert designer.text == renamed
-    designer.editing.ask(SetText(title, "en", "Hello"))
-    designer.editing.undo()
-    assert designer.text == renamed
-
-
 def test_opening_the_open_study_again_keeps_its_steps(designer: Any) -> None:
     before = designer.file.read_text()
-    designer.controller.open("kitchen")
+    designer.open()
     designer.editing.ask(SetValue(("study", "version"), "0.7"))
-    designer.controller.open(str(designer.file))
+    designer.open(str(designer.file))
     assert designer.saving.banner is None
     designer.editing.undo()
     assert designer.text == before
 
 
-@pytest.mark.parametrize("name", ["kitchen**", "/kitchen"])
-def test_a_study_whose_name_is_refused_by_check_is_saved(designer: Any, name: str) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.ask(SetValue(("study", "name"), name))
-    designer.saving.save()
-    assert designer.file.read_text() == designer.text
-    assert name in designer.text
-
-
 def test_the_text_of_the_file_follows_as_soon_as_it_is_seen(designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.select(("blocks", "delays"))
+    designer.open("kitchen", "blocks", "delays")
     designer.editing.ask(SetValue(("study", "name"), "larder"))
     editor = designer.place.file.editor
     assert "larder" not in editor.toPlainText()
@@ -102,10 +78,10 @@ def test_the_text_of_the_file_follows_as_soon_as_it_is_seen(designer: Any) -> No
 
 
 def test_what_is_being_typed_stays_in_its_study_when_another_is_opened(designer: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     designer.place.show_tab("file")
     designer.place.file.editor.insertPlainText("# mine\n")
-    designer.controller.open("rek2024")
+    designer.open("rek2024")
     assert "# mine" not in designer.text
     draft = draft_of(designer.file)
     assert draft is not None
@@ -114,7 +90,7 @@ def test_what_is_being_typed_stays_in_its_study_when_another_is_opened(designer:
 
 def test_a_draft_is_kept_on_leaving_and_found_again_until_it_is_discarded(designer: Any) -> None:
     before = designer.file.read_text()
-    designer.controller.open("kitchen")
+    designer.open()
     designer.editing.ask(SetValue(("study", "version"), "0.7"))
     designer.window.go("home")
     draft = draft_of(designer.file)
@@ -134,7 +110,7 @@ def test_a_draft_is_kept_on_leaving_and_found_again_until_it_is_discarded(design
 
 def test_a_file_changed_outside_is_taken_in_or_asked_about_and_never_overwritten(designer: Any) -> None:
     before = designer.file.read_text()
-    designer.controller.open("kitchen")
+    designer.open()
     designer.file.write_text(before + "# outside\n")
     designer.controller.enter()
     assert designer.text.endswith("# outside\n")
@@ -150,31 +126,11 @@ def test_a_file_changed_outside_is_taken_in_or_asked_about_and_never_overwritten
     assert 'version = "0.7"' in designer.text
 
 
-def test_a_version_that_was_run_is_saved_under_another_number(designer: Any) -> None:
-    designer.controller.open("kitchen")
-    version = designer.editing.opened.study.document["study"]["version"]
-    session = designer.results / "kitchen" / "data" / "sub-P001" / "ses-01"
-    session.mkdir(parents=True)
-    protocol = {"study": {"version": version}}
-    receipt = {"key_hash": "0" * 64, "protocol_hash": "of another content", "protocol": protocol, "started_at": MOMENT}
-    (session / "receipt.json").write_text(json.dumps(receipt))
-    before = designer.file.read_text()
-    designer.editing.ask(SetValue(("blocks", "liquids", "repetitions"), 3))
-    designer.saving.save()
-    assert designer.file.read_text() == before
-    assert designer.place.prompt is not None
-    designer.place.prompt.save.click()
-    assert designer.place.prompt is None
-    saved = designer.editing.opened.study.document["study"]["version"]
-    assert saved != version
-    assert designer.file.read_text() == designer.text
-
-
 @pytest.mark.variants(4)
 @pytest.mark.parametrize("name", shipped())
 def test_a_shipped_study_is_read_only_and_can_be_copied(designer: Any, name: str) -> None:
     before = shipped_file(name).read_bytes()
-    designer.controller.open(name)
+    designer.open(name)
     assert "ships with the program" in designer.place.banner_words.text()
     text = designer.text
     designer.editing.ask(SetValue(("study", "version"), "9"))
@@ -184,7 +140,7 @@ def test_a_shipped_study_is_read_only_and_can_be_copied(designer: Any, name: str
     assert shipped_file(name).read_bytes() == before
     designer.controller.begin(name, "mine")
     assert not designer.editing.opened.file.exists()
-    assert designer.editing.opened.study.faults == ()
+    assert designer.study.faults == ()
     designer.saving.save()
     assert designer.editing.opened.file.read_text() == designer.text
 
@@ -192,7 +148,7 @@ def test_a_shipped_study_is_read_only_and_can_be_copied(designer: Any, name: str
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="everybody may write here")
 def test_a_file_that_may_not_be_written_is_read_only(designer: Any) -> None:
     designer.file.chmod(0o444)
-    designer.controller.open("kitchen")
+    designer.open()
     assert "may not write" in designer.place.banner_words.text()
 
 
@@ -211,27 +167,18 @@ def test_a_new_study_that_was_never_saved_is_found_again(designer: Any) -> None:
     again.place.deleteLater()
 
 
-@pytest.mark.parametrize("name", ["", "My study", "rek2024", "kitchen"])
-def test_a_name_that_cannot_be_is_refused_in_place(designer: Any, name: str) -> None:
-    designer.controller.ask_for_new()
-    designer.place.new_page.name.setText(name)
-    designer.place.new_page.make.click()
-    assert designer.place.new_page.refusal.text()
-    assert designer.editing.opened is None
-
-
 def test_a_file_that_is_not_utf_8_is_refused_with_a_message(designer: Any) -> None:
     designer.file.write_bytes(b"format = 1\n# \xff\n")
-    designer.controller.open("kitchen")
+    designer.open()
     assert designer.messages == [("kitchen.toml cannot be opened", "line 2 is not UTF-8 text: save the file as UTF-8.")]
 
 
 @pytest.mark.parametrize("then", ["another study", "the same study", "a new study", "another place"])
 def test_why_a_file_cannot_be_opened_is_closed_by_what_is_opened_next(designer: Any, then: str) -> None:
     designer.file.with_name("odd.toml").write_bytes(b"\xff")
-    designer.controller.open("kitchen")
+    designer.open()
     designer.window.go("home")
-    designer.controller.open("odd")
+    designer.open("odd")
     designer.window.go("designer")
     notice = designer.window.notice
     assert notice.isVisible()
@@ -240,5 +187,5 @@ def test_why_a_file_cannot_be_opened_is_closed_by_what_is_opened_next(designer: 
     elif then == "another place":
         designer.window.go("home")
     else:
-        designer.controller.open("demo" if then == "another study" else "kitchen")
+        designer.open("demo" if then == "another study" else "kitchen")
     assert not notice.isVisible()

@@ -25,7 +25,7 @@ def small(designer: Any) -> Any:
 
 
 def open_drawer(qtbot: Any, designer: Any) -> None:
-    qtbot.keyClick(QApplication.focusWidget() or designer.window, KEY.Key_1, CONTROL)
+    designer.key("ctrl+1")
     QApplication.processEvents()
 
 
@@ -50,7 +50,7 @@ def test_the_drawer_opens_as_it_was_closed(qtbot: Any, small: Any) -> None:
     assert tree.verticalScrollBar().value() > 60
     qtbot.keyClick(tree, KEY.Key_Return)
     assert not outline.isVisible()
-    assert small.place.form.isAncestorOf(QApplication.focusWidget())
+    assert small.place.form.isAncestorOf(small.keyboard)
     small.editing.ask(SetText(("study", "title"), "en", "Another title"))  # the rows are made anew
     small.controller.show_outline()
     open_drawer(qtbot, small)
@@ -72,7 +72,7 @@ def test_a_click_in_the_drawer_leads_to_the_form_and_leaves_what_is_open(qtbot: 
         tree.scrollTo(index)
         qtbot.mouseClick(tree.viewport(), LEFT, pos=tree.visualRect(index).center())
         assert not outline.isVisible()
-        assert small.place.form.isAncestorOf(QApplication.focusWidget())
+        assert small.place.form.isAncestorOf(small.keyboard)
         assert expanded(small) == before
     open_drawer(qtbot, small)
     index = index_of(small, "blocks", "liquids")
@@ -80,30 +80,6 @@ def test_a_click_in_the_drawer_leads_to_the_form_and_leaves_what_is_open(qtbot: 
     qtbot.mouseClick(tree.viewport(), LEFT, pos=QPoint(20, tree.visualRect(index).center().y()))
     assert outline.isVisible(), "the sign before the title opens and closes, it does not choose"
     assert ("blocks", "liquids") not in expanded(small)
-
-
-def test_a_copy_closes_the_drawer_and_has_the_keyboard_in_its_first_text(qtbot: Any, small: Any) -> None:
-    small.editing.select(("blocks", "liquids"))
-    open_drawer(qtbot, small)
-    qtbot.keyClick(small.place.outline.tree, KEY.Key_D, CONTROL)
-    QApplication.processEvents()
-    assert small.editing.selected == ("blocks", "liquids_2")
-    assert not small.place.outline.isVisible()
-    text = QApplication.focusWidget()
-    assert small.row("blocks", "liquids_2", "title").isAncestorOf(text)
-    assert text.selectedText() == text.text() == "Baseline settings"
-    titles = {row.path: row.title for row in small.place.outline.rows}
-    assert titles["blocks", "liquids"] == "Baseline settings"
-    assert titles["blocks", "liquids_2"] == "Baseline settings (liquids_2)"
-
-
-@pytest.mark.parametrize("part", ["words", "tree"])
-def test_esc_closes_the_drawer(qtbot: Any, small: Any, part: str) -> None:
-    open_drawer(qtbot, small)
-    getattr(small.place.outline, part).setFocus()
-    qtbot.keyClick(QApplication.focusWidget(), KEY.Key_Escape)
-    assert not small.place.outline.isVisible()
-    assert small.place.parts.path.outline.hasFocus()
 
 
 def test_what_was_found_is_gone_to_by_enter_and_the_drawer_lists_all_again(qtbot: Any, small: Any) -> None:
@@ -120,7 +96,7 @@ def test_what_was_found_is_gone_to_by_enter_and_the_drawer_lists_all_again(qtbot
     found = small.editing.selected
     qtbot.keyClick(tree, KEY.Key_Return)
     assert not outline.isVisible()
-    assert small.place.form.isAncestorOf(QApplication.focusWidget())
+    assert small.place.form.isAncestorOf(small.keyboard)
     open_drawer(qtbot, small)
     assert outline.words.text() == ""
     assert small.editing.selected == found
@@ -128,39 +104,10 @@ def test_what_was_found_is_gone_to_by_enter_and_the_drawer_lists_all_again(qtbot
     assert expanded(small) - before <= above, "what was found stays in sight, and nothing else stays open"
 
 
-def test_enter_leads_from_the_outline_of_a_large_window_to_the_form(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    open_drawer(qtbot, designer)
-    qtbot.keyClick(designer.place.outline.tree, KEY.Key_Return)
-    assert designer.place.outline.isVisible()
-    assert designer.place.form.isAncestorOf(QApplication.focusWidget())
-
-
-def test_a_study_that_begins_in_a_small_window_has_the_keyboard_in_its_form(qtbot: Any, designer: Any) -> None:
-    designer.window.resize(1366, 768)
-    designer.controller.open("kitchen")
-    designer.controller.ask_for_new()
-    qtbot.keyClicks(QApplication.focusWidget(), "Cold tea")
-    qtbot.keyClick(QApplication.focusWidget(), KEY.Key_Return)
-    QApplication.processEvents()
-    assert designer.editing.opened.name == "coldtea"
-    assert designer.place.form.isAncestorOf(QApplication.focusWidget())
-
-
-def test_the_keyboard_is_in_the_form_after_a_question_in_a_small_window(qtbot: Any, designer: Any) -> None:
-    designer.window.resize(1366, 768)
-    designer.controller.open("kitchen")
-    designer.controller.ask_to_delete(("liquids", "thick"))
-    QApplication.processEvents()
-    qtbot.keyClick(QApplication.focusWidget(), KEY.Key_Escape)
-    assert designer.place.prompt is None
-    assert designer.place.form.isAncestorOf(QApplication.focusWidget())
-
-
 @pytest.fixture
 def find(qtbot: Any, designer: Any) -> Any:
     """Types words into the field that finds, which Ctrl+F leads to; returns the titles that are left."""
-    designer.controller.open("kitchen")
+    designer.open()
 
     def type_words(words: str) -> list[str]:
         qtbot.keyClick(designer.window, Qt.Key.Key_F, CONTROL)
@@ -174,7 +121,7 @@ def find(qtbot: Any, designer: Any) -> Any:
 
 
 def has_keyboard(designer: Any, *path: str | int) -> bool:
-    return bool(designer.row(*path).field.isAncestorOf(QApplication.focusWidget()))
+    return bool(designer.field(*path).isAncestorOf(designer.keyboard))
 
 
 def test_enter_goes_to_the_field_whose_label_or_choice_was_found(qtbot: Any, designer: Any, find: Any) -> None:
@@ -183,9 +130,9 @@ def test_enter_goes_to_the_field_whose_label_or_choice_was_found(qtbot: Any, des
     qtbot.keyClick(words, Qt.Key.Key_Return)
     assert designer.editing.selected == ("device",)
     assert has_keyboard(designer, "device", "force_limit_n")
-    assert QApplication.focusWidget().selectedText() == "6"
-    qtbot.keyClicks(QApplication.focusWidget(), "7")
-    assert QApplication.focusWidget().text() == "7"
+    assert designer.keyboard.selectedText() == "6"
+    qtbot.keyClicks(designer.keyboard, "7")
+    assert designer.keyboard.text() == "7"
     titles = find("williams")
     assert titles
     assert all(title.endswith(" · Order") for title in titles)
@@ -204,13 +151,6 @@ def test_a_line_says_that_nothing_was_found_and_for_which_words(designer: Any, f
         assert nothing.whole == f'Nothing called "{words}" in this study'
     assert find("force limit")
     assert not nothing.isVisible()
-
-
-def test_the_number_of_participants_is_found_by_what_it_is_a_number_of(qtbot: Any, designer: Any, find: Any) -> None:
-    assert find("planned") == ["Analysis · Participants planned"]
-    assert find("participants") == ["Analysis · Participants planned"]
-    qtbot.keyClick(designer.place.outline.words, Qt.Key.Key_Return)
-    assert QApplication.focusWidget().accessibleName() == "Add Participants planned"
 
 
 def test_down_leads_into_the_tree_and_enter_or_a_click_there_to_the_field(qtbot: Any, designer: Any, find: Any) -> None:
@@ -233,71 +173,19 @@ def test_down_leads_into_the_tree_and_enter_or_a_click_there_to_the_field(qtbot:
     assert has_keyboard(designer, "conditions", "thick", "delay_ms")
 
 
-def test_down_without_words_leads_to_the_selected_element(qtbot: Any, designer: Any, find: Any) -> None:
-    find("")
-    designer.select(("conditions", "thin"))
-    designer.place.parts.focus_find()
-    qtbot.keyClick(designer.place.outline.words, Qt.Key.Key_Down)
-    assert designer.place.outline.tree.hasFocus()
-    assert designer.editing.selected == ("conditions", "thin")
-
-
 def test_a_key_that_the_file_does_not_have_leads_to_the_button_that_adds_it(
     qtbot: Any, designer: Any, find: Any
 ) -> None:
     titles = find("break every")
     assert titles[0].endswith(" · Break every")
     qtbot.keyClick(designer.place.outline.words, Qt.Key.Key_Return)
-    assert QApplication.focusWidget().accessibleName() == "Add Break every"
-    qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Space)
-    assert "break_every" in designer.editing.opened.study.document["blocks"][designer.editing.selected[1]]
-
-
-def test_a_title_that_has_the_words_comes_without_a_field(qtbot: Any, designer: Any, find: Any) -> None:
-    assert "A first look" in find("first look")
-    qtbot.keyClick(designer.place.outline.words, Qt.Key.Key_Return)
-    assert designer.editing.selected == ("pages", "welcome")
-    assert designer.place.outline.tree.hasFocus()
-
-
-def test_a_title_that_has_the_words_comes_before_a_field(qtbot: Any, designer: Any, find: Any) -> None:
-    designer.controller.open("rek2024")
-    assert find("break")[0] == "Practice · Break every"
-    qtbot.keyClick(designer.place.outline.words, Qt.Key.Key_Return)
-    assert designer.editing.selected[0] == "pages"
-    assert designer.place.outline.tree.hasFocus()
-
-
-def test_the_words_are_cleared_when_another_study_opens(designer: Any, find: Any) -> None:
-    find("williams")
-    designer.controller.open("rek2024")
-    assert designer.place.outline.words.text() == ""
-    assert ("pages", "debrief") in [row.path for row in designer.place.outline.rows]
-
-
-@pytest.mark.parametrize("way", ["click", "Enter"])
-def test_a_found_field_in_the_drawer_leads_to_that_field(qtbot: Any, designer: Any, find: Any, way: str) -> None:
-    outline, tree = designer.place.outline, designer.place.outline.tree
-    designer.window.resize(1024, 640)
-    QApplication.processEvents()
-    find("delay")
-    at = next(one for one in outline.indexes() if one.data(ROW_ROLE).path == ("conditions", "thin"))
-    tree.scrollTo(at)
-    if way == "click":
-        qtbot.mouseClick(tree.viewport(), LEFT, pos=tree.visualRect(at).center())
-    else:
-        tree.setCurrentIndex(at)
-        qtbot.keyClick(tree, Qt.Key.Key_Return)
-    assert designer.editing.selected == ("conditions", "thin")
-    assert has_keyboard(designer, "conditions", "thin", "delay_ms")
-    assert not outline.isVisible()
-    assert outline.words.text() == ""
-    assert ("pages", "welcome") in [row.path for row in outline.rows], "it lists every element when it opens again"
+    assert designer.keyboard.accessibleName() == "Add Break every"
+    designer.key("Space")
+    assert "break_every" in designer.value("blocks")[designer.editing.selected[1]]
 
 
 def test_the_list_of_what_can_be_added_offers_fields_to_go_to(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.select(("blocks", "liquids"))
+    designer.open("kitchen", "blocks", "liquids")
     adding = designer.place.adding
     designer.place.ask_to_add()
     count = adding.list.count()
@@ -314,3 +202,12 @@ def test_the_list_of_what_can_be_added_offers_fields_to_go_to(qtbot: Any, design
     qtbot.keyClick(adding.words, Qt.Key.Key_Return)
     assert has_keyboard(designer, "device", "force_limit_n")
     assert designer.text == before
+
+
+@pytest.mark.parametrize("part", ["words", "tree"])
+def test_esc_closes_the_drawer(qtbot: Any, small: Any, part: str) -> None:
+    open_drawer(qtbot, small)
+    getattr(small.place.outline, part).setFocus()
+    small.key("Escape")
+    assert not small.place.outline.isVisible()
+    assert small.place.parts.path.outline.hasFocus()

@@ -9,85 +9,63 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QEvent, QObject, QPoint, Qt
-from PySide6.QtWidgets import (
-    QAbstractButton,
-    QAbstractItemView,
-    QApplication,
-    QComboBox,
-    QLineEdit,
-    QPlainTextEdit,
-    QWidget,
-)
+from PySide6.QtCore import QPoint, Qt
 
 from study_app.authoring.drafts import draft_of
 from study_app.gui.designer.outline.rows import ROW_ROLE
-from study_app.gui.theme.theme import DARK, LIGHT
 
 pytestmark = pytest.mark.slow
 
 KILLS = int(os.environ.get("LIQUID_STUDY_DRAFT_KILLS", "2"))
-MODIFIERS = {"Ctrl": Qt.KeyboardModifier.ControlModifier, "Alt": Qt.KeyboardModifier.AltModifier,
-             "Shift": Qt.KeyboardModifier.ShiftModifier}  # fmt: skip
-
-
-def press(qtbot: Any, designer: Any, keys: str) -> None:
-    """Press keys in the focused part, as "Ctrl+Z"."""
-    *held, key = keys.split("+")
-    modifiers = Qt.KeyboardModifier.NoModifier
-    for one in held:
-        modifiers |= MODIFIERS[one]
-    part = QApplication.focusWidget() or designer.window
-    qtbot.keyClick(part, getattr(Qt.Key, f"Key_{key}"), modifiers)
 
 
 @pytest.mark.usefixtures("editors")
 def test_a_small_study_is_edited_by_keys_alone(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     designer.window.activateWindow()
     before = designer.file.read_text()
-    press(qtbot, designer, "Ctrl+1")
+    designer.key("ctrl+1")
     assert designer.place.outline.tree.hasFocus()
-    press(qtbot, designer, "Down")
-    press(qtbot, designer, "Down")
-    press(qtbot, designer, "Up")
+    designer.key("Down")
+    designer.key("Down")
+    designer.key("Up")
     assert designer.place.view.form.path == ("blocks", "liquids")
-    press(qtbot, designer, "Alt+Down")
-    assert designer.editing.opened.study.document["sequence"][:3] == ("welcome", "reaching", "liquids")
-    press(qtbot, designer, "Alt+Up")
-    press(qtbot, designer, "F2")
+    designer.key("alt+Down")
+    assert designer.value("sequence")[:3] == ("welcome", "reaching", "liquids")
+    designer.key("alt+Up")
+    designer.key("F2")
     assert designer.place.form.head.id.hasFocus()
     qtbot.keyClicks(designer.place.form.head.id, "fluids")
-    press(qtbot, designer, "Return")
+    designer.key("Return")
     assert "[blocks.fluids]" in designer.text
     assert '"fluids"' in designer.text
-    press(qtbot, designer, "Ctrl+2")
+    designer.key("ctrl+2")
     for _ in range(60):
-        if QApplication.focusWidget() is designer.row("blocks", "fluids", "repetitions").field.line:
+        if designer.keyboard is designer.field("blocks", "fluids", "repetitions").line:
             break
-        press(qtbot, designer, "Tab")
-    line = designer.row("blocks", "fluids", "repetitions").field.line
+        designer.key("Tab")
+    line = designer.field("blocks", "fluids", "repetitions").line
     assert line.hasFocus()
     qtbot.keyClicks(line, "4")
-    press(qtbot, designer, "Return")
-    assert designer.editing.opened.study.document["blocks"]["fluids"]["repetitions"] == int(line.text())
+    designer.key("Return")
+    assert designer.value("blocks", "fluids", "repetitions") == int(line.text())
     assert f"repetitions = {line.text()}" in designer.place.file.editor.words()
-    press(qtbot, designer, "Ctrl+E")
+    designer.key("ctrl+e")
     assert designer.place.file.editor.hasFocus()
-    press(qtbot, designer, "Ctrl+Z")
-    press(qtbot, designer, "Ctrl+Z")
+    designer.key("ctrl+z")
+    designer.key("ctrl+z")
     assert "[blocks.liquids]" in designer.place.file.editor.words()
-    press(qtbot, designer, "Ctrl+Shift+Z")
-    press(qtbot, designer, "Ctrl+S")
+    designer.key("ctrl+shift+z")
+    designer.key("ctrl+s")
     assert designer.file.read_text() == designer.text != before
     while designer.editing.opened.history.done:
-        press(qtbot, designer, "Ctrl+Z")
+        designer.key("ctrl+z")
     assert designer.text == before
 
 
 @pytest.mark.usefixtures("editors")
 def test_a_small_study_is_edited_by_mouse_alone(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     before = designer.file.read_text()
     place, tree = designer.place, designer.place.outline.tree
 
@@ -97,10 +75,10 @@ def test_a_small_study_is_edited_by_mouse_alone(qtbot: Any, designer: Any) -> No
     index = next(one for one in place.outline.indexes() if one.data(ROW_ROLE).path == ("blocks", "liquids"))
     qtbot.mouseClick(tree.viewport(), Qt.MouseButton.LeftButton, pos=tree.visualRect(index).center())
     assert place.view.form.path == ("blocks", "liquids")
-    replicates = designer.row("blocks", "liquids", "replicates").field.toggle
+    replicates = designer.field("blocks", "liquids", "replicates").toggle
     qtbot.mouseClick(replicates, Qt.MouseButton.LeftButton, pos=QPoint(16, 16))
-    assert designer.editing.opened.study.document["blocks"]["liquids"]["replicates"] is True
-    click(designer.row("blocks", "liquids", "task").field.arrow)
+    assert designer.value("blocks", "liquids", "replicates") is True
+    click(designer.field("blocks", "liquids", "task").arrow)
     assert place.view.form.path == ("tasks", "explore")
     click(place.form.head.copy)
     assert place.view.form.path == ("tasks", "explore_2")
@@ -113,74 +91,43 @@ def test_a_small_study_is_edited_by_mouse_alone(qtbot: Any, designer: Any) -> No
 
 
 def test_typing_into_the_file_reaches_the_form_and_a_fault_its_field(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.select(("blocks", "liquids"))
+    designer.open("kitchen", "blocks", "liquids")
     editor = designer.place.file.editor
     line = next(at for at, text in enumerate(editor.words().split("\n")) if text.startswith("order = ")
                 and editor.shown.selected[0][0] < at)  # fmt: skip
     editor.go_to(line)
     editor.setFocus()
-    press(qtbot, designer, "End")
+    designer.key("End")
     cursor = editor.textCursor()
     cursor.movePosition(cursor.MoveOperation.StartOfBlock)
     cursor.movePosition(cursor.MoveOperation.Right, n=len('order = "'))
     editor.setTextCursor(cursor)
     qtbot.keyClicks(editor, "x")
     qtbot.waitUntil(lambda: not editor.pending)
-    row = designer.row("blocks", "liquids", "order")
+    row = designer.form_row("blocks", "liquids", "order")
     assert row.wrong.isVisible()
     assert "is not" in row.wrong.sentence.text()
-    press(qtbot, designer, "F8")
+    designer.key("F8")
     assert designer.place.problems.isVisible()
-    assert designer.place.form.isAncestorOf(QApplication.focusWidget())
-    press(qtbot, designer, "Ctrl+Z")
-    assert not designer.row("blocks", "liquids", "order").wrong.isVisible()
-
-
-def test_text_that_is_not_a_number_stays_with_its_reason(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.select(("device",))
-    before = designer.text
-    row = designer.row("device", "force_limit_n")
-    row.field.line.setFocus()
-    row.field.line.selectAll()
-    qtbot.keyClicks(row.field.line, "strong")
-    press(qtbot, designer, "Return")
-    assert designer.text == before
-    assert row.field.line.text() == "strong"
-    assert "is not a number" in row.wrong.sentence.text()
-    press(qtbot, designer, "Escape")
-    assert row.field.line.text() != "strong"
-    assert not row.wrong.isVisible()
+    assert designer.place.form.isAncestorOf(designer.keyboard)
+    designer.key("ctrl+z")
+    assert not designer.form_row("blocks", "liquids", "order").wrong.isVisible()
 
 
 def test_esc_restores_what_was_accepted_last(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.select(("device",))
-    line = designer.row("device", "force_limit_n").field.line
+    designer.open("kitchen", "device")
+    line = designer.field("device", "force_limit_n").line
     line.setFocus()
     for typed, key in (("5", "Return"), ("strong", "Return"), ("", "Escape")):
         line.selectAll()
         qtbot.keyClicks(line, typed)
-        press(qtbot, designer, key)
+        designer.key(key)
     assert line.text() == "5"
-    assert designer.editing.opened.study.document["device"]["force_limit_n"] == 5
-
-
-@pytest.mark.usefixtures("editors")
-@pytest.mark.parametrize("width", [pytest.param(1600, marks=pytest.mark.nightly), 1366])
-def test_every_form_fits_its_width(designer: Any, width: int) -> None:
-    designer.window.resize(width, 768)
-    designer.controller.open("kitchen")
-    area = designer.place.form.area
-    for row in designer.place.outline.rows:
-        designer.editing.select(row.path)
-        QApplication.processEvents()
-        assert area.widget().minimumSizeHint().width() <= area.viewport().width(), row.path
+    assert designer.value("device", "force_limit_n") == 5
 
 
 def test_a_file_that_is_not_toml_keeps_the_outline_and_says_its_fault(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     rows = len(designer.place.outline.rows)
     editor = designer.place.file.editor
     editor.setFocus()
@@ -190,75 +137,8 @@ def test_a_file_that_is_not_toml_keeps_the_outline_and_says_its_fault(qtbot: Any
     assert designer.place.header.problems.words == "1 problem"
     qtbot.wait(400)
     assert len(designer.place.outline.rows) == rows
-    press(qtbot, designer, "F8")
+    designer.key("F8")
     assert editor.hasFocus()
-
-
-def above(part: Any) -> list[Any]:
-    found = []
-    while (part := part.parent()) is not None:
-        found.append(part)
-    return found
-
-
-class Shown(QObject):
-    """Notes every window that is shown."""
-
-    def __init__(self, windows: list[str], parent: QObject) -> None:
-        super().__init__(parent)
-        self.windows = windows
-
-    def eventFilter(self, part: Any, event: QEvent) -> bool:  # noqa: N802 - Qt's name
-        window = event.type() == QEvent.Type.Show and isinstance(part, QWidget) and part.isWindow()
-        if window and part.graphicsProxyWidget() is None:  # the participant's page lies within the designer
-            self.windows.append(type(part).__name__)
-        return False
-
-
-def test_no_part_of_a_form_is_shown_as_a_window(designer: Any) -> None:
-    windows: list[str] = []
-    watch = Shown(windows, designer.window)
-    QApplication.instance().installEventFilter(watch)
-    designer.controller.open("kitchen")
-    for path in [row.path for row in designer.place.outline.rows if row.path]:
-        designer.editing.select(path)
-    designer.controller.ask_to_delete(("liquids", "thick"))
-    QApplication.instance().removeEventFilter(watch)
-    assert not windows
-
-
-@pytest.mark.usefixtures("editors")
-def test_everything_that_takes_the_keyboard_has_a_name(designer: Any) -> None:
-    kinds = (QAbstractButton, QLineEdit, QPlainTextEdit, QComboBox, QAbstractItemView)
-    designer.controller.open("kitchen")
-    nameless = []
-    for path in [row.path for row in designer.place.outline.rows if row.path]:
-        designer.editing.select(path)
-        for kind in kinds:
-            for part in designer.place.findChildren(kind):
-                inner = any(isinstance(one, QComboBox) for one in above(part))
-                words = part.accessibleName() or (part.text() if isinstance(part, QAbstractButton) else "")
-                if not words and not inner and part.focusPolicy() != Qt.FocusPolicy.NoFocus:
-                    nameless.append((path, part))
-    assert not nameless
-
-
-@pytest.mark.variants(3)
-@pytest.mark.parametrize("size", [(1600, 1000), (1366, 768), (1024, 640)])
-@pytest.mark.parametrize("theme", [LIGHT, DARK])
-def test_the_place_fits_its_window(designer: Any, size: tuple[int, int], theme: Any) -> None:
-    designer.window.show_theme(theme)
-    designer.window.resize(*size)
-    designer.controller.open("kitchen")
-    QApplication.processEvents()
-    assert (designer.window.width(), designer.window.height()) == size
-    assert designer.place.form.isVisible()
-    assert designer.place.pane.isVisible() == (size[0] > 1200)
-    designer.place.sides.buttons[1].click()
-    assert designer.place.pane.isVisible()
-    QApplication.processEvents()
-    wide = designer.place.parts.width()
-    assert designer.place.pane.width() > (0.4 if designer.place.form.isVisible() else 0.95) * wide
 
 
 SCRIPT = """

@@ -4,12 +4,10 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit
+from PySide6.QtWidgets import QFileDialog, QLineEdit
 
 from study_app.app.designer.controller import DesignerController
 from study_app.authoring.templates import templates
-from study_app.gui.designer.repair_button import NameRefusal
-from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.protocol.source.files import shipped
 from study_app.viewmodels.designer.requests import SetValue
 from study_app.workspace import workspace
@@ -58,7 +56,7 @@ def test_a_study_begins_with_the_answers_and_nothing_is_on_disk(qtbot: Any, desi
     chosen["en"].click()
     assert not first_texts.isVisible()
     qtbot.keyClick(standards, Qt.Key.Key_Return)
-    document = designer.editing.opened.study.document
+    document = designer.study.document
     assert document["study"]["name"] == "thicker"
     assert document["study"]["title"] == {"en": "Which liquid is thicker?"}
     assert document["study"]["languages"] == ("en", "nl")
@@ -103,21 +101,6 @@ def test_a_short_name_that_is_refused_can_be_replaced_by_one_that_is_free(
     assert designer.editing.opened.file.stem == free
 
 
-@pytest.mark.parametrize("size", [(1600, 1000), (1366, 768), (1024, 640)])
-@pytest.mark.parametrize("theme", [LIGHT, DARK])
-def test_the_page_fits_its_window(qtbot: Any, designer: Any, size: tuple[int, int], theme: Any) -> None:
-    designer.window.show_theme(theme)
-    designer.window.resize(*size)
-    designer.controller.ask_for_new()
-    page = designer.place.new_page
-    for one in page.buttons:
-        one.setChecked(True)
-        qtbot.wait(1)
-        inner = page.card.area.widget()
-        assert inner.minimumSizeHint().width() <= page.card.area.viewport().width(), one.choice.source
-    assert (designer.window.width(), designer.window.height()) == size
-
-
 def test_a_study_begins_as_a_copy_of_a_file(designer: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     designer.controller.ask_for_new()
     page = designer.place.new_page
@@ -135,7 +118,7 @@ def test_a_study_begins_as_a_copy_of_a_file(designer: Any, monkeypatch: pytest.M
     assert chosen.choice.note == "kitchen.toml"
     page.name.setText("mine")
     page.make.click()
-    document = designer.editing.opened.study.document
+    document = designer.study.document
     assert (document["study"]["name"], document["study"]["version"]) == ("mine", "0.1")
     assert designer.text.count("#") == designer.file.read_text().count("#")
 
@@ -159,7 +142,7 @@ def test_a_copy_has_a_short_name_that_is_free_where_none_is_typed(qtbot: Any, de
         designer.controller.ask_for_new("kitchen")
         page = designer.place.new_page
         assert page.name.placeholderText() == name
-        qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Return)
+        designer.key("Return")
         assert designer.editing.opened.name == name
         if name == "kitchencopy":
             designer.saving.save()
@@ -182,8 +165,8 @@ def test_tab_goes_to_the_chosen_card_and_arrows_to_others_which_are_scrolled_to(
     assert demo.visibleRegion().boundingRect() == demo.rect()
     seen = {demo}
     for _ in range(3):
-        qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Up)
-        focused = QApplication.focusWidget()
+        designer.key("Up")
+        focused = designer.keyboard
         assert focused.isChecked()
         assert focused.visibleRegion().boundingRect() == focused.rect()
         seen.add(focused)
@@ -198,10 +181,10 @@ def test_tab_goes_through_the_questions_to_the_button_that_makes_the_study(qtbot
         expected = [questions.title, questions.name, *questions.languages.values(), *questions.own.values(), page.make]
         assert questions.title.hasFocus()
         for part in expected:
-            assert QApplication.focusWidget() is part
+            assert designer.keyboard is part
             qtbot.keyClick(part, Qt.Key.Key_Tab)
-        qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Backtab)
-        assert QApplication.focusWidget() is page.make
+        designer.key("Backtab")
+        assert designer.keyboard is page.make
 
 
 @pytest.mark.parametrize("width", [1600, 1024])
@@ -216,7 +199,7 @@ def test_arrows_skip_no_card_and_no_row(qtbot: Any, designer: Any, width: int) -
         one.setChecked(True)
         one.setFocus()
         qtbot.keyClick(one, key)
-        there = QApplication.focusWidget()
+        there = designer.keyboard
         assert there.isChecked()
         return there
 
@@ -228,31 +211,8 @@ def test_arrows_skip_no_card_and_no_row(qtbot: Any, designer: Any, width: int) -
             assert rows.index(press(key, one).y()) == min(max(row + by, 0), len(rows) - 1)
 
 
-def test_the_keyboard_stays_in_the_questions_where_a_card_is_clicked(qtbot: Any, designer: Any) -> None:
-    designer.controller.ask_for_new()
-    page = designer.place.new_page
-    for field in (page.card.questions.title, page.name):
-        field.setFocus()
-        field.setText("oiling")
-        field.setCursorPosition(3)
-        for source in ("template:rate-realism", "template:rate-realism", "template:empty"):
-            qtbot.mouseClick(button(page, source), Qt.MouseButton.LeftButton)
-            assert button(page, source).isChecked()
-            assert field.hasFocus()
-        assert (field.cursorPosition(), field.selectedText()) == (3, "")
-
-
-def test_the_header_names_a_study_that_was_saved_for_the_first_time(designer: Any) -> None:
-    designer.controller.begin("template:compare-liquids", "mine")
-    assert designer.place.header.study.currentText() == "Feeling liquids  ·  mine.toml"
-    designer.place.save_asked.emit()
-    assert designer.editing.opened.file.exists()
-    assert designer.place.header.study.currentText() == "Feeling liquids  ·  mine.toml"
-
-
 def test_a_draft_can_be_continued_where_no_study_is_open(designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.select(("device",))
+    designer.open("kitchen", "device")
     designer.editing.ask(SetValue(("device", "force_limit_n"), 3.0))
     designer.saving.leave()
     text = designer.text
@@ -277,11 +237,4 @@ def test_enter_begins_a_study_at_a_language_too(qtbot: Any, designer: Any) -> No
     qtbot.keyClick(dutch, Qt.Key.Key_Space)
     qtbot.keyClick(dutch, Qt.Key.Key_Return)
     assert begun == ["twodrinks"]
-    assert designer.editing.opened.study.document["study"]["languages"] == ("en", "nl")
-
-
-def test_the_button_of_a_long_free_name_says_what_it_does(qtbot: Any) -> None:
-    refusal = NameRefusal("Save as")
-    qtbot.addWidget(refusal)
-    refusal.show_refusal("It is taken", free="a" * 30)
-    assert (refusal.use.text(), refusal.use.accessibleName()) == ("Save it", f"Save as {'a' * 30}")
+    assert designer.value("study", "languages") == ("en", "nl")

@@ -8,7 +8,7 @@ from PySide6.QtGui import QGuiApplication, QMouseEvent
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.designer.outline.rows import ROW_ROLE
-from study_app.viewmodels.designer.requests import AddElement, MoveTo, RemoveKey, SetText, SetValue
+from study_app.viewmodels.designer.requests import MoveTo, RemoveKey, SetValue
 
 pytestmark = pytest.mark.slow
 
@@ -44,11 +44,11 @@ def event_move(view: Any, at: QPoint) -> None:
 
 
 def sequence(designer: Any) -> tuple[str, ...]:
-    return tuple(designer.editing.opened.study.document["sequence"])
+    return tuple(designer.value("sequence"))
 
 
 def test_a_row_is_dragged_to_where_the_line_is_and_esc_cancels(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     before, text = sequence(designer), designer.text
     tree = designer.place.outline.tree
     first, third = (
@@ -68,19 +68,17 @@ def test_a_row_is_dragged_to_where_the_line_is_and_esc_cancels(qtbot: Any, desig
 
 def _thing(designer: Any, at: int) -> tuple[str, str]:
     name = sequence(designer)[at]
-    return next(
-        (section, name) for section in ("pages", "blocks") if name in designer.editing.opened.study.document[section]
-    )
+    return next((section, name) for section in ("pages", "blocks") if name in designer.value(section))
 
 
 def test_several_selected_elements_move_are_copied_and_deleted_together(qtbot: Any, designer: Any) -> None:
     designer.controller.begin("rek2024", "mine")
-    document, text = designer.editing.opened.study.document, designer.text
+    document, text = designer.study.document, designer.text
     items = [item["id"] for item in document["questionnaires"]["liquid"]["items"]]
     path = ("questionnaires", "liquid", "items")
 
     def ids() -> list[str]:
-        return [item["id"] for item in designer.editing.opened.study.document["questionnaires"]["liquid"]["items"]]
+        return [item["id"] for item in designer.value("questionnaires", "liquid", "items")]
 
     designer.editing.select((*path, 0))
     designer.controller.show_outline()
@@ -105,26 +103,14 @@ def test_several_selected_elements_move_are_copied_and_deleted_together(qtbot: A
     assert "2 elements" in prompt.accessibleName()
     prompt.all.click()
     assert tree.hasFocus()
-    assert not {"honey", "syrup"} & set(designer.editing.opened.study.document["liquids"])
-    designer.editing.undo()
-    assert designer.text == text
-
-
-def test_a_new_page_comes_right_after_the_selected_step(designer: Any) -> None:
-    designer.controller.open("kitchen")
-    before, text = sequence(designer), designer.text
-    designer.editing.select(("pages", "welcome"))
-    designer.editing.ask(AddElement(("pages",)))
-    assert sequence(designer) == (before[0], "page", *before[1:])
-    assert designer.editing.opened.study.faults == ()
-    assert designer.place.form.isAncestorOf(QApplication.focusWidget())
+    assert not {"honey", "syrup"} & set(designer.value("liquids"))
     designer.editing.undo()
     assert designer.text == text
 
 
 def test_parts_are_numbered_again_where_a_move_would_break_them(designer: Any) -> None:
     designer.controller.begin("rek2024", "mine")
-    study = designer.editing.opened.study
+    study = designer.study
     parts = [
         study.document["blocks"][name].get("part") for name in sequence(designer) if name in study.document["blocks"]
     ]
@@ -133,7 +119,7 @@ def test_parts_are_numbered_again_where_a_move_would_break_them(designer: Any) -
         at for at, name in enumerate(sequence(designer)) if study.document["blocks"].get(name, {}).get("part") == 2
     )
     designer.editing.ask(MoveTo((("sequence", last),), 0))
-    after = designer.editing.opened.study
+    after = designer.study
     assert after.document["blocks"][study.document["sequence"][last]]["part"] == 1
     assert not [fault for fault in after.faults if fault.path[-1] == "part"]
 
@@ -143,34 +129,34 @@ def test_entries_of_a_list_are_dragged_or_moved_by_keys(qtbot: Any, designer: An
     path = ("blocks", "liquids", "conditions")
 
     def listed() -> tuple[str, ...]:
-        return designer.editing.opened.study.document["blocks"]["liquids"]["conditions"]
+        return designer.value("blocks", "liquids", "conditions")
 
-    designer.select(path[:2])
+    designer.go_to(*path[:2])
     first, second, third = listed()
-    row = designer.row(*path).field.rows[0]
+    row = designer.field(*path).rows[0]
     qtbot.mousePress(row, LEFT, pos=QPoint(10, 16))
     event_move(row, QPoint(10, 40))
     event_move(row, QPoint(10, 70))
     qtbot.mouseRelease(row, LEFT, pos=QPoint(10, 70))
     assert listed() == (second, first, third)
     QApplication.processEvents()
-    row = designer.row(*path).field.rows[1]
+    row = designer.field(*path).rows[1]
     row.setFocus()
     qtbot.keyClick(row, Qt.Key.Key_Down, Qt.KeyboardModifier.AltModifier)
     assert listed() == (second, third, first)
-    row = designer.row(*path).field.rows[0]
+    row = designer.field(*path).rows[0]
     row.setFocus()
     qtbot.keyClick(row, Qt.Key.Key_C, CONTROL)
     assert f"[conditions.{second}]" in QGuiApplication.clipboard().text()
     row.setFocus()
     qtbot.keyClick(row, Qt.Key.Key_V, CONTROL)
-    assert f"{second}_2" in designer.editing.opened.study.document["conditions"]
+    assert f"{second}_2" in designer.value("conditions")
     designer.editing.undo()
     assert designer.editing.selected == path[:2]
 
 
 def test_rows_say_what_and_where_they_are_and_contain_the_problems_below_them(designer: Any) -> None:
-    designer.controller.open("rek2024")
+    designer.open("rek2024")
     rows = designer.place.outline.rows
     count = len(sequence(designer))
     block = next(row for row in rows if row.path == ("blocks", "liquids"))
@@ -190,7 +176,7 @@ def test_what_changes_by_itself_is_said_once(designer: Any, monkeypatch: Any) ->
     said: list[str] = []
     monkeypatch.setattr("study_app.gui.designer.designer_header.say", lambda _widget, words: said.append(words))
     monkeypatch.setattr("study_app.gui.designer.view.say", lambda _widget, words: said.append(words))
-    designer.controller.open("kitchen")
+    designer.open()
     assert said == []
     designer.editing.ask(MoveTo((("sequence", 1),), 3))
     assert said[-1].endswith("now 3 of 5")
@@ -203,36 +189,8 @@ def test_what_changes_by_itself_is_said_once(designer: Any, monkeypatch: Any) ->
     assert len([words for words in said if words.startswith("Draft kept")]) == 1
 
 
-def test_a_drawer_holds_the_outline_in_a_small_window(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.window.resize(1024, 640)
-    QApplication.processEvents()
-    outline, parts = designer.place.outline, designer.place.parts
-    assert not outline.isVisible()
-    qtbot.keyClick(designer.window, Qt.Key.Key_1, CONTROL)
-    assert outline.isVisible()
-    assert outline.tree.hasFocus()
-    qtbot.keyClick(outline.tree, Qt.Key.Key_Down)
-    selected = designer.editing.selected
-    qtbot.keyClick(outline.tree, Qt.Key.Key_Return)
-    assert not outline.isVisible()
-    assert designer.place.form.isAncestorOf(QApplication.focusWidget())
-    assert parts.path.steps[-1].whole == designer.place.view.form.title
-    long = SetText((*designer.place.view.form.path, "title"), "en", "A very long title of a page " * 6)
-    designer.editing.ask(long)
-    QApplication.processEvents()
-    assert designer.window.width() == 1024
-    assert parts.path.steps[-1].text().endswith("…")
-    qtbot.mouseClick(parts.path.steps[0], LEFT)
-    assert designer.editing.selected == selected[:1]
-    designer.window.resize(1600, 1000)
-    QApplication.processEvents()
-    assert outline.isVisible()
-    assert not parts.path.isVisible()
-
-
 def test_what_keys_do_in_the_outline_its_menu_does_too(designer: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     before = sequence(designer)
     designer.editing.select(("pages", "welcome"))
     outline = designer.place.outline
@@ -247,8 +205,8 @@ def test_what_keys_do_in_the_outline_its_menu_does_too(designer: Any) -> None:
     designer.editing.select(("liquids", "thick"))
     choose("Copy")
     choose("Paste")
-    assert "thick_2" in designer.editing.opened.study.document["liquids"]
+    assert "thick_2" in designer.value("liquids")
     choose("Delete")
-    assert "thick_2" not in designer.editing.opened.study.document["liquids"]
+    assert "thick_2" not in designer.value("liquids")
     choose("Rename")
     assert designer.place.form.head.id.hasFocus()

@@ -7,10 +7,8 @@ from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QEnterEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.authoring.measures.participant_texts import texts_by_language
 from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.edits import Set
-from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.requests import ChangeLanguage, SetValue
 
 pytestmark = pytest.mark.slow
@@ -28,7 +26,7 @@ def test_the_list_keeps_its_height_and_stays_while_the_pointer_is_over_it(design
     text = designer.file.read_text()
     broken = text.replace("force_limit_n = 6", "force_limit_n = 60").replace('liquid = "thick"', 'liquid = "thik"', 1)
     designer.file.write_text(broken.replace("[blocks.liquids]\n", "[blocks.liquids]\nnonsense = 1\n"))
-    designer.controller.open("kitchen")
+    designer.open()
     designer.place.header.problems.click()
     problems, count = designer.place.problems, len(designer.place.view.problems)
     assert count >= 2
@@ -51,7 +49,7 @@ def test_no_line_moves_while_the_pointer_is_over_the_list(qtbot: Any, designer: 
     text = designer.file.read_text()
     broken = text.replace("force_limit_n = 6", "force_limit_n = 60").replace('liquid = "thick"', 'liquid = "thik"', 1)
     designer.file.write_text(broken)
-    designer.controller.open("kitchen")
+    designer.open()
     designer.place.header.problems.click()
     problems = designer.place.problems
     enter(problems)
@@ -71,8 +69,8 @@ def test_no_line_moves_while_the_pointer_is_over_the_list(qtbot: Any, designer: 
 
 
 def test_a_problem_keeps_its_line_mark_and_repair_while_its_number_changes(qtbot: Any, designer: Any) -> None:
-    designer.file.write_text(designer.file.read_text().replace("force_limit_n = 6", "force_limit_n = 60"))
-    designer.controller.open("kitchen")
+    designer.change(("force_limit_n = 6", "force_limit_n = 60"))
+    designer.open()
     designer.place.header.problems.click()
     problems = designer.place.problems
     (line,) = problems.lines
@@ -90,10 +88,10 @@ def test_a_problem_keeps_its_line_mark_and_repair_while_its_number_changes(qtbot
 
 
 def test_the_chip_of_warnings_opens_a_list_of_them(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     designer.editing.make("Alike", Set(("liquids", "thick", "density_kg_m3"), 1001))
     qtbot.waitUntil(lambda: "warning" in designer.place.header.problems.words)
-    warned = facts(designer.editing.opened.study).warnings
+    warned = facts(designer.study).warnings
     assert designer.place.view.problems == ()
     designer.place.header.problems.click()
     problems = designer.place.problems
@@ -108,44 +106,10 @@ def test_the_chip_of_warnings_opens_a_list_of_them(qtbot: Any, designer: Any) ->
     qtbot.waitUntil(lambda: not problems.isVisible())
 
 
-def test_the_list_is_not_made_anew_while_the_pointer_leaves_it(qtbot: Any, designer: Any) -> None:
-    """Qt says that the pointer leaves when what is under it is replaced: to replace it then would never end."""
-    text = designer.file.read_text()
-    designer.file.write_text(text.replace("force_limit_n = 6", "force_limit_n = 60"))
-    designer.controller.open("kitchen")
-    designer.place.header.problems.click()
-    problems = designer.place.problems
-    qtbot.waitUntil(lambda: bool(problems.lines[0].repairs))
-    offered = [button.text() for button in problems.lines[0].repairs]
-    for here_only in (True, False):
-        problems.limit.chosen.emit(here_only)
-    assert [button.text() for line in problems.lines for button in line.repairs] == offered
-    enter(problems)
-    designer.editing.type_text("Correct the file", text)
-    before = problems.area.widget()
-    leave(problems)
-    assert problems.area.widget() is before
-
-
-def test_a_text_that_is_missing_hides_no_force_and_is_counted_the_same_everywhere(designer: Any) -> None:
-    text = shipped_file("rek2024").read_text().replace('name = "rek2024"', 'name = "kitchen"')
-    designer.file.write_text(text.replace('title = { en = "Welcome", nl = "Welkom" }', 'title = { en = "Welcome" }'))
-    designer.controller.open("kitchen")
-    designer.editing.select(("blocks", "liquids"))
-    lines = designer.row("blocks", "liquids", "conditions").row.facts
-    assert all(line.force.endswith(" N") for line in lines)
-    designer.editing.select(("study",))
-    languages = designer.row("study", "languages").field.row.entries
-    texts = texts_by_language(designer.editing.opened.study)["en"][1]
-    assert [entry.note for entry in languages] == [f"{texts} of {texts} texts", f"{texts - 1} of {texts} texts"]
-    assert facts(designer.editing.opened.study).missing == {"nl": 1}
-    assert [problem.message for problem in designer.place.view.problems] == ["Is missing in Dutch"]
-
-
 def test_every_text_of_a_second_language_is_copied_from_the_list_or_a_field_in_one_step(
     qtbot: Any, designer: Any
 ) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     designer.editing.ask(ChangeLanguage("add", "nl"))
     before, count = designer.text, len(designer.place.view.problems)
     designer.place.header.problems.click()
@@ -155,50 +119,15 @@ def test_every_text_of_a_second_language_is_copied_from_the_list_or_a_field_in_o
     assert [button.text() for button in line.repairs] == ["Copy English to Dutch", words]
     qtbot.mouseClick(line.repairs[1], Qt.MouseButton.LeftButton)
     assert designer.place.view.problems == ()
-    assert designer.editing.opened.study.faults == ()
+    assert designer.study.faults == ()
     designer.editing.undo()
     assert designer.text == before
     designer.editing.select(("pages", "welcome"))
-    title = designer.row("pages", "welcome", "title")
+    title = designer.form_row("pages", "welcome", "title")
     qtbot.waitUntil(lambda: any(button.text() == words for button in title.repairs), timeout=20_000)
     next(button for button in title.repairs if button.text() == words).click()
-    assert designer.editing.opened.study.faults == ()
-    assert "not translated yet" in designer.row("pages", "welcome", "title").field.copied.text()
-
-
-def test_closing_the_list_returns_the_keyboard_to_where_it_was(qtbot: Any, designer: Any) -> None:
-    designer.file.write_text(designer.file.read_text().replace("max_s = 30", "max_s = 3"))
-    designer.controller.open("kitchen")
-    designer.select(("tasks", "explore"))
-    field = designer.row("tasks", "explore", "min_s").field.line
-    field.setFocus()
-    designer.place.areas.focus_problems()
-    qtbot.mouseClick(designer.place.problems.close_button, Qt.MouseButton.LeftButton)
-    assert field.hasFocus()
-
-
-def test_the_list_begins_anew_with_another_study(qtbot: Any, designer: Any) -> None:
-    text = designer.file.read_text().replace("force_limit_n = 6", "force_limit_n = 60")
-    other = designer.file.with_name("garden.toml")
-    other.write_text(text.replace('name = "kitchen"', 'name = "garden"').replace("max_s = 30", "max_s = 3"))
-    designer.file.write_text(text.replace('liquid = "thick"', 'liquid = "thik"', 1))
-    designer.controller.open("kitchen")
-    designer.place.header.problems.click()
-    problems = designer.place.problems
-    enter(problems)
-    problems.lines[1].go.click()
-    problems.lines[0].go.click()
-    designer.controller.open(str(other))
-    assert [line.row for line in problems.lines] == list(designer.place.view.problems)
-    assert len(problems.lines) > 1
-    assert all(line.isEnabled() for line in problems.lines)
-    assert not any(line.here for line in problems.lines)
-    problems.next.click()
-    assert problems.at == problems.rows[0]
-    leave(problems)
-    assert problems.isVisible()
-    designer.controller.open("demo")
-    assert not problems.isVisible()
+    assert designer.study.faults == ()
+    assert "not translated yet" in designer.field("pages", "welcome", "title").copied.text()
 
 
 @pytest.mark.parametrize("width", [1600, 1100])
@@ -207,7 +136,7 @@ def test_a_file_that_was_never_readable_is_opened_at_the_line_of_its_fault(desig
     line = text[: text.index("[study]")].count("\n")
     designer.file.write_text(text.replace("[study]", "[study"))
     designer.window.resize(width, 900)
-    designer.controller.open("kitchen")
+    designer.open()
     place, editor = designer.place, designer.place.file.editor
     assert (place.pane.tab, place.pane.isVisible(), editor.hasFocus()) == ("file", True, True)
     assert editor.textCursor().blockNumber() == line
@@ -222,10 +151,3 @@ def test_a_file_that_was_never_readable_is_opened_at_the_line_of_its_fault(desig
     assert place.form.rows
     assert len(place.outline.rows) > 10
     assert place.outline.add.isEnabled()
-
-
-def test_a_file_whose_fault_has_no_line_is_shown_too(designer: Any) -> None:
-    designer.file.write_text(f"a = {'[' * 5000}")
-    designer.controller.open("kitchen")
-    assert (designer.place.pane.tab, designer.place.problems.isVisible()) == ("file", True)
-    assert designer.place.form.own.text().startswith("Is nested too deeply")

@@ -10,7 +10,8 @@ import pytest
 
 from study_app.authoring.edited_study import Study, read
 from tests.app.designer.support.made_studies import STUDIES
-from tests.app.designer.support.program import USERS, environment
+from tests.app.designer.support.program import environment
+from tests.app.designer.support.users import USERS
 from tests.compiled import needs_servo
 from tests.end_to_end.real_windows import needs_display, virtual_display
 

@@ -12,7 +12,6 @@ from study_app.authoring.versions.contents import content_hash, kept_content
 from study_app.errors import StoreError
 from study_app.protocol.source.files import protocol_hash
 from study_app.store.sessions.folder_lock import open_alone
-from study_app.viewmodels.designer.play import under_way
 from study_app.viewmodels.designer.requests import ChangeLanguage, SetText, SetValue
 
 pytestmark = pytest.mark.slow
@@ -24,7 +23,7 @@ TITLE = ("pages", "welcome", "title")
 @pytest.fixture
 def drafted(designer: Any) -> Any:
     """The designer with an edited study whose draft is written."""
-    designer.controller.open("kitchen")
+    designer.open()
     designer.editing.ask(SetValue(VERSION, "0.7"))
     designer.saving.write_draft(at_once=True)
     assert draft_of(designer.file) is not None
@@ -116,7 +115,7 @@ def test_a_file_that_cannot_be_read_is_said_at_once_until_it_can_be(
     def unreadable(_opened: object) -> bool:
         raise StoreError("kitchen.toml cannot be read: Input/output error")
 
-    designer.controller.open("kitchen")
+    designer.open()
     for _ in range(2):
         with monkeypatch.context() as broken:
             broken.setattr("study_app.app.designer.open_study.OpenStudy.changed_outside", unreadable)
@@ -128,29 +127,9 @@ def test_a_file_that_cannot_be_read_is_said_at_once_until_it_can_be(
     assert said == ["Kitchen.toml cannot be read: Input/output error"] * 2
 
 
-def test_letters_typed_after_the_files_content_was_taken_are_a_step_of_their_own(drafted: Any) -> None:
-    drafted.editing.ask(SetText(TITLE, "en", "H"))
-    drafted.file.write_text(drafted.file.read_text() + "# outside\n")
-    drafted.saving.look_again()
-    drafted.saving.answer_banner("take")
-    taken = drafted.text
-    drafted.editing.ask(SetText(TITLE, "en", "He"))
-    drafted.editing.undo()
-    assert drafted.text == taken
-
-
-def test_letters_typed_after_saving_a_version_are_a_step_of_their_own(drafted: Any) -> None:
-    drafted.editing.ask(SetText(TITLE, "en", "H"))
-    drafted.editing.opened.set_version("0.8")
-    numbered = drafted.text
-    drafted.editing.ask(SetText(TITLE, "en", "He"))
-    drafted.editing.undo()
-    assert drafted.text == numbered
-
-
 def test_saving_says_that_the_study_cannot_be_run_until_it_is_edited(drafted: Any, said: list[str]) -> None:
     drafted.editing.ask(ChangeLanguage("add", "nl"))
-    count = len(drafted.editing.opened.study.faults)
+    count = len(drafted.study.faults)
     assert count > 10
     drafted.saving.save()
     words = f"Saved. It cannot be run yet: {count} problems"
@@ -171,10 +150,10 @@ def test_saving_says_that_the_study_cannot_be_run_until_it_is_edited(drafted: An
 def test_the_line_about_a_draft_ends_by_undo_by_saving_and_by_closing_it(designer: Any, qtbot: Any) -> None:
     banner, text = designer.place.banner, designer.file.read_text()
     for end in ("undo", "save", "button", "escape"):
-        designer.controller.open("demo")
+        designer.open("demo")
         assert not banner.close_button.isVisible(), "a read-only study stays one"
         keep(designer.file, Draft(f"{text}# {end}\n", content_hash(designer.file.read_bytes())))
-        designer.controller.open("kitchen")
+        designer.open()
         assert designer.place.banner_words.text().startswith("Draft of today")
         designer.editing.ask(SetText(TITLE, "en", end))
         assert banner.isVisible()
@@ -198,9 +177,8 @@ def test_the_line_about_a_draft_ends_by_undo_by_saving_and_by_closing_it(designe
 @pytest.mark.parametrize("button", ["close", "discard"])
 def test_a_line_that_is_answered_by_a_key_gives_the_keyboard_back(designer: Any, qtbot: Any, button: str) -> None:
     keep(designer.file, Draft(f"{designer.file.read_text()}# more\n", content_hash(designer.file.read_bytes())))
-    designer.controller.open("kitchen")
-    designer.select(TITLE[:2])
-    banner, field = designer.place.banner, next(iter(designer.row(*TITLE).field.lines.values()))
+    designer.open("kitchen", *TITLE[:2])
+    banner, field = designer.place.banner, next(iter(designer.field(*TITLE).lines.values()))
     field.setFocus()
     pressed = banner.close_button if button == "close" else banner.buttons[0]
     pressed.setFocus(Qt.FocusReason.TabFocusReason)
@@ -209,32 +187,12 @@ def test_a_line_that_is_answered_by_a_key_gives_the_keyboard_back(designer: Any,
     assert field.hasFocus()
 
 
-def test_a_read_only_study_shows_one_line_at_a_time_above_the_parts(designer: Any) -> None:
-    place = designer.place
-    designer.controller.open("demo")
-    assert place.banner.isVisible()
-    place.header.strip.show_state(under_way("Welcome", "Scripted hand"))
-    assert not place.banner.isVisible()
-    place.header.strip.show_state(None)
-    assert place.banner.isVisible()
-
-
-def test_a_line_about_a_pilot_hides_no_question_about_the_file(drafted: Any) -> None:
-    place = drafted.place
-    place.header.strip.show_state(under_way("Welcome", "Scripted hand"))
-    drafted.file.write_text(drafted.file.read_text() + "# outside\n")
-    drafted.saving.save()
-    assert place.header.strip.isVisible()
-    assert place.banner.isVisible()
-    assert place.banner_words.text().startswith("Another program changed this file")
-
-
 @pytest.fixture
 def never_saved(designer: Any) -> Any:
     """The designer with a study that was never saved, opened by its draft."""
     designer.controller.begin("template:compare-liquids", "mine")
-    designer.controller.open("kitchen")
-    designer.controller.open(str(designer.file.with_name("mine.toml")))
+    designer.open()
+    designer.open(str(designer.file.with_name("mine.toml")))
     return designer
 
 
@@ -256,19 +214,10 @@ def test_a_study_that_was_never_saved_is_discarded_once_that_is_confirmed(never_
     assert file.name not in [one.file for one in place.header.state.studies]
     never_saved.saving.write_draft(at_once=True)
     assert draft_of(file) is None
-    never_saved.controller.open("kitchen")
+    never_saved.open()
     assert place.parts.isVisible()
     never_saved.controller.begin("template:compare-liquids", "mine")
     assert never_saved.editing.opened.history.done == ()
-
-
-def test_a_study_that_was_never_saved_can_be_discarded_each_time_it_is_opened(designer: Any) -> None:
-    designer.controller.begin("template:compare-liquids", "mine")
-    assert not designer.place.banner.isVisible(), "it was begun just now"
-    designer.window.go("home")
-    designer.controller.open(str(designer.file.with_name("mine.toml")))
-    designer.window.go("designer")
-    assert [one.text() for one in designer.place.banner.buttons] == ["Discard the draft"]
 
 
 def test_a_study_stays_open_where_its_draft_cannot_be_deleted(never_saved: Any, stuck: pytest.MonkeyPatch) -> None:

@@ -27,10 +27,10 @@ from study_app.gui.designer.problems import ProblemsCard
 from study_app.gui.designer.versions.change_list import ChangeLine
 from study_app.gui.widgets.controls import ActionButton
 from study_app.protocol.source.files import shipped_file
-from tests.app.designer.support.key_user import KeyUser
+from tests.app.designer.support.inputs import name_of, wait_until
 from tests.app.designer.support.made_studies import begin, participant, save
-from tests.app.designer.support.program import USERS, environment, use
-from tests.app.designer.support.users import User, name_of, wait_until
+from tests.app.designer.support.program import environment, use
+from tests.app.designer.support.users import USERS, KeyUser, User
 from tests.end_to_end.real_windows import virtual_display
 
 FAULTS = (

@@ -7,8 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QLabel
 
 from study_app.app.designer.edit_steps import Steps
-from study_app.authoring.changes.short_texts import short_of
-from study_app.authoring.edited_study import Study, read
+from study_app.authoring.edited_study import read
 from study_app.authoring.undo_stack import History
 from study_app.authoring.writer.edits import Set
 from study_app.protocol.source.document import value_at
@@ -19,12 +18,10 @@ from study_app.viewmodels.designer.requests import (
     AddElement,
     AddKey,
     ChangeLanguage,
-    DeleteElement,
     DuplicateElement,
     MoveElement,
     RenameElement,
     SetText,
-    SetValue,
     SwitchKind,
 )
 from tests.authoring.grown import PROTOCOLS
@@ -64,7 +61,7 @@ def test_elements_are_added_copied_moved_renamed_and_deleted(designer: Any) -> N
 def test_deleting_the_only_task_asks_what_becomes_of_the_blocks_that_leave_its_name_out(designer: Any) -> None:
     study = shipped_file("delayjnd").read_text().replace('name = "delayjnd"', 'name = "kitchen"')
     designer.file.write_text(study)
-    designer.controller.open("kitchen")
+    designer.open()
     designer.controller.ask_to_delete(("tasks", "reach"))
     words = [one.text() for one in designer.place.prompt.findChildren(QLabel)]
     assert "Block Delay: Task (the only one)" in words
@@ -75,13 +72,12 @@ def test_deleting_the_only_task_asks_what_becomes_of_the_blocks_that_leave_its_n
 
 @pytest.mark.parametrize("path", [("questionnaires", "liquid", "items", 0), ("pages", "thanks"), ("pages", "welcome")])
 def test_a_copy_comes_right_after_its_original(designer: Any, path: tuple[str | int, ...]) -> None:
-    text = designer.file.read_text()
-    designer.file.write_text(text.replace('\nintro = "', '\nintro.en = "'))
-    designer.controller.open("kitchen")
-    at = position_of(designer.editing.opened.study.document, path)
+    designer.change(('\nintro = "', '\nintro.en = "'))
+    designer.open()
+    at = position_of(designer.study.document, path)
     designer.editing.select(path)
     designer.place.form.head.copy.click()
-    study = designer.editing.opened.study
+    study = designer.study
     assert {fault.message for fault in study.faults} <= {"reads as an earlier item does"}
     assert at is not None
     assert position_of(study.document, designer.editing.opened.history.selected) == (at[0] + 1, at[1] + 1)
@@ -90,11 +86,11 @@ def test_a_copy_comes_right_after_its_original(designer: Any, path: tuple[str | 
 def test_what_can_be_added_is_filtered_by_typing_and_comes_after_the_selected_element(
     designer: Any, qtbot: Any
 ) -> None:
-    designer.controller.open("kitchen")
-    of_format_1 = addable(designer.editing.opened.study, ("questionnaires", "liquid", "items", 0))
+    designer.open()
+    of_format_1 = addable(designer.study, ("questionnaires", "liquid", "items", 0))
     assert len([one for one in of_format_1 if one.words.startswith("Question")]) == 2
     designer.controller.begin("template:questionnaire-only", "asked")
-    form = next(iter(designer.editing.opened.study.document["questionnaires"]))
+    form = next(iter(designer.value("questionnaires")))
     items = ("questionnaires", form, "items")
     designer.editing.select((*items, 0))
     designer.place.ask_to_add()
@@ -104,38 +100,12 @@ def test_what_can_be_added_is_filtered_by_typing_and_comes_after_the_selected_el
     assert adding.list.count() == 1
     qtbot.keyClick(adding.words, Qt.Key.Key_Return)
     assert designer.place.view.form.path == (*items, 1)
-    assert designer.editing.opened.study.document["questionnaires"][form]["items"][1]["kind"] == "slider"
-    assert designer.editing.opened.study.faults == ()
-
-
-def test_a_question_can_be_added_wherever_there_is_a_questionnaire(designer: Any, qtbot: Any) -> None:
-    designer.controller.begin("template:compare-liquids", "asked")
-    adding = designer.place.adding
-
-    def offered(selected: tuple[str, ...], words: str = "question") -> list[str]:
-        designer.editing.select(selected)
-        designer.place.ask_to_add()
-        adding.words.setText(words)
-        every = [adding.list.item(at).data(Qt.ItemDataRole.UserRole) for at in range(adding.list.count())]
-        return [one.words for one in every if isinstance(one.asks, AddElement)]
-
-    assert offered(("pages", "welcome")) == ["Question", "Questionnaire"]
-    for words in ("design", "2ifc"):
-        assert offered(("pages", "welcome"), words) == ["Trial design"]
-    designer.editing.ask(AddElement(("questionnaires",)))
-    questions = [words for words in offered(("pages", "welcome")) if words.startswith("Question of")]
-    assert questions == ["Question of Liquid", "Question of Questionnaire"]
-    assert "Question of Liquid" in offered(("blocks", "liquids"))
-    assert "Question of Questionnaire" not in offered(("blocks", "liquids"))
-    before = len(designer.editing.opened.study.document["questionnaires"]["liquid"]["items"])
-    adding.list.setCurrentRow(offered(("blocks", "liquids")).index("Question of Liquid"))
-    qtbot.keyClick(adding.words, Qt.Key.Key_Return)
-    assert designer.place.view.form.path == ("questionnaires", "liquid", "items", before)
+    assert designer.value("questionnaires", form, "items", 1, "kind") == "slider"
+    assert designer.study.faults == ()
 
 
 def test_an_id_that_is_refused_can_be_replaced_by_one_that_is_free(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.select(("liquids", "thin"))
+    designer.open("kitchen", "liquids", "thin")
     designer.editing.ask(RenameElement(("liquids", "thin"), "thick"))
     head = designer.place.form.head
     assert head.refusal.text() == 'The name "thick" is taken: "thick_2" is free.'
@@ -148,75 +118,54 @@ def test_an_id_that_is_refused_can_be_replaced_by_one_that_is_free(qtbot: Any, d
 
 
 def test_a_kind_is_switched_and_back_without_losing_values(designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.select(("tasks", "explore"))
-    before = designer.editing.opened.study.document["tasks"]["explore"]
+    designer.open("kitchen", "tasks", "explore")
+    before = designer.value("tasks", "explore")
     designer.editing.ask(SwitchKind(("tasks", "explore"), "reach"))
-    assert designer.editing.opened.study.document["tasks"]["explore"]["kind"] == "reach"
+    assert designer.value("tasks", "explore", "kind") == "reach"
     designer.editing.ask(SwitchKind(("tasks", "explore"), "explore"))
-    assert designer.editing.opened.study.document["tasks"]["explore"] == before
+    assert designer.value("tasks", "explore") == before
 
 
 def test_one_key_is_given_in_place_of_another_and_back_without_losing_its_value(designer: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     task = ("tasks", "reach")
     designer.editing.select(task)
     before = designer.text
-    row = designer.row(*task, "count")
+    row = designer.form_row(*task, "count")
     assert row.remove is None
     assert not [one for one in designer.place.form.rows if one.row.row.path[-1] == "duration_s"]
     row.keys.buttons[1].click()
-    study = designer.editing.opened.study
+    study = designer.study
     assert study.faults == ()
     assert "count" not in study.document["tasks"]["reach"]
-    designer.row(*task, "duration_s").keys.buttons[0].click()
-    assert designer.editing.opened.study.document["tasks"]["reach"]["count"] == 6
+    designer.form_row(*task, "duration_s").keys.buttons[0].click()
+    assert designer.value("tasks", "reach", "count") == 6
     designer.editing.undo()
     designer.editing.undo()
     assert designer.text == before
     designer.editing.select(("blocks", "liquids"))
-    designer.row("blocks", "liquids", "conditions").keys.buttons[1].click()
-    assert "nothing that Stimulus can name" in designer.row("blocks", "liquids", "conditions").wrong.sentence.text()
+    designer.form_row("blocks", "liquids", "conditions").keys.buttons[1].click()
+    assert (
+        "nothing that Stimulus can name" in designer.form_row("blocks", "liquids", "conditions").wrong.sentence.text()
+    )
 
 
 def test_every_optional_key_of_a_liquid_can_be_added_and_undone(designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.select(("liquids", "thick"))
+    designer.open("kitchen", "liquids", "thick")
     before = designer.text
     absent = [row.path for section in designer.place.view.form.sections for row in section.absent]
     assert len(absent) > 5
     for path in absent:
         designer.editing.ask(AddKey(path))
-        assert path[-1] in designer.editing.opened.study.document["liquids"]["thick"], path
+        assert path[-1] in designer.value("liquids", "thick"), path
         designer.editing.undo()
         assert designer.text == before
-
-
-def test_a_broken_file_is_repaired_by_a_button(designer: Any, qtbot: Any) -> None:
-    text = designer.file.read_text()
-    designer.file.write_text(text.replace('liquid = "thick"', 'liquid = "thik"', 1))
-    designer.controller.open("kitchen")
-    assert designer.place.header.problems.words == "1 problem"
-    designer.place.header.problems.click()
-    qtbot.waitUntil(lambda: bool(designer.place.problems.lines[0].repairs))
-    designer.place.problems.lines[0].repairs[0].click()
-    assert designer.text == text
-    assert designer.place.header.problems.words != "1 problem"
-
-
-def test_deleting_with_gaps_leaves_faults_and_undo_takes_them_back(designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.ask(DeleteElement(("liquids", "thick")))
-    assert designer.editing.opened.study.faults
-    designer.editing.undo()
-    assert not designer.editing.opened.study.faults
 
 
 def test_after_a_rename_comments_that_mention_the_old_name_are_listed_and_left(designer: Any, qtbot: Any) -> None:
     text = designer.file.read_text()
     designer.file.write_text(f"{text}# No thanks to common words.\n# The pages `thanks` and `thanks_2` are short.\n")
-    designer.controller.open("kitchen")
-    designer.editing.select(("pages", "thanks"))
+    designer.open("kitchen", "pages", "thanks")
     head = designer.place.form.head
     head.edit_id()
     qtbot.keyClicks(head.id, "goodbye")
@@ -236,26 +185,12 @@ def test_after_a_rename_comments_that_mention_the_old_name_are_listed_and_left(d
     assert not head.comments.isVisible()
 
 
-def test_after_a_rename_the_button_of_an_absent_key_is_found_at_its_new_path(designer: Any, qtbot: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.select(("conditions", "thick"))
-    form = designer.place.form
-    path, button = next(iter(form.adds.items()))
-    form.head.edit_id()
-    qtbot.keyClicks(form.head.id, "thicker")
-    qtbot.keyClick(form.head.id, Qt.Key.Key_Return)
-    assert designer.editing.selected == ("conditions", "thicker")
-    assert form.focus(("conditions", "thicker", path[-1]))
-    assert QApplication.focusWidget() is button
-    assert not form.focus(path), "there is no element of the old id"
-
-
 def test_a_rename_says_once_how_many_references_followed(
     designer: Any, qtbot: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     said: list[str] = []
     monkeypatch.setattr("study_app.gui.designer.form.form_head.say", lambda _head, words: said.append(words))
-    designer.controller.open("kitchen")
+    designer.open()
     head = designer.place.form.head
     for path, name, words in (
         (("conditions", "thick"), "honey", "1 place updated"),
@@ -263,7 +198,7 @@ def test_a_rename_says_once_how_many_references_followed(
         (("scales", "agreement"), "likert", "2 places updated"),
         (("questionnaires", "liquid", "items", 0), "feels", ""),
     ):
-        designer.select(path)
+        designer.go_to(*path)
         assert head.followed.text() == ""
         head.edit_id()
         qtbot.keyClicks(head.id, name)
@@ -276,34 +211,11 @@ def test_a_rename_says_once_how_many_references_followed(
     assert not said
 
 
-@pytest.mark.parametrize("path", [("conditions", "thick"), ("questionnaires", "liquid", "items", 0)])
-def test_a_refused_rename_is_not_told_after_another_step(designer: Any, qtbot: Any, path: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.ask(SetValue(("study", "version"), "0.7"))
-    designer.select(path)
-    head = designer.place.form.head
-    head.edit_id()
-    qtbot.keyClicks(head.id, "9 no!")
-    qtbot.keyClick(head.id, Qt.Key.Key_Return)
-    assert head.refusal.text()
-    designer.editing.undo()
-    assert head.followed.text() == ""
-
-
-def test_an_id_with_answers_is_not_proposed_while_another_one_is_typed(designer: Any) -> None:
-    designer.controller.open("kitchen")
-    question = ("questionnaires", "liquid", "items", 0)
-    designer.select(question)
-    designer.editing.recorded = lambda _element: frozenset({"cold"})
-    designer.place.id_typed.emit(question, "Cold!")
-    assert '"cold_2" is free' in designer.place.form.head.refusal.text()
-
-
 ITEMS = ("questionnaires", "liquid", "items")
 
 
 def write(qtbot: Any, designer: Any, field: str, words: str) -> None:
-    line = designer.row(*designer.editing.selected, field).field.lines["en"]
+    line = designer.field(*designer.editing.selected, field).lines["en"]
     line.setFocus(Qt.FocusReason.TabFocusReason)
     line.selectAll()
     qtbot.keyClicks(line, words)
@@ -312,28 +224,7 @@ def write(qtbot: Any, designer: Any, field: str, words: str) -> None:
 
 
 def short(designer: Any) -> Any:
-    return designer.row(*designer.editing.selected, "short").row.row.value
-
-
-def test_copies_in_another_language_follow_a_text_and_its_short_one_until_they_are_edited() -> None:
-    source = (PROTOCOLS / "demo.toml").read_text(encoding="utf-8")
-    study, question = read(source.encode(), PROTOCOLS), (*ITEMS, 0)
-
-    def typed(study: Study, code: str, words: str) -> tuple[Study, Any]:
-        now, _ = study.edited(*Steps().step(study, SetText((*question, "text"), code, words)).edits)
-        return now, [value_at(now.document, (*question, key)) for key in ("text", "short")]
-
-    for code in ("nl", "de"):
-        for how in ("add", "copy"):
-            study, _ = study.edited(*Steps().step(study, ChangeLanguage(how, code)).edits)
-    text = value_at(study.document, (*question, "text"))["en"]
-    study, _ = study.edited(*(Set((*question, "short", code), short_of(text)) for code in ("en", "nl", "de")))
-    study, _ = typed(study, "de", "War es kalt?")
-    _, found = typed(study, "en", "Was it cold?")
-    assert found == [
-        {"en": "Was it cold?", "nl": "Was it cold?", "de": "War es kalt?"},
-        {"en": "Was it cold", "nl": "Was it cold", "de": "War es kalt"},
-    ]
+    return designer.form_row(*designer.editing.selected, "short").row.row.value
 
 
 @pytest.mark.parametrize(
@@ -367,13 +258,13 @@ def test_which_languages_follow_is_decided_where_typing_begins(
 
 
 def test_the_short_text_follows_the_text_until_it_is_edited(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     designer.editing.ask(AddElement(ITEMS))
     before = designer.text
     assert short(designer) == "New question"
     write(qtbot, designer, "text", "Was it cold?")
     assert short(designer) == "Was it cold"
-    assert designer.editing.opened.study.faults == ()
+    assert designer.study.faults == ()
     write(qtbot, designer, "text", "Was it warm?")
     assert short(designer) == "Was it warm"
     designer.editing.undo()
@@ -382,11 +273,3 @@ def test_the_short_text_follows_the_text_until_it_is_edited(qtbot: Any, designer
     write(qtbot, designer, "short", "Warm")
     write(qtbot, designer, "text", "Was it warm or cold?")
     assert short(designer) == "Warm"
-
-
-def test_it_follows_in_the_language_that_is_typed(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.ask(ChangeLanguage("add", "nl"))
-    designer.editing.ask(AddElement(ITEMS))
-    write(qtbot, designer, "text", "Was it cold?")
-    assert short(designer) == {"en": "Was it cold", "nl": "New question"}

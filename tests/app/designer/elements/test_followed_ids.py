@@ -1,31 +1,17 @@
 """The id of a new element, while its text is typed."""
 
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path as File
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QApplication
 
 from study_app.app.designer.edit_steps import Steps
-from study_app.app.designer.editing import Editing
-from study_app.app.designer.open_study import OpenStudy
 from study_app.authoring.edited_study import read
 from study_app.authoring.undo_stack import History
 from study_app.authoring.writer.refused import Refused
-from study_app.protocol.source.document import Path, value_at
-from study_app.viewmodels.designer.requests import (
-    AddElement,
-    AddKey,
-    AddNamed,
-    Paste,
-    RenameElement,
-    Request,
-    RetypeFile,
-    SetText,
-)
+from study_app.protocol.source.document import Path
+from study_app.viewmodels.designer.requests import AddElement, AddKey, AddNamed, RenameElement, Request, SetText
 from tests.authoring.grown import PROTOCOLS
 
 ITEMS = ("questionnaires", "liquid", "items")
@@ -99,19 +85,6 @@ def test_only_new_elements_follow_and_only_their_first_language() -> None:
     assert typist.id == "cold"
 
 
-def test_references_follow_a_new_block_and_page() -> None:
-    for section in ("blocks", "pages"):
-        typist = Typist()
-        name = typist.ask(AddElement((section,)))[1]
-        assert name in typist.history.study.document["sequence"]
-        typist.write("Second part!", "title")
-        assert typist.history.selected == (section, "second_part")
-        assert "second_part" in typist.history.study.document["sequence"]
-        assert name not in typist.history.study.document["sequence"]
-        typist.write("Third", "title")
-        assert typist.id == "third"
-
-
 def test_an_element_that_a_reference_adds_follows_and_its_questions_go_on_following() -> None:
     typist = Typist()
     typist.ask(AddNamed(("blocks", "liquids", "questionnaire"), "questionnaires"))
@@ -130,79 +103,6 @@ def test_an_element_that_a_reference_adds_follows_and_its_questions_go_on_follow
     assert items[-1]["id"] == "tired"
 
 
-def test_questions_go_on_following_after_their_form_is_renamed_by_hand() -> None:
-    typist = Typist()
-    typist.ask(AddNamed(("blocks", "liquids", "questionnaire"), "questionnaires"))
-    form = typist.history.selected
-    question = typist.ask(AddElement((*form, "items")))
-    typist.ask(RenameElement(form, "exit"))
-    typist.ask(SetText(("questionnaires", "exit", *question[2:], "text"), "en", "Tired?"))
-    assert typist.history.study.document["questionnaires"]["exit"]["items"][-1]["id"] == "tired"
-    typist.ask(SetText(("questionnaires", "exit", "title"), "en", "Afterwards"))
-    assert "exit" in typist.history.study.document["questionnaires"]
-
-
-def test_an_id_that_a_new_question_left_is_that_of_another_one_from_then_on() -> None:
-    typist = Typist()
-    typist.ask(AddElement(ITEMS))
-    for text in ("Hot", "Hot now"):
-        typist.write(text)
-    typist.history = replace(typist.history, selected=QUESTION)
-    old = f'id = "{typist.id}"'
-    typist.history = typist.history.typed("File", typist.history.study.text.replace(old, 'id = "hot"', 1))
-    assert typist.id == "hot"
-    typist.write("Is it hot?")
-    assert typist.id == "hot"
-    typist.history = replace(typist.history, selected=(*ITEMS, 1))
-    typist.ask(AddElement(ITEMS))
-    typist.write("Cold")
-    typist.history = replace(typist.history, selected=(*ITEMS, 1))
-    typist.write("Wet")
-    assert typist.id == "wet"  # also after another one began as it did
-
-
-@pytest.fixture
-def editing(tmp_path: File, monkeypatch: pytest.MonkeyPatch) -> Iterator[Editing]:
-    """The demo with a new question, whose text was typed in two steps."""
-    monkeypatch.setattr("study_app.app.designer.editing.JOIN_S", 0.0)
-    parent = QObject()
-    made = Editing(tmp_path, parent)
-    made.open(OpenStudy(tmp_path / "demo.toml", Typist().history))
-    made.ask(AddElement(ITEMS))
-    for text in ("Hot", "Hot now"):
-        made.ask(SetText((*made.selected, "text"), "en", text))
-    yield made
-    parent.deleteLater()
-
-
-def test_an_id_that_undo_brings_back_follows_again(editing: Editing) -> None:
-    editing.undo()
-    opened = editing.opened
-    assert opened is not None
-    assert value_at(opened.study.document, (*editing.selected, "id")) == "hot"
-    editing.ask(SetText((*editing.selected, "text"), "en", "Cold"))
-    assert value_at(opened.study.document, (*editing.selected, "id")) == "cold"
-
-
-@pytest.mark.parametrize("how", ["file", "words", "paste"])
-def test_an_id_that_a_text_brings_in_stays(how: str, editing: Editing) -> None:
-    opened = editing.opened
-    assert opened is not None
-    for _ in range(3):
-        editing.undo()
-    question = '[[questionnaires.liquid.items]]\nid = "question"\nkind = "statement"\ntext = "Old"\n'
-    if how == "paste":
-        editing.ask(Paste(QUESTION, question))
-    elif how == "file":
-        editing.ask(RetypeFile(f"{opened.study.text}\n{question}"))
-    else:
-        editing.type_text("Restore", f"{opened.study.text}\n{question}")
-    items = value_at(opened.study.document, ITEMS)
-    at = next(at for at, item in enumerate(items) if item["id"] == "question")
-    editing.ask(SetText((*ITEMS, at, "text"), "en", "Not as old"))
-    assert value_at(opened.study.document, (*ITEMS, at, "id")) == "question"
-
-
 def test_an_id_with_answers_stays_and_is_given_to_no_other_question() -> None:
     typist = Typist(recorded=frozenset({"cold"}))
     typist.ask(AddElement(ITEMS))
@@ -219,21 +119,21 @@ def test_an_id_with_answers_stays_and_is_given_to_no_other_question() -> None:
 
 
 def title(designer: Any) -> Any:
-    return designer.row(*designer.editing.selected, "title").field.lines["en"]
+    return designer.field(*designer.editing.selected, "title").lines["en"]
 
 
 @pytest.mark.slow
 def test_the_keyboard_stays_in_the_title_whose_block_gets_another_id(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     designer.editing.ask(AddElement(("blocks",)))
     before = designer.text
     name = designer.editing.selected[1]
     designer.place.form.focus_first_text(filled=False)
     for letters in ("Sec", "ond", " part"):
-        qtbot.keyClicks(QApplication.focusWidget(), letters)
+        qtbot.keyClicks(designer.keyboard, letters)
         designer.place.flush()
         QApplication.processEvents()
-        assert QApplication.focusWidget() is title(designer)
+        assert designer.keyboard is title(designer)
     assert designer.editing.selected == ("blocks", "second_part")
     assert designer.place.form.head.id.text() == "second_part"
     assert title(designer).text() == "Second part"
@@ -241,25 +141,23 @@ def test_the_keyboard_stays_in_the_title_whose_block_gets_another_id(qtbot: Any,
     assert designer.text == before
     assert designer.editing.selected == ("blocks", name)
     designer.place.form.focus_first_text(filled=True)
-    qtbot.keyClicks(QApplication.focusWidget(), "Last")
+    qtbot.keyClicks(designer.keyboard, "Last")
     designer.place.outline.chosen.emit(("blocks", name))  # what is typed is handed on before
     assert designer.editing.selected == ("blocks", "last")
 
 
 @pytest.mark.slow
 def test_a_question_is_added_after_the_title_that_is_being_typed(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     designer.editing.ask(AddElement(("questionnaires",)))
     form = designer.editing.selected
     designer.editing.ask(AddKey((*form, "title")))
     line = title(designer)
-    line.setFocus()
-    line.selectAll()
-    qtbot.keyClicks(line, "Afterwards")
-    designer.row(*form, "items").field.add.click()
+    designer.fill(line, "Afterwards", "")
+    designer.field(*form, "items").add.click()
     after = ("questionnaires", "afterwards")
     assert designer.editing.selected[:3] == (*after, "items")
-    assert QApplication.focusWidget() is designer.row(*designer.editing.selected, "text").field.lines["en"]
+    assert designer.keyboard is designer.field(*designer.editing.selected, "text").lines["en"]
     designer.editing.undo()
     assert designer.editing.selected == after
     assert title(designer).text() == "Afterwards"

@@ -20,13 +20,12 @@ def water(designer: Any) -> Any:
     """The designer at a condition that a block with a Williams design lists alone."""
     text = designer.file.read_text().replace('conditions = ["thin", "thick"]', 'conditions = ["thin"]')
     designer.file.write_text(text)
-    designer.controller.open("kitchen")
-    designer.select(CONDITION)
+    designer.open("kitchen", *CONDITION)
     return designer
 
 
 def document(designer: Any) -> Any:
-    return designer.editing.opened.study.document
+    return designer.study.document
 
 
 def card(designer: Any) -> SeriesCard:
@@ -50,10 +49,10 @@ def test_a_series_of_delays_is_made_by_keys_alone_in_one_step(qtbot: Any, water:
     named = ["thin", "thin_60", "thin_120", "thin_240"]
     assert [conditions[name]["delay_ms"] for name in named] == [0, 60, 120, 240]
     assert list(document(water)["blocks"]["liquids"]["conditions"]) == named
-    assert water.editing.opened.study.faults == ()
+    assert water.study.faults == ()
     assert water.editing.selected == CONDITION
     assert water.place.outline.selected == tuple(("conditions", name) for name in named)
-    assert len(water.editing.opened.history.done) == 1
+    assert len(water.steps) == 1
     water.editing.undo()
     assert water.text == before
 
@@ -81,7 +80,7 @@ def test_values_are_refused_in_the_card_and_enter_then_makes_nothing(qtbot: Any,
 
 
 def test_another_number_is_chosen_and_the_series_made_by_the_mouse(qtbot: Any, water: Any) -> None:
-    water.select(("liquids", "thin"))
+    water.go_to("liquids", "thin")
     qtbot.mouseClick(water.place.form.head.series, LEFT)
     shown = card(water)
     shown.number.setCurrentIndex(shown.number.findText("Viscosity [Pa·s]"))
@@ -94,25 +93,20 @@ def test_another_number_is_chosen_and_the_series_made_by_the_mouse(qtbot: Any, w
     assert liquids["thin_2_5"]["density_kg_m3"] == liquids["thin"]["density_kg_m3"]
 
 
-def test_a_number_of_another_format_is_refused(qtbot: Any, water: Any) -> None:
-    water.editing.ask(MakeSeries(CONDITION, (*CONDITION, "force_loss"), "0, 0.25"))
-    assert "Thin, Force loss: belongs to format 2" in water.place.form.own.text()
-
-
 def test_a_series_is_offered_in_the_list_of_conditions_and_at_headings(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     head = designer.place.form.head
-    designer.select(LISTED[:2])
+    designer.go_to(*LISTED[:2])
     assert head.series.isVisible()  # of blocks
-    field = designer.row(*LISTED).field
+    field = designer.field(*LISTED)
     for chosen, path in (((0,), CONDITION), ((1,), ("conditions", "thick")), ((), ()), ((0, 1), ())):
-        field = designer.row(*LISTED).field
+        field = designer.field(*LISTED)
         field.choose(chosen)
         qtbot.mouseClick(field.series, LEFT)
         assert card(designer).asked.path == path
         designer.place.close_prompt()
-        designer.select(LISTED[:2])
-    designer.select(LISTED[2:])
+        designer.go_to(*LISTED[:2])
+    designer.go_to(*LISTED[2:])
     qtbot.mouseClick(head.series, LEFT)
     assert [path for path, _ in card(designer).asked.among] == [
         ("conditions", name) for name in document(designer)["conditions"]
@@ -121,14 +115,13 @@ def test_a_series_is_offered_in_the_list_of_conditions_and_at_headings(qtbot: An
     page = next(("pages", name) for name, one in document(designer)["pages"].items())
     designer.editing.ask(AddKey((*page, "min_s")))
     for path in (("study",), ("scene",), ("pages",), page):
-        designer.select(path)
+        designer.go_to(*path)
         assert not head.series.isVisible()
 
 
 def test_a_series_of_a_list_asks_which_condition_it_is_of(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.select(LISTED[:2])
-    qtbot.mouseClick(designer.row(*LISTED).field.series, LEFT)
+    designer.open("kitchen", *LISTED[:2])
+    qtbot.mouseClick(designer.field(*LISTED).series, LEFT)
     shown = card(designer)
     assert shown.elements.hasFocus()
     assert shown.elements.currentIndex() == -1
@@ -145,29 +138,12 @@ def test_a_series_of_a_list_asks_which_condition_it_is_of(qtbot: Any, designer: 
     qtbot.waitUntil(lambda: "differ in liquid and in delay" in card(designer).refusal.text())  # of the block
 
 
-def test_a_series_that_would_make_a_problem_is_refused_while_it_is_typed(qtbot: Any, water: Any) -> None:
-    water.editing.ask(MakeSeries(CONDITION, (*CONDITION, "delay_ms"), "0 60"))
-    before = water.text
-    water.place.series_asked.emit(AskSeries(CONDITION))
-    values = card(water).values
-    qtbot.keyClicks(values, "0 60")
-    qtbot.keyClick(values, Qt.Key.Key_Return)  # before the keys rest
-    qtbot.waitUntil(lambda: '"thin_60" presents the same as "thin_60_2"' in card(water).refusal.text())
-    assert not card(water).make.isEnabled()
-    qtbot.keyClick(values, Qt.Key.Key_Return)
-    assert water.text == before
-    qtbot.keyClick(values, Qt.Key.Key_Backspace)
-    qtbot.keyClicks(values, "1")
-    assert card(water).refusal.text() == ""
-    assert card(water).make.text() == "Make 2 conditions"
-
-
 def shown_ways(designer: Any) -> list[str]:
     return [way.text() for way in card(designer).ways if way.isVisible()]
 
 
 def test_a_way_on_is_offered_until_the_values_change_and_made_in_one_step(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     before = designer.text
     designer.place.series_asked.emit(AskSeries(CONDITION))
     values = card(designer).values
@@ -180,7 +156,7 @@ def test_a_way_on_is_offered_until_the_values_change_and_made_in_one_step(qtbot:
     qtbot.mouseClick(card(designer).ways[0], LEFT)
     assert designer.place.prompt is None
     assert list(document(designer)["blocks"]["liquids"]["conditions"]) == ["thin", "thin_600"]
-    assert len(designer.editing.opened.history.done) == 1
+    assert len(designer.steps) == 1
     designer.editing.undo()
     assert designer.text == before
 
@@ -206,40 +182,11 @@ def test_values_typed_before_cancel_come_back_for_the_same_element(qtbot: Any, w
     assert card(water).values.text() == ""
 
 
-def test_a_problem_that_a_study_had_before_refuses_no_series(designer: Any) -> None:
-    text = designer.file.read_text().replace('conditions = ["thin", "thick"]', 'conditions = ["thin", "nosuch"]')
-    designer.file.write_text(text)
-    designer.controller.open("kitchen")
-    designer.select(CONDITION)
-    assert [fault.message for fault in designer.editing.opened.study.faults]
-    before = designer.text
-    designer.editing.ask(MakeSeries(CONDITION, (*CONDITION, "delay_ms"), "0 60"))
-    assert designer.text != before
-
-
-@pytest.mark.parametrize(("number", "kept"), [("Density [kg/m³]", "1 2"), ("Wake, Exponent", "")])
-def test_values_stay_for_another_element_that_has_the_same_number(
-    qtbot: Any, designer: Any, number: str, kept: str
-) -> None:
-    liquids = (("liquids", "thin"), ("liquids", "thick"))  # the second one has no wake
-    designer.controller.open("kitchen")
-    designer.place.series_asked.emit(AskSeries(liquids[0], liquids))
-    shown = card(designer)
-    shown.number.setCurrentIndex(shown.number.findText(number))
-    assert shown.number.currentText() == number
-    qtbot.keyClicks(shown.values, "1 2")
-    qtbot.keyClick(shown.elements, Qt.Key.Key_Down)
-    shown = card(designer)
-    assert shown.asked.path == liquids[1]
-    assert (shown.number.currentText(), shown.values.text()) == ("Density [kg/m³]", kept)
-
-
-@pytest.mark.parametrize("word", ["series", "levels", "delays"])
-@pytest.mark.parametrize("selected", [CONDITION, LISTED[:2]])
+@pytest.mark.parametrize(("word", "selected"), [("delays", CONDITION), ("series", LISTED[:2])])
 def test_a_series_is_found_in_the_list_of_what_can_be_added(
     qtbot: Any, water: Any, word: str, selected: tuple[str, str]
 ) -> None:
-    water.select(selected)
+    water.go_to(*selected)
     water.place.ask_to_add()
     adding = water.place.adding
     qtbot.keyClicks(adding.words, word)
@@ -262,8 +209,8 @@ def test_a_series_is_found_in_the_list_of_what_can_be_added(
 def test_ctrl_shift_d_says_why_there_can_be_no_series(
     qtbot: Any, designer: Any, name: str, selected: tuple[str, ...], why: str
 ) -> None:
-    designer.controller.open(name)
-    designer.select(selected)
+    designer.open(name)
+    designer.go_to(*selected)
     both = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
     qtbot.keyClick(designer.window, Qt.Key.Key_D, both)
     assert designer.messages == [("There can be no series of this element", why)]
@@ -272,12 +219,11 @@ def test_ctrl_shift_d_says_why_there_can_be_no_series(
 
 def test_blocks_of_a_series_get_letters_titles_and_places_in_the_session(designer: Any) -> None:
     block = ("blocks", "liquids")
-    designer.controller.open("rek2024")
-    designer.select(("conditions", "water"))
+    designer.open("rek2024", "conditions", "water")
     assert not designer.place.form.head.series.isVisible()  # read-only
     designer.controller.begin("rek2024", "mine")
     before = document(designer)["sequence"]
-    faults = designer.editing.opened.study.faults
+    faults = designer.study.faults
     designer.editing.ask(MakeSeries(block, (*block, "repetitions"), "1 2 3"))
     after = document(designer)
     at = before.index("liquids")
@@ -285,4 +231,4 @@ def test_blocks_of_a_series_get_letters_titles_and_places_in_the_session(designe
     letters = [one["code_prefix"] for one in after["blocks"].values() if "code_prefix" in one]
     assert len(letters) == len(set(letters))
     assert after["blocks"]["liquids_3"]["title"]["nl"] == "Basisinstellingen, 3"
-    assert designer.editing.opened.study.faults == faults
+    assert designer.study.faults == faults

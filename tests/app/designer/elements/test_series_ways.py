@@ -1,14 +1,10 @@
 """What helps where a study cannot take a series: values that are left out, and lists of blocks."""
 
-from typing import Any
-
 import pytest
 
 from study_app.app.designer.edit_steps import Steps
 from study_app.app.designer.series_steps import judged_series
-from study_app.authoring import edited_study
 from study_app.authoring.edited_study import Study, read
-from study_app.protocol.load import examined
 from study_app.protocol.source.document import value_at
 from study_app.viewmodels.designer.prompts import SeriesPlan
 from study_app.viewmodels.designer.requests import MakeSeries
@@ -52,24 +48,6 @@ def listed(study: Study, path: tuple[str, ...]) -> list[str]:
     return list(value_at(study.document, path))
 
 
-def test_nothing_is_said_of_a_series_that_can_be_made(study: Study) -> None:
-    plan = judged(study, WATER, "0 60")
-    alone = made(study, plan, "List only these in Baseline settings")
-    assert judged(alone, WATER, "0 30") is None
-
-
-def test_a_list_can_hold_the_series_alone_or_stay_as_it_is(study: Study) -> None:
-    plan = judged(study, WATER, "0 60 120")
-    assert plan is not None
-    assert "its conditions differ in liquid and in delay" in plan.refusal
-    only, kept = "List only these in Baseline settings", "Leave Baseline settings as it is"
-    assert words_of(plan) == [only, kept]
-    assert listed(made(study, plan, only), LIQUIDS) == ["water", "water_60", "water_120"]
-    after = made(study, plan, kept)
-    assert listed(after, LIQUIDS) == listed(study, LIQUIDS)
-    assert "water_120" in after.document["conditions"]
-
-
 def test_the_block_that_is_the_cause_alone_stays_as_it_is(study: Study) -> None:
     plan = judged(study, NO_DELAY, "0 30 60")
     assert ALONE in words_of(plan)
@@ -92,20 +70,6 @@ def test_values_that_cause_a_problem_are_named_and_left_out(study: Study) -> Non
     assert "delay_30" in made(without, again, LEFT).document["conditions"]
 
 
-def test_the_study_is_checked_once_in_each_part_at_most(study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
-    checks: list[int] = [0]
-
-    def counted(*arguments: Any) -> Any:
-        checks[-1] += 1
-        return examined(*arguments)
-
-    monkeypatch.setattr(edited_study, "examined", counted)
-    assert study.faults == ()
-    checks.extend(0 for _ in judged_series(study, MakeSeries(NO_DELAY, (*NO_DELAY, "delay_ms"), "0 30 50 60")))
-    assert max(checks[1:]) == 1
-    assert sum(checks) > 10
-
-
 @pytest.mark.parametrize(
     ("values", "why", "words"),
     [
@@ -121,11 +85,6 @@ def test_values_that_are_not_permitted_can_be_left_out(study: Study, values: str
     assert plan.refusal.splitlines()[0] == why
     assert words_of(plan) == [words]
     made(study, plan, words)
-
-
-@pytest.mark.parametrize("values", ["900 much", "900 -1", "900"])
-def test_nothing_is_offered_where_too_few_values_stay(study: Study, values: str) -> None:
-    assert words_of(judged(study, SYRUP, values, "density_kg_m3")) == []
 
 
 def test_a_series_is_refused_while_the_file_cannot_be_read_or_has_no_such_number(study: Study) -> None:

@@ -4,14 +4,11 @@ from typing import Any
 
 import pytest
 import shiboken6
-from PySide6.QtCore import QEvent, QMimeData, QPoint, QRect, Qt
-from PySide6.QtGui import QFocusEvent
-from PySide6.QtWidgets import QApplication, QWidget, QWidgetItem
+from PySide6.QtCore import QMimeData, QPoint, QRect, Qt
+from PySide6.QtWidgets import QWidget, QWidgetItem
 
 from study_app.gui.designer.form.row_widget import RowWidget
 from study_app.gui.designer.form.typed_fields import HAND_ON_MS, TypedLine, TypedSentence, TypedText
-from study_app.gui.designer.tab_order import stops
-from study_app.viewmodels.designer.requests import AddEntry, ChangeLanguage, DuplicateElement, SetValue
 
 pytestmark = pytest.mark.slow
 
@@ -21,9 +18,9 @@ BLOCK = ("blocks", "liquids")
 @pytest.fixture
 def form(designer: Any) -> Any:
     """The form of a page, in a window that shows only the first rows of a block."""
-    designer.controller.open("kitchen")
+    designer.open()
     designer.window.resize(1024, 640)
-    designer.select(("pages", "welcome"))
+    designer.go_to("pages", "welcome")
     return designer.place.form
 
 
@@ -42,98 +39,32 @@ def test_a_row_below_the_fold_of_another_element_is_scrolled_to(qtbot: Any, desi
     last = form.form.rows[-1].row.path
     assert form.focus(last)
     for _ in range(2):
-        row = designer.row(*last)
-        assert row.isAncestorOf(QApplication.focusWidget())
+        row = designer.form_row(*last)
+        assert row.isAncestorOf(designer.keyboard)
         assert is_seen(form, row)
         qtbot.wait(50)
     assert form.area.verticalScrollBar().value() > 0
 
 
-def test_tab_goes_from_the_rows_seen_at_first_to_those_made_later(qtbot: Any, designer: Any, form: Any) -> None:
-    designer.editing.select(BLOCK)
-    assert 0 < rows_made(form) < len(form.form.rows)
-    rows = form.rows
-    QApplication.processEvents()
-    rows[0].field.take_keyboard()
-    met = [rows[0]]
-    while met[-1] is not rows[-1]:
-        qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
-        keyboard = QApplication.focusWidget()
-        assert form.inside.isAncestorOf(keyboard), keyboard
-        met += [row for row in rows if row.isAncestorOf(keyboard) and row is not met[-1]]
-    assert met == rows
-
-
-@pytest.mark.parametrize("width", [1366, 1600])
-def test_tab_leaves_a_form_whose_last_rows_were_made_later(qtbot: Any, designer: Any, width: int) -> None:
-    designer.window.resize(width, 768)
-    designer.controller.begin("template:viscosity-jnd", "thicker")
-    designer.select(("blocks", "training"))
-    designer.place.areas.focus_header()  # a form that has the keyboard is made at once
-    designer.editing.select(("blocks", "viscosity"))
-    assert 0 < rows_made(designer.place.form) < len(designer.place.form.form.rows)
-    QApplication.processEvents()
-    designer.place.form.focus_first()
-    met = [QApplication.focusWidget()]
-    while True:
-        qtbot.keyClick(met[-1], Qt.Key.Key_Tab)
-        keyboard = QApplication.focusWidget()
-        if keyboard in met:
-            break
-        met.append(keyboard)
-    assert designer.place.form.rows[-1].isAncestorOf(met[-1]) or not designer.place.form.isAncestorOf(met[-1])
-    assert keyboard in {met[0], met[-1]}, f"Tab goes round from {keyboard.accessibleName()}"  # not every platform wraps
-
-
 def test_the_help_is_of_the_row_that_has_the_keyboard_after_its_step_made_the_form_anew(designer: Any) -> None:
     designer.controller.begin("template:empty", "helped")
-    designer.select(("blocks", "liquids"))
-    field = designer.row("blocks", "liquids", "order").field
+    designer.go_to("blocks", "liquids")
+    field = designer.field("blocks", "liquids", "order")
     rows = [row.key for row in designer.place.form.rows]
     field.take_keyboard()
     field.list.setCurrentIndex(field.list.findText("Williams", Qt.MatchFlag.MatchStartsWith))
     field.list.activated.emit(field.list.currentIndex())
     assert [row.key for row in designer.place.form.rows] != rows, "the form was made anew"
-    assert designer.row("blocks", "liquids", "order").isAncestorOf(QApplication.focusWidget())
+    assert designer.form_row("blocks", "liquids", "order").isAncestorOf(designer.keyboard)
     assert designer.place.form.foot.title.text() == "Order"
-
-
-def test_every_field_that_lacks_a_text_has_the_edge_of_a_fault(designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.ask(ChangeLanguage("add", "nl"))
-    designer.select(("pages", "welcome"))
-    for key in ("title", "body"):
-        texts = designer.row("pages", "welcome", key).field.lines
-        assert [bool(part.property("state")) for part in texts.values()] == [False, True]
-
-
-def test_the_delay_of_a_condition_is_shown_whole(designer: Any) -> None:
-    designer.controller.begin("template:empty", "late")
-    designer.editing.ask(DuplicateElement(("conditions", "water")))
-    designer.editing.ask(SetValue(("conditions", "water_2", "delay_ms"), 240))
-    designer.editing.ask(AddEntry((*BLOCK, "conditions"), "water_2"))
-    designer.select(BLOCK)
-    rows = designer.row(*BLOCK, "conditions").field.rows
-    assert [row.note.text() for row in rows] == ["0 ms late", "Water, 240 ms late"]
-    assert [row.note.text() for row in rows] == [row.note.text() for row in rows]
-
-
-def test_tab_passes_the_buttons_of_an_entry_whose_actions_have_a_key(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.select(BLOCK)
-    first = designer.row(*BLOCK, "conditions").field.rows[0]
-    assert stops(first) == [first.liquid]
-    first.setFocus()
-    qtbot.keyClick(first, Qt.Key.Key_Return)
-    assert designer.editing.selected[0] == "conditions"
 
 
 def test_forms_leave_no_wrapper_of_an_item_of_their_layouts(qtbot: Any, designer: Any) -> None:
     """An event at the address of an item that Qt has deleted would get the wrapper, and a key would fail."""
     designer.controller.begin("template:viscosity-jnd", "thicker")
-    for row in [("study",), *((name, id) for name, ids in designer.editing.opened.study.document.items()
+    for row in [("study",), *((name, id) for name, ids in designer.study.document.items()
                               if isinstance(ids, dict) for id in ids if isinstance(ids[id], dict))]:  # fmt: skip
-        designer.select(row)
+        designer.go_to(*row)
     qtbot.wait(50)
     assert [one for one in shiboken6.getAllValidWrappers() if type(one) is QWidgetItem] == []
 
@@ -175,15 +106,6 @@ def test_a_pasted_text_keeps_its_spaces_but_no_line_break(qtbot: Any, pasted: st
     assert field.words() == whole
 
 
-@pytest.mark.parametrize(("reason", "marked"), [("TabFocusReason", "New question"), ("MouseFocusReason", "")])
-def test_tab_marks_a_sentence_so_that_what_is_typed_replaces_it(qtbot: Any, reason: str, marked: str) -> None:
-    field = TypedSentence("Text")
-    qtbot.addWidget(field)
-    field.show_text("New question")
-    QApplication.sendEvent(field, QFocusEvent(QEvent.Type.FocusIn, Qt.FocusReason[reason]))
-    assert field.textCursor().selectedText() == marked
-
-
 @pytest.mark.parametrize("kind", [TypedLine, TypedText, TypedSentence])
 def test_a_word_after_letters_of_two_units_is_deleted_before_the_key_is_removed(
     qtbot: Any, kind: type[TypedLine | TypedText]
@@ -206,40 +128,35 @@ def test_a_word_after_letters_of_two_units_is_deleted_before_the_key_is_removed(
 
 
 def test_numbers_are_counted_by_keys_and_taken_ids_refused_while_typing(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.select(("blocks", "liquids"))
+    designer.open("kitchen", "blocks", "liquids")
     path = ("blocks", "liquids", "repetitions")
-    line = designer.row(*path).field.line
-    before = designer.editing.opened.study.document["blocks"]["liquids"]["repetitions"]
+    line = designer.field(*path).line
+    before = designer.value("blocks", "liquids", "repetitions")
     line.setFocus()
     qtbot.keyClick(line, Qt.Key.Key_Up)
     qtbot.keyClick(line, Qt.Key.Key_Up)
-    assert designer.editing.opened.study.document["blocks"]["liquids"]["repetitions"] == before + 2
+    assert designer.value("blocks", "liquids", "repetitions") == before + 2
     qtbot.keyClick(line, Qt.Key.Key_Down)
     assert line.text() == str(before + 1)
     designer.editing.undo()
-    assert designer.editing.opened.study.document["blocks"]["liquids"]["repetitions"] == before
+    assert designer.value("blocks", "liquids", "repetitions") == before
     head = designer.place.form.head
-    head.id.setFocus()
-    head.id.selectAll()
-    qtbot.keyClicks(head.id, "delays")
+    designer.fill(head.id, "delays", "")
     assert "is taken" in head.refusal.text()
     qtbot.keyClicks(head.id, "2")
     assert not head.refusal.text()
 
 
 def test_a_comma_that_may_separate_numbers_is_refused_in_a_list_of_them(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     path = ("device", "workspace_mm")
     designer.editing.select(path[:1])
-    field = designer.row(*path).field
+    field = designer.field(*path)
 
     def size_after(text: str) -> object:
-        field.line.setFocus()
-        field.line.selectAll()
-        qtbot.keyClicks(field.line, text)
+        designer.fill(field.line, text, "")
         designer.place.flush()
-        return designer.editing.opened.study.document["device"]["workspace_mm"]
+        return designer.value("device", "workspace_mm")
 
     assert size_after("90,5 60; 60") == (90.5, 60, 60)
     assert size_after("100, 60, 60") == (100, 60, 60)
@@ -248,14 +165,11 @@ def test_a_comma_that_may_separate_numbers_is_refused_in_a_list_of_them(qtbot: A
 
 
 def test_esc_restores_the_value_of_a_field_that_was_left_with_a_refused_text(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.select(("blocks", "liquids"))
-    row = designer.row("blocks", "liquids", "repetitions")
+    designer.open("kitchen", "blocks", "liquids")
+    row = designer.form_row("blocks", "liquids", "repetitions")
     line = row.field.line
-    line.setFocus()
-    line.selectAll()
-    qtbot.keyClicks(line, "2x\t")
-    value = designer.editing.opened.study.document["blocks"]["liquids"]["repetitions"]
+    designer.fill(line, "2x\t", "")
+    value = designer.value("blocks", "liquids", "repetitions")
     assert row.wrong.sentence.text() == f"“2x” is not a whole number. The study keeps {value}; Esc restores it."
     line.setFocus()
     qtbot.keyClick(line, Qt.Key.Key_Escape)

@@ -13,6 +13,7 @@ from study_app.gui.widgets.controls import IconButton
 from study_app.haptics.model.steady_state import steady
 from study_app.protocol.load import load
 from study_app.protocol.source.json_schema import schema
+from study_app.viewmodels.designer.requests import SetValue
 from study_app.viewmodels.designer.special import FACTS
 from tests.authoring.grown import PROTOCOLS
 from tests.authoring.test_fields import every_row
@@ -35,37 +36,31 @@ def press(qtbot: Any, part: QWidget) -> None:
 
 
 def test_conditions_say_liquid_delay_and_force(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.select(("blocks", "delays"))
+    designer.open("kitchen", "blocks", "delays")
     protocol = load(designer.file)
-    late = designer.row("blocks", "delays", "conditions").field.rows[1]
+    late = designer.field("blocks", "delays", "conditions").rows[1]
     assert late.note.text() == "Thin, 200 ms late"
     assert late.force.text() == f"{steady(protocol.scene_for('late')).force_n:.2f} N"
-    field = designer.row("blocks", "delays", "conditions").field
-    designer.file.write_text(designer.file.read_text().replace("density_kg_m3 = 1000", "density_kg_m3 = 1300"))
+    field = designer.field("blocks", "delays", "conditions")
+    designer.change(("density_kg_m3 = 1000", "density_kg_m3 = 1300"))
     designer.controller.enter()
     assert field.rows[1].force.text() == f"{steady(load(designer.file).scene_for('late')).force_n:.2f} N"
     press(qtbot, field.rows[1].liquid)
     assert designer.place.view.form.path == ("liquids", "thin")
 
 
-@pytest.mark.parametrize(
-    ("order", "repetitions", "words"),
-    [
-        ("shuffled", 1, "balanced on average"),
-        ("fixed", 1, "same for all"),
-        ("williams", 1, "balanced at 2, 4, 6 …"),
-        ("latin", 1, "balanced at 2, 4, 6 …"),
-    ],
-)
-def test_an_order_states_with_how_many_it_is_balanced(designer: Any, order: str, repetitions: int, words: str) -> None:
-    text = designer.file.read_text().replace('order = "shuffled"', f'order = "{order}"')
-    designer.file.write_text(text.replace("repetitions = 1", f"repetitions = {repetitions}"))
-    designer.controller.open("kitchen")
-    designer.editing.select(("blocks", "liquids"))
-    chip = designer.row("blocks", "liquids", "order").field.chip
-    assert chip.isVisible()
-    assert chip.word == words
+def test_an_order_states_with_how_many_it_is_balanced(designer: Any) -> None:
+    designer.open("kitchen", "blocks", "liquids")
+    for order, words in (
+        ("shuffled", "balanced on average"),
+        ("fixed", "same for all"),
+        ("williams", "balanced at 2, 4, 6 …"),
+        ("latin", "balanced at 2, 4, 6 …"),
+    ):
+        designer.editing.ask(SetValue(("blocks", "liquids", "order"), order))
+        chip = designer.field("blocks", "liquids", "order").chip
+        assert chip.isVisible()
+        assert chip.word == words
 
 
 def two_languages(designer: Any) -> None:
@@ -73,23 +68,23 @@ def two_languages(designer: Any) -> None:
     designer.file.write_text(
         text.replace('text = "This liquid behaves like honey."', 'text = { en = "Like honey.", nl = "Als honing." }')
     )
-    designer.controller.open("kitchen")
+    designer.open()
 
 
 def test_questions_stand_side_by_side_and_a_missing_text_is_written(qtbot: Any, designer: Any) -> None:
     two_languages(designer)
     designer.editing.select(QUESTIONNAIRE)
-    first, second = designer.row(*ITEMS).field.rows.rows
+    first, second = designer.field(*ITEMS).rows.rows
     assert first.write is not None
     assert second.write is None
     assert second.line.texts == ("Like honey.", "Als honing.")
     press(qtbot, first.write)
     assert designer.place.view.form.path == (*ITEMS, 0)
-    english, dutch = designer.row(*ITEMS, 0, "text").field.lines.values()
+    english, dutch = designer.field(*ITEMS, 0, "text").lines.values()
     assert dutch.hasFocus()
     qtbot.keyClicks(dutch, "Dit voelt vloeibaar.")
     qtbot.keyClick(dutch, Qt.Key.Key_Return)
-    item = designer.editing.opened.study.document["questionnaires"]["liquid"]["items"][0]
+    item = designer.value("questionnaires", "liquid", "items", 0)
     assert item["text"]["nl"] == "Dit voelt vloeibaar."
     assert item["text"]["en"] == english.words() != ""
     assert [row.line.number for row in designer.place.form.others] == [2]
@@ -97,42 +92,29 @@ def test_questions_stand_side_by_side_and_a_missing_text_is_written(qtbot: Any, 
     assert designer.place.view.form.path == (*ITEMS, 1)
 
 
-def test_the_keyboard_goes_across_the_languages_then_down(qtbot: Any, designer: Any) -> None:
-    two_languages(designer)
-    designer.editing.select((*ITEMS, 1))
-    lines = list(designer.row(*ITEMS, 1, "text").field.lines.values())
-    lines += list(designer.row(*ITEMS, 1, "short").field.lines.values())
-    lines[0].setFocus()
-    for line in lines:
-        assert QApplication.focusWidget() is line
-        qtbot.keyClick(line, Qt.Key.Key_Tab)
-
-
 @pytest.mark.parametrize("width", [1600, 1024])
 def test_the_kind_of_a_question_is_chosen_and_its_texts_stay(designer: Any, width: int) -> None:
     designer.window.resize(width, 1000)
-    designer.controller.open("kitchen")
-    designer.editing.select((*ITEMS, 0))
+    designer.open("kitchen", *ITEMS, 0)
     QApplication.processEvents()
-    field = designer.row(*ITEMS, 0, "kind").field
+    field = designer.field(*ITEMS, 0, "kind")
     assert field.all.isVisible() != field.list.isVisible()
     if field.all.isVisible():
         next(button for button in field.all.buttons if button.text() == "Slider").click()
     else:
         field.list.activated.emit(field.list.findText("Slider"))
-    item = designer.editing.opened.study.document["questionnaires"]["liquid"]["items"][0]
+    item = designer.value("questionnaires", "liquid", "items", 0)
     assert item["kind"] == "slider"
     assert item["short"] == "Feels like a liquid"
 
 
 def test_a_target_is_dragged_moved_by_keys_and_typed(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.select(("tasks", "reach"))
+    designer.open("kitchen", "tasks", "reach")
     before = designer.text
-    field = designer.row("tasks", "reach", "targets_mm").field
+    field = designer.field("tasks", "reach", "targets_mm")
 
     def targets() -> Any:
-        return designer.editing.opened.study.document["tasks"]["reach"]["targets_mm"]
+        return designer.value("tasks", "reach", "targets_mm")
 
     QApplication.processEvents()
     view = field.front
@@ -145,25 +127,20 @@ def test_a_target_is_dragged_moved_by_keys_and_typed(qtbot: Any, designer: Any) 
     x, y, z = targets()[1]
     assert (x, z) == (pytest.approx(20, abs=1), 0)
     assert y == pytest.approx(12, abs=1)
-    assert len(designer.editing.opened.history.done) == 1
+    assert len(designer.steps) == 1
     field.above.setFocus()
     qtbot.keyClick(field.above, Qt.Key.Key_Down, Qt.KeyboardModifier.ShiftModifier)
     assert targets()[1] == (x, y, 5)
     for _ in range(20):
         qtbot.keyClick(field.above, Qt.Key.Key_Down, Qt.KeyboardModifier.ShiftModifier)
     assert targets()[1] == (x, y, 24)
-    assert designer.editing.opened.study.faults == ()
+    assert designer.study.faults == ()
     qtbot.keyClick(field.above, Qt.Key.Key_PageDown)
     assert "target 1 of 2" in field.above.accessibleDescription()
     line = field.lines[0][1]
-    line.setFocus()
-    line.selectAll()
-    qtbot.keyClicks(line, "-7.5")
-    qtbot.keyClick(line, Qt.Key.Key_Return)
+    designer.fill(line, "-7.5")
     assert targets()[0] == (-30, -7.5, 0)
-    while designer.editing.opened.history.done:
-        designer.editing.undo()
-    assert designer.text == before
+    assert designer.undo_all() == before
 
 
 def _drag(view: QWidget, at: QPoint) -> QMouseEvent:
@@ -176,21 +153,17 @@ def _drag(view: QWidget, at: QPoint) -> QMouseEvent:
 def test_points_of_a_scale_are_written_added_and_removed_in_every_language(qtbot: Any, designer: Any) -> None:
     text = (PROTOCOLS / "rek2024.toml").read_text().replace('name = "rek2024"', 'name = "kitchen"')
     designer.file.write_text(text)
-    designer.controller.open("kitchen")
-    designer.editing.select(("scales", "agreement"))
+    designer.open("kitchen", "scales", "agreement")
 
     def labels() -> Any:
-        return designer.editing.opened.study.document["scales"]["agreement"]["labels"]
+        return designer.value("scales", "agreement", "labels")
 
     def field() -> Any:
-        return designer.row("scales", "agreement", "labels").field
+        return designer.field("scales", "agreement", "labels")
 
     first = labels()
     line = field().lines[6][1]
-    line.setFocus()
-    line.selectAll()
-    qtbot.keyClicks(line, "Eens")
-    qtbot.keyClick(line, Qt.Key.Key_Return)
+    designer.fill(line, "Eens")
     assert labels()["nl"] == (*first["nl"][:6], "Eens")
     press(qtbot, field().add)
     assert [len(words) for words in labels().values()] == [8, 8]
@@ -205,51 +178,34 @@ def test_points_of_a_scale_are_written_added_and_removed_in_every_language(qtbot
     assert designer.text == text
 
 
-def test_a_repair_is_offered_at_its_field_and_made_there(qtbot: Any, designer: Any) -> None:
-    text = designer.file.read_text()
-    designer.file.write_text(text.replace('conditions = ["thin", "thick"]', 'conditions = ["thin", "thik"]'))
-    designer.controller.open("kitchen")
-    designer.editing.select(("blocks", "liquids"))
-    row = designer.row("blocks", "liquids", "conditions")
-    assert row.field.rows[1].faulty
-    assert row.field.rows[1].note.text() == "not in the study"
-    qtbot.waitUntil(lambda: bool(row.repairs))
-    press(qtbot, row.repairs[0])
-    assert designer.text == text
-    assert not designer.row("blocks", "liquids", "conditions").repairs
-
-
 def test_a_question_without_an_id_says_so_at_its_id_and_gets_one(qtbot: Any, designer: Any) -> None:
-    designer.file.write_text(designer.file.read_text().replace('id = "like_honey"\n', ""))
-    designer.controller.open("kitchen")
-    designer.editing.select((*ITEMS, 1))
+    designer.change(('id = "like_honey"\n', ""))
+    designer.open("kitchen", *ITEMS, 1)
     head = designer.place.form.head
     assert head.refusal.isVisible()
     assert "Is missing" in head.refusal.text()
     qtbot.keyClicks(head.id, "honey")
     qtbot.keyClick(head.id, Qt.Key.Key_Return)
-    assert designer.editing.opened.study.document["questionnaires"]["liquid"]["items"][1]["id"] == "honey"
+    assert designer.value("questionnaires", "liquid", "items", 1, "id") == "honey"
     assert not designer.place.form.head.refusal.isVisible()
 
 
 def test_the_keyboard_stays_in_a_row_that_is_made_anew(qtbot: Any, designer: Any, editors: None) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.select(("blocks", "liquids"))
+    designer.open("kitchen", "blocks", "liquids")
     path = ("blocks", "liquids", "conditions")
-    before = designer.row(*path)
+    before = designer.form_row(*path)
     count = len(before.field.rows)
     press(qtbot, next(one for one in before.field.rows[0].findChildren(IconButton) if "Remove" in one.accessibleName()))
-    after = designer.row(*path)
+    after = designer.form_row(*path)
     assert after is not before
     assert len(after.field.rows) == count - 1
-    assert after.isAncestorOf(QApplication.focusWidget())
+    assert after.isAncestorOf(designer.keyboard)
 
 
 def test_a_question_is_shown_whole_and_typed_as_one_paragraph(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.select((*ITEMS, 0))
+    designer.open("kitchen", *ITEMS, 0)
     before = designer.text
-    (line,) = designer.row(*ITEMS, 0, "text").field.lines.values()
+    (line,) = designer.field(*ITEMS, 0, "text").lines.values()
     low = line.height()
     line.setFocus()
     line.selectAll()
@@ -260,7 +216,7 @@ def test_a_question_is_shown_whole_and_typed_as_one_paragraph(qtbot: Any, design
     assert designer.text == before
     qtbot.keyClick(line, Qt.Key.Key_Return)
     assert "\n" not in line.words()
-    assert designer.editing.opened.study.document["questionnaires"]["liquid"]["items"][0]["text"] == line.words()
+    assert designer.value("questionnaires", "liquid", "items", 0, "text") == line.words()
     qtbot.waitUntil(lambda: line.height() > low)
     assert line.verticalScrollBar().maximum() == 0
     line.selectAll()

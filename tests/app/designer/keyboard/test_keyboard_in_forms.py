@@ -5,31 +5,24 @@ from typing import Any
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
+from PySide6.QtWidgets import QLineEdit, QWidget
 
 from study_app.gui.designer.form.languages_field import LanguagesField
 from study_app.gui.designer.form.typed_fields import TypedText
 from study_app.gui.designer.outline.rows import ROW_ROLE
 from study_app.gui.designer.tab_order import stops
-from study_app.viewmodels.designer.requests import ChangeLanguage, SetValue
+from study_app.viewmodels.designer.requests import SetValue
 
 pytestmark = pytest.mark.slow
 
 CONTROL, KEY = Qt.KeyboardModifier.ControlModifier, Qt.Key
 
 
-def press(qtbot: Any, key: KEY, held: Any = Qt.KeyboardModifier.NoModifier) -> Any:
-    """Press a key in the part with the keyboard, and return the part that has it then."""
-    qtbot.keyClick(QApplication.focusWidget(), key, held)
-    QApplication.processEvents()
-    return QApplication.focusWidget()
-
-
 def first_row(designer: Any) -> QWidget:
     return designer.place.form.rows[0]
 
 
-@pytest.mark.variants(4)
+@pytest.mark.variants(3)
 @pytest.mark.parametrize("width", [1600, 1366])
 @pytest.mark.parametrize("area", ["form", "outline"])
 @pytest.mark.parametrize(
@@ -39,11 +32,10 @@ def test_a_duplicate_is_selected_everywhere_and_has_the_keyboard(
     qtbot: Any, designer: Any, width: int, area: str, path: tuple[str | int, ...]
 ) -> None:
     designer.window.resize(width, 768)
-    designer.controller.open("kitchen")
-    designer.select(path)
+    designer.open("kitchen", *path)
     outline, tree = designer.place.outline, designer.place.outline.tree
     designer.place.areas.focus_form() if area == "form" else designer.place.parts.focus_outline()
-    keyboard = press(qtbot, KEY.Key_D, CONTROL)
+    keyboard = designer.hit("ctrl+d")
     copy = (*path[:-1], path[-1] + 1 if isinstance(path[-1], int) else f"{path[-1]}_2")
     assert designer.editing.selected == copy
     assert designer.place.form.form.path == copy
@@ -57,31 +49,29 @@ def test_a_duplicate_is_selected_everywhere_and_has_the_keyboard(
         assert chosen == keyboard.words() != ""
     else:
         assert first_row(designer).isAncestorOf(keyboard)
-    assert press(qtbot, KEY.Key_1, CONTROL) is tree
+    assert designer.hit("ctrl+1") is tree
     assert tree.currentIndex().data(ROW_ROLE).path == copy
     assert tree.viewport().rect().contains(tree.visualRect(tree.currentIndex()))
-    assert first_row(designer).isAncestorOf(press(qtbot, KEY.Key_Return))
+    assert first_row(designer).isAncestorOf(designer.hit("Return"))
     assert designer.place.form.form.path == copy
 
 
 def test_a_reference_leads_to_the_form_of_its_element_and_back(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.select(("blocks", "liquids"))
-    designer.row("blocks", "liquids", "task").field.arrow.setFocus()
-    keyboard = press(qtbot, KEY.Key_Return)
+    designer.open("kitchen", "blocks", "liquids")
+    designer.field("blocks", "liquids", "task").arrow.setFocus()
+    keyboard = designer.hit("Return")
     assert designer.editing.selected == ("tasks", "explore")
     assert first_row(designer).isAncestorOf(keyboard)
-    keyboard = press(qtbot, KEY.Key_Left, Qt.KeyboardModifier.AltModifier)
+    keyboard = designer.hit("alt+Left")
     assert designer.editing.selected == ("blocks", "liquids")
     assert designer.place.form.isAncestorOf(keyboard)
 
 
 def test_a_field_that_is_added_has_the_keyboard(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.select(("conditions", "thick"))
+    designer.open("kitchen", "conditions", "thick")
     before = {row.row.row.path for row in designer.place.form.rows}
     next(iter(designer.place.form.adds.values())).setFocus()
-    keyboard = press(qtbot, KEY.Key_Return)
+    keyboard = designer.hit("Return")
     (added,) = (row for row in designer.place.form.rows if row.row.row.path not in before)
     assert added.isAncestorOf(keyboard)
 
@@ -91,57 +81,54 @@ def test_a_number_that_is_left_by_tab_at_once_keeps_the_keyboard_in_its_form(
     qtbot: Any, designer: Any, back: bool
 ) -> None:
     path = ("conditions", "thin", "force_delay_ms")
-    designer.file.write_text(designer.file.read_text().replace("format = 1", "format = 2"))
-    designer.controller.open("kitchen")
-    designer.select(path[:2])
-    designer.row(*path).field.line.setFocus()
+    designer.change(("format = 1", "format = 2"))
+    designer.open("kitchen", *path[:2])
+    designer.field(*path).line.setFocus()
     rows = [row.row.row.path for row in designer.place.form.rows]
-    qtbot.keyClicks(QApplication.focusWidget(), "7")
-    press(qtbot, KEY.Key_Backtab if back else KEY.Key_Tab)  # the key is new in the file: the form is made anew
-    assert designer.editing.opened.study.document["conditions"]["thin"]["force_delay_ms"] == 7
+    qtbot.keyClicks(designer.keyboard, "7")
+    designer.hit("Backtab" if back else "Tab")  # the key is new in the file: the form is made anew
+    assert designer.value("conditions", "thin", "force_delay_ms") == 7
     beside = rows[rows.index(path) + (-1 if back else 1)]
-    assert designer.row(*beside).isAncestorOf(QApplication.focusWidget())
+    assert designer.form_row(*beside).isAncestorOf(designer.keyboard)
 
 
 @pytest.mark.parametrize("width", [1600, 1024])
 def test_ctrl_e_goes_to_the_file_and_back_to_the_same_field(qtbot: Any, designer: Any, width: int) -> None:
     designer.window.resize(width, 640)
-    designer.controller.open("kitchen")
-    designer.select(("blocks", "liquids"))
-    field = designer.row("blocks", "liquids", "repetitions").field.line
+    designer.open("kitchen", "blocks", "liquids")
+    field = designer.field("blocks", "liquids", "repetitions").line
     field.setFocus()
-    assert press(qtbot, KEY.Key_E, CONTROL) is designer.place.file.editor
-    assert press(qtbot, KEY.Key_E, CONTROL) is field
-    assert press(qtbot, KEY.Key_E, CONTROL) is designer.place.file.editor
+    assert designer.hit("ctrl+e") is designer.place.file.editor
+    assert designer.hit("ctrl+e") is field
+    assert designer.hit("ctrl+e") is designer.place.file.editor
     field.setEnabled(False)
-    assert first_row(designer).isAncestorOf(press(qtbot, KEY.Key_E, CONTROL)), "the field cannot take the keyboard"
+    assert first_row(designer).isAncestorOf(designer.hit("ctrl+e")), "the field cannot take the keyboard"
 
 
 def test_the_first_row_has_the_keyboard_where_undo_removes_the_row_that_had_it(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.select(("tasks", "explore"))
+    designer.open("kitchen", "tasks", "explore")
     designer.editing.ask(SetValue(("tasks", "explore", "kind"), "reach"))
-    designer.row("tasks", "explore", "dwell_s").field.line.setFocus()
-    keyboard = press(qtbot, KEY.Key_Z, CONTROL)
-    assert designer.editing.opened.study.document["tasks"]["explore"]["kind"] == "explore"
+    designer.field("tasks", "explore", "dwell_s").line.setFocus()
+    keyboard = designer.hit("ctrl+z")
+    assert designer.value("tasks", "explore", "kind") == "explore"
     assert first_row(designer).isAncestorOf(keyboard)
 
 
 def test_ctrl_3_goes_to_the_page_and_then_to_the_tabs_where_enter_chooses(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     pane = designer.place.pane
     first_row(designer).setFocus()
-    assert press(qtbot, KEY.Key_3, CONTROL) not in pane.tabs.buttons
-    assert press(qtbot, KEY.Key_3, CONTROL) in pane.tabs.buttons
+    assert designer.hit("ctrl+3") not in pane.tabs.buttons
+    assert designer.hit("ctrl+3") in pane.tabs.buttons
     pane.tabs.buttons[1].setFocus()
-    press(qtbot, KEY.Key_Return)
+    designer.hit("Return")
     assert pane.tab == "measures"
 
 
 def test_ctrl_delete_removes_the_key_of_a_field_whose_cross_tab_passes(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     block = ("blocks", "liquids")
-    designer.select(block)
+    designer.go_to(*block)
     text, removable = designer.text, [row for row in designer.place.form.rows if row.remove is not None]
     assert {"title", "order", "repetitions", "questionnaire"} <= {str(row.row.row.path[-1]) for row in removable}
     for row in removable:
@@ -149,11 +136,11 @@ def test_ctrl_delete_removes_the_key_of_a_field_whose_cross_tab_passes(qtbot: An
         assert "(Ctrl+Del)" in row.remove.toolTip()
         path = row.row.row.path
         designer.place.form.focus(path)
-        if isinstance(QApplication.focusWidget(), QLineEdit):
-            QApplication.focusWidget().selectAll()  # as where Tab leads to it
-        press(qtbot, KEY.Key_Delete, CONTROL)
-        assert path[-1] not in designer.editing.opened.study.document["blocks"]["liquids"], path
-        assert designer.place.form.isAncestorOf(QApplication.focusWidget())
+        if isinstance(designer.keyboard, QLineEdit):
+            designer.keyboard.selectAll()  # as where Tab leads to it
+        designer.hit("ctrl+Delete")
+        assert path[-1] not in designer.value("blocks", "liquids"), path
+        assert designer.place.form.isAncestorOf(designer.keyboard)
         designer.editing.undo()
         assert designer.text == text
 
@@ -161,40 +148,19 @@ def test_ctrl_delete_removes_the_key_of_a_field_whose_cross_tab_passes(qtbot: An
 def test_ctrl_delete_deletes_a_word_where_one_follows_and_no_key_comes_back_with_what_was_typed(
     qtbot: Any, designer: Any
 ) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     title = ("blocks", "liquids", "title")
-    designer.select(title[:2])
+    designer.go_to(*title[:2])
     designer.place.form.focus(title)
-    field = QApplication.focusWidget()
+    field = designer.keyboard
     field.setText("Two liquids")
     field.setCursorPosition(0)
-    press(qtbot, KEY.Key_Delete, CONTROL)
+    designer.hit("ctrl+Delete")
     assert field.text() == "liquids"
     field.setCursorPosition(len(field.text()))
     qtbot.keyClicks(field, " now")
-    press(qtbot, KEY.Key_Delete, CONTROL)
-    assert "title" not in designer.editing.opened.study.document["blocks"]["liquids"]
-
-
-def test_ctrl_delete_removes_a_text_once_it_is_empty_or_marked_in_each_language(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.editing.ask(ChangeLanguage("add", "nl"))
-    title = ("blocks", "liquids", "title")
-    designer.select(title[:2])
-    english, dutch = designer.row(*title).field.lines.values()
-    english.setFocus()
-    english.setText("Two liquids")
-    dutch.setText("Twee")
-    press(qtbot, KEY.Key_Delete, CONTROL)
-    english.selectAll()
-    press(qtbot, KEY.Key_Delete, CONTROL)
-    press(qtbot, KEY.Key_Delete, CONTROL)
-    assert (english.text(), dutch.text()) == ("", "Twee")
-    assert "title" in designer.editing.opened.study.document["blocks"]["liquids"]
-    dutch.setFocus()
-    dutch.selectAll()
-    press(qtbot, KEY.Key_Delete, CONTROL)
-    assert "title" not in designer.editing.opened.study.document["blocks"]["liquids"]
+    designer.hit("ctrl+Delete")
+    assert "title" not in designer.value("blocks", "liquids")
 
 
 @pytest.mark.parametrize("shown", ["the form gets another row", "the file can be read again"])
@@ -203,10 +169,9 @@ def test_what_is_typed_into_the_file_stays_there_where_the_form_is_made_anew(
 ) -> None:
     again = shown == "the file can be read again"
     if again:
-        designer.controller.open("rek2024")
-        designer.file.write_text(designer.file.read_text().replace("[study]", "[study", 1))
-    designer.controller.open("kitchen")
-    designer.select(("study",))
+        designer.open("rek2024")
+        designer.change(("[study]", "[study"))
+    designer.open("kitchen", "study")
     designer.place.form.focus_first()
     editor = designer.place.file.editor
     designer.place.show_tab("file")
@@ -218,7 +183,7 @@ def test_what_is_typed_into_the_file_stays_there_where_the_form_is_made_anew(
     editor.setTextCursor(cursor)
     typed = "] # and more" if again else '\rcredits = "abc" # and more'
     for letter in typed:
-        qtbot.keyClicks(QApplication.focusWidget(), letter)
+        qtbot.keyClicks(designer.keyboard, letter)
         qtbot.wait(30)
     qtbot.wait(300)
     assert editor.hasFocus()
@@ -226,7 +191,7 @@ def test_what_is_typed_into_the_file_stays_there_where_the_form_is_made_anew(
 
 
 def test_what_is_typed_into_a_missing_text_stays_in_its_language(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     designer.editing.ask(SetValue(("study", "languages"), ("en", "de")))
     designer.editing.ask(SetValue(("study", "title"), {"en": "Kitchen"}))
     designer.editing.select(("study",))
@@ -235,10 +200,10 @@ def test_what_is_typed_into_a_missing_text_stays_in_its_language(qtbot: Any, des
     row = next(one for one in form.rows if one.row.row.path == ("study", "title"))
     row.field.lines["de"].setFocus()
     for letter in "Kueche und Bad":
-        field = QApplication.focusWidget()
+        field = designer.keyboard
         assert field is not None
         QTest.keyClicks(field, letter)
         qtbot.wait(60)
     qtbot.wait(400)
     form.flush()
-    assert designer.editing.opened.study.document["study"]["title"] == {"en": "Kitchen", "de": "Kueche und Bad"}
+    assert designer.value("study", "title") == {"en": "Kitchen", "de": "Kueche und Bad"}

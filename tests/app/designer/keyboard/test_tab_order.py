@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.gui.designer.tab_order import stops
-from study_app.viewmodels.designer.requests import ChangeLanguage, SetValue
+from study_app.viewmodels.designer.requests import ChangeLanguage
 
 pytestmark = pytest.mark.slow
 
@@ -19,26 +19,20 @@ MOST = 250
 @pytest.fixture
 def dutch(qtbot: Any, designer: Any) -> Any:
     """The study in two languages, with a block selected."""
-    designer.controller.open("kitchen")
+    designer.open()
     for how in ("add", "copy"):
         designer.editing.ask(ChangeLanguage(how, "nl"))
-    designer.select(("blocks", "liquids"))
+    designer.go_to("blocks", "liquids")
     qtbot.waitUntil(lambda: len(designer.controller.preview.tab.languages.buttons) == 2)
     return designer
 
 
-def press(qtbot: Any, key: KEY, held: Any = Qt.KeyboardModifier.NoModifier) -> Any:
-    """Press a key in the part with the keyboard, and return the part that has it then."""
-    qtbot.keyClick(QApplication.focusWidget(), key, held)
-    return QApplication.focusWidget()
-
-
-def passed(qtbot: Any, until: Callable[[QWidget], bool]) -> list[Any]:
+def passed(designer: Any, until: Callable[[QWidget], bool]) -> list[Any]:
     """Press Tab until the keyboard is at a part; return all that it was at."""
-    seen = [QApplication.focusWidget()]
+    seen = [designer.keyboard]
     while not until(seen[-1]):
         assert len(seen) < MOST, [one.accessibleName() for one in seen[-40:]]
-        seen.append(press(qtbot, KEY.Key_Tab))
+        seen.append(designer.hit("Tab"))
     return seen
 
 
@@ -48,7 +42,7 @@ def test_tab_goes_through_the_parts_as_they_are_seen(qtbot: Any, dutch: Any, wid
     QApplication.processEvents()
     place, rail = dutch.place, dutch.window.rail
     place.areas.focus_header()
-    seen = passed(qtbot, lambda part: part is place.pane.tabs.buttons[0])
+    seen = passed(dutch, lambda part: part is place.pane.tabs.buttons[0])
     parts = [place.header, place.parts.path if width < 1400 else place.outline, place.form.head, place.form.inside]
     areas = [next((at for at, part in enumerate(parts) if part.isAncestorOf(one)), len(parts)) for one in seen]
     assert areas == sorted(areas)
@@ -57,10 +51,10 @@ def test_tab_goes_through_the_parts_as_they_are_seen(qtbot: Any, dutch: Any, wid
     for crumb in place.parts.path.steps:
         assert (crumb in seen) == (width < 1400)
     tab = dutch.controller.preview.tab
-    seen = passed(qtbot, lambda part: part is tab.page)
+    seen = passed(dutch, lambda part: part is tab.page)
     assert seen == [*place.pane.tabs.buttons, *tab.languages.buttons, tab.screens, tab.page]
     tab.page.left.emit()
-    assert rail.isAncestorOf(passed(qtbot, lambda part: not place.isAncestorOf(part))[-1])
+    assert rail.isAncestorOf(passed(dutch, lambda part: not place.isAncestorOf(part))[-1])
 
 
 @pytest.mark.variants(4)
@@ -71,34 +65,23 @@ def test_tab_goes_to_each_stop_of_a_form_once(
     qtbot: Any, dutch: Any, editors: None, path: tuple[str | int, ...]
 ) -> None:
     del editors
-    dutch.select(path)
+    dutch.go_to(*path)
     form = dutch.place.form
     assert form.rows
     QApplication.processEvents()
     dutch.place.areas.focus_header()
-    seen = passed(qtbot, lambda part: part is dutch.place.pane.tabs.buttons[0])
+    seen = passed(dutch, lambda part: part is dutch.place.pane.tabs.buttons[0])
     assert [part.accessibleName() for part in seen if form.inside.isAncestorOf(part)] == [
         part.accessibleName() for part in stops(form.inside) if part.isVisible() and part.isEnabled()
     ]
 
 
-def test_shift_tab_goes_from_the_page_to_the_form_and_its_head(qtbot: Any, dutch: Any) -> None:
-    tab, form = dutch.controller.preview.tab, dutch.place.form
-    tab.screens.setFocus()
-    back = [press(qtbot, KEY.Key_Backtab, Qt.KeyboardModifier.ShiftModifier) for _ in range(7)]
-    assert back[:2] == tab.languages.buttons[::-1]
-    assert back[2:6] == dutch.place.pane.tabs.buttons[::-1]
-    assert form.inside.isAncestorOf(back[6])
-    form.focus_first()
-    assert press(qtbot, KEY.Key_Backtab, Qt.KeyboardModifier.ShiftModifier) is form.head.id
-
-
 def test_f6_goes_to_the_tabs_and_enter_on_a_language_shows_its_page(qtbot: Any, dutch: Any) -> None:
     pane, tab = dutch.place.pane, dutch.controller.preview.tab
     dutch.place.areas.focus_form()
-    assert press(qtbot, KEY.Key_F6) is pane.tabs.buttons[0]
-    passed(qtbot, lambda part: part is tab.languages.buttons[1])
-    press(qtbot, KEY.Key_Return)
+    assert dutch.hit("F6") is pane.tabs.buttons[0]
+    passed(dutch, lambda part: part is tab.languages.buttons[1])
+    dutch.hit("Return")
     assert tab.view.language == "nl"
     assert tab.languages.buttons[1].hasFocus()
 
@@ -109,13 +92,13 @@ def test_ctrl_l_shows_the_page_in_the_next_language(qtbot: Any, dutch: Any, widt
     place, tab = dutch.place, dutch.controller.preview.tab
     place.show_tab("measures")
     place.areas.focus_form()
-    field = QApplication.focusWidget()
-    keyboard = press(qtbot, KEY.Key_L, CONTROL)
+    field = dutch.keyboard
+    keyboard = dutch.hit("ctrl+l")
     assert keyboard is field if width == 1600 else place.pane.isAncestorOf(keyboard)
     assert tab.isVisible()
     assert tab.view.language == "nl"
     assert "(Ctrl+L)" in tab.languages.buttons[0].toolTip()
-    press(qtbot, KEY.Key_L, CONTROL)
+    dutch.hit("ctrl+l")
     assert tab.view.language == "en"
 
 
@@ -123,7 +106,7 @@ def test_tab_goes_through_problems_questions_and_the_banner_which_are_made_later
     qtbot: Any, designer: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("study_app.app.designer.repair_search.REST_MS", 0)
-    designer.controller.open("kitchen")
+    designer.open()
     designer.editing.ask(ChangeLanguage("add", "nl"))
     designer.saving.save()
     place = designer.place
@@ -133,40 +116,10 @@ def test_tab_goes_through_problems_questions_and_the_banner_which_are_made_later
     designer.controller.ask_to_delete(("liquids", "thick"))
     qtbot.waitUntil(place.prompt.isVisible)
     place.areas.focus_header()
-    press(qtbot, KEY.Key_Tab)
-    seen = passed(qtbot, lambda part: part is place.header.study or designer.window.rail.isAncestorOf(part))
+    designer.hit("Tab")
+    seen = passed(designer, lambda part: part is place.header.study or designer.window.rail.isAncestorOf(part))
     lines = [part for line in place.problems.lines for part in (line.go, *line.repairs)]
     card = place.prompt
     made = [*place.banner.buttons, place.outline.tree, card.cancel, card.gaps, card.other, card.all, *lines]
     assert [part for part in seen if part in made] == made
     assert len(set(seen)) == len(seen)
-
-
-def test_tab_goes_to_the_drafts_to_continue_where_no_study_is_open(qtbot: Any, designer: Any) -> None:
-    designer.controller.begin("demo", "mine")
-    designer.saving.leave()
-    designer.editing.opened = None
-    designer.controller.enter()
-    place = designer.place
-    qtbot.waitUntil(lambda: [one.isVisible() for one in place.nothing.drafts] == [True])
-    place.setFocus()
-    for expected in (*place.nothing.drafts, place.nothing.new, place.header.study):
-        place.focusNextChild()
-        assert QApplication.focusWidget() is expected
-
-
-def test_tab_goes_to_what_the_line_above_the_parts_offers_and_then_to_what_closes_it(qtbot: Any, designer: Any) -> None:
-    designer.file.write_text(designer.file.read_text().replace("force_limit_n = 6", "force_limit_n = 60"))
-    designer.controller.open("kitchen")
-    designer.editing.ask(SetValue(("study", "title"), "Another title"))
-    designer.place.header.save.click()
-    banner = designer.place.banner
-    offered = [*banner.buttons, banner.close_button]
-    assert [one.text() for one in banner.buttons] == ["Show the list"]
-    QApplication.processEvents()
-    assert all(one.isVisible() for one in offered)
-    designer.place.areas.focus_header()
-    seen = passed(qtbot, designer.place.outline.isAncestorOf)
-    assert [one for one in seen if banner.isAncestorOf(one)] == offered
-    back = [press(qtbot, KEY.Key_Backtab, Qt.KeyboardModifier.ShiftModifier) for _ in offered]
-    assert back == offered[::-1]

@@ -4,26 +4,13 @@ from typing import Any
 
 import pytest
 from pyqtgraph import TextItem
-from PySide6.QtCore import QEvent, QPointF, Qt
-from PySide6.QtGui import QEnterEvent
+from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QApplication, QLineEdit
 
-from study_app.authoring.drafts import discard, drafted_files
-from study_app.authoring.kept_settings import keep_setting, kept_participants
+from study_app.authoring.kept_settings import kept_participants
 from study_app.authoring.writer.edits import Set
-from study_app.gui.designer.measures.card_grid import CardGrid
 from study_app.gui.designer.measures.limit_colours import limit_colour
-from study_app.gui.designer.measures.parts import NumberPart
-from study_app.gui.theme.theme import DARK, LIGHT
-from study_app.viewmodels.designer.measures.number_cards import (
-    ON_AVERAGE,
-    UNKNOWN,
-    Line,
-    LinesCard,
-    NumberCard,
-    TextsCard,
-)
+from study_app.viewmodels.designer.measures.number_cards import ON_AVERAGE, UNKNOWN
 from tests.app.designer.measures.conftest import Worker, jnd, shown
 
 pytestmark = pytest.mark.slow
@@ -38,10 +25,7 @@ def test_what_is_simulated_is_typed_at_the_right(qtbot: Any, designer: Any, work
     qtbot.waitUntil(lambda: bool(worker.orders))
     controls = designer.place.measures.controls
     for control, typed in ((controls.threshold, "30"), (controls.lapses, "5"), (controls.participants, "8")):
-        control.field.setFocus()
-        control.field.selectAll()
-        qtbot.keyClicks(control.field, typed)
-        qtbot.keyClick(control.field, Qt.Key.Key_Return)
+        designer.fill(control.field, typed)
     qtbot.waitUntil(lambda: worker.orders[-1].wanted[0].lapses == 0.05)
     observing, grouping, measuring, _ = worker.orders[-1].wanted
     assert (observing.threshold, measuring.lapses, grouping.participants) == (0.3, 0.05, 8)
@@ -57,10 +41,7 @@ def test_the_number_of_participants_is_kept_for_each_study(qtbot: Any, designer:
     control = designer.place.measures.controls.participants
 
     def simulate(number: str) -> None:
-        control.field.setFocus()
-        control.field.selectAll()
-        qtbot.keyClicks(control.field, number)
-        qtbot.keyClick(control.field, Qt.Key.Key_Return)
+        designer.fill(control.field, number)
 
     def shows(number: str, planned: str) -> None:
         qtbot.waitUntil(lambda: (control.field.text(), control.unit.text()) == (number, planned))
@@ -69,45 +50,15 @@ def test_the_number_of_participants_is_kept_for_each_study(qtbot: Any, designer:
     simulate("8")
     shows("8", "(24 planned)")
     file = designer.editing.opened.file
-    designer.controller.open("kitchen")
+    designer.open()
     shows("12", "(none planned)")
-    designer.controller.open(str(file))
+    designer.open(str(file))
     shows("8", "(24 planned)")
     assert kept_participants(file) == 8
     assert b"participants = 24" in designer.editing.opened.source()
     simulate("24")
     shows("24", "planned")
     assert kept_participants(file) is None  # from now on it follows the file
-
-
-@pytest.mark.parametrize(
-    ("right", "wrong", "shown"),
-    [
-        ("precision = 0.15", "precision = 15", ("24", "planned")),
-        ("format = 2", "format = 9", ("24", "planned")),
-        ("participants = 24", "participants = 0", ("12", "(none planned)")),
-    ],
-)
-def test_the_planned_number_of_participants_is_that_of_a_faulty_file_too(
-    qtbot: Any, designer: Any, worker: Worker, right: str, wrong: str, shown: tuple[str, str]
-) -> None:
-    jnd(designer)
-    control = designer.place.measures.controls.participants
-    designer.file.write_text(designer.text.replace(right, wrong, 1))
-    designer.controller.open("kitchen")
-    assert designer.editing.opened.study.faults
-    qtbot.waitUntil(lambda: (control.field.text(), control.unit.text()) == shown)
-
-
-def test_a_new_study_has_no_number_of_participants_of_one_that_was_discarded(
-    qtbot: Any, designer: Any, worker: Worker
-) -> None:
-    jnd(designer)
-    keep_setting(designer.editing.opened.file, "participants", 8)
-    designer.controller.open("kitchen")
-    discard(next(file for file in drafted_files() if file.stem == "thicker"))
-    jnd(designer)
-    qtbot.waitUntil(lambda: designer.place.measures.controls.participants.field.text() == "24")
 
 
 def test_a_verdict_says_whether_the_participants_are_enough(qtbot: Any, designer: Any, worker: Worker) -> None:
@@ -147,33 +98,16 @@ def test_a_clipped_level_is_repaired_by_its_button(qtbot: Any, designer: Any) ->
     assert {bar.clipped_by for bar in forces.shown.bars} == {None, "slope"}
     assert forces.words.text() == designer.place.view.problems[0].message
     click(forces.repair)
-    assert designer.editing.opened.study.protocol is not None
-    highest = designer.editing.opened.study.document["stimuli"]["damping"]["levels"][1]
+    assert designer.study.protocol is not None
+    highest = designer.value("stimuli", "damping", "levels", 1)
     assert forces.repair.text() == f"Highest level {highest}"
     qtbot.waitUntil(lambda: not forces.bar.isVisible())
     designer.editing.undo()
-    assert designer.editing.opened.study.document["stimuli"]["damping"]["levels"][1] == 0.75
-
-
-@pytest.mark.usefixtures("worker")
-def test_each_block_names_its_own_levels_that_are_clipped(qtbot: Any, designer: Any) -> None:
-    jnd(designer)
-    designer.editing.make("Change", Set(("stimuli", "damping", "standards"), [40]))
-    page = designer.place.measures
-    qtbot.waitUntil(lambda: "forces" in page.cards)
-    forces = page.cards["forces"]
-    for block, named in (("viscosity", "levels 0.34 to 0.6 gives up to 64"), ("training", "level 0.5 gives 60")):
-        designer.editing.select(("blocks", block))
-        said = f"Standard 40 at {named} N·s/m at the hand; the slope limit (1000 Hz, kalman, 1 tick) is 53"
-        qtbot.waitUntil(lambda said=said: forces.words.text() == said)
-        qtbot.waitUntil(forces.repair.isVisible)
-    click(forces.repair)
-    assert designer.editing.opened.study.faults == ()
+    assert designer.value("stimuli", "damping", "levels", 1) == 0.75
 
 
 def test_a_block_of_statements_shows_what_people_can_show(qtbot: Any, designer: Any, worker: Worker) -> None:
-    designer.controller.open("rek2024")
-    designer.editing.select(("blocks", "liquids"))
+    designer.open("rek2024", "blocks", "liquids")
     designer.place.pane.show_tab("measures")
     qtbot.waitUntil(lambda: bool(worker.orders))
     (wanted,) = worker.orders[0].wanted
@@ -210,70 +144,3 @@ def test_a_row_opens_the_measures_of_a_block_that_uses_an_element(qtbot: Any, de
     click(part.buttons[1])
     assert designer.editing.selected == ("blocks", "viscosity")
     qtbot.waitUntil(lambda: not page.blocks.isVisible())
-
-
-@pytest.mark.variants(3)
-@pytest.mark.parametrize("size", [(1600, 1000), (1366, 768), (1024, 640)])
-@pytest.mark.parametrize("theme", [LIGHT, DARK])
-def test_every_element_has_measures_that_fit(
-    qtbot: Any, designer: Any, worker: Worker, size: tuple[int, int], theme: Any
-) -> None:
-    designer.window.show_theme(theme)
-    designer.window.resize(*size)
-    jnd(designer)
-    designer.place.sides.buttons[1].click()
-    qtbot.waitUntil(lambda: bool(worker.orders))
-    worker.answer()
-    shown(qtbot, designer, 2, "93")
-    page = designer.place.measures
-    assert page.area.widget().minimumSizeHint().width() <= page.area.viewport().width()
-    for part in page.findChildren(QAbstractButton) + page.controls.findChildren(QLineEdit):
-        assert part.accessibleName() or part.text()
-    for path in (("liquids", "damper"), ("study",), ("designs", "pair"), ("tasks", "stir")):
-        designer.editing.select(path)
-        qtbot.waitUntil(lambda path=path: page.shown is not None and designer.editing.selected == path)
-        designer.controller.measures.show()
-        assert page.area.widget().minimumSizeHint().width() <= page.area.viewport().width(), path
-
-
-def test_measures_are_those_of_the_study_that_is_opened(qtbot: Any, designer: Any) -> None:
-    def languages() -> list[str]:
-        cards = () if designer.place.measures.shown is None else designer.place.measures.shown.cards
-        return [line.title for card in cards if isinstance(card, TextsCard) for line in card.languages]
-
-    designer.controller.open("kitchen")
-    designer.place.show_tab("measures")
-    for study, titles in (("rek2024", ["English", "Dutch"]), ("demo", ["English"])):
-        designer.controller.open(study)
-        qtbot.waitUntil(lambda titles=titles: languages() == titles)
-
-
-def test_no_card_moves_while_the_pointer_is_over_the_cards(qtbot: Any) -> None:
-    grid = CardGrid()
-    qtbot.addWidget(grid)
-    grid.resize(600, 800)
-    grid.show()
-    lines = tuple(Line(f"Liquid {number}", "1 N", 0.5) for number in range(4))
-    long, short, other = LinesCard("Force", "", lines), LinesCard("Force", "", ()), LinesCard("Other", "", lines)
-    grid.show_cards((long, long, other, other))
-    qtbot.wait(20)
-    before = grid.parts[2].pos()
-    QApplication.sendEvent(grid, QEnterEvent(QPointF(5, 5), QPointF(5, 5), QPointF(5, 5)))
-    grid.show_cards((short, short, other, other))
-    qtbot.wait(20)
-    assert grid.parts[2].pos() == before
-    QApplication.sendEvent(grid, QEvent(QEvent.Type.Leave))
-    qtbot.waitUntil(lambda: grid.parts[2].y() < before.y())
-
-
-@pytest.mark.parametrize(("number", "size_px"), [("5.1 – 60", 26), ("4.8 – 240", 16)])
-def test_a_number_is_never_cut(qtbot: Any, number: str, size_px: int) -> None:
-    part = NumberPart()
-    qtbot.addWidget(part)
-    part.resize(154, 90)
-    part.show_card(NumberCard("JNDs it can measure", number, "%"))
-    part.show()
-    assert part.number.width() >= part.number.sizeHint().width()
-    assert part.number.font().pixelSize() == size_px
-    part.resize(300, 90)
-    assert part.number.font().pixelSize() == 26

@@ -16,7 +16,7 @@ from study_app.app.designer.measures.measures_worker import (
     MeasureOrder,
     carry_out,
 )
-from study_app.app.designer.measures.page_fit import PageFit, _pages
+from study_app.app.designer.measures.page_fit import _pages
 from study_app.app.designer.measures.wanted import wanted_of
 from study_app.authoring.edited_study import read
 from study_app.authoring.measures.planned import ENOUGH
@@ -73,14 +73,6 @@ def test_warnings_that_take_simulated_observers_are_those_of_check() -> None:
     assert answers[0][1]
 
 
-def test_an_order_is_given_up_before_its_first_number() -> None:
-    protocol = template("viscosity-jnd").protocol
-    assert protocol is not None
-    planned = plans(protocol, (20,))
-    with pytest.raises(Stopped):
-        carry_out(MeasureOrder((Grouping(planned["viscosity"][20], 6, 0.5),)), print, lambda: True)
-
-
 def test_what_is_wanted_depends_on_forces_and_tasks_and_on_no_text() -> None:
     study = read(shipped_file("rek2024").read_bytes(), shipped_file("rek2024").parent)
     path = ("blocks", "liquids")
@@ -114,14 +106,8 @@ def test_a_page_never_shown_has_the_parts_of_one_that_is(qtbot: Any, size: tuple
     assert parts_of(page, words(language), size) == len(shown.parts) == expected
 
 
-@pytest.mark.slow
-def test_the_fit_is_found_once_for_each_page_and_language(qtbot: Any, qapp: Any) -> None:
-    protocol = load("rek2024")
-    fit = PageFit(qapp)
-    fit.rest.setInterval(1)
-    focus = focus_of(protocol, PATH)
-    assert fit.parts(protocol, focus, PATH) is None
-    qtbot.waitSignal(fit.found).wait()
-    assert fit.parts(protocol, focus, PATH) == 1
-    assert not fit.rest.isActive()
-    assert fit.parts(protocol, focus_of(protocol, ("study",)), ("study",)) is None
+def test_an_order_is_given_up_before_its_first_number() -> None:
+    protocol = template("viscosity-jnd").protocol
+    assert protocol is not None
+    with pytest.raises(Stopped):
+        carry_out(MeasureOrder((Grouping(plans(protocol, (20,))["viscosity"][20], 6, 0.5),)), print, lambda: True)

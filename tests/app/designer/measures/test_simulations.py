@@ -106,19 +106,6 @@ def test_a_card_says_how_far_its_simulations_are_and_that_one_crashed(
     assert people.note.text() == ANEW  # another study, another try
 
 
-def test_a_process_that_ends_after_its_last_answer_makes_no_number_fail(
-    qtbot: Any, designer: Any, worker: Worker
-) -> None:
-    jnd(designer)
-    qtbot.waitUntil(lambda: bool(worker.orders))
-    worker.answer()
-    worker.given[-1] = (1, Crashed(1))
-    shown(qtbot, designer, 2, "93")
-    slow = designer.controller.measures.slow
-    assert not slow.waits
-    assert not any(slow.failure(one) for one in worker.orders[0].wanted)
-
-
 def test_without_a_process_the_other_numbers_stay(qtbot: Any, designer: Any) -> None:
     designer.controller.measures.slow.rest.setInterval(10)
     jnd(designer)
@@ -174,38 +161,8 @@ def test_numbers_of_what_is_broken_stay_in_grey(qtbot: Any, designer: Any, worke
     assert not page.function.shown.anew
 
 
-def test_numbers_of_what_is_not_broken_continue(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    facts = designer.place.pane.facts
-
-    def forces() -> list[str]:
-        found = [card for card in facts.grid.cards if getattr(card, "title", "") == "Force of each liquid"]
-        return [line.number for card in found for line in card.lines]
-
-    designer.editing.select(("blocks", "delays"))
-    qtbot.waitUntil(lambda: bool(forces()))
-    designer.editing.make("Break", Set(("tasks", "reach", "dwell_s"), -1))
-    qtbot.waitUntil(facts.earlier.isVisible)
-    assert not facts.grid.isEnabled()
-    designer.editing.select(("blocks", "liquids"))
-    qtbot.waitUntil(lambda: not facts.earlier.isVisible())
-    assert facts.grid.isEnabled()
-    before = forces()
-    designer.editing.make("Change", Set(("liquids", "thick", "density_kg_m3"), 1700))
-    qtbot.waitUntil(lambda: forces() != before)
-    designer.editing.undo()
-    designer.editing.undo()
-    qtbot.waitUntil(lambda: UNKNOWN not in str(facts.grid.cards[0]))
-    session = facts.grid.cards[0]
-    designer.editing.make("Break", Set(("device", "force_limit_n"), 60))
-    qtbot.waitUntil(lambda: set(forces()) == {UNKNOWN})
-    assert facts.grid.cards[0] == session  # its length does not depend on the device
-    assert not facts.earlier.isVisible()
-
-
 def test_a_click_on_a_step_of_the_session_bar_opens_the_step(qtbot: Any, designer: Any) -> None:
-    designer.controller.open("kitchen")
-    designer.select(("pages", "welcome"))
+    designer.open("kitchen", "pages", "welcome")
     facts = designer.place.pane.facts
 
     def bar() -> Any:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from PySide6.QtCore import QObject, Qt, QTimer
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QApplication
+from PySide6.QtWidgets import QAbstractButton
 
 from study_app.app.designer.participant.shown_step import StepPosition
 from study_app.app.designer.play import playing
@@ -80,7 +80,7 @@ def likert(designer: Any) -> Any:
     for key, value in (("min_s", "0.3"), ("count", "1"), ("dwell_s", "0.05"), *((one, "1000") for one in UNLIMITED)):
         text = re.sub(rf"^{key} = [\d.]+", f"{key} = {value}", text, flags=re.MULTILINE)
     designer.file.write_text(text)
-    designer.controller.open("kitchen")
+    designer.open()
     return designer
 
 
@@ -88,7 +88,7 @@ def press_f5(qtbot: Any, designer: Any) -> None:
     designer.window.activateWindow()
     qtbot.waitUntil(designer.window.isActiveWindow)
     with qtbot.waitSignal(designer.place.header.play.asked):
-        qtbot.keyClick(QApplication.focusWidget() or designer.window, Qt.Key.Key_F5)
+        designer.key("F5")
 
 
 def lines_of(study: Path) -> list[dict[str, Any]]:
@@ -268,8 +268,8 @@ def test_an_adaptive_study_is_played_from_its_tenth_trial(qtbot: Any, designer: 
         assert old in text
         text = text.replace(old, new, 1)
     designer.file.write_text(text.replace('name = "viscosity"', 'name = "kitchen"'))
-    designer.controller.open("kitchen")
-    protocol = designer.editing.opened.study.protocol
+    designer.open()
+    protocol = designer.study.protocol
     assert protocol is not None
     designer.controller.playing.where = lambda: StepPosition("viscosity", trial=10, language="en", seed=5)
     player = play_to_the_end(qtbot, designer)

@@ -1,14 +1,21 @@
-"""Keys and clicks of a user, which the X server sends to a real window."""
+"""Keys and clicks of a user: sent to a real window by the X server, or to a window without a screen by Qt."""
 
 import subprocess
 import time
 from collections.abc import Callable
+from typing import Protocol
 
-from PySide6.QtCore import QPoint
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
 
 ACTIVE_MS, SETTLES_MS = 3000, 40
+PATIENCE_MS = 30_000
+HELD = {
+    "ctrl": Qt.KeyboardModifier.ControlModifier,
+    "alt": Qt.KeyboardModifier.AltModifier,
+    "shift": Qt.KeyboardModifier.ShiftModifier,
+}
 
 
 def happens(found: Callable[[], object], ms: int) -> bool:
@@ -19,6 +26,74 @@ def happens(found: Callable[[], object], ms: int) -> bool:
             return False
         QTest.qWait(5)
     return True
+
+
+def wait_until(found: Callable[[], object], what: str, ms: int = PATIENCE_MS) -> None:
+    """Handle events until something is so."""
+    assert happens(found, ms), f"waited {ms / 1000:g} s in vain for {what}"
+
+
+def name_of(part: QWidget) -> str:
+    """Return what a screen reader calls a part."""
+    return part.accessibleName() or (part.text() if isinstance(part, QAbstractButton) else "")
+
+
+def window_in_front() -> QWidget | None:
+    """Return the window that takes keys: an open list, a dialog, or the active window."""
+    return QApplication.activePopupWidget() or QApplication.activeModalWidget() or QApplication.activeWindow()
+
+
+class Hand(Protocol):
+    """What sends keys and texts to the part that has the keyboard, clicks and notches of the wheel to a place."""
+
+    def key(self, keys: str) -> None: ...
+
+    def write(self, text: str) -> None: ...
+
+    def click(self, at: QPoint, times: int = 1) -> None: ...
+
+    def turn_wheel(self, at: QPoint, down: bool) -> None: ...
+
+    def come_forward(self, window: QWidget) -> None: ...
+
+
+class QtInput:
+    """Keys and clicks of Qt's test module, for windows without a screen."""
+
+    def key(self, keys: str) -> None:
+        """Press keys, as "ctrl+s" or "shift+Tab"."""
+        *held, name = keys.split("+")
+        modifiers = Qt.KeyboardModifier.NoModifier
+        for one in held:
+            modifiers |= HELD[one]
+        QTest.keyClick(self._takes_keys(), Qt.Key[f"Key_{name[:1].upper()}{name[1:]}"], modifiers)
+
+    def write(self, text: str) -> None:
+        """Type a text."""
+        QTest.keyClicks(self._takes_keys(), text)
+
+    def click(self, at: QPoint, times: int = 1) -> None:
+        """Click at a place of the screen."""
+        part = QApplication.widgetAt(at)
+        assert part is not None, at
+        for _ in range(times):
+            QTest.mouseClick(part, Qt.MouseButton.LeftButton, pos=part.mapFromGlobal(at))
+
+    def turn_wheel(self, at: QPoint, down: bool) -> None:
+        """Turn the wheel by a notch."""
+        window = QApplication.activeWindow()
+        assert window is not None
+        QTest.wheelEvent(window.windowHandle(), window.mapFromGlobal(at), QPoint(0, -120 if down else 120))
+
+    def come_forward(self, window: QWidget) -> None:
+        """Give the keyboard to a window."""
+        window.activateWindow()
+
+    @staticmethod
+    def _takes_keys() -> QWidget:
+        part = QApplication.focusWidget() or QApplication.activeWindow()
+        assert part is not None, "no window takes keys"
+        return part
 
 
 class XInput:

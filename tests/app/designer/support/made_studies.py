@@ -9,7 +9,8 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import EndPage, FeedbackPage, Page, TaskPage
-from tests.app.designer.support.users import User, wait_until
+from tests.app.designer.support.inputs import wait_until
+from tests.app.designer.support.users import User
 
 PLAYED_S = 400.0
 """A pilot of some trials is over by then, even where the force model is compiled first [s]."""

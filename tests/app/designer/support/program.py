@@ -15,12 +15,9 @@ from PySide6.QtTest import QTest
 from study_app.app.main_controller import home
 from study_app.gui.application import application_here
 from tests.app.designer.support.inputs import XInput
-from tests.app.designer.support.key_user import KeyUser
 from tests.app.designer.support.made_studies import STUDIES, play, save
-from tests.app.designer.support.mouse_user import MouseUser
-from tests.app.designer.support.users import User
+from tests.app.designer.support.users import USERS, User
 
-USERS: dict[str, type[User]] = {"keys": KeyUser, "mouse": MouseUser}
 SIZE = QSize(1366, 768)
 
 

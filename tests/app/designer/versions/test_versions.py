@@ -22,14 +22,14 @@ from study_app.protocol.source.files import protocol_hash, shipped_file
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.viewmodels.designer.requests import SetText, SetValue
 from study_app.viewmodels.sessions import SessionFacts
-from tests.app.designer.conftest import Designer
+from tests.app.designer.support.designer import Designer
 from tests.app.designer.versions.conftest import REPETITIONS, click, rows, run, version_of
 
 pytestmark = pytest.mark.slow
 
 
 def test_a_study_that_was_not_run_is_saved_without_a_question(designer: Any, qtbot: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     qtbot.waitUntil(lambda: designer.place.header.version.words == "Not run yet")
     run(designer, "P001", designer.file.read_bytes(), study="kitchen-pilot", pilot=True)
     designer.controller.enter()
@@ -94,9 +94,9 @@ def test_what_changes_the_measure_can_be_saved_as_another_study(ran: Any, qtbot:
     file = ran.file.parent / "kitchen2.toml"
     assert ran.editing.opened.file == file
     assert file.read_text() == ran.text
-    assert ran.editing.opened.study.document["blocks"]["liquids"]["repetitions"] == 3
+    assert ran.value("blocks", "liquids", "repetitions") == 3
     assert (ran.file.read_bytes(), draft_of(ran.file)) == (before, None)
-    ran.controller.open("kitchen")
+    ran.open()
     assert ran.text.encode() == before
 
 
@@ -129,7 +129,7 @@ def test_another_study_is_not_saved_over_a_version_that_was_run_under_its_name(r
 
 
 def test_a_change_by_another_program_is_noticed_while_the_place_is_shown(designer: Any, qtbot: Any) -> None:
-    designer.controller.open("kitchen")
+    designer.open()
     before = designer.file.read_text()
     designer.file.write_text(before + "# outside\n")
     qtbot.waitUntil(lambda: designer.text.endswith("# outside\n"))
@@ -196,14 +196,14 @@ def test_a_copy_takes_the_liquid_files_of_its_study_along(designer: Any, tmp_pat
     (elsewhere / "sea").mkdir()
     (elsewhere / "sea" / "waves.mp4").write_bytes(b"copied, not decoded")
     (elsewhere / "kitchen.toml").write_text(text)
-    designer.controller.open(str(elsewhere / "kitchen.toml"))
-    assert designer.editing.opened.study.faults == ()
+    designer.open(str(elsewhere / "kitchen.toml"))
+    assert designer.study.faults == ()
     designer.controller.begin(str(elsewhere / "kitchen.toml"), "mine")
     designer.saving.save()
     assert designer.editing.opened.file.exists()
     assert (designer.file.parent / "syrup.toml").read_bytes() == (elsewhere / "syrup.toml").read_bytes()
     assert (designer.file.parent / "sea" / "waves.mp4").read_bytes() == b"copied, not decoded"
-    designer.controller.open("kitchen")
+    designer.open()
     again = DesignerController(designer.results)
     again.open("mine")
     assert again.editing.opened is not None
@@ -236,7 +236,7 @@ def test_two_programs_on_one_study_lose_no_edit_silently(designer: Any, qtbot: A
         command = [sys.executable, "-c", OTHER, str(designer.results), words, then]
         subprocess.run(command, check=True, env={**os.environ, "QT_QPA_PLATFORM": "offscreen"})
 
-    designer.controller.open("kitchen")
+    designer.open()
     designer.editing.ask(SetValue(REPETITIONS, 3))
     other("Saved elsewhere", "save")
     assert "Saved elsewhere" in designer.file.read_text()
@@ -294,7 +294,7 @@ def test_changes_begin_with_the_last_session_where_no_participant_was_run(
     assert early != source
     run(designer, "P001", source, study=f"kitchen-{kind}-1", **{key: True})
     run(designer, "P001", early, study=f"kitchen-{kind}-2", started_at="2026-11-19T12:00:00+00:00", **{key: True})
-    designer.controller.open("kitchen")
+    designer.open()
     qtbot.waitUntil(lambda: bool(designer.controller.runs.known))
     designer.editing.ask(SetValue(REPETITIONS, 3))
     designer.place.show_tab("changes")
