@@ -159,12 +159,6 @@ def test_every_text_that_a_language_lacks_is_copied_in_one_step() -> None:
     assert study.edited(*every.edits)[0].faults == ()
 
 
-def test_a_single_text_that_is_missing_is_copied_alone() -> None:
-    study = study_of("rek2024", ('title = { en = "Welcome", nl = "Welkom" }', 'title = { en = "Welcome" }'))
-    (fault,) = study.faults
-    assert [repair.words for repair in repairs(study, fault)] == ["Copy English to Dutch"]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", shipped())
 def test_facts_are_those_of_the_session_and_of_check(name: str) -> None:

@@ -1,7 +1,5 @@
 """Entries that move together, and elements that are copied and pasted, in every protocol and in grown files."""
 
-from typing import Any
-
 import pytest
 
 from study_app.authoring.changes.fragments import copied, pasted
@@ -9,19 +7,13 @@ from study_app.authoring.changes.moves import moved
 from study_app.authoring.edited_study import Study
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.groups.group import sequences_in
-from study_app.protocol.source.document import Path, entries
-from tests.authoring.comments import owners
+from study_app.protocol.source.document import entries
 from tests.authoring.grown import texts
+from tests.authoring.random_edits import at, owners
 
 TEXTS = texts()
 PASTED = 8
 """So many elements of each text are copied, evenly spread."""
-
-
-def at(document: Any, path: Path) -> Any:
-    for step in path:
-        document = document[step]
-    return document
 
 
 @pytest.mark.slow

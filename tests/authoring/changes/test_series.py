@@ -2,7 +2,7 @@
 
 import pytest
 
-from study_app.authoring.changes.series import members, number_row, number_rows
+from study_app.authoring.changes.series import members, number_row
 from study_app.authoring.edited_study import Study, read
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.refused import Refused
@@ -101,22 +101,6 @@ def test_a_title_of_another_element_is_refused() -> None:
         members(study, path, row, "1 2 3")
 
 
-def test_ids_have_every_digit_and_no_exponent(study: Study) -> None:
-    assert made(study, ("liquids", "water", "density_kg_m3"), "1000 1000.0001 1000,0002")[1:] == [
-        ("water_1000_0001", "Water 1000 0001"), ("water_1000_0002", "Water 1000 0002"),
-    ]  # fmt: skip
-    assert made(study, DELAY, "0 0.00002")[1][0] == "water_0_00002"
-
-
 def _of(text: str, field: Path) -> tuple[Study, Path, object]:
     study = read(text.encode(), PROTOCOLS)
     return study, field[:2], number_row(study.document, field[:2], field)
-
-
-def test_numbers_of_tables_within_an_element_count_and_those_of_questions_do_not() -> None:
-    study = read((PROTOCOLS / "rek2024.toml").read_bytes(), PROTOCOLS)
-    paths = [row.path[2:] for row in number_rows(study.document, ("liquids", "water"))]
-    assert ("density_kg_m3",) in paths
-    assert ("wake", "length") in paths
-    assert number_rows(study.document, ("questionnaires", "liquid", "items", 0)) == ()
-    assert number_rows(study.document, ("device",)) == ()

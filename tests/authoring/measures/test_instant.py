@@ -37,13 +37,6 @@ def test_a_limit_begins_where_levels_begin_to_be_clipped(name: str, block: str) 
         assert limits.loop == pytest.approx(loop, rel=1e-4)
 
 
-def test_numbers_of_a_condition_have_no_force_of_their_own() -> None:
-    for name in ("delaydetect", "forcedelay"):
-        protocol = load(name)
-        assert level_limits(protocol, protocol.blocks["delay"]) is None
-        assert {one.asked_n for one in levels(protocol, "delay")} == {None}
-
-
 def test_a_study_with_clipped_levels_still_has_its_numbers() -> None:
     clipped, _ = study_of("viscosityjnd").edited(Set(("stimuli", "damping", "levels"), [0.02, 3]))
     assert clipped.protocol is None

@@ -9,7 +9,7 @@ import pytest
 from study_app.analysis.power.threshold_studies import Case, study_batch
 from study_app.app.designer.measures.measures_worker import Measuring
 from study_app.app.designer.measures.wanted import wanted_of
-from study_app.authoring.measures.observers import OBSERVERS, PLANTED, GivenUp, Planted, _longest, measurable, observe
+from study_app.authoring.measures.observers import OBSERVERS, PLANTED, GivenUp, measurable, observe
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
 from study_app.protocol.checks.expected_precision import ThresholdPlan, expected, threshold_plan
@@ -71,15 +71,6 @@ def test_levels_are_presented_as_the_limits_leave_them(
     plan = plan_of(40, *changes)
     found = 10.0 ** plan.presented(np.log10(asked))
     assert found.tolist() == pytest.approx(presented, rel=1e-6)
-
-
-def test_observers_answer_to_clipped_levels_as_to_the_highest_that_is_presented_in_full() -> None:
-    plan, full = plan_of(12, *CLIPPED), np.log10(FULL)
-    answered = plan.answered(np.full(4, full), np.random.default_rng(1), 0.02)
-    assert answered is not None
-    at_limit, beyond = (answered.observers.probability(np.full(4, at))[0] for at in (full, full + 0.4))
-    assert at_limit == pytest.approx(0.5 + 0.48 / 2, abs=1e-3)
-    assert beyond == pytest.approx(at_limit, abs=1e-6)
 
 
 def test_no_clipped_level_is_a_threshold_that_can_be_measured() -> None:
@@ -166,14 +157,6 @@ def test_thresholds_beyond_the_levels_are_not_measurable_and_none_below_the_erro
     assert found.ends is not None
     assert min(one.threshold for one in found.planted) >= 0.1 == pytest.approx(found.ends[0], rel=0.5)
     assert all(one.coverage > 0.9 for one in found.planted)
-
-
-def test_the_range_is_the_longest_row_without_a_gap() -> None:
-    good, biased, uncovered = (Planted(1.0, 0.05, 0.95), Planted(1.0, 0.2, 0.99), Planted(1.0, 0.0, 0.8))
-    assert [one.measurable for one in (good, biased, uncovered)] == [True, False, False]
-    listed = [Planted(float(at), 0.0, 0.95 if at not in {2, 6} else 0.5) for at in range(8)]
-    assert _longest(listed) == (3.0, 5.0)
-    assert _longest([biased]) is None
 
 
 def test_a_simulation_is_given_up_when_asked() -> None:

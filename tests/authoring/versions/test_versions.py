@@ -73,10 +73,6 @@ def test_changes_are_sorted_by_what_they_do(old: str, new: str, effect: str, *, 
     assert {one.effect for one in found} == {effect}, found
 
 
-def test_changes_of_the_same_study_are_none() -> None:
-    assert changes(TEXT, Study(f"# more\n{TEXT}")) == ()
-
-
 @pytest.mark.parametrize("name", shipped())
 def test_a_study_does_not_differ_from_its_own_receipt(name: str) -> None:
     protocol = load(name)

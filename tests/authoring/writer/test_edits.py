@@ -1,196 +1,96 @@
+"""A study under any sequence of edits, undo and redo: comments stay, and undo gives every byte back."""
+
 import os
-import time
-import tomllib
-from collections import Counter
 from random import Random
-from typing import Any
 
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 
-from study_app.authoring.writer.edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset, apply, meaning, same
+from study_app.authoring.edited_study import Study
+from study_app.authoring.undo_stack import History
 from study_app.authoring.writer.refused import Refused
-from study_app.authoring.writer.splices import Splices, applied, reverted
-from study_app.protocol.source.document import Path
-from study_app.protocol.source.notation import scan
-from tests.authoring.comments import FREE, owners
 from tests.authoring.grown import texts
+from tests.authoring.random_edits import check_edit, edit_of, holds_nothing
 
 EDITS = int(os.environ.get("LIQUID_STUDY_EDITS", "0"))
-"""How many random edits are made; without it about 200. `tests/benchmarks/windows/designer.py` prints their times."""
+"""How many random edits are tried; without it about 400. `tests/benchmarks/windows/designer.py` prints their times."""
 TEXTS = texts()
-
-TEXT = ["water", "Two words", "it's", 'say "x"', "one\n\ntwo\n", "tab\t", "\\", "é", "x" * 130, "", "#", "[a]"]
-NAMES = ["new", "other_2", "with blank", "dot.ted"]
+STEPS = 16
 
 
-def value_of(random: Random, depth: int = 0) -> Any:
-    """Return a random value."""
-    kind = random.randrange(6 if depth < 2 else 4)
-    if kind < 4:
-        return (random.choice(TEXT), random.randrange(-5, 2000), random.gauss(0, 1), random.random() < 0.5)[kind]
-    if kind == 4:
-        return [value_of(random, depth + 1) for _ in range(random.randrange(4))]
-    return {name: value_of(random, depth + 1) for name in random.sample(["en", "nl", "a b", "x"], random.randrange(4))}
+class Edited(RuleBasedStateMachine):
+    """A study that is edited; ``texts`` are those before each step that can be undone, and the one now."""
 
+    @initialize(name=st.sampled_from([*TEXTS, *["grown", "grown, \\r\\n"] * 8]))
+    def open(self, name: str) -> None:
+        self.history = History(Study(TEXTS[name]))
+        self.texts, self.undone = [TEXTS[name]], list[str]()
 
-def paths(node: Any, path: Path = ()) -> list[Path]:
-    """Return the paths of everything in a document."""
-    inner = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
-    return [found for key, value in inner for found in ((*path, key), *paths(value, (*path, key)))]
+    @rule(seed=st.integers(0, 2**32))
+    def edit(self, seed: int) -> None:
+        edit = edit_of(Random(seed), self.texts[-1])  # noqa: S311
+        study, before = self.history.study, self.history
+        try:
+            self.history = before.edited("Edit", edit)
+        except Refused:
+            return
+        check_edit(study.text, self.history.study.text, edit)
+        if self.history.done != before.done:
+            self.texts.append(self.history.study.text)
+            self.undone.clear()
 
+    @precondition(lambda self: len(self.texts) > 1)
+    @rule()
+    def undo(self) -> None:
+        self.history = self.history.undo()
+        self.undone.append(self.texts.pop())
+        assert self.history.study.text == self.texts[-1]
 
-def at(document: Any, path: Path) -> Any:
-    for step in path:
-        document = document[step]
-    return document
+    @precondition(lambda self: self.undone)
+    @rule()
+    def redo(self) -> None:
+        self.history = self.history.redo()
+        self.texts.append(self.undone.pop())
+        assert self.history.study.text == self.texts[-1]
 
+    @rule()
+    def type(self) -> None:
+        """Add a comment line, as a person who types into the file."""
+        text = self.texts[-1]
+        newline = "\r\n" if "\r\n" in text else "\n"
+        self.history = self.history.typed("Type", f"{text}{newline}# typed{newline}")
+        self.texts.append(self.history.study.text)
+        self.undone.clear()
+        assert self.history.study.document == Study(text).document
 
-def edit_of(random: Random, text: str) -> Edit:
-    """Return a random edit of a text, every second one of what has comments; it may be one that makes no sense."""
-    document = tomllib.loads(text)
-    known = paths(document)
-    commented = [path for path, _ in owners(text) if path in known and random.random() < 0.5]
-    known = commented or known
-    name, new = random.choice(NAMES), value_of(random)
-    if not known:
-        return Set((name,), new)
-    path = random.choice(known)
-    value, parent = at(document, path), at(document, path[:-1])
-    several = isinstance(parent, list)
-    choices: list[Edit] = [Set(path, new), Unset(path), Duplicate(path, name)]
-    if several:
-        choices += [Insert(path, new), Move(path, random.randrange(len(parent)))]
-    else:
-        naming = tuple(one for one in known if at(document, one) == path[-1] and one[: len(path)] != path)
-        choices += [Rename(path, name, naming), Set((*path[:-1], name), new, random.choice([None, path[-1]]))]
-    if isinstance(value, dict):
-        choices += [Set((*path, name), new, random.choice([None, *value])), Set((*path, name, "inner"), new)]
-    if isinstance(value, list):
-        choices.append(Insert((*path, len(value)), new))
-    return random.choice(choices)
+    @rule(seed=st.integers(0, 2**32))
+    def try_edit(self, seed: int) -> None:
+        """A trial has the document and the faults of the edited text, and changes nothing."""
+        study, edit = self.history.study, edit_of(Random(seed), self.texts[-1])  # noqa: S311
+        document = repr(study.document)
+        try:
+            written, tried = study.edited(edit)[0], study.trial.edited(edit)[0]
+        except Refused:
+            return
+        assert tried.document == written.document or holds_nothing(edit)
+        assert repr(study.document) == document
 
-
-def renumbered(path: Path, edit: Edit) -> Path | None:
-    """Return where a path of the text before an edit is after it; None where the edit may touch its comments."""
-    at_, depth = edit.path, len(edit.path) - 1
-    if path[:depth] != at_[:depth] or len(path) <= depth:
-        return path
-    step, last = path[depth], at_[depth]
-    if isinstance(edit, Rename):
-        return (*at_[:depth], edit.name, *path[depth + 1 :]) if step == last else path
-    if isinstance(edit, Set):
-        return None if step == last else path
-    if isinstance(step, str) or isinstance(last, str):
-        return None if step == last and isinstance(edit, Unset) else path
-    if isinstance(edit, Unset):
-        return None if step == last else (*at_[:depth], step - (step > last), *path[depth + 1 :])
-    if isinstance(edit, Insert):
-        return (*at_[:depth], step + (step >= last), *path[depth + 1 :])
-    if isinstance(edit, Duplicate):
-        return (*at_[:depth], step + (step > last), *path[depth + 1 :])
-    order = list(range(max(step, last, edit.to) + 1))
-    order.insert(edit.to, order.pop(last))
-    return (*at_[:depth], order.index(step), *path[depth + 1 :])
-
-
-def check_comments(before: str, after: str, edit: Edit) -> None:
-    old, new = owners(before), owners(after)
-    for (path, comment), count in old.items():
-        if path == FREE:
-            continue
-        moved = renumbered(path, edit)
-        if moved is not None:
-            assert new[moved, comment] >= count, (path, moved, comment)
-        elif isinstance(edit, Unset):
-            everywhere = [sum(n for (_, words), n in one.items() if words == comment) for one in (old, new)]
-            assert everywhere[1] <= everywhere[0] - count, (path, comment)
-        if isinstance(edit, Duplicate) and path[: len(edit.path)] == edit.path:
-            last = edit.path[-1]
-            copy = (*edit.path[:-1], last + 1 if isinstance(last, int) else edit.name, *path[len(edit.path) :])
-            assert new[copy, comment] >= count, (path, comment)
-    kept = Counter(comment for (path, comment) in old.elements() if path == FREE)
-    there = Counter(comment for (_, comment) in new.elements())
-    if not isinstance(edit, Unset | Set):
-        assert not kept - there
-
-
-def values_of(text: str) -> dict[Path, str]:
-    """Return how each value that holds no other one is written."""
-    nodes = [node for node in scan(text) if node.kind in {"key", "pair", "entry"}]
-    inner = {node.path[:length] for node in nodes for length in range(len(node.path))}
-    return {node.path: text[node.value : node.end] for node in nodes if node.path not in inner}
-
-
-def unmeant_changes(before: str, after: str, edit: Edit) -> list[Path]:
-    """Return the values that an edit does not concern and that are written in another way after it."""
-    old, new = values_of(before), values_of(after)
-    concerned = {edit.path[:length] for length in range(len(edit.path))}
-    concerned |= set(edit.references) if isinstance(edit, Rename) else set()
-    places = {path: renumbered(path, edit) for path in old if path not in concerned}
-    return [path for path, place in places.items() if place is not None and new.get(place) != old[path]]
-
-
-def check_edit(text: str, edit: Edit) -> tuple[str, list[Splices]]:
-    meant = meaning(tomllib.loads(text), edit)
-    begin = time.thread_time()
-    after, steps = apply(text, edit)
-    TIMES.append(1000 * (time.thread_time() - begin))
-    found = tomllib.loads(after)
-    changed = text
-    for step in steps:
-        changed = applied(changed, step)
-    assert changed == after
-    for step in reversed(steps):
-        changed = applied(changed, reverted(step))
-    assert changed == text
-    holds_nothing = isinstance(edit, Unset) or (isinstance(edit, Set) and "{}" in str(edit.value))
-    assert same(found, meant) or holds_nothing
-    check_comments(text, after, edit)
-    assert not unmeant_changes(text, after, edit)
-    return after, list(steps)
-
-
-TIMES: list[float] = []
-MADE: list[int] = []
-
-
-def walk(random: Random, text: str, count: int) -> int:
-    """Make, undo and redo random edits of a text; return how many were made."""
-    first, made = text, 0
-    done: list[tuple[str, list[Splices]]] = []
-    undone: list[tuple[str, list[Splices]]] = []
-    for _ in range(count):
-        action = random.randrange(8)
-        if action == 0 and done:
-            undone.append((text, done[-1][1]))
-            text = done.pop()[0]
-        elif action == 1 and undone:
-            after, steps = undone.pop()
-            done.append((text, steps))
-            for step in steps:
-                text = applied(text, step)
-            assert text == after
-        else:
-            edit = edit_of(random, text)
-            try:
-                after, steps = check_edit(text, edit)
-            except Refused:
-                continue
-            done.append((text, steps))
-            undone.clear()
-            text, made = after, made + 1
-    for _, steps in reversed(done):
-        for step in reversed(steps):
-            text = applied(text, reverted(step))
-    assert text == first
-    return made
+    def teardown(self) -> None:
+        """Undo everything."""
+        while self.history.done:
+            self.history = self.history.undo()
+        assert self.history.study.text == self.texts[0]
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-@settings(max_examples=EDITS // 8 or 25, deadline=None, derandomize=not EDITS, database=None, phases=[Phase.generate])
-@given(st.sampled_from([*TEXTS, *["grown", "grown, \\r\\n"] * 8]), st.integers(0, 2**32))
-def test_edits_change_what_is_meant_and_undo_gives_every_byte_back(name: str, seed: int) -> None:
-    MADE.append(walk(Random(seed), TEXTS[name], 12))  # noqa: S311
+def test_edits_change_what_is_meant_keep_comments_and_undo_gives_every_byte_back() -> None:
+    run_state_machine_as_test(
+        Edited,
+        settings=settings(
+            max_examples=EDITS // STEPS or 25, stateful_step_count=STEPS, deadline=None, derandomize=not EDITS,
+            database=None, phases=[Phase.generate], suppress_health_check=list(HealthCheck),
+        ),
+    )  # fmt: skip

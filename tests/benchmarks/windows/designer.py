@@ -1,32 +1,46 @@
 """How long edits of a study take: python tests/benchmarks/windows/designer.py [EDITS] prints milliseconds of a core.
 
 Edits are random, of every kind, over every protocol and the grown studies of the tests; each is checked as the tests do
-(document, values it does not concern, comments, undo), and the first one that is written wrongly ends the run.
+(document, values it does not concern, comments), and the first one that is written wrongly ends the run.
 """
 
 import statistics
 import sys
+import time
 from itertools import count
 from pathlib import Path
 from random import Random
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
-from tests.authoring.writer import test_edits
+from study_app.authoring.writer.edits import apply
+from study_app.authoring.writer.refused import Refused
+from tests.authoring.grown import texts
+from tests.authoring.random_edits import check_edit, edit_of
 
 
 def main(wanted: int) -> None:
     """Make so many random edits, each checked as the tests do."""
-    names, made = sorted(test_edits.TEXTS), 0
+    written = texts()
+    names, times = sorted(written), list[float]()
     for seed in count():
-        made += test_edits.walk(Random(seed), test_edits.TEXTS[names[seed % len(names)]], 12)  # noqa: S311
-        if made >= wanted:
+        draw, text = Random(seed), written[names[seed % len(names)]]  # noqa: S311
+        for _ in range(12):
+            edit = edit_of(draw, text)
+            began_s = time.thread_time()
+            try:
+                after, _splices = apply(text, edit)
+            except Refused:
+                continue
+            times.append(1000 * (time.thread_time() - began_s))
+            check_edit(text, after, edit)
+            text = after
+        if len(times) >= wanted:
             break
-    times = test_edits.TIMES
     print("| edits | texts | median ms | 95 % ms | worst ms |")
     print("| --- | --- | --- | --- | --- |")
     ninety_five = statistics.quantiles(times, n=20)[-1]
-    print(f"| {made} | {len(names)} | {statistics.median(times):.1f} | {ninety_five:.1f} | {max(times):.1f} |")
+    print(f"| {len(times)} | {len(names)} | {statistics.median(times):.1f} | {ninety_five:.1f} | {max(times):.1f} |")
 
 
 if __name__ == "__main__":

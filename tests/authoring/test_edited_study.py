@@ -1,11 +1,13 @@
+"""An edited study: its document and faults are those of its text, in a trial too; undo, redo, and what is refused."""
+
 from pathlib import Path
 
 import pytest
 
 from study_app.authoring.edited_study import read
 from study_app.authoring.fields import rows
-from study_app.authoring.undo_stack import MOST_STEPS, History
-from study_app.authoring.writer.edits import Set, Unset
+from study_app.authoring.undo_stack import History
+from study_app.authoring.writer.edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset
 from study_app.authoring.writer.refused import Refused
 from study_app.errors import ProtocolError
 from study_app.protocol.load import load, parse, shipped
@@ -46,14 +48,6 @@ def test_a_step_that_changes_nothing_is_none() -> None:
     assert (same.done, same.selected) == ((), ("study",))
 
 
-@pytest.mark.slow
-def test_the_oldest_of_too_many_steps_is_forgotten() -> None:
-    history = History(read(b"a = 0\n"))
-    for number in range(MOST_STEPS + 3):
-        history = history.edited("Count", Set(("a",), number + 1))
-    assert len(history.done) == MOST_STEPS
-
-
 def test_a_text_that_is_not_toml_keeps_its_last_document_and_is_typed_on() -> None:
     broken = History(DEMO).typed("Type", DEMO.text.replace("format = 1", "format = "))
     assert not broken.study.is_toml
@@ -84,3 +78,36 @@ def test_typed_refuses_half_a_character() -> None:
 def test_read_refuses_what_is_not_utf_8() -> None:
     with pytest.raises(Refused, match="line 2 is not UTF-8 text"):
         read(b"a = 1\nb = '\xff'\n")
+
+
+BLOCK = ("blocks", "delays", "conditions")
+EDITS: tuple[Edit, ...] = (
+    Set(("conditions", "water", "delay_ms"), 5000),
+    Duplicate(("conditions", "water"), "sea"),
+    Insert((*BLOCK, 1), "sea"),
+    Move((*BLOCK, 1), 3),
+    Rename(("conditions", "delay_50"), "late", ((*BLOCK, 1),)),
+    Unset((*BLOCK, 4)),
+    Set(("liquids", "brine"), {"density_kg_m3": 1200, "effects": ["drag"], "wake": {"length": 40}}),
+    Unset(("study", "title")),
+)
+
+
+@pytest.mark.slow
+def test_a_trial_has_the_document_and_the_faults_of_the_text() -> None:
+    study = read((PROTOCOLS / "rek2024.toml").read_bytes(), PROTOCOLS)
+    tried = study.trial
+    for edit in EDITS:
+        written, (tried, _) = study.edited(edit)[0], tried.edited(edit)
+        assert tried.document == written.document
+        assert tried.faults == written.faults
+        study = written
+    assert study.faults
+
+
+def test_an_edit_that_makes_no_sense_is_refused_and_so_is_a_text_that_is_not_toml() -> None:
+    study = read((PROTOCOLS / "rek2024.toml").read_bytes(), PROTOCOLS)
+    with pytest.raises(Refused):
+        study.trial.edited(Unset(("liquids", "tar")))
+    with pytest.raises(Refused):
+        _ = study.typed("[")[0].trial
