@@ -90,8 +90,3 @@ def test_limiters_are_counted_by_tick_in_this_trial_and_those_that_say_nothing_a
     mixed.scene[12:] = 2
     forces.take(mixed)
     assert forces.figures().limiters == (("force", 8),)
-
-
-def test_nothing_felt_has_no_points() -> None:
-    times_s, forces_n, wakes_mps = Forces(8.0).trace(0)
-    assert (times_s.shape, forces_n.shape, wakes_mps.shape) == ((0,), (0, 4), (0,))

@@ -8,7 +8,6 @@ import pytest
 from study_app.app.designer.participant.shown_step import showing
 from study_app.app.designer.participant.sound_part import sound_part
 from study_app.app.designer.play.playable import NotPlayableError, playable
-from study_app.authoring.changes.series import number_rows
 from study_app.authoring.edited_study import Study, read
 from study_app.authoring.names import blocks_using
 from study_app.authoring.new_study import template
@@ -16,7 +15,7 @@ from study_app.authoring.repairs import repairs
 from study_app.authoring.study_facts import facts
 from study_app.authoring.templates import FOLDER
 from study_app.authoring.versions.changes import changes
-from study_app.authoring.writer.edits import Duplicate, Edit, Insert, Set, Unset
+from study_app.authoring.writer.edits import Edit, Insert, Set, Unset
 from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.element_facts import brief, used_by
@@ -24,7 +23,6 @@ from study_app.viewmodels.designer.form.form_rows import form
 from study_app.viewmodels.designer.measures.measures_view import Controls, SlowResults, measures_view
 from study_app.viewmodels.designer.outline_rows import outline_rows
 from study_app.viewmodels.designer.problem_rows import problem_rows
-from study_app.viewmodels.designer.prompts import series_plan
 from tests.authoring.grown import PROTOCOLS
 
 REACH = {"kind": "reach", "count": 12}
@@ -113,16 +111,6 @@ def test_what_is_not_used_can_be_deleted(file: pathlib.Path) -> None:
     elements = (path for path, _ in entries(study.document, "*.*"))
     for path in [one for one in elements if used_by(study.document, one) == "not used"]:
         assert study.edited(Unset(path))[0].faults == study.faults, path
-
-
-def test_several_stimuli_are_counted_by_the_name_of_their_section() -> None:
-    study = study_of(PROTOCOLS / "viscosityjnd.toml")
-    stimulus = next(iter(study.document["stimuli"]))
-    condition = study.document["stimuli"][stimulus].get("condition") or next(iter(study.document["conditions"]))
-    study, _ = study.edited(Duplicate(("stimuli", stimulus), "other"))
-    assert used_by(study.document, ("conditions", condition)) == "used by 2 stimuli"
-    field = number_rows(study.document, ("stimuli", "other"))[0].path
-    assert series_plan(study, ("stimuli", "other"), field, "21 31 41").make == "Make 3 stimuli"
 
 
 def test_outline_and_lists_to_choose_from_say_it() -> None:
