@@ -34,23 +34,18 @@ from tests.protocol.groups.grouped import GROUPS, STUDY
 pytestmark = pytest.mark.slow
 
 
-def start(results, participant, status=None, *, simulated=False, pilot=False):
-    protocol = load("demo")
-    store = begin(
-        results / "demo",
-        protocol,
-        source_bytes("demo"),
-        SessionStart(
-            participant,
-            seed=1,
-            operator="AK",
-            language="en",
-            device={"name": "scripted"},
-            screens={},
-            simulated=simulated,
-            pilot=pilot,
-        ),
-    )
+def begun(results, participant, source="demo", *, device="mouse", screens=None, simulated=False, pilot=False):
+    """Begin a session of the demo, or of a copy of it."""
+    protocol = load(source)
+    how = SessionStart(
+        participant, seed=1, operator="AK", language="en", device={"name": device}, screens=screens or {},
+        simulated=simulated, pilot=pilot,
+    )  # fmt: skip
+    return protocol, begin(results / "demo", protocol, source_bytes(source), how)
+
+
+def start(results, participant, status=None, **how):
+    _, store = begun(results, participant, device="scripted", **how)
     if status is None:
         store.close()
     else:
@@ -59,23 +54,8 @@ def start(results, participant, status=None, *, simulated=False, pilot=False):
 
 def stop_at(results, participant, steps, *, screens=None, source="demo", then=()):
     """Leave a session unfinished after so many steps of its schedule, or in the middle of the next one."""
-    protocol = load(source)
-    store = begin(
-        results / "demo",
-        protocol,
-        source_bytes(source),
-        SessionStart(
-            participant,
-            seed=1,
-            operator="AK",
-            language="en",
-            device={"name": "mouse"},
-            screens=screens or {"participant": {}},
-            simulated=False,
-        ),
-    )
-    schedule = build_schedule(protocol, participant, 1)
-    for step in schedule.steps[:steps]:
+    protocol, store = begun(results, participant, source, screens=screens or {"participant": {}})
+    for step in build_schedule(protocol, participant, 1).steps[:steps]:
         if isinstance(step, PageStep):
             store.append("page_shown", page=step.page_id)
             store.append("page_left", page=step.page_id)
@@ -83,10 +63,8 @@ def stop_at(results, participant, steps, *, screens=None, source="demo", then=()
         told = {name: getattr(step, name) for name in ("block", "phase", "part", "index", "of", "code")}
         store.append("trial_started", trial=step.number, attempt=1, **told)
         store.append("trial_ended", trial=step.number, attempt=1, outcome="complete")
-        rows = [
-            {"item": item, "number": n, "value": 4, "onset_s": 1, "first_s": 1, "last_s": 1, "changes": 0}
-            for n, item in enumerate(step.items, 1)
-        ]
+        answer = {"value": 4, "onset_s": 1, "first_s": 1, "last_s": 1, "changes": 0}
+        rows = [{"item": item, "number": number, **answer} for number, item in enumerate(step.items, 1)]
         store.append("responses", trial=step.number, attempt=1, items=rows)
     for event, said in then:
         store.append(event, **said)
@@ -144,24 +122,20 @@ def test_a_session_of_a_study_whose_liquid_file_is_lost_is_offered(tmp_path):
     assert interrupted(sessions(results, {}), [broken, study_facts("demo")], now) == whole
 
 
-def test_the_shipped_protocols_are_at_hand_the_demo_last():
+def test_the_card_of_a_protocol_states_extent_languages_and_needs(tmp_path):
     assert sources()[-1] == "demo"
-    assert "rek2024" in sources()
-
-
-def test_the_card_of_a_protocol_states_extent_languages_and_needs():
     facts = study_facts("rek2024")
     assert isinstance(facts, StudyFacts)
-    assert facts.extent == "2 parts, 10 settings, 62 answers"
-    assert facts.languages == "Dutch, English"
+    assert (facts.extent, facts.languages) == ("2 parts, 10 settings, 62 answers", "Dutch, English")
     assert "8 N" in facts.needs
-
-
-def test_a_study_of_levels_counts_trials() -> None:
-    facts = study_facts("viscosityjnd")
-    assert isinstance(facts, StudyFacts)
-    assert facts.extent.startswith("1 part, 220 trials, ")
-    assert facts.duration.startswith("about ")
+    levels = study_facts("viscosityjnd")
+    assert isinstance(levels, StudyFacts)
+    assert levels.extent.startswith("1 part, 220 trials, ")
+    assert levels.duration.startswith("about ")
+    (tmp_path / "grouped.toml").write_text(STUDY + GROUPS)
+    grouped = study_facts(str(tmp_path / "grouped.toml"))
+    assert isinstance(grouped, StudyFacts)
+    assert (grouped.extent, grouped.duration) == ("2 parts, 6 settings, 6 to 7 answers", "about 1 to 2 min")
 
 
 def test_a_broken_protocol_names_its_first_problem(tmp_path):
@@ -184,12 +158,11 @@ def test_sessions_that_need_care_stand_first_then_the_newest(tmp_path):
     start(tmp_path, "P002")
     start(tmp_path, "P003", "withdrawn")
     found = sessions(tmp_path, {"demo": 8})
-    assert [(row.participant, row.status) for row in found] == [
-        ("P002", "unfinished"),
-        ("P003", "withdrawn"),
-        ("P001", "completed"),
-    ]
+    wanted = [("P002", "unfinished"), ("P003", "withdrawn"), ("P001", "completed")]
+    assert [(row.participant, row.status) for row in found] == wanted
     assert (found[0].answers, found[0].answers_of) == (0, 8)
+    assert held(found, "demo") == "3 sessions, 1 complete"
+    assert held(found, "rek2024") == "no participant yet"
 
 
 def test_a_session_open_in_a_program_is_running_until_that_ends(tmp_path):
@@ -228,14 +201,6 @@ def test_a_pilot_counts_as_one_also_where_its_first_steps_were_simulated(tmp_pat
     (found,) = sessions(tmp_path, {})
     assert found.kind == "pilot"
     assert held([found], "demo") == "no participant yet, 1 pilot"
-
-
-def test_held_sessions_are_counted_with_their_ends(tmp_path):
-    start(tmp_path, "P001", "completed")
-    start(tmp_path, "P002")
-    found = sessions(tmp_path, {})
-    assert held(found, "demo") == "2 sessions, 1 complete"
-    assert held(found, "rek2024") == "no participant yet"
 
 
 def test_a_session_that_is_left_out_says_why(tmp_path):
@@ -299,14 +264,6 @@ def test_drafts_come_first_the_newest_of_all_and_a_copy_names_its_original(tmp_p
     assert found[3].draft.words.endswith(", not saved: Device")
     assert [it.draft for it in found[4:]] == [None] * len(found[4:])
     assert {it.origin for it in found[5:]} == {"Shipped study"}
-
-
-def test_the_extent_of_a_study_with_groups_is_a_range(tmp_path):
-    (tmp_path / "grouped.toml").write_text(STUDY + GROUPS)
-    facts = study_facts(str(tmp_path / "grouped.toml"))
-    assert isinstance(facts, StudyFacts)
-    assert facts.extent == "2 parts, 6 settings, 6 to 7 answers"
-    assert facts.duration == "about 1 to 2 min"
 
 
 def test_a_file_of_liquids_that_becomes_a_study_is_noticed(tmp_path: Path) -> None:

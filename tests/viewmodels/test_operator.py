@@ -37,35 +37,21 @@ def words(view):
     return found
 
 
-def test_a_trial_is_counted_among_the_main_ones_with_its_neutral_name(told):
+def test_a_trial_has_its_neutral_name_and_a_time_that_stands_still_while_statements_are_answered(told):
     told.welcome()
     told.start(1)
+    told.now_s += 12.0
     view = told.view()
     assert view.heading == "Trial 1 of 4"
     assert view.setting_line.startswith("Liquid setting 1")
     assert view.part_line.startswith("Part 1 of 2")
-    assert view.state == "running"
-    assert view.may_pause
-    assert view.may_repeat
-
-
-def test_time_in_the_trial_stands_still_while_statements_are_answered(told):
-    told.welcome()
-    told.start(1)
+    assert (view.state, view.may_pause, view.may_repeat) == ("running", True, True)
+    time = view.trial_time
+    assert (time.least_s, time.most_s, time.words) == (5.0, 30.0, "0:12 of 0:30")
     told.end(1)
     told.now_s += 33.0
-    view = told.view()
-    assert view.trial_time.elapsed_s == 20.0
-    assert "answering" in view.setting_line
-
-
-def test_exploring_shows_least_and_most_time(told):
-    told.welcome()
-    told.start(1)
-    told.now_s += 12.0
-    time = told.view().trial_time
-    assert (time.least_s, time.most_s) == (5.0, 30.0)
-    assert time.words == "0:12 of 0:30"
+    assert told.view().trial_time.elapsed_s == 32.0
+    assert "answering" in told.view().setting_line
 
 
 def test_time_in_a_trial_of_intervals_has_no_limit_of_a_single_interval(told):
@@ -133,51 +119,33 @@ def test_a_device_slower_than_at_the_start_is_named_until_it_recovers(told):
     assert said[1][0].startswith("The device answers after 3 ticks, after 1 at the start: ")
 
 
-def test_a_paused_session_can_resume_but_not_repeat(told):
+def test_what_is_offered_follows_pause_trouble_and_end(told):
     told.welcome()
     told.start(1)
     told.end(1, outcome="interrupted")
     told.tell("paused", by="participant")
     view = told.view()
-    assert view.state == "paused"
-    assert view.may_resume
-    assert not view.may_repeat
-
-
-def test_trouble_is_said_and_nothing_but_the_end_is_offered(told):
-    told.welcome()
+    assert (view.state, view.may_resume, view.may_repeat) == ("paused", True, False)
     told.tell("broke", what="the device 'mouse' stopped responding")
     view = told.view(force_on=False)
     assert view.state == "trouble"
     assert "stopped responding" in view.trouble
     assert [view.may_pause, view.may_resume, view.may_repeat] == [False, False, False]
-
-
-def test_the_device_is_what_the_servo_says_whatever_else_is_wrong(told):
-    told.welcome()
-    told.tell("broke", what="the disk is full")
-    view = told.view()
-    assert view.device.ready
-    assert dict(view.device.rows)["Safety faults"] == "0"
-    view = told.view(device_ready=False, faults=2)
-    assert not view.device.ready
-    assert dict(view.device.rows)["Safety faults"] == "2"
-
-
-def test_the_end_is_said_with_its_status(told):
-    told.welcome()
+    for ready, faults in ((True, 0), (False, 2)):  # whatever else is wrong
+        device = told.view(device_ready=ready, faults=faults).device
+        assert (device.ready, dict(device.rows)["Safety faults"]) == (ready, str(faults))
     told.tell("session_ended", 4.0, status="withdrawn", reason="")
+    ended_s = told.view().elapsed_s
     told.now_s += 100.0
     view = told.view()
-    assert view.over
-    assert view.state_word == "Withdrawn"
-    assert view.elapsed_s == 5.0
+    assert (view.over, view.state_word, view.elapsed_s) == (True, "Withdrawn", ended_s)
 
 
 def test_a_complete_session_has_every_step_done(told):
     told.welcome()
     told.tell("session_ended", 4.0, status="completed", reason="", fingerprint="k3vq-7m2p-xw4d")
     assert {row.state for row in told.view().steps} == {"done"}
+    assert told.view().elapsed_s == 5.0
     assert told.view().trials_line == "4 of 4 trials"
     assert told.view().setting_line.endswith("Fingerprint k3vq-7m2p-xw4d")
 
@@ -269,14 +237,10 @@ def test_every_limit_of_a_trial_has_a_name_for_the_operator(told):
     assert judged == set(MEASURES)
 
 
-def test_tiles_judge_by_the_asked_rate_and_the_protocols_limit(told, health):
+def test_tiles_judge_by_the_asked_rate_and_the_protocols_limit_and_claim_nothing_unmeasured(told, health):
     tiles = told.view(health).tiles
     assert [tile.verdict for tile in tiles] == ["ok", "ok", "ok", "ok"]
-    assert tiles[0].value == "1000.0"
-    assert (tiles[1].value, tiles[1].unit) == ("15", "µs")
-
-
-def test_unmeasured_tiles_claim_nothing(told):
+    assert (tiles[0].value, tiles[1].value, tiles[1].unit) == ("1000.0", "15", "µs")
     assert {tile.verdict for tile in told.view().tiles} == {"open"}
 
 
@@ -292,38 +256,19 @@ def test_no_word_of_a_view_names_a_condition_a_force_or_a_limiter(told, health):
     assert "hidden" in " ".join(words(told.view(health)))
 
 
-def test_times_and_numbers_read_as_people_write_them():
-    assert minutes(68) == "1:08"
-    assert minutes(3723) == "1:02:03"
-
-
-@pytest.mark.parametrize(
-    ("seconds", "words"),
-    [
-        (0.4, "0 s"),
-        (2.5, "3 s"),
-        (45.2, "45 s"),
-        (59.6, "1 min"),
-        (150, "3 min"),
-        (612, "10 min"),
-        (3599, "1 h 00 min"),
-        (3900, "1 h 05 min"),
-    ],
-)
-def test_a_duration_is_written_in_one_way(seconds: float, words: str) -> None:
-    assert duration(seconds) == words
-    assert duration_range(seconds, seconds) == words
-
-
-def test_durations_below_a_minute_have_tenths_where_they_are_those_of_fields() -> None:
+def test_durations_are_written_in_one_way() -> None:
+    for seconds, words in (
+        (0.4, "0 s"), (2.5, "3 s"), (45.2, "45 s"), (59.6, "1 min"), (150, "3 min"), (612, "10 min"),
+        (3599, "1 h 00 min"), (3900, "1 h 05 min"),
+    ):  # fmt: skip
+        assert duration(seconds) == duration_range(seconds, seconds) == words
     assert [duration(one, tenths=True) for one in (0.6, 11.42, 120)] == ["0.6 s", "11.4 s", "2 min"]
-
-
-def test_a_range_of_durations_names_a_common_unit_once() -> None:
-    assert duration_range(900, 1920) == "15 to 32 min"
-    assert duration_range(3300, 4200) == "55 min to 1 h 10 min"
-    assert duration_range(3700, 7500) == "1 h 02 min to 2 h 05 min"
-    assert duration_range(30, 150) == "30 s to 3 min"
-    assert grouped(45918) == "45\u2009918"
-    assert duration_words(62e-6) == "62 µs"
-    assert duration_words(1.4e-3) == "1.4 ms"
+    for least, most, words in (
+        (900, 1920, "15 to 32 min"),
+        (3300, 4200, "55 min to 1 h 10 min"),
+        (3700, 7500, "1 h 02 min to 2 h 05 min"),
+        (30, 150, "30 s to 3 min"),
+    ):
+        assert duration_range(least, most) == words
+    assert (minutes(68), minutes(3723), grouped(45918)) == ("1:08", "1:02:03", "45\u2009918")
+    assert (duration_words(62e-6), duration_words(1.4e-3)) == ("62 µs", "1.4 ms")

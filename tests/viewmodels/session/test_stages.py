@@ -7,29 +7,25 @@ from study_app.store.progress import Progress
 from study_app.viewmodels.session.stages import stages
 
 
-def test_an_interrupted_trial_is_not_done_and_starts_again_in_place(told):
+def test_trials_are_done_interrupted_judged_and_repeated(told):
+    limit = told.protocol.limits.lateness_ms
     told.welcome()
     told.start(1)
     told.end(1, outcome="interrupted")
     told.tell("paused", by="operator")
-    assert told.progress.broken == {}
-    assert told.progress.paused
+    assert (told.progress.broken, told.progress.paused) == ({}, True)
     told.tell("resumed")
     told.start(1, attempt=2)
-    assert not told.progress.paused
-    assert told.progress.here == 1
-
-
-def test_a_trial_beyond_a_limit_is_done_but_not_within_limits(told):
-    limit = told.protocol.limits.lateness_ms
-    told.welcome()
-    told.start(1)
+    assert (told.progress.paused, told.progress.here) == (False, 1)
     told.end(1, lateness_p99_ms=limit * 0.9)
     told.answer(1)
     told.start(2)
     told.end(2, lateness_p99_ms=limit * 1.1)
     assert told.session.broken(told.progress) == {1: (), 2: (("lateness_p99_ms", limit * 1.1, limit),)}
     assert ("Trials within limits", "1 of 2") in told.view().counts
+    told.answer(2)
+    told.tell("repeat", trial=2, reason="phone rang")
+    assert (set(told.progress.answered), set(told.progress.broken), told.progress.repeats) == ({1}, {1}, 1)
 
 
 def test_a_picture_that_came_too_early_is_judged_as_in_the_trials_table(told):
@@ -39,20 +35,6 @@ def test_a_picture_that_came_too_early_is_judged_as_in_the_trials_table(told):
     told.end(1, delay_error_p95_ms=-40.0)
     assert within_limits({"delay_error_p95_ms": -40.0}, told.protocol.limits.model_dump()) is False
     assert told.session.broken(told.progress) == {1: (("delay_error_p95_ms", -40.0, 25.0),)}
-    told.start(2)
-    told.end(2)
-    assert ("Trials within limits", "1 of 2") in told.view().counts
-
-
-def test_a_repeat_takes_back_the_trials_answers(told):
-    told.welcome()
-    told.start(1)
-    told.end(1)
-    told.answer(1)
-    told.tell("repeat", trial=1, reason="phone rang")
-    assert told.progress.answered == {}
-    assert told.progress.broken == {}
-    assert told.progress.repeats == 1
 
 
 def test_a_resumed_session_is_where_its_journal_says_and_an_attempt_takes_back_the_one_before(told):
@@ -81,24 +63,12 @@ def test_a_page_is_the_step_after_the_present_one_and_stays_it_when_shown_again(
     assert told.schedule.steps[told.progress.here].page_id == "reaching"
 
 
-def test_long_blocks_are_one_row_and_short_ones_a_row_a_trial():
-    protocol = load("rek2024")
-    labels = [stage.label for stage in stages(protocol, build_schedule(protocol, "P001", 1))]
-    assert "Liquid setting 1" in labels
-    assert "Liquid setting 3" in labels
-    assert "Delay setting 1 to 7" in labels
-
-
-def test_rows_cover_every_step_once():
+def test_rows_cover_every_step_once_and_name_no_condition_and_no_liquid():
     protocol = load("rek2024")
     schedule = build_schedule(protocol, "P001", 1)
-    covered = [step for stage in stages(protocol, schedule) for step in range(stage.first, stage.last + 1)]
-    assert covered == list(range(len(schedule.steps)))
-
-
-def test_rows_name_no_condition_and_no_liquid():
-    protocol = load("rek2024")
-    said = " ".join(stage.label for stage in stages(protocol, build_schedule(protocol, "P001", 1))).lower()
-    secrets = {name for block in protocol.main_blocks for name in block.conditions}
-    for secret in (*secrets, "water", "honey", "oil", "ms"):
-        assert secret not in said.split()
+    rows = stages(protocol, schedule)
+    assert [step for stage in rows for step in range(stage.first, stage.last + 1)] == list(range(len(schedule.steps)))
+    labels = [stage.label for stage in rows]
+    assert {"Liquid setting 1", "Liquid setting 3", "Delay setting 1 to 7"} <= set(labels)  # long blocks are one row
+    conditions = {name for block in protocol.main_blocks for name in block.conditions}
+    assert not {*conditions, "water", "honey", "oil", "ms"} & set(" ".join(labels).lower().split())

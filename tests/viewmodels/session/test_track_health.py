@@ -73,6 +73,10 @@ def test_what_was_repeated_is_counted_with_its_reason(told: Told) -> None:
     assert told.lines()[0].endswith("1 of at most 24 answered")
     assert told.lines()[1] == "First 0 %, Second 100 %"
     assert told.lines()[-2:] == ("repeated 1: interrupted", "repeated 1: hand slipped")
+    told.tell("trial_started", 25.0, trial=2, attempt=1)
+    told.tell("session_resumed", 50.0)
+    told.trial(2, "first", attempt=2)
+    assert told.lines()[-1] == "repeated 1: program ended"
 
 
 def test_tracks_are_counted_apart(told: Told) -> None:
@@ -82,13 +86,6 @@ def test_tracks_are_counted_apart(told: Told) -> None:
     for number in range(1, 7):
         told.trial(number, "first")
     assert told.lines()[0] == f"Track {codes[5]}: {codes.count(codes[5])} of at most 24 answered"
-
-
-def test_a_program_that_ended_is_a_reason(told: Told) -> None:
-    told.tell("trial_started", 1.0, trial=1, attempt=1)
-    told.tell("session_resumed", 50.0)
-    told.trial(1, "first", attempt=2)
-    assert told.lines()[-1] == "repeated 1: program ended"
 
 
 def test_a_trial_without_intervals_has_no_track(told: Told) -> None:
@@ -116,15 +113,10 @@ def test_reasons_of_invalid_intervals_are_words_without_a_number(told: Told) -> 
     assert not any("repeated" in line for line in told.lines())
 
 
-def test_the_reason_is_shown_while_the_trial_is_presented_again(told: Told) -> None:
-    undelivered(told, 1, 1, "level_error_percent")
-    assert told.lines()[-1] == "not delivered 1: the force was not as requested"
-
-
 def test_a_trial_that_was_never_delivered_is_counted_as_unanswered(told: Told) -> None:
     for attempt in (1, 2, 3):
         undelivered(told, 1, attempt, "level_error_ms")
-    assert told.lines()[-1] == "not delivered 3: the visual delays did not differ as requested"
+        assert told.lines()[-1] == f"not delivered {attempt}: the visual delays did not differ as requested"
     told.trial(2, "first")
     assert told.lines()[-1] == "1 unanswered: no attempt was delivered"
 

@@ -49,19 +49,19 @@ def test_every_key_of_every_element_is_in_its_form_with_its_value(file: Path) ->
             assert rows[around] == value_at(study.document, around)
 
 
-def test_a_row_says_its_place_and_line(study: Study) -> None:
-    row = next(row for row in form(study, ("blocks", "liquids")).rows if row.row.path[-1] == "order")
-    place, line = row.place.split(" · line ")
+def test_rows_say_place_languages_and_target_and_optional_keys_are_offered(study: Study) -> None:
+    made = form(study, ("blocks", "liquids"))
+    rows = {row.row.path[-1]: row for row in made.rows}
+    place, line = rows["order"].place.split(" · line ")
     assert place == "blocks.liquids.order"
     assert study.text.splitlines()[int(line) - 1].startswith("order = ")
-
-
-def test_optional_keys_are_offered_not_shown(study: Study) -> None:
-    made = form(study, ("blocks", "liquids"))
+    assert [code for code, _ in rows["title"].languages] == ["en", "nl"]
+    assert rows["task"].target == ("tasks", "explore")
+    assert [entry.title for entry in rows["conditions"].entries] == ["Water", "Honey", "Light oil"]
     absent = {row.path[-1] for section in made.sections for row in section.absent}
     assert {"max_repeats", "break_every", "design"} <= absent
     assert not {"standard", "until", "catch"} & absent
-    assert not absent & {row.row.path[-1] for row in made.rows}
+    assert not absent & set(rows)
 
 
 @pytest.mark.parametrize(
@@ -80,13 +80,6 @@ def test_keys_that_do_not_belong_are_neither_offered_nor_shown(
     assert there <= keys
     document = template(name).document["blocks"][block]
     assert set(document) <= keys
-
-
-def test_texts_have_every_language_and_references_their_target(study: Study) -> None:
-    rows = {row.row.path[-1]: row for row in form(study, ("blocks", "liquids")).rows}
-    assert [code for code, _ in rows["title"].languages] == ["en", "nl"]
-    assert rows["task"].target == ("tasks", "explore")
-    assert [entry.title for entry in rows["conditions"].entries] == ["Water", "Honey", "Light oil"]
 
 
 def test_positions_are_those_of_the_session_or_the_list(study: Study) -> None:
