@@ -1,10 +1,13 @@
-"""Which step shows an element, in studies whose sessions differ, for what is in no session, and which is the first."""
+"""Which step shows an element and is played: in studies with groups, faults before it, and texts that are missing."""
 
 import pytest
 
-from study_app.app.designer.participant.shown_step import STANDALONE, same_step, showing, step_name
+from study_app.app.designer.participant.shown_step import STANDALONE, StepPosition, same_step, showing, step_name
 from study_app.app.designer.play.first_step import first_step
-from study_app.protocol.load import load
+from study_app.app.designer.play.playable import NotPlayableError, playable
+from study_app.authoring.edited_study import Study
+from study_app.authoring.writer.edits import Edit, Set, Unset
+from study_app.protocol.load import load, parse, source_bytes
 from study_app.protocol.orders.schedule import PageStep, Trial
 from study_app.session.simulated.preview import preview
 from tests.protocol.groups.grouped import grouped
@@ -65,3 +68,48 @@ def test_every_table_leads_to_the_first_step_that_shows_it(name: str, seed: int)
         if condition in presented:
             assert first_step(shown, ("conditions", condition)) == presented[condition]
     assert first_step(shown, ("study",)) == 0
+
+
+def edited(name: str, *edits: Edit) -> Study:
+    return Study(source_bytes(name).decode()).edited(*edits)[0]
+
+
+@pytest.mark.slow
+def test_a_sound_draft_is_played_as_it_is() -> None:
+    study = Study(source_bytes("rek2024").decode())
+    found = playable(study, ("study",), StepPosition("liquids", trial=3, language="nl", seed=7))
+    step = preview(load("rek2024"), 7).schedule.steps[found.step]
+    assert isinstance(step, Trial)
+    assert (step.block, step.index) == ("liquids", 3)
+    assert found.source == source_bytes("rek2024")
+    assert found.words.endswith("trial 3 of 3")
+
+
+@pytest.mark.slow
+def test_a_missing_text_of_another_language_prevents_nothing() -> None:
+    study = edited("rek2024", Unset(("pages", "debrief", "title", "nl")))
+    assert study.protocol is None
+    found = playable(study, ("blocks", "liquids"), StepPosition("liquids", language="en"))
+    title = found.protocol.pages["debrief"].title
+    assert isinstance(title, dict)
+    assert title["nl"] == title["en"]
+    with pytest.raises(NotPlayableError) as refused:
+        playable(study, ("blocks", "liquids"), StepPosition("liquids", language="nl"))
+    (problem,) = refused.value.problems
+    assert problem.place == "pages.debrief.title"
+    assert problem.line is not None
+
+
+@pytest.mark.slow
+def test_a_fault_prevents_only_playing_its_step_and_earlier_ones() -> None:
+    document = Study(source_bytes("rek2024").decode()).document
+    (*_, last) = [name for name in document["sequence"] if name in document["blocks"]]
+    study = edited("rek2024", Set(("pages", document["sequence"][0], "body"), 3))
+    with pytest.raises(NotPlayableError, match=r"pages\..*\.body"):
+        playable(study, ("pages", document["sequence"][0]))
+    found = playable(study, ("blocks", last))
+    assert found.step == 0
+    assert found.protocol == parse(found.source, "played")
+    step = preview(found.protocol).schedule.steps[0]
+    assert isinstance(step, Trial)
+    assert step.block == last
