@@ -9,17 +9,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QPoint, Qt
 
 from study_app.authoring.drafts import draft_of
-from study_app.gui.designer.outline.rows import ROW_ROLE
+from tests.app.designer.support.inputs import QtInput
+from tests.app.designer.support.made_studies import STUDIES, check_file, save
+from tests.app.designer.support.users import USERS
 
 pytestmark = pytest.mark.slow
 
 KILLS = int(os.environ.get("LIQUID_STUDY_DRAFT_KILLS", "2"))
 
 
-@pytest.mark.usefixtures("editors")
 def test_a_small_study_is_edited_by_keys_alone(qtbot: Any, designer: Any) -> None:
     designer.open()
     designer.window.activateWindow()
@@ -63,31 +63,23 @@ def test_a_small_study_is_edited_by_keys_alone(qtbot: Any, designer: Any) -> Non
     assert designer.text == before
 
 
-@pytest.mark.usefixtures("editors")
-def test_a_small_study_is_edited_by_mouse_alone(qtbot: Any, designer: Any) -> None:
-    designer.open()
-    before = designer.file.read_text()
-    place, tree = designer.place, designer.place.outline.tree
-
-    def click(part: Any) -> None:
-        qtbot.mouseClick(part, Qt.MouseButton.LeftButton)
-
-    index = next(one for one in place.outline.indexes() if one.data(ROW_ROLE).path == ("blocks", "liquids"))
-    qtbot.mouseClick(tree.viewport(), Qt.MouseButton.LeftButton, pos=tree.visualRect(index).center())
-    assert place.view.form.path == ("blocks", "liquids")
-    replicates = designer.field("blocks", "liquids", "replicates").toggle
-    qtbot.mouseClick(replicates, Qt.MouseButton.LeftButton, pos=QPoint(16, 16))
-    assert designer.value("blocks", "liquids", "replicates") is True
-    click(designer.field("blocks", "liquids", "task").arrow)
-    assert place.view.form.path == ("tasks", "explore")
-    click(place.form.head.copy)
-    assert place.view.form.path == ("tasks", "explore_2")
-    click(place.form.head.delete)
-    assert "explore_2" not in designer.text
-    click(place.header.undo)
-    assert "[tasks.explore_2]" in place.file.editor.words()
-    click(place.header.save)
-    assert designer.file.read_text() == designer.text != before
+@pytest.mark.parametrize(
+    ("kind", "study"),
+    [
+        ("keys", "twoliquids"),
+        ("mouse", "whichwaslate"),
+        pytest.param("keys", "whichwaslate", marks=pytest.mark.nightly),
+        pytest.param("mouse", "twoliquids", marks=pytest.mark.nightly),
+    ],
+)
+def test_a_study_is_made_from_the_empty_one_by_names_and_saved(designer: Any, kind: str, study: str) -> None:
+    user = USERS[kind](designer.window, QtInput())
+    STUDIES[study](user)
+    file = designer.file.with_name(f"{study}.toml")
+    save(user, file)
+    assert user.actions < 600
+    check_file(file, study)
+    assert file.read_text() == designer.text
 
 
 def test_typing_into_the_file_reaches_the_form_and_a_fault_its_field(qtbot: Any, designer: Any) -> None:

@@ -3,13 +3,11 @@
 import json
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from study_app.authoring.edited_study import Study, read
-from tests.app.designer.support.made_studies import STUDIES
+from tests.app.designer.support.made_studies import STUDIES, check_file
 from tests.app.designer.support.program import environment
 from tests.app.designer.support.users import USERS
 from tests.compiled import needs_servo
@@ -17,40 +15,6 @@ from tests.end_to_end.real_windows import needs_display, virtual_display
 
 ROOT = Path(__file__).resolve().parents[3]
 LIMIT_S = 900.0
-
-
-def check_likert(study: Study) -> None:
-    found = study.document
-    assert found["blocks"]["liquids"]["conditions"] == ("water", "honey")
-    assert found["conditions"]["honey"]["liquid"] == "honey"
-    assert found["liquids"]["honey"] == {"density_kg_m3": 1400, "viscosity_pa_s": 5, "effects": ("drag",)}
-    questionnaire = found["questionnaires"][found["blocks"]["liquids"]["questionnaire"]]
-    assert [item["text"] for item in questionnaire["items"]] == ["This feels like a liquid.", "This is thick."]
-    labels = found["scales"][questionnaire["scale"]]["labels"]["en"]
-    assert (labels[0], labels[6], len(labels)) == ("Not at all", "Very much", 7)
-
-
-def check_two_interval(study: Study) -> None:
-    found = study.document
-    block = found["blocks"]["liquids"]
-    assert "conditions" not in block
-    stimulus, design, method = (
-        found[section][block[key]]
-        for section, key in (("stimuli", "stimulus"), ("designs", "design"), ("methods", "method"))
-    )
-    assert stimulus == {"vary": "delay_ms", "levels": (50, 200)}
-    assert design == {"kind": "2ifc", "item": "later", "question": "Which one was late?"}
-    assert method == {"kind": "constant", "levels": (50, 200), "repetitions": 2}
-
-
-CHECKS: dict[str, Callable[[Study], None]] = {"twoliquids": check_likert, "whichwaslate": check_two_interval}
-
-
-def check_file(file: Path, study: str) -> None:
-    made = read(file.read_bytes(), file.parent)
-    assert made.faults == ()
-    assert made.document["tasks"]["explore"]["max_s"] == 2
-    CHECKS[study](made)
 
 
 def command(folder: Path, *words: str) -> str:

@@ -54,8 +54,6 @@ class Designer(KeyUser):
         self.controller.deleteLater()
         QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
-    # the study
-
     def change(self, *pairs: tuple[str, str]) -> str:
         """Replace texts in the file of the study, each where it stands first; return the text before."""
         before = text = self.file.read_text(encoding="utf-8")
@@ -105,8 +103,6 @@ class Designer(KeyUser):
         while self.steps:
             self.editing.undo()
         return self.text
-
-    # the window
 
     def form_row(self, *path: str | int) -> Any:
         """The form's row of a place."""

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
 
@@ -44,7 +44,12 @@ def window_in_front() -> QWidget | None:
 
 
 class Hand(Protocol):
-    """What sends keys and texts to the part that has the keyboard, clicks and notches of the wheel to a place."""
+    """What sends keys and texts to the part that has the keyboard, clicks and notches of the wheel to a place.
+
+    ``aims_ms`` is how long a part must stay where it is before it is clicked.
+    """
+
+    aims_ms: int
 
     def key(self, keys: str) -> None: ...
 
@@ -60,6 +65,8 @@ class Hand(Protocol):
 class QtInput:
     """Keys and clicks of Qt's test module, for windows without a screen."""
 
+    aims_ms = 0
+
     def key(self, keys: str) -> None:
         """Press keys, as "ctrl+s" or "shift+Tab"."""
         *held, name = keys.split("+")
@@ -74,30 +81,37 @@ class QtInput:
 
     def click(self, at: QPoint, times: int = 1) -> None:
         """Click at a place of the screen."""
-        part = QApplication.widgetAt(at)
-        assert part is not None, at
-        for _ in range(times):
-            QTest.mouseClick(part, Qt.MouseButton.LeftButton, pos=part.mapFromGlobal(at))
+        window = self._in_front()
+        handle, place = window.windowHandle(), window.mapFromGlobal(at)
+        if times > 1:
+            QTest.mouseDClick(handle, Qt.MouseButton.LeftButton, pos=place)
+        if times != 2:
+            QTest.mouseClick(handle, Qt.MouseButton.LeftButton, pos=place)
 
     def turn_wheel(self, at: QPoint, down: bool) -> None:
         """Turn the wheel by a notch."""
-        window = QApplication.activeWindow()
-        assert window is not None
-        QTest.wheelEvent(window.windowHandle(), window.mapFromGlobal(at), QPoint(0, -120 if down else 120))
+        window = self._in_front()
+        place = QPointF(window.mapFromGlobal(at))
+        QTest.wheelEvent(window.windowHandle(), place, QPoint(0, -120 if down else 120))
 
     def come_forward(self, window: QWidget) -> None:
         """Give the keyboard to a window."""
         window.activateWindow()
 
+    def _takes_keys(self) -> QWidget:
+        return QApplication.focusWidget() or self._in_front()
+
     @staticmethod
-    def _takes_keys() -> QWidget:
-        part = QApplication.focusWidget() or QApplication.activeWindow()
-        assert part is not None, "no window takes keys"
-        return part
+    def _in_front() -> QWidget:
+        window = window_in_front()
+        assert window is not None, "no window takes keys"
+        return window
 
 
 class XInput:
     """Keys and clicks of the X server, by xdotool; they go to the window that has its focus or is under its pointer."""
+
+    aims_ms = 200
 
     def key(self, keys: str) -> None:
         """Press keys, as "ctrl+s"."""

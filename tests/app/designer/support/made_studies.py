@@ -1,12 +1,14 @@
 """Studies that a user makes from the empty one, and what follows: saving, and playing as a pilot that is kept."""
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from study_app.authoring.edited_study import Study, read
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import EndPage, FeedbackPage, Page, TaskPage
 from tests.app.designer.support.inputs import wait_until
@@ -125,3 +127,40 @@ def participant() -> ParticipantWindow | None:
 
 STUDIES = {"twoliquids": make_likert, "whichwaslate": make_two_interval}
 """What makes each study, by its short name."""
+
+
+def check_likert(study: Study) -> None:
+    """Check the study of two liquids."""
+    found = study.document
+    assert found["blocks"]["liquids"]["conditions"] == ("water", "honey")
+    assert found["conditions"]["honey"]["liquid"] == "honey"
+    assert found["liquids"]["honey"] == {"density_kg_m3": 1400, "viscosity_pa_s": 5, "effects": ("drag",)}
+    questionnaire = found["questionnaires"][found["blocks"]["liquids"]["questionnaire"]]
+    assert [item["text"] for item in questionnaire["items"]] == ["This feels like a liquid.", "This is thick."]
+    labels = found["scales"][questionnaire["scale"]]["labels"]["en"]
+    assert (labels[0], labels[6], len(labels)) == ("Not at all", "Very much", 7)
+
+
+def check_two_interval(study: Study) -> None:
+    """Check the study of delays."""
+    found = study.document
+    block = found["blocks"]["liquids"]
+    assert "conditions" not in block
+    stimulus, design, method = (
+        found[section][block[key]]
+        for section, key in (("stimuli", "stimulus"), ("designs", "design"), ("methods", "method"))
+    )
+    assert stimulus == {"vary": "delay_ms", "levels": (50, 200)}
+    assert design == {"kind": "2ifc", "item": "later", "question": "Which one was late?"}
+    assert method == {"kind": "constant", "levels": (50, 200), "repetitions": 2}
+
+
+CHECKS: dict[str, Callable[[Study], None]] = {"twoliquids": check_likert, "whichwaslate": check_two_interval}
+
+
+def check_file(file: Path, study: str) -> None:
+    """Check that the file holds the study as it was meant."""
+    made = read(file.read_bytes(), file.parent)
+    assert made.faults == ()
+    assert made.document["tasks"]["explore"]["max_s"] == 2
+    CHECKS[study](made)

@@ -31,7 +31,7 @@ from tests.app.designer.support.inputs import Hand, name_of, wait_until, window_
 
 MOST_TABS = 120
 COLUMN_PX = 480
-AIMS_MS, STEP_MS = 200, 40
+STEP_MS = 40
 VIEWS = "View of the study"
 """The tabs of the views, to which their key goes when it is pressed again."""
 AREAS = (("Header", "ctrl+5"), ("Outline", "ctrl+1"), ("Form", "ctrl+2"), ("Views of the study", "ctrl+3"))
@@ -52,20 +52,12 @@ def _of_a_group(focused: QWidget, part: QWidget) -> bool:
     return focused.group() is not None and focused.group() is part.group()
 
 
-def _text_of(part: QWidget) -> str:
-    if isinstance(part, QLineEdit):
-        return part.text()
-    return part.toPlainText() if isinstance(part, QPlainTextEdit) else ""
-
-
 class User:
     """What users share; ``actions`` counts what was done."""
 
     def __init__(self, window: QWidget, hand: Hand) -> None:
         self.window, self.hand = window, hand
         self.actions = 0
-
-    # looking
 
     def parts(self, name: str, *kinds: type[QWidget]) -> list[QWidget]:
         """Return the parts of some kinds in the window in front that are shown under a name; it may end in "*"."""
@@ -112,8 +104,6 @@ class User:
         found = look()
         assert found is not None
         return found
-
-    # what each does in their way
 
     def key(self, keys: str, times: int = 1) -> None:
         """Press keys."""
@@ -306,11 +296,10 @@ class MouseUser(User):
         inside = self._bring_into_view(part)
         self.click_at(part.mapToGlobal(inside.center()), times)
 
-    @staticmethod
-    def _aim(part: QWidget) -> None:
+    def _aim(self, part: QWidget) -> None:
         """Wait until a part stays where it is: what was done before may still move it."""
         before, still_ms = None, 0
-        while still_ms < AIMS_MS:
+        while still_ms < self.hand.aims_ms:
             here = part.mapToGlobal(QPoint(0, 0)), part.size()
             still_ms = still_ms + STEP_MS if here == before else 0
             before = here
@@ -337,8 +326,7 @@ class MouseUser(User):
             bar = area.verticalScrollBar()
             before = bar.value()
             self.actions += 1
-            # near the edge, where no field takes the wheel
-            self.hand.turn_wheel(view.mapToGlobal(QPoint(4, view.height() // 2)), below)
+            self.hand.turn_wheel(view.mapToGlobal(QPoint(4, view.height() // 2)), below)  # where no field takes it
             assert bar.value() != before, f"the wheel does not bring {name_of(part)!r} into view"
         seen = part.visibleRegion().boundingRect()
         assert not seen.isEmpty(), f"{name_of(part)!r} cannot be seen"
@@ -349,7 +337,7 @@ class MouseUser(User):
 
     def write(self, name: str, text: str, *, accept: bool = True) -> None:
         part = self.part(name, QLineEdit, QPlainTextEdit)
-        self.click(part, 3 if name_of(part) and _text_of(part) else 1)
+        self.click(part, 3 if name_of(part) and (part.property("text") or part.property("plainText")) else 1)
         self.type(text)
 
     def choose(self, name: str, words: str) -> None:
