@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from study_app.gui.theme.theme import DARK, LIGHT
+from study_app.gui.widgets.cards import Chip
 from tests.app.designer.support.inputs import name_of
 
 pytestmark = [pytest.mark.slow, pytest.mark.variants(2)]
@@ -59,12 +60,23 @@ def nameless(place: Any) -> list[QWidget]:
     return [part for part in takes_keys if not name_of(part)]
 
 
+def cut(place: Any) -> list[str]:
+    """Return the words shown in chips and empty fields for which there is too little room."""
+    chips = [one for one in place.form.findChildren(Chip) if one.isVisible() and one.width() < one.sizeHint().width()]
+    lines = [one for one in place.form.inside.findChildren(QLineEdit) if one.isVisible() and not one.text()]
+    room = [one.width() - one.fontMetrics().horizontalAdvance(one.placeholderText()) for one in lines]
+    return [one.word for one in chips] + [
+        one.placeholderText() for one, left in zip(lines, room, strict=True) if left < 0
+    ]
+
+
 def go_through_forms(designer: Any) -> None:
     place = designer.place
     for path in [row.path for row in place.outline.rows if row.path]:
         designer.go_to(*path)
         assert fits(place.form.area), path
         assert not nameless(place), path
+        assert not cut(place), path
 
 
 @SIZES

@@ -173,9 +173,7 @@ def broken(qtbot: Any, designer: Any) -> Any:
 
 
 @pytest.mark.parametrize(("width", "side"), [(1600, "form"), (1024, "pane")])
-def test_enter_alone_makes_every_repair(
-    qtbot: Any, broken: Any, monkeypatch: pytest.MonkeyPatch, width: int, side: str
-) -> None:
+def test_enter_alone_makes_every_repair(broken: Any, monkeypatch: pytest.MonkeyPatch, width: int, side: str) -> None:
     monkeypatch.setattr("study_app.app.designer.repair_search.REST_MS", 1_000_000)  # a user does not wait for repairs
     broken.window.resize(width, 768)
     broken.place.parts.show_side(side)
@@ -192,7 +190,7 @@ def test_enter_alone_makes_every_repair(
     assert broken.form_row(*second.fault.path).isAncestorOf(field), "nothing is left: the field that was repaired"
 
 
-def test_enter_passes_problems_without_a_repair_and_ends_at_a_field_of_one(qtbot: Any, broken: Any) -> None:
+def test_enter_passes_problems_without_a_repair_and_ends_at_a_field_of_one(broken: Any) -> None:
     text = broken.text.replace("delay_ms = 0", 'delay_ms = "a"', 1).replace("min_s = 5 ", 'min_s = "a" ')
     broken.editing.type_text("Break", text)
     first, unclear, second, last = broken.place.view.problems

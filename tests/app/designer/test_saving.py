@@ -99,6 +99,14 @@ def test_edits_of_a_read_only_study_whose_file_changed_are_asked_about_once_it_c
     assert [action for action, _ in drafted.place.view.banner.actions] == ["keep", "take", "compare"]
 
 
+def test_a_draft_goes_where_the_files_content_is_taken(drafted: Any) -> None:
+    drafted.change(("A first look", "Another look"))
+    drafted.saving.look_again()
+    drafted.saving.answer_banner("take")
+    assert drafted.text == drafted.file.read_text()
+    assert draft_of(drafted.file) is None
+
+
 def test_a_deleted_file_is_written_anew_where_mine_is_kept(drafted: Any) -> None:
     drafted.file.unlink()
     drafted.controller.enter()

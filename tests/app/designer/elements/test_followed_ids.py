@@ -147,7 +147,7 @@ def test_the_keyboard_stays_in_the_title_whose_block_gets_another_id(qtbot: Any,
 
 
 @pytest.mark.slow
-def test_a_question_is_added_after_the_title_that_is_being_typed(qtbot: Any, designer: Any) -> None:
+def test_a_question_is_added_after_the_title_that_is_being_typed(designer: Any) -> None:
     designer.open()
     designer.editing.ask(AddElement(("questionnaires",)))
     form = designer.editing.selected

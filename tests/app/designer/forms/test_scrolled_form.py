@@ -147,7 +147,7 @@ def test_numbers_are_counted_by_keys_and_taken_ids_refused_while_typing(qtbot: A
     assert not head.refusal.text()
 
 
-def test_a_comma_that_may_separate_numbers_is_refused_in_a_list_of_them(qtbot: Any, designer: Any) -> None:
+def test_a_comma_that_may_separate_numbers_is_refused_in_a_list_of_them(designer: Any) -> None:
     designer.open()
     path = ("device", "workspace_mm")
     designer.editing.select(path[:1])

@@ -117,7 +117,7 @@ def first_row(designer: Any) -> QWidget:
     "path", [("blocks", "liquids"), ("conditions", "thick"), ("questionnaires", "liquid", "items", 0)]
 )
 def test_a_duplicate_is_selected_everywhere_and_has_the_keyboard(
-    qtbot: Any, designer: Any, width: int, area: str, path: tuple[str | int, ...]
+    designer: Any, width: int, area: str, path: tuple[str | int, ...]
 ) -> None:
     designer.window.resize(width, 768)
     designer.open("kitchen", *path)
@@ -144,7 +144,7 @@ def test_a_duplicate_is_selected_everywhere_and_has_the_keyboard(
     assert designer.place.form.form.path == copy
 
 
-def test_a_reference_leads_to_the_form_of_its_element_and_back(qtbot: Any, designer: Any) -> None:
+def test_a_reference_leads_to_the_form_of_its_element_and_back(designer: Any) -> None:
     designer.open("kitchen", "blocks", "liquids")
     designer.field("blocks", "liquids", "task").arrow.setFocus()
     keyboard = designer.hit("Return")
@@ -155,7 +155,7 @@ def test_a_reference_leads_to_the_form_of_its_element_and_back(qtbot: Any, desig
     assert designer.place.form.isAncestorOf(keyboard)
 
 
-def test_a_field_that_is_added_has_the_keyboard(qtbot: Any, designer: Any) -> None:
+def test_a_field_that_is_added_has_the_keyboard(designer: Any) -> None:
     designer.open("kitchen", "conditions", "thick")
     before = {row.row.row.path for row in designer.place.form.rows}
     next(iter(designer.place.form.adds.values())).setFocus()
@@ -181,7 +181,7 @@ def test_a_number_that_is_left_by_tab_at_once_keeps_the_keyboard_in_its_form(
 
 
 @pytest.mark.parametrize("width", [1600, 1024])
-def test_ctrl_e_goes_to_the_file_and_back_to_the_same_field(qtbot: Any, designer: Any, width: int) -> None:
+def test_ctrl_e_goes_to_the_file_and_back_to_the_same_field(designer: Any, width: int) -> None:
     designer.window.resize(width, 640)
     designer.open("kitchen", "blocks", "liquids")
     field = designer.field("blocks", "liquids", "repetitions").line
@@ -193,7 +193,7 @@ def test_ctrl_e_goes_to_the_file_and_back_to_the_same_field(qtbot: Any, designer
     assert first_row(designer).isAncestorOf(designer.hit("ctrl+e")), "the field cannot take the keyboard"
 
 
-def test_the_first_row_has_the_keyboard_where_undo_removes_the_row_that_had_it(qtbot: Any, designer: Any) -> None:
+def test_the_first_row_has_the_keyboard_where_undo_removes_the_row_that_had_it(designer: Any) -> None:
     designer.open("kitchen", "tasks", "explore")
     designer.editing.ask(SetValue(("tasks", "explore", "kind"), "reach"))
     designer.field("tasks", "explore", "dwell_s").line.setFocus()
@@ -202,7 +202,7 @@ def test_the_first_row_has_the_keyboard_where_undo_removes_the_row_that_had_it(q
     assert first_row(designer).isAncestorOf(keyboard)
 
 
-def test_ctrl_3_goes_to_the_page_and_then_to_the_tabs_where_enter_chooses(qtbot: Any, designer: Any) -> None:
+def test_ctrl_3_goes_to_the_page_and_then_to_the_tabs_where_enter_chooses(designer: Any) -> None:
     designer.open()
     pane = designer.place.pane
     first_row(designer).setFocus()
@@ -213,7 +213,7 @@ def test_ctrl_3_goes_to_the_page_and_then_to_the_tabs_where_enter_chooses(qtbot:
     assert pane.tab == "measures"
 
 
-def test_ctrl_delete_removes_the_key_of_a_field_whose_cross_tab_passes(qtbot: Any, designer: Any) -> None:
+def test_ctrl_delete_removes_the_key_of_a_field_whose_cross_tab_passes(designer: Any) -> None:
     designer.open()
     block = ("blocks", "liquids")
     designer.go_to(*block)

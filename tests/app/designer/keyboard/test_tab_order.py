@@ -37,7 +37,7 @@ def passed(designer: Any, until: Callable[[QWidget], bool]) -> list[Any]:
 
 
 @pytest.mark.parametrize("width", [1600, 1366])
-def test_tab_goes_through_the_parts_as_they_are_seen(qtbot: Any, dutch: Any, width: int) -> None:
+def test_tab_goes_through_the_parts_as_they_are_seen(dutch: Any, width: int) -> None:
     dutch.window.resize(width, 800)
     QApplication.processEvents()
     place, rail = dutch.place, dutch.window.rail
@@ -61,9 +61,7 @@ def test_tab_goes_through_the_parts_as_they_are_seen(qtbot: Any, dutch: Any, wid
 @pytest.mark.parametrize(
     "path", [("blocks", "liquids"), ("questionnaires", "liquid"), ("tasks", "reach"), ("liquids", "thin"), ("study",)]
 )
-def test_tab_goes_to_each_stop_of_a_form_once(
-    qtbot: Any, dutch: Any, editors: None, path: tuple[str | int, ...]
-) -> None:
+def test_tab_goes_to_each_stop_of_a_form_once(dutch: Any, editors: None, path: tuple[str | int, ...]) -> None:
     del editors
     dutch.go_to(*path)
     form = dutch.place.form
@@ -76,7 +74,7 @@ def test_tab_goes_to_each_stop_of_a_form_once(
     ]
 
 
-def test_f6_goes_to_the_tabs_and_enter_on_a_language_shows_its_page(qtbot: Any, dutch: Any) -> None:
+def test_f6_goes_to_the_tabs_and_enter_on_a_language_shows_its_page(dutch: Any) -> None:
     pane, tab = dutch.place.pane, dutch.controller.preview.tab
     dutch.place.areas.focus_form()
     assert dutch.hit("F6") is pane.tabs.buttons[0]
@@ -87,7 +85,7 @@ def test_f6_goes_to_the_tabs_and_enter_on_a_language_shows_its_page(qtbot: Any, 
 
 
 @pytest.mark.parametrize("width", [1600, 1100])
-def test_ctrl_l_shows_the_page_in_the_next_language(qtbot: Any, dutch: Any, width: int) -> None:
+def test_ctrl_l_shows_the_page_in_the_next_language(dutch: Any, width: int) -> None:
     dutch.window.resize(width, 768)
     place, tab = dutch.place, dutch.controller.preview.tab
     place.show_tab("measures")

@@ -9,7 +9,6 @@ from PySide6.QtTest import QTest
 
 from study_app.authoring.kept_settings import kept_participants
 from study_app.authoring.writer.edits import Set
-from study_app.gui.designer.measures.limit_colours import limit_colour
 from study_app.viewmodels.designer.measures.number_cards import ON_AVERAGE, UNKNOWN
 from tests.app.designer.measures.conftest import Worker, jnd, shown
 
@@ -93,8 +92,6 @@ def test_a_clipped_level_is_repaired_by_its_button(qtbot: Any, designer: Any) ->
     assert f"{forces.shown.slope_n:.2f}" == "7.99"  # 53 N·s/m at 0.151 m/s, and not the force limit of 8 N
     drawn = [one for one in page.forces.drawn if isinstance(one, TextItem)]
     assert [one.toPlainText() for one in drawn] == ["force limit 8 N", "slope limit 7.99 N"]
-    inks = [limit_colour(page.theme, limit) for limit in ("norm", "slope")]  # those of the axis in the form
-    assert [one.color.name().upper() for one in drawn] == [ink.upper() for ink in inks]
     assert {bar.clipped_by for bar in forces.shown.bars} == {None, "slope"}
     assert forces.words.text() == designer.place.view.problems[0].message
     click(forces.repair)

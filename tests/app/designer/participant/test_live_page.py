@@ -356,3 +356,11 @@ def test_the_language_is_kept_for_the_study(designer: Any, tab: Any) -> None:
     assert tab.view.language == "en"
     designer.open("kitchen", *ITEM)
     assert (tab.view.language, kept_language(file)) == ("nl", "nl")
+
+
+def test_an_answer_that_was_emptied_does_not_come_back_when_the_page_is_repainted(designer: Any, live: Any) -> None:
+    field = live.page_window.widget.fields[0]
+    field.give(3)
+    field.take_back()
+    designer.editing.ask(SetText((*ITEM, "text"), "en", "Was it like honey?"))
+    assert answers(live) == {}

@@ -231,7 +231,7 @@ else:
 
 
 @pytest.mark.nightly
-def test_two_programs_on_one_study_lose_no_edit_silently(designer: Any, qtbot: Any) -> None:
+def test_two_programs_on_one_study_lose_no_edit_silently(designer: Any) -> None:
     def other(words: str, then: str) -> None:
         command = [sys.executable, "-c", OTHER, str(designer.results), words, then]
         subprocess.run(command, check=True, env={**os.environ, "QT_QPA_PLATFORM": "offscreen"})
@@ -277,6 +277,9 @@ def test_changes_lists_what_differs_and_reverts_single_differences(ran: Any, qtb
     assert "Revert Liquids, Repetitions" in ran.place.header.undo.accessibleName()
     click(qtbot, card.how.buttons[1])
     assert card.sides.place.text() == "1 of 1"
+    sides = (card.sides.before, card.sides.after)
+    marked = [[line.text[slice(*span)].strip('" ') for line in side.lines for span in line.spans] for side in sides]
+    assert marked == [["A first look"], ["Hello"]]
     click(qtbot, card.sides.revert)
     assert ran.text == before
     assert card.view.note == "The study does not differ from this version."
