@@ -7,22 +7,13 @@ from PySide6.QtWidgets import QApplication
 from shiboken6 import isValid
 
 from study_app.app import delay_session as held
-from study_app.app.session.bridge import SessionBridge
-from study_app.app.session.parts import Parts
 from study_app.devices.scripted import ScriptedDevice
 from study_app.errors import StudyError
-from study_app.gui.operator import OperatorWindow
-from study_app.gui.operator.watch import WatchedJournal
-from study_app.gui.participant.window import ParticipantWindow
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import parse
-from study_app.protocol.orders.schedule import Trial, build_schedule, draw_key, stream
-from study_app.protocol.wording.languages import words
 from study_app.session.trial import SETTLED_S
-from study_app.store.progress import Progress
-from study_app.viewmodels.operator import Session
-from study_app.viewmodels.session.stages import stages
+from tests.app.world import begun
 from tests.compiled import needs_servo
 from tests.session.fakes import FakeJournal
 
@@ -38,46 +29,9 @@ class Room:
     def __init__(self, servo):
         self.servo = servo
         self.protocol = parse(held.study_of_delays(TRIAL_S), "delays.toml")
-        self.schedule = build_schedule(self.protocol, "P001", 1)
-        self.key = draw_key(self.protocol, stream(1, "key").random)
-        self.journal = FakeJournal([])
-        session = Session(
-            protocol=self.protocol,
-            schedule=self.schedule,
-            stages=stages(self.protocol, self.schedule),
-            who="Participant P001",
-            expected_s=10.0,
-            answers_of=0,
-            lateness_limit_s=0.002,
-            device_name="Scripted hand",
-            device_icon="fast_forward",
-            device_rows=(),
-        )
-        parts = Parts(
-            session=session,
-            key=self.key,
-            language="en",
-            servo=servo,
-            journal=WatchedJournal(self.journal, Progress(), self.seconds),
-            clock=self.seconds,
-            aim_m=lambda: (0.0, 0.0, 0.0),
-            recorder=self,
-        )
-        participant = ParticipantWindow(words("en"), clock=self.seconds, windowed=True)
-        operator = OperatorWindow(
-            "delays",
-            lateness_limit_s=0.002,
-            reach_m=0.05,
-            pointer=False,
-            force_limit_n=self.protocol.device.force_limit_n,
-        )
-        for window in (participant, operator):
-            window.show()
-        QApplication.processEvents()
         self.frames = []
-        self.bridge = SessionBridge(parts, participant, operator)
-        self.bridge.start()
-        self.bridge.frames.stop()
+        limit_n = self.protocol.device.force_limit_n
+        self.bridge = begun(self.protocol, servo, FakeJournal([]), self.seconds, recorder=self, force_limit_n=limit_n)
 
     def seconds(self):
         return self.servo.now_ns() / 1e9
@@ -102,8 +56,9 @@ class Room:
         self.frames[-1][1].append((painted_ns, sample_ns))
 
     def delay_s(self, trial):
-        (step,) = [step for step in self.schedule.steps if isinstance(step, Trial) and step.number == trial]
-        return self.protocol.delay_s(self.key[step.block][step.code])
+        parts = self.bridge.parts
+        (step,) = [one for one in parts.session.schedule.trials if one.number == trial]
+        return self.protocol.delay_s(parts.key[step.block][step.code])
 
 
 @pytest.fixture
@@ -153,23 +108,6 @@ def test_what_is_drawn_is_of_the_moment_that_was_asked_for_at_every_delay(room):
     assert compared > 40 * len(ODD_S)
     assert {room.delay_s(trial) for trial, _ in room.frames} == set(ODD_S)
     assert all(len(frames) > 40 for _, frames in room.frames)
-
-
-def test_plots_and_bookkeeping_take_nothing_from_a_frame(room, monkeypatch):
-    """What else a frame's turn does comes after the view was painted, so that it makes no picture older."""
-    order = []
-    monitor, tank = type(room.bridge.monitor), type(room.bridge.participant.tank)
-    for kind, name in ((monitor, "look"), (monitor, "show_traces"), (monitor, "show_forces"), (tank, "show_view")):
-        plain = getattr(kind, name)
-        monkeypatch.setattr(
-            kind, name, lambda self, *given, plain=plain, name=name: (order.append(name), plain(self, *given))[1]
-        )
-    room.bridge.participant.painted.connect(lambda _sample_ns: order.append("painted"))
-    room.servo.advance(17)
-    room.bridge.budget.tasks[1].done_ns = room.bridge.budget.tasks[2].done_ns = None
-    monkeypatch.setattr(type(room.bridge.frames), "next_ns", 1 << 62)
-    room.bridge.draw_frame()
-    assert order == ["show_view", "painted", "look", "show_traces", "show_forces"]
 
 
 def test_a_session_of_delays_is_held_and_its_recordings_are_read(qapp, monkeypatch):

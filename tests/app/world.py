@@ -1,13 +1,23 @@
-"""A servo, a store and a clock that do as they are told."""
+"""A servo, a store and a clock that do as they are told, and the two windows of a session between them."""
 
 from types import SimpleNamespace
 
 import numpy as np
 
+from study_app.app.session.bridge import SessionBridge
+from study_app.app.session.parts import Parts
 from study_app.errors import StoreError
+from study_app.gui.operator import OperatorWindow
+from study_app.gui.operator.watch import WatchedJournal
+from study_app.gui.participant.window import ParticipantWindow
 from study_app.haptics.model.layout import SAMPLE, records
+from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
+from study_app.protocol.wording.languages import words
 from study_app.session.pages import TaskPage
 from study_app.session.transitions.events import Continue
+from study_app.store.progress import Progress
+from study_app.viewmodels.operator import Session
+from study_app.viewmodels.session.stages import stages
 
 
 class World:
@@ -71,6 +81,42 @@ class World:
 
     def events(self):
         return [done[0] for done in self.done if isinstance(done, tuple)]
+
+
+def begun(protocol, servo, journal, clock, *, strip=None, force_limit_n=None, **parts):
+    """Return the bridge of a session that has begun in its two windows; its frames come when a test draws them."""
+    schedule = build_schedule(protocol, "P001", 1)
+    session = Session(
+        protocol=protocol,
+        schedule=schedule,
+        stages=stages(protocol, schedule),
+        who="Participant P001",
+        expected_s=180.0,
+        answers_of=8,
+        lateness_limit_s=0.002,
+        device_name="Mouse",
+        device_icon="mouse",
+        device_rows=(),
+    )
+    given = {
+        "session": session,
+        "key": draw_key(protocol, stream(1, "key").random),
+        "language": "en",
+        "servo": servo,
+        "journal": WatchedJournal(journal, Progress(), clock),
+        "clock": clock,
+        "aim_m": lambda: (0.0, 0.0, 0.0),
+    }
+    participant = ParticipantWindow(words("en"), clock=clock, windowed=True, strip=strip)
+    operator = OperatorWindow(
+        protocol.study.name, lateness_limit_s=0.002, reach_m=0.05, pointer=True, force_limit_n=force_limit_n
+    )
+    for window in (participant, operator):
+        window.show()
+    bridge = SessionBridge(Parts(**(given | parts)), participant, operator)
+    bridge.start()
+    bridge.frames.stop()
+    return bridge
 
 
 def begin_trial(bridge, world):

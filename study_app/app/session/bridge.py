@@ -38,6 +38,12 @@ from study_app.viewmodels.operator import OperatorView
 TRACES_S = 0.030  # every second frame of 60 a second, every fifth of 144
 TILES_S = 0.5
 END_SHOWN_MS = 5000
+SCREEN_SETTLES_MS = 500  # a window manager may put a window on another screen for a moment
+SCREEN_REMOVED = (
+    "Both windows are on one screen",
+    "The session is paused: the participant's window would cover the force stop. Connect the second screen again, and "
+    "move the participant's window to it before you resume.",
+)
 log = logging.getLogger(__name__)
 
 
@@ -154,6 +160,24 @@ class SessionBridge(QObject):
         if not self._gone and not self.runner.finished:
             self._break_off()
         self._leave()
+
+    def watch_screens(self) -> None:
+        """From now on, pause where the participant's window comes to cover the operator's, as Qt moves windows of a
+        screen that is removed; both are shown.
+        """
+        for window in (self.participant, self.operator):
+            window.windowHandle().screenChanged.connect(
+                lambda _screen: QTimer.singleShot(SCREEN_SETTLES_MS, self, self._check_screens)
+            )
+
+    @guarded_session_slot
+    def _check_screens(self) -> None:
+        participant, operator = self.participant, self.operator
+        shared = participant.screen().name() == operator.screen().name()
+        if shared and self.strip is None and participant.isFullScreen() and not (self._gone or self.runner.finished):
+            self._post(PauseAsked(self._now(), "program"))
+            operator.come_forward()
+            operator.show_message(*SCREEN_REMOVED)
 
     @guarded_session_slot
     def _break_off(self) -> None:

@@ -163,6 +163,8 @@ def show_windows(
     if shown_on is operated_on and bridge.strip is None:
         raise DisplayError("a screen was removed while the session opened; begin it again")
     bridge.participant.open_on(shown_on)
+    if not played:
+        bridge.watch_screens()
 
 
 def _reconnecting(rig: Rig, videos: Videos | None) -> Callable[[], dict[str, Any]]:

@@ -9,19 +9,9 @@ from PySide6.QtCore import QCoreApplication, QEvent, QTimer
 from PySide6.QtWidgets import QApplication
 from shiboken6 import isValid
 
-from study_app.app.session.bridge import SessionBridge
-from study_app.app.session.parts import Parts
-from study_app.gui.operator import OperatorWindow
-from study_app.gui.operator.watch import WatchedJournal
-from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.load import load, source_bytes
-from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
-from study_app.protocol.wording.languages import words
 from study_app.session import start
-from study_app.store.progress import Progress
-from study_app.viewmodels.operator import Session
-from study_app.viewmodels.session.stages import stages
-from tests.app.world import World
+from tests.app.world import World, begun
 
 PATIENCE_MS = 150_000  # less than pytest's timeout
 
@@ -33,43 +23,11 @@ def world():
 
 @pytest.fixture
 def make(qapp, world):
-    def build(blinding="double", force_limit_n=None, strip=None, **parts):
+    def build(blinding="double", **parts):
         protocol = load("demo")
         protocol = protocol.model_copy(update={"study": protocol.study.model_copy(update={"blinding": blinding})})
-        schedule = build_schedule(protocol, "P001", 1)
-        session = Session(
-            protocol=protocol,
-            schedule=schedule,
-            stages=stages(protocol, schedule),
-            who="Participant P001",
-            expected_s=180.0,
-            answers_of=8,
-            lateness_limit_s=0.002,
-            device_name="Mouse",
-            device_icon="mouse",
-            device_rows=(),
-        )
-        given = {
-            "session": session,
-            "key": draw_key(protocol, stream(1, "key").random),
-            "language": "en",
-            "servo": world,
-            "journal": WatchedJournal(world, Progress(), world.seconds),
-            "clock": world.seconds,
-            "aim_m": lambda: (0.0, 0.0, 0.0),
-        }
-        made = Parts(**(given | parts))
-        participant = ParticipantWindow(words("en"), clock=world.seconds, windowed=True, strip=strip)
-        operator = OperatorWindow(
-            "demo", lateness_limit_s=0.002, reach_m=0.05, pointer=True, force_limit_n=force_limit_n
-        )
-        for window in (participant, operator):
-            window.show()
-        bridge = SessionBridge(made, participant, operator)
-        made_bridges.append(bridge)
-        bridge.start()
-        bridge.frames.stop()  # a test moves time itself
-        return bridge
+        made_bridges.append(begun(protocol, **({"servo": world, "journal": world, "clock": world.seconds} | parts)))
+        return made_bridges[-1]
 
     made_bridges = []
     hook = sys.excepthook

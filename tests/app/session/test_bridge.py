@@ -1,28 +1,32 @@
-"""Events in, views out: what the windows say reaches the session; its stops and its ends."""
+"""The two windows of a session: what they say reaches servo and journal; its stops, its ends, both on one screen."""
 
 import threading
-from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
 from shiboken6 import isValid
 
 from study_app.errors import StoreError
+from study_app.gui.operator.strip import Strip
+from study_app.gui.widgets.dialogs import Notice
+from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_NORM, SAMPLE, records
 from study_app.session.pages import EndPage, PausePage, TaskPage, TextPage, TroublePage
 from study_app.session.transitions.events import Continue, ForceStopped, ResumeAsked
-from tests.app.world import begin_trial, tick
+from tests.app.world import World, begin_trial, tick
 
 pytestmark = pytest.mark.slow
 
-
-def test_starting_shows_the_first_page_to_both(bridge, world):
-    assert isinstance(bridge.participant.page, TextPage)
-    assert bridge.operator.rail.heading.text() == "A first look"
-    assert world.events() == ["page_shown"]
+LEFT = Qt.MouseButton.LeftButton
 
 
 def test_the_operators_buttons_become_events(bridge, world):
+    assert isinstance(bridge.participant.page, TextPage)
+    assert bridge.operator.rail.heading.text() == "A first look"
+    assert world.events() == ["page_shown"]
     begin_trial(bridge, world)
     bridge.operator.note_written.emit("left-handed")
     bridge.operator.mark_set.emit()
@@ -46,9 +50,8 @@ def test_leaving_out_is_kept_and_noted_and_a_refusal_is_told(make, world):
 
     bridge = make(exclude=exclude)
     begin_trial(bridge, world)
-    bridge.operator.exclude_asked.emit(1, "phone rang")
-    bridge.operator.exclude_asked.emit(None, "no consent")
-    bridge.operator.exclude_asked.emit(1, "again")
+    for trial, reason in ((1, "phone rang"), (None, "no consent"), (1, "again")):
+        bridge.operator.exclude_asked.emit(trial, reason)
     assert left_out == [(1, "phone rang"), (None, "no consent")]
     notes = [done[1]["text"] for done in world.done if done[0] == "note"]
     assert notes == [
@@ -75,124 +78,75 @@ def test_force_and_task_begin_when_the_tank_is_painted_and_not_while_a_page_asks
     assert "load" not in world.done
     bridge.draw_frame()
     assert world.done[-1] == "load"
-    world.samples = tick(world, 3.0)
-    bridge.draw_frame()
-    world.samples = tick(world, 3.75)
-    bridge.draw_frame()
+    for at_s in (3.0, 3.75):
+        world.samples = tick(world, at_s)
+        bridge.draw_frame()
     assert bridge.runner.task.elapsed_s == 0.75
 
 
-def test_painted_frames_are_counted_on_the_servos_clock(bridge, world):
-    begin_trial(bridge, world)
-    for frame in range(5):
-        world.now_s = 2.0 + frame / 60
-        bridge.participant.painted.emit(world.now_ns())
-    vitals = bridge.monitor.health.vitals()
-    assert (vitals.refreshes, vitals.refreshes_missed) == (4, 0)
-    assert vitals.frame_rate_hz == pytest.approx(60, abs=0.1)
-
-
-def test_the_pointer_and_its_buttons_reach_the_mouse_device(make, world):
-    told = []
-    bridge = make(point_to=lambda *place: told.append(place), press=told.append)
-    begin_trial(bridge, world)
-    bridge.participant.pointer.emit(0.01, 0.02, 0.03)
-    bridge.participant.buttons.emit(1)
-    assert told == [(0.01, 0.02, 0.03), 1]
-
-
-def test_a_simulated_hand_sees_each_frame_and_may_go_on(make, world):
-    seen = []
-
-    def hand_for(page):
-        return (
-            SimpleNamespace(act=lambda now_s, _view: seen.append(now_s) or now_s > 10.0)
-            if isinstance(page, TaskPage)
-            else None
-        )
-
-    bridge = make(hand_for=hand_for)
-    begin_trial(bridge, world)
-    world.samples = tick(world, 2.0)
-    bridge.draw_frame()
-    assert len(seen) == 1
-    assert isinstance(bridge.participant.page, TaskPage)
-    for at_s in (11.0, 11.1, 11.2):
-        world.samples = tick(world, at_s)
-        bridge.draw_frame()
-    assert "trial_ended" in world.events()
-
-
-def test_the_operator_sees_traces_and_figures(bridge, world):
-    begin_trial(bridge, world)
-    world.samples = tick(world, 2.0)
-    bridge.draw_frame()
-    bridge.show_traces()
-    bridge.show_tiles()
-    times, _ = bridge.operator.position.plot.curves[0].getData()
-    assert len(times) >= 1
-    assert bridge.operator.tiles.cards[1].value.text() == "0"
-
-
-def test_a_diagnosis_is_begun_with_the_force_off_and_a_pause(bridge, world, qtbot):
+def test_a_diagnosis_is_begun_with_the_force_off_and_a_pause_even_with_a_full_disk(bridge, world, qtbot, caplog):
     begin_trial(bridge, world)
     seen = []
     bridge.diagnose_asked.connect(lambda: seen.append((world.force_is_on, bridge.participant.page)))
-    with qtbot.waitSignal(bridge.diagnose_asked):
-        qtbot.mouseClick(bridge.operator.device.diagnose, Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(bridge.operator.device.diagnose, LEFT)
     assert seen == [(False, PausePage(force_off=True, held="force"))]
+    bridge.operator.fade_in_asked.emit()
+    world.full = True
+    bridge.operator.diagnose_asked.emit()
+    assert [force for force, _ in seen] == [False, False]
+    assert "no space left" in caplog.text
+    world.full = False
+    world.now_s += 2.0
+    bridge.draw_frame()
+    caplog.clear()
     bridge.operator.end_asked.emit("aborted", "the device is broken")
     before = len(world.done)
-    with qtbot.waitSignal(bridge.diagnose_asked):
-        bridge.operator.diagnose_asked.emit()
+    bridge.operator.diagnose_asked.emit()
     assert world.done[before:] == ["stop_force"]
+    assert len(seen) == 3
 
 
-def test_a_diagnosis_of_a_full_disk_is_opened_all_the_same(bridge, world, qtbot, caplog):
-    begin_trial(bridge, world)
-    world.full = True
-    with qtbot.waitSignal(bridge.diagnose_asked):
-        bridge.operator.diagnose_asked.emit()
-    assert not world.force_is_on
-    assert "no space left" in caplog.text
-    caplog.clear()
-
-
-def test_stop_force_reaches_the_servo_before_the_disk(bridge, world):
+def test_a_stop_reaches_the_servo_before_the_disk_and_only_the_operator_takes_it_back(bridge, world):
     begin_trial(bridge, world)
     before = len(world.done)
     bridge.operator.stop_asked.emit()
-    after = world.done[before:]
-    assert after[0] == "stop_force"
+    assert world.done[before] == "stop_force"
     assert "force_stopped" in world.events()
-    assert isinstance(bridge.participant.page, PausePage)
+    assert bridge.participant.page == PausePage(force_off=True, held="force")
     assert bridge.operator.stop.word.text() == "Force is off"
-
-
-def test_stop_force_works_with_a_full_disk(bridge, world, caplog):
-    begin_trial(bridge, world)
-    world.full = True
-    bridge.operator.stop_asked.emit()
+    done = list(world.done)
+    QTest.keyClick(bridge.participant.widget, Qt.Key.Key_Return)
+    bridge.participant.event.emit(ResumeAsked(world.now_s, "participant"))
+    assert (world.force_is_on, world.done) == (False, done)
+    bridge.operator.fade_in_asked.emit()
+    assert world.force_is_on
+    assert ("force_restored", {"by": "operator"}) in world.done
+    assert isinstance(bridge.participant.page, TaskPage)
+    assert world.events().count("trial_started") == 2
+    bridge.participant.event.emit(ForceStopped(world.now_s, "participant"))
     assert not world.force_is_on
-    assert isinstance(bridge.participant.page, TroublePage)
-    assert "No space left" in bridge.operator.banner.what.text()
-    assert bridge.operator.header.state.word == "Waiting for the disk"
-    assert "no space left" in caplog.text
-    caplog.clear()
+    assert ("force_stopped", {"by": "participant"}) in world.done
 
 
-def test_when_there_is_space_again_the_session_goes_on_paused_with_nothing_lost(bridge, world, caplog):
+def test_with_a_full_disk_the_force_stops_and_the_session_waits_and_loses_nothing(bridge, world, caplog):
     begin_trial(bridge, world)
     world.full = True
     bridge.operator.mark_set.emit()
     bridge.operator.note_written.emit("dropped while the disk is full")
-    assert "Free disk space" in bridge.operator.banner.then.text()
+    bridge.operator.stop_asked.emit()
+    assert not world.force_is_on
+    assert isinstance(bridge.participant.page, TroublePage)
+    banner = bridge.operator.banner
+    assert "No space left" in banner.what.text()
+    assert "Free disk space" in banner.then.text()
+    assert bridge.operator.header.state.word == "Waiting for the disk"
     assert bridge.operator.device.chip.word == "Ready"
+    assert "no space left" in caplog.text
     world.full = False
     world.now_s += 2.0
     bridge.draw_frame()
     assert isinstance(bridge.participant.page, PausePage)
-    assert not bridge.operator.banner.isVisible()
+    assert not banner.isVisible()
     assert ("note", {"kind": "mark", "text": ""}) in world.done
     bridge.operator.fade_in_asked.emit()
     assert isinstance(bridge.participant.page, TaskPage)
@@ -201,70 +155,35 @@ def test_when_there_is_space_again_the_session_goes_on_paused_with_nothing_lost(
     caplog.clear()
 
 
-def test_the_participants_stop_reaches_the_servo_at_once(bridge, world):
-    begin_trial(bridge, world)
-    bridge.participant.event.emit(ForceStopped(world.now_s, "participant"))
-    assert not world.force_is_on
-    assert ("force_stopped", {"by": "participant"}) in world.done
-
-
-def test_the_participant_cannot_bring_back_a_force_that_the_operator_stopped(bridge, world):
-    begin_trial(bridge, world)
-    bridge.operator.stop_asked.emit()
-    assert bridge.participant.page == PausePage(force_off=True, held="force")
-    before = list(world.done)
-    QTest.keyClick(bridge.participant.widget, Qt.Key.Key_Return)
-    bridge.participant.event.emit(ResumeAsked(world.now_s, "participant"))
-    assert not world.force_is_on
-    assert world.done == before
-    bridge.operator.fade_in_asked.emit()
-    assert world.force_is_on
-    assert ("force_restored", {"by": "operator"}) in world.done
-
-
-def test_fade_in_brings_the_force_back_and_the_trial_again(bridge, world):
-    begin_trial(bridge, world)
-    bridge.operator.stop_asked.emit()
-    bridge.operator.fade_in_asked.emit()
-    assert world.force_is_on
-    assert isinstance(bridge.participant.page, TaskPage)
-    assert world.events().count("trial_started") == 2
-
-
 def test_ending_closes_the_journal_with_status_and_reason_and_waits_to_be_closed(bridge, world, qtbot):
     begin_trial(bridge, world)
     bridge.operator.end_asked.emit("withdrawn", "felt unwell")
     assert world.done[-1] == ("session_ended", {"status": "withdrawn", "reason": "felt unwell"})
     assert isinstance(bridge.participant.page, EndPage)
-    assert bridge.operator.buttons.close_session.isVisible()
     with qtbot.waitSignal(bridge.done):
-        qtbot.mouseClick(bridge.operator.buttons.close_session, Qt.MouseButton.LeftButton)
+        qtbot.mouseClick(bridge.operator.buttons.close_session, LEFT)
     assert not any(window.isVisible() for window in (bridge.operator, bridge.participant) if isValid(window))
 
 
-def test_closing_the_operators_window_stops_the_force_and_asks(bridge, world, qtbot):
+@pytest.mark.parametrize("answer", ["end", "close again"])
+def test_closing_the_operators_window_stops_the_force_and_asks_and_closing_it_again_leaves_the_session_unfinished(
+    bridge, world, qtbot, answer
+):
     begin_trial(bridge, world)
     bridge.operator.close()
     assert not world.force_is_on
     assert bridge.operator.isVisible()
-    assert bridge.operator.question is not None
     assert "session_ended" not in world.events()
-    bridge.operator.question.accept()
-    assert world.done[-1][1]["status"] == "aborted"
+    if answer == "end":
+        bridge.operator.question.accept()
+        assert world.done[-1][1]["status"] == "aborted"
     with qtbot.waitSignal(bridge.done):
         bridge.operator.close()
-
-
-def test_closing_it_again_leaves_the_session_unfinished(bridge, world, qtbot):
-    begin_trial(bridge, world)
-    bridge.operator.close()
-    with qtbot.waitSignal(bridge.done):
-        bridge.operator.close()
-    assert "session_ended" not in world.events()
+    assert ("session_ended" in world.events()) == (answer == "end")
     assert not world.force_is_on
 
 
-def test_ending_from_outside_is_zero_force_no_end_and_gone_once(bridge, world, qtbot):
+def test_ending_from_outside_is_zero_force_no_end_and_gone_once(bridge, world):
     begin_trial(bridge, world)
     gone = []
     bridge.done.connect(lambda: gone.append(True))
@@ -280,7 +199,6 @@ def test_an_end_that_cannot_be_written_still_lets_the_windows_go(bridge, world, 
     world.full = True
     bridge.operator.end_asked.emit("aborted", "")
     assert not world.force_is_on
-    assert "No space left" in bridge.operator.banner.what.text()
     assert bridge.runner.stalled
     with qtbot.waitSignal(bridge.done):
         bridge.operator.close()
@@ -288,27 +206,178 @@ def test_an_end_that_cannot_be_written_still_lets_the_windows_go(bridge, world, 
     caplog.clear()
 
 
+class SlowRecorder:
+    """Writes its recordings until ``on_disk``."""
+
+    lost, dropped, on_disk = (), 0, False
+
+    def start(self, *_arguments):
+        pass
+
+    append = frame = stop = start
+
+    def settled(self):
+        return self.on_disk
+
+
 def test_windows_answer_while_recordings_are_written_and_close_after_it(make, world, qtbot):
-    class Slow:
-        lost, dropped, on_disk = (), 0, False
-
-        def start(self, *_arguments):
-            pass
-
-        append = frame = stop = start
-
-        def settled(self):
-            return self.on_disk
-
-    recorder = Slow()
+    recorder = SlowRecorder()
     bridge = make(recorder=recorder)
     begin_trial(bridge, world)
     bridge.operator.end_asked.emit("withdrawn", "tired")
     bridge.runner.poll()
     assert isinstance(bridge.participant.page, EndPage)
-    assert bridge.runner.ending
     bridge.operator.close_asked.emit()
     assert not bridge.participant.may_close, "the end is still to be written"
     recorder.on_disk = True
     with qtbot.waitSignal(bridge.done):
         bridge.runner.poll()
+
+
+@pytest.mark.parametrize("full_screen", [True, False])
+def test_a_participants_window_that_comes_to_cover_the_operators_pauses_the_session(
+    bridge, world, qtbot, monkeypatch, full_screen
+):
+    monkeypatch.setattr("study_app.app.session.bridge.SCREEN_SETTLES_MS", 0)
+    if full_screen:
+        bridge.participant.showFullScreen()
+    bridge.watch_screens()
+    begin_trial(bridge, world)
+    bridge.participant.come_forward()
+    handle = bridge.participant.windowHandle()
+    handle.screenChanged.emit(handle.screen())  # as Qt does for a window of a screen that is removed
+    QApplication.processEvents()
+    assert (("paused", {"by": "program"}) in world.done) == full_screen
+    assert isinstance(bridge.participant.page, PausePage if full_screen else TaskPage)
+    told = [one for one in bridge.operator.findChildren(Notice) if one.isVisible()]
+    assert len(told) == full_screen
+    if full_screen:
+        qtbot.waitUntil(lambda: QApplication.activeWindow() in (bridge.operator, *told))
+
+
+def test_a_screen_that_is_rescaled_in_a_trial_changes_neither_force_nor_place_of_the_hand(bridge, world):
+    begin_trial(bridge, world)
+    window = bridge.participant
+    window.resize(1000, 700)
+    world.samples = tick(world, 2.0)
+    bridge.draw_frame()
+    large, done = window.tank.ball, len(world.done)
+    for part in (window, bridge.operator):
+        QApplication.sendEvent(part, QEvent(QEvent.Type.DevicePixelRatioChange))
+    window.resize(500, 350)
+    world.samples = tick(world, 3.0)
+    bridge.draw_frame()
+    small = window.tank.ball
+    assert (world.done[done:], world.force_is_on, bridge.trouble) == ([], True, "")
+    assert window.tank.placer.place(tuple(window.tank.view.position_m)) == small != large
+
+
+@pytest.fixture
+def one_screen(make, qtbot):
+    bridge = make(strip=Strip())
+    qtbot.waitExposed(bridge.participant)
+    return bridge
+
+
+def test_the_strip_covers_no_page_and_stops_the_force_at_the_first_touch(one_screen, world, qtbot):
+    strip, participant = one_screen.strip, one_screen.participant
+    for page in ("text", "tank"):
+        assert strip.isVisible(), page
+        assert participant.widget.geometry().top() == strip.height()
+        if page == "text":
+            begin_trial(one_screen, world)
+    assert (strip.state.word, world.force_is_on) == ("Running", True)
+    qtbot.mousePress(strip.stop, LEFT)
+    assert (strip.state.word, world.force_is_on) == ("Paused, force is off", False)
+
+
+def test_each_window_leads_to_the_other_by_a_click_and_by_f6(one_screen, world, qtbot):
+    participant, operator = one_screen.participant, one_screen.operator
+    focus = participant.focusWidget()
+    qtbot.mouseClick(one_screen.strip.operator, LEFT)
+    assert participant.focusWidget() is focus is not None, "the strip leaves the keyboard to the page"
+    qtbot.waitUntil(lambda: QApplication.activeWindow() is operator)
+    qtbot.mouseClick(operator.header.page, LEFT)
+    qtbot.waitUntil(lambda: QApplication.activeWindow() is participant)
+    begin_trial(one_screen, world)
+    for here, there in ((participant, operator), (operator, participant)):
+        qtbot.keyClick(here, Qt.Key.Key_F6)
+        qtbot.waitUntil(lambda there=there: QApplication.activeWindow() is there)
+    assert world.force_is_on
+
+
+def test_trouble_brings_the_operators_window_to_the_front_once(one_screen, world, qtbot, caplog):
+    begin_trial(one_screen, world)
+    one_screen.participant.come_forward()
+    one_screen.fail(RuntimeError("the disk is gone"))
+    qtbot.waitUntil(lambda: QApplication.activeWindow() is one_screen.operator)
+    one_screen.participant.come_forward()
+    qtbot.waitUntil(lambda: QApplication.activeWindow() is one_screen.participant)
+    one_screen.show_tiles()
+    assert QApplication.activeWindow() is one_screen.participant
+    caplog.clear()
+
+
+@pytest.mark.parametrize("key", [Qt.Key.Key_Space, Qt.Key.Key_Escape, None])
+def test_the_last_page_ends_by_a_key_or_a_click_and_leads_to_the_operator(one_screen, world, qtbot, key):
+    begin_trial(one_screen, world)
+    one_screen.operator.end_asked.emit("withdrawn", "felt unwell")
+    participant = one_screen.participant
+    if key is None:
+        qtbot.mouseClick(participant.widget.button, LEFT)
+    else:
+        qtbot.keyClick(participant.focusWidget(), key)
+    assert not participant.isVisible()
+    qtbot.waitUntil(lambda: QApplication.activeWindow() is one_screen.operator)
+    assert one_screen.operator.buttons.close_session.isVisible()
+
+
+def pushes(world: World, count: int = 400) -> Any:
+    """Return samples of the scene now loaded with a force of 3 N, 1.5 N of it along x, limited now and then."""
+    samples = records(SAMPLE, count)
+    world.now_s += count / 1000
+    samples.tick = np.arange(count)
+    samples.time_ns = round(world.now_s * 1e9) - np.arange(count)[::-1] * 1_000_000
+    samples.scene = world.serial
+    samples.fresh = 1
+    samples.device_force_n = (1.5, 0.0, np.sqrt(9 - 1.5**2))
+    samples.wake_mps = (0.3, 0.0, 0.4)
+    samples.permitted_n, samples.withheld_n = 4.0, 0.25
+    samples.limiters = LIMITER_FADE
+    samples.limiters[:7] |= LIMITER_NORM
+    return samples
+
+
+def test_the_operator_sees_forces_in_a_single_blind_study_alone_and_the_participant_the_same_in_both(
+    make: Any, world: World
+) -> None:
+    names = ("Force, share of 6 N", "Limiters acted", "Force withheld, limit 5\u2009%")
+    told, seen = {}, []
+    for blinding, limit_n in (("single", 6.0), ("double", None)):
+        bridge = make(blinding=blinding, force_limit_n=limit_n)
+        begin_trial(bridge, world)
+        world.samples = pushes(world)
+        bridge.draw_frame()
+        bridge.show_traces()
+        bridge.show_tiles()
+        rows, card = dict(bridge.view().device.rows), bridge.operator.force
+        told[bridge.operator.header.blind.word] = [rows[name] for name in names]
+        if blinding == "single":
+            x_n, size_n = (card.plot.curves[curve].getData()[1] for curve in (0, 3))
+            assert x_n == pytest.approx(1.5)
+            assert size_n == pytest.approx(3.0)
+            assert card.wake.curve.getData()[1] == pytest.approx(0.5)
+            assert len(bridge.operator.position.plot.curves[0].getData()[0]) > 0
+        else:
+            assert not hasattr(card, "plot")
+            assert bridge.monitor.forces is None
+        assert bridge.participant.widget.geometry().top() == 0, "without a strip"
+        assert bridge.operator.header.page.isHidden()
+        seen.append((repr(bridge.participant.page), bridge.participant.grab().toImage()))
+        bridge.leave_now()
+        world.samples = records(SAMPLE, 0)
+    assert told == {
+        "Single-blind": ["50\u2009%, most 50\u2009%", "force 7", "6.2\u2009%"],
+        "Double-blind": ["hidden", "hidden", "hidden"],
+    }
+    assert seen[0] == seen[1]

@@ -11,11 +11,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QDialog, QLineEdit, QVBoxLayout, QWidget
 
 from study_app.app.session.bridge import SessionBridge
-from study_app.gui.operator.watch import WatchedJournal
 from study_app.gui.widgets import escape_key
 from study_app.session.pages import PausePage, TaskPage
 from study_app.session.transitions.events import Continue
-from study_app.store.progress import Progress
 from tests.app.world import World, begin_trial
 from tests.compiled import needs_servo
 
@@ -52,22 +50,19 @@ def operator(bridge: Bridge) -> QWidget:
     return bridge.operator
 
 
-def repeating(bridge: Bridge) -> QWidget:
-    bridge.operator.ask_to_repeat()
-    assert bridge.operator.question is not None
-    return bridge.operator.question
+def asking(ask: str) -> Callable[[Bridge], QWidget]:
+    """Return a function that opens a question of the operator's window."""
+
+    def open_(bridge: Bridge) -> QWidget:
+        getattr(bridge.operator, ask)()
+        assert bridge.operator.question is not None
+        return bridge.operator.question
+
+    open_.__name__ = ask
+    return open_
 
 
-def leaving_out(bridge: Bridge) -> QWidget:
-    bridge.operator.ask_to_exclude()
-    assert bridge.operator.question is not None
-    return bridge.operator.question
-
-
-def ending(bridge: Bridge) -> QWidget:
-    bridge.operator.ask_to_end()
-    assert bridge.operator.question is not None
-    return bridge.operator.question
+repeating, leaving_out, ending = (asking(f"ask_to_{what}") for what in ("repeat", "exclude", "end"))
 
 
 def told(bridge: Bridge) -> QWidget:
@@ -209,8 +204,7 @@ def real() -> Iterator[Real]:
 def test_the_servo_sends_no_force_from_the_next_tick_on(
     make: Any, real: Real, qtbot: Any, open_: Callable[[Bridge], QWidget]
 ) -> None:
-    journal = WatchedJournal(real, Progress(), real.seconds)
-    bridge = make(servo=real.servo, journal=journal, clock=real.seconds)
+    bridge = make(servo=real.servo, journal=real, clock=real.seconds)
     bridge.participant.event.emit(Continue(real.seconds()))
     assert isinstance(bridge.participant.page, TaskPage)
     with qtbot.waitExposed(bridge.participant):

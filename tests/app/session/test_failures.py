@@ -1,7 +1,6 @@
 """Whatever fails ends in zero force, is written down once and told; a device that failed is connected again."""
 
 import pkgutil
-import sys
 import threading
 import weakref
 from types import SimpleNamespace
@@ -21,44 +20,22 @@ from tests.app.world import begin_trial
 pytestmark = pytest.mark.slow
 
 
-def test_an_exception_in_a_slot_ends_in_zero_force(bridge, world, caplog):
+def test_what_breaks_in_a_slot_is_zero_force_and_told_and_written_once(bridge, world, caplog):
     begin_trial(bridge, world)
     world.broken_clock = True
     bridge.draw_frame()
-    assert "stop_force" in world.done
     assert not world.force_is_on
-    assert "the clock fell off the wall" in caplog.text
+    assert [record.getMessage() for record in caplog.records] == [
+        "the session failed: RuntimeError: the clock fell off the wall",
+        "and could not be recorded: the clock fell off the wall",
+    ]
+    for _ in range(5):
+        bridge.draw_frame()
+    assert len(caplog.records) == 2
     caplog.clear()
     world.broken_clock = False
     bridge.show_tiles()
     assert "the clock fell off the wall" in bridge.operator.banner.what.text()
-
-
-def test_what_breaks_again_and_again_is_written_once(bridge, world, caplog):
-    begin_trial(bridge, world)
-    bridge.participant.show_view = None  # not callable: every frame fails
-    for _ in range(5):
-        world.now_s += 0.1
-        bridge.draw_frame()
-    assert world.events().count("broke") == 1
-    assert len(caplog.records) == 1
-    caplog.clear()
-    assert isinstance(bridge.participant.page, TroublePage)
-    assert isinstance(bridge.failure, TypeError)
-
-
-def test_an_exception_in_painting_ends_in_zero_force_too(bridge, world, caplog, monkeypatch):
-    begin_trial(bridge, world)
-    heard = []
-    monkeypatch.setattr(bridge.uncaught, "previous", lambda *error: heard.append(error))
-    error = ValueError("no such colour")
-    sys.excepthook(ValueError, error, None)
-    assert not world.force_is_on
-    assert isinstance(bridge.participant.page, TroublePage)
-    assert heard == [(ValueError, error, None)]
-    monkeypatch.undo()
-    assert "no such colour" in caplog.text
-    caplog.clear()
 
 
 def test_an_event_that_comes_too_late_changes_nothing(bridge, world):
@@ -98,30 +75,23 @@ def test_what_fails_in_the_program_is_no_fault_of_the_device(bridge, world, capl
 BROKEN = "no such colour"
 
 
-def breaks(*_arguments, **_named):
-    raise ValueError(BROKEN)
+class Breaking:
+    """Lets a method of a window fail from ``now`` on: in a slot or an event that Qt calls itself."""
 
+    def __init__(self, monkeypatch, owner, method):
+        self.on, kind = False, pkgutil.resolve_name(f"study_app.gui.{owner}")
+        whole, breaking = getattr(kind, method), self
 
-def scribble(bridge):
-    """Emit what the operator's own slot listens to."""
-    bridge.operator.notes.field.setPlainText("left-handed")
-    bridge.operator.notes.field.entered.emit()
+        def broken(self, *arguments, **named):  # a panel that failed is found by this name
+            if breaking.on:
+                raise ValueError(BROKEN)
+            return whole(self, *arguments, **named)
 
+        monkeypatch.setattr(kind, method, broken, raising=False)
 
-def show_position(bridge):
-    bridge.show_traces()
-
-
-def choose_theme(bridge):
-    bridge.operator.header.theme_button.click()
-
-
-def paint_rail(bridge):
-    bridge.operator.rail.update()
-
-
-def paint_plot(bridge):
-    bridge.operator.position.plot.viewport().update()
+    def now(self, bridge, do):
+        self.on = True
+        QTimer.singleShot(0, lambda: do(bridge))  # from Qt's loop, as it is in the program
 
 
 def paint_tank(bridge):
@@ -129,55 +99,46 @@ def paint_tank(bridge):
 
 
 def tap(bridge):
-    """Press a key that the participant's window hears itself."""
     key = QKeyEvent(QEvent.Type.KeyPress, Qt.Key.Key_Space, Qt.KeyboardModifier.NoModifier)
     QApplication.postEvent(bridge.participant, key)
 
 
-def show_notes(bridge):
-    bridge.operator.mark_set.emit()
-
-
-def hold(bridge):
-    bridge.participant.findChild(EscapeHold).tapped.emit()
+def write_note(bridge):
+    bridge.operator.notes.field.setPlainText("left-handed")
+    bridge.operator.notes.field.entered.emit()
 
 
 @pytest.mark.parametrize(
     ("owner", "method", "do"),
     [
-        ("study_app.gui.operator.window.OperatorWindow", "_change_theme", choose_theme),
-        ("study_app.gui.participant.tank_widget.TankWidget", "paintEvent", paint_tank),
-        ("study_app.gui.participant.window.ParticipantWindow", "keyPressEvent", tap),
-        ("study_app.gui.participant.window.ParticipantWindow", "_pause", hold),
+        ("operator.window.OperatorWindow", "_change_theme", lambda bridge: bridge.operator.header.theme_button.click()),
+        ("participant.tank_widget.TankWidget", "paintEvent", paint_tank),
+        ("participant.window.ParticipantWindow", "keyPressEvent", tap),
+        (
+            "participant.window.ParticipantWindow",
+            "_pause",
+            lambda bridge: bridge.participant.findChild(EscapeHold).tapped.emit(),
+        ),
     ],
 )
 def test_whatever_window_it_happens_in_a_failure_is_zero_force_and_told(
     make, world, qtbot, monkeypatch, caplog, owner, method, do
 ):
-    """Qt calls these itself: the exception is raised in a slot or an event of the window, not in the bridge."""
-    breaks_here = []
-
-    def broken(*arguments, **named):
-        if breaks_here:
-            breaks(*arguments, **named)
-        return whole(*arguments, **named)
-
-    kind = pkgutil.resolve_name(owner)
-    whole = getattr(kind, method)
-    monkeypatch.setattr(kind, method, broken, raising=False)
+    breaking = Breaking(monkeypatch, owner, method)
     bridge = make()
-    before, bridge.uncaught.previous = bridge.uncaught.previous, lambda *_error: None
+    heard = []
+    before, bridge.uncaught.previous = bridge.uncaught.previous, lambda *error: heard.append(error)
     begin_trial(bridge, world)
     QApplication.processEvents()
     assert world.force_is_on
-    breaks_here.append(True)
-    QTimer.singleShot(0, lambda: do(bridge))  # from Qt's loop, as it is in the program
+    breaking.now(bridge, do)
     qtbot.waitUntil(lambda: not world.force_is_on)
+    assert BROKEN in str(heard[0][1]), "it is passed on as well"
     assert world.events().count("broke") == 1
     assert isinstance(bridge.participant.page, TroublePage)
     assert BROKEN in bridge.operator.banner.what.text()
     assert BROKEN in caplog.text
-    breaks_here.clear()
+    breaking.on = False
     bridge.uncaught.previous = before
     caplog.clear()
 
@@ -186,33 +147,22 @@ def test_whatever_window_it_happens_in_a_failure_is_zero_force_and_told(
 @pytest.mark.parametrize(
     ("owner", "method", "do", "name"),
     [
-        ("study_app.gui.operator.notes.NotesCard", "show_view", show_notes, "Notes"),
-        ("study_app.gui.operator.notes.NoteField", "toPlainText", scribble, "Notes"),
-        ("study_app.gui.operator.plot_cards.PositionCard", "show_health", show_position, "Position"),
-        ("study_app.gui.widgets.live_plots.TracePlot", "show_traces", show_position, "Position"),
-        ("study_app.gui.widgets.live_plots.Plot", "paintEvent", paint_plot, "Position"),
-        ("study_app.gui.operator.steps_card.Rail", "paintEvent", paint_rail, "Session"),
-        ("study_app.gui.operator.current_step.Tally", "show_view", show_notes, "Counts"),
+        ("operator.notes.NotesCard", "show_view", lambda bridge: bridge.operator.mark_set.emit(), "Notes"),
+        ("operator.notes.NoteField", "toPlainText", write_note, "Notes"),
+        ("operator.plot_cards.PositionCard", "show_health", lambda bridge: bridge.show_traces(), "Position"),
+        ("widgets.live_plots.Plot", "paintEvent", lambda it: it.operator.position.plot.viewport().update(), "Position"),
+        ("operator.steps_card.Rail", "paintEvent", lambda bridge: bridge.operator.rail.update(), "Session"),
+        ("operator.current_step.Tally", "show_view", lambda bridge: bridge.operator.mark_set.emit(), "Counts"),
     ],
 )
 def test_a_panel_that_fails_is_replaced_by_a_line_and_the_session_goes_on(
     make, world, qtbot, monkeypatch, caplog, owner, method, do, name
 ):
-    breaks_here = []
-
-    def broken(self, *arguments, **named):
-        if breaks_here:
-            breaks()
-        return whole(self, *arguments, **named)
-
-    kind = pkgutil.resolve_name(owner)
-    whole = getattr(kind, method)
-    monkeypatch.setattr(kind, method, broken, raising=False)
+    breaking = Breaking(monkeypatch, owner, method)
     bridge = make()
     begin_trial(bridge, world)
     QApplication.processEvents()
-    breaks_here.append(True)
-    QTimer.singleShot(0, lambda: do(bridge))  # from Qt's loop, as it is in the program
+    breaking.now(bridge, do)
     panels = bridge.operator.panels
     qtbot.waitUntil(lambda: None not in panels.covers.values() and bool(panels.covers))
     for _ in range(3):
@@ -222,14 +172,13 @@ def test_a_panel_that_fails_is_replaced_by_a_line_and_the_session_goes_on(
     cover = next(cover for panel, cover in panels.covers.items() if panels.names[panel] == name)
     assert cover.isVisible()
     assert cover.line.text() == f"{name}: this panel failed. The session continues."
-    assert world.force_is_on
-    assert not bridge.trouble
+    assert (world.force_is_on, bridge.trouble) == (True, "")
     assert isinstance(bridge.participant.page, TaskPage)
     assert "broke" not in world.events()
     told = [entry[1]["text"] for entry in world.done if entry[0] == "note" and entry[1]["kind"] == "note"]
     assert len([text for text in told if f"panel {name!r} failed" in text and BROKEN in text]) == 1
     assert f"the panel {name!r} failed" in caplog.text
-    breaks_here.clear()
+    breaking.on = False
     caplog.clear()
 
 

@@ -21,8 +21,6 @@ from study_app.haptics.runtime.clocks.grants import NO_THREAD
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.load import load
-from study_app.protocol.trials.tasks.explore import Explore
-from study_app.protocol.trials.tasks.reach import Reach
 from study_app.protocol.trials.tasks.stroke import Stroke
 from study_app.session.preflight import Facts
 from study_app.session.request import NewSession
@@ -240,31 +238,3 @@ def test_the_share_withheld_is_asked_of_each_liquid_in_the_fastest_stroke_of_its
         name: pytest.approx(0.01 * (1 + max(n for n, one in enumerate(asked) if one.liquid == name)))
         for name in protocol.liquids
     }
-
-
-def test_of_several_shares_of_a_liquid_the_largest_counts(monkeypatch: Any) -> None:
-    monkeypatch.setattr(preflight_controller, "start_appraisal_worker", Answering)
-    monkeypatch.setattr(Answering, "given", (Errors(0.0, 0.0, 0.0, (), 0.04), Errors(0.0, 0.0, 0.0, (), 0.02)))
-    asked = preflight_controller.study_scenes(load("demo"))[0]
-    appraisal = Appraisal([asked, asked], UNKNOWN)
-    while not appraisal.over:
-        appraisal.look()
-    assert appraisal.withheld == {asked.liquid: 0.04}
-
-
-@pytest.mark.parametrize("order", [1, -1])
-def test_of_the_strokes_of_several_tasks_the_fastest_counts(monkeypatch: Any, order: int) -> None:
-    protocol = load("demo")
-    blocks = list(protocol.blocks.values())
-    strokes = [Stroke(float(hz), 0.03) for hz in range(1, 1 + len(blocks))][::order]
-    given = iter(strokes)
-    for kind in (Explore, Reach):
-        monkeypatch.setattr(kind, "fastest_stroke", lambda *_words: next(given))
-    thin = [
-        stroke
-        for stroke, block in zip(strokes, blocks, strict=True)
-        if any(protocol.scene_for(it).liquids[0].id == "thin" for it in block.conditions)
-    ]
-    assert len(thin) > 1
-    found = {one.stroke for one in preflight_controller.study_scenes(protocol) if one.liquid == "thin"}
-    assert found == {max(thin, key=lambda stroke: stroke.speed_mps)}

@@ -1,0 +1,242 @@
+"""What runs when: work beside frames, garbage in the windows' thread alone, that thread before other programs."""
+
+import gc
+import os
+import sys
+import threading
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
+
+import pytest
+
+from study_app.app.session import garbage_collection, thread_priority
+from study_app.app.session.frame_budget import MOST_PERIODS, MOST_SHARE, FrameBudget
+from study_app.app.session.garbage_collection import (
+    OLDEST,
+    PERIOD_MS,
+    collect_if_due,
+    collecting_here,
+    freeze_garbage,
+    unfreeze_garbage,
+)
+from study_app.app.session.thread_priority import ThreadPriority
+
+MS = 1_000_000
+
+
+class Frame:
+    """A clock turned by hand, and works that take their time."""
+
+    def __init__(self, **works_ms: tuple[int, int]) -> None:
+        """Take name = (how often, how long it takes) [ms]."""
+        self.now_ns = 0
+        self.done: list[tuple[str, int]] = []
+        self.takes_ms = {name: takes for name, (_, takes) in works_ms.items()}
+        works = [(lambda name=name: self.do(name), every / 1000) for name, (every, _) in works_ms.items()]
+        self.slack = FrameBudget(works, lambda: self.now_ns)
+
+    def do(self, name: str) -> None:
+        self.done.append((name, self.now_ns // MS))
+        self.now_ns += self.takes_ms[name] * MS
+
+    def run(self, frames: int, every_ms: int, tank_ms: int = 2) -> list[float]:
+        """Let frames come, each painted for so long; return how long works ran past the next one [ms]."""
+        past = []
+        start_ns = self.now_ns
+        for number in range(frames):
+            due_ns = start_ns + number * every_ms * MS
+            self.now_ns = max(self.now_ns, due_ns) + tank_ms * MS
+            self.slack.use(due_ns + every_ms * MS)
+            past.append(max(0, self.now_ns - due_ns - every_ms * MS) / MS)
+        return past
+
+    def times(self, name: str) -> list[int]:
+        return [at for one, at in self.done if one == name]
+
+
+def test_works_are_done_as_often_as_asked_where_there_is_room_and_else_wait_their_turn() -> None:
+    frame = Frame(plot=(30, 2), table=(500, 1))
+    assert max(frame.run(120, 16)) == 0
+    assert (len(frame.times("plot")), len(frame.times("table"))) == (60, 4)
+    frame = Frame(one=(30, 3), other=(30, 3))
+    assert max(frame.run(100, 7)[2:]) == 0, "how long they take is known after the first time"
+    frames = [at // 7 for _, at in frame.done[2:]]
+    assert len(frames) == len(set(frames))
+    assert min(len(frame.times(name)) for name in ("one", "other")) >= 18
+
+
+def test_what_never_fits_is_done_one_thing_at_a_time_and_never_more_than_its_share() -> None:
+    frame = Frame(slow=(30, 9))
+    frame.run(400, 7)
+    assert (
+        max(late - early for early, late in pairwise(frame.times("slow"))) <= (MOST_PERIODS + 1) * 30 + 9 / MOST_SHARE
+    )
+    assert 9 * len(frame.done) <= 1.1 * MOST_SHARE * 400 * 7
+    frame = Frame(one=(30, 9), other=(30, 9))
+    assert max(frame.run(400, 7)[2:]) <= 9
+    assert min(len(frame.times(name)) for name in ("one", "other")) > 10
+
+
+def test_a_work_that_took_long_once_comes_back_to_its_pace() -> None:
+    frame = Frame(plot=(30, 40))
+    frame.run(10, 16)
+    frame.takes_ms["plot"] = 1
+    frame.run(600, 16)
+    assert max(late - early for early, late in pairwise(frame.times("plot")[-10:])) == 32
+
+
+@pytest.fixture
+def automatic_collection(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Collect as the interpreter does; the other tests collect between tests alone.
+
+    What those left goes first: while another thread frees it, nobody else can collect. However much it is, it is less
+    than the bound. What is left of other tests is looked at once only, not in each collection.
+    """
+    monkeypatch.setattr(garbage_collection, "MOST_FROZEN", 10**9)
+    gc.collect()
+    gc.freeze()
+    gc.enable()
+    yield
+    gc.disable()
+    gc.freeze()
+
+
+class Cycle:
+    """An object that only the collector can free, and that remembers which thread freed it."""
+
+    def __init__(self, freed_in: list[int]) -> None:
+        self.itself, self.freed_in = self, freed_in
+
+    def __del__(self) -> None:
+        self.freed_in.append(threading.get_ident())
+
+
+def allocate_elsewhere() -> list[list[int]]:
+    """Let another thread make objects enough for a collection to be due; return them."""
+    kept: list[list[int]] = []
+    worker = threading.Thread(target=lambda: kept.extend([] for _ in range(20_000)))
+    worker.start()
+    worker.join()
+    return kept
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("automatic_collection")
+def test_no_other_thread_frees_what_belongs_to_windows_open_or_closed(qtbot: Any) -> None:
+    open_, closed = [], []
+    with collecting_here():
+        assert not gc.isenabled()
+        Cycle(open_)
+        kept = allocate_elsewhere()
+        assert open_ == []
+        qtbot.waitUntil(lambda: bool(open_))
+        Cycle(closed)
+    assert gc.isenabled()
+    allocate_elsewhere()
+    assert open_ == closed == [threading.get_ident()]
+    assert len(kept) == 20_000
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("automatic_collection")
+def test_nothing_is_collected_before_it_is_due() -> None:
+    gc.disable()
+    gc.collect()
+    assert collect_if_due() is None
+    kept = [[] for _ in range(5_000)]
+    assert collect_if_due() == 0
+    assert len(kept) == 5_000
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("automatic_collection")
+def test_what_has_settled_is_looked_at_no_more_until_it_is_again() -> None:
+    freed_in: list[int] = []
+    Cycle(freed_in)
+    freeze_garbage()
+    try:
+        assert freed_in, "what nobody holds goes first"
+        held = Cycle(freed_in)
+        freeze_garbage()
+        del held
+        gc.collect()
+        assert len(freed_in) == 1
+        Cycle(freed_in)
+        gc.collect()
+        assert len(freed_in) == 2, "what came since is looked at"
+    finally:
+        unfreeze_garbage()
+    gc.collect()
+    assert len(freed_in) == 3
+
+
+@pytest.mark.nightly
+@pytest.mark.usefixtures("automatic_collection")
+def test_what_made_a_collection_take_long_is_passed_over_until_a_session_has_ended(
+    qtbot: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(garbage_collection, "LONG_S", -1.0)
+    monkeypatch.setattr(garbage_collection, "collect_if_due", lambda: OLDEST)
+    freed_in: list[int] = []
+    held = [Cycle(freed_in)]
+    with collecting_here():
+        qtbot.wait(2 * PERIOD_MS + 100)
+        held.clear()
+        gc.collect()
+        assert freed_in == []
+        unfreeze_garbage()
+        gc.collect()
+        assert freed_in == [threading.get_ident()]
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("automatic_collection", "qapp")
+def test_what_is_passed_over_is_bounded_between_sessions_alone(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(garbage_collection, "PERIOD_MS", 5)
+    monkeypatch.setattr(garbage_collection, "LONG_S", -1.0)
+    monkeypatch.setattr(garbage_collection, "collect_if_due", lambda: OLDEST)
+    unfreeze_garbage()
+    with collecting_here():
+        qtbot.waitUntil(lambda: gc.get_freeze_count() > 0)
+        count = gc.get_freeze_count()
+        monkeypatch.setattr(garbage_collection, "MOST_FROZEN", count // 2)
+        freeze_garbage()
+        qtbot.wait(50)
+        assert gc.get_freeze_count() > count // 2, "no collection of everything while a session runs"
+        unfreeze_garbage()
+        qtbot.wait(50)
+        assert gc.get_freeze_count() == 0
+
+
+def level() -> int:
+    return os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="levels of Linux")
+@pytest.mark.parametrize("granted_by", ["the system", "the desktop's service", "nobody"])
+def test_the_windows_thread_goes_before_other_programs_where_that_is_granted(
+    granted_by: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept, asked = level(), []
+    if kept < 0:
+        pytest.skip("this thread goes before others already")
+
+    def refuse(*_given: object) -> None:
+        raise PermissionError
+
+    made = ThreadPriority()
+    if granted_by == "the system":
+        if not made.raise_priority():
+            pytest.skip("this user may not")
+        assert level() == thread_priority.NICE
+    else:
+        monkeypatch.setattr(os, "setpriority", refuse)
+        grant = refuse if granted_by == "nobody" else lambda *given: asked.append(given)
+        monkeypatch.setattr(thread_priority, "make_high_priority", grant)
+        assert made.raise_priority() == (granted_by != "nobody")
+        assert asked == ([] if granted_by == "nobody" else [(threading.get_native_id(), thread_priority.NICE)])
+        monkeypatch.undo()
+    for _ in range(2):
+        made.restore()
+        assert level() == kept
