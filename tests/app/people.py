@@ -4,12 +4,15 @@ import csv
 import json
 import os
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from study_app import app
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
@@ -39,7 +42,6 @@ class Person(QObject):
         super().__init__()
         self.once = once
         self.answered = None
-        self.shots = []
         self._timer = QTimer(self)
         self._timer.timeout.connect(self.look)
         self._timer.start(20)
@@ -66,6 +68,26 @@ class Person(QObject):
             operator.end_asked.emit("aborted", "cable")
         elif isinstance(page, EndPage):
             QTest.mouseClick(operator.buttons.close_session, Qt.MouseButton.LeftButton)
+
+
+def attended(study, results, person=None, **options):
+    """Run P001's session in its windows, attended by a person; return the exit code and what is printed."""
+    person, lines = person or Person(), []
+    given = {"participant": "P001", "seed": 5, "device": "scripted", "windowed": True, "operator": "AK"}
+    try:
+        return app.run(str(study), **(given | {"results": results, "progress": lines.append} | options)), lines
+    finally:
+        person.deleteLater()
+
+
+@contextmanager
+def looking(look) -> Iterator[None]:
+    """Call ``look`` every 20 ms."""
+    timer = QTimer(interval=20)
+    timer.timeout.connect(look)
+    timer.start()
+    yield
+    timer.stop()
 
 
 def can_go_on(study: str, results: Path) -> bool:

@@ -15,7 +15,6 @@ from study_app.app.main_controller import MainController, home
 from study_app.app.session import live_session
 from study_app.app.session.termination import BY_SIGNAL_S
 from study_app.errors import DeviceLost, DeviceNotFound
-from study_app.gui.home.main_window import FULL, LEAST
 from study_app.gui.theme.theme import DARK
 from study_app.session.request import NewSession
 
@@ -162,23 +161,6 @@ def test_a_theme_that_was_changed_in_the_cockpit_stays(visit: MainController, mo
     assert visit.machine.settings.theme == "dark"
 
 
-def test_the_window_is_no_larger_than_its_screen(visit: MainController) -> None:
-    room = visit.window.screen().availableGeometry().size()
-    assert FULL.height() > room.height()  # else this shows nothing
-    visit.open()
-    assert visit.window.size() == FULL.boundedTo(room).expandedTo(LEAST)
-
-
-def test_f1_shows_the_page_about_the_place(visit: MainController, qtbot: Any) -> None:
-    visit.window.go("machine")
-    visit.window.activateWindow()
-    qtbot.keyClick(visit.window, Qt.Key.Key_F1)
-    assert visit.help is not None
-    assert (visit.window.here, visit.help.reader.page) == ("help", "this-machine")
-    qtbot.keyClick(visit.window, Qt.Key.Key_F1)
-    assert visit.help.reader.page == "index"
-
-
 def test_back_leads_from_the_help_to_the_place_where_it_was_asked_for(visit: MainController, qtbot: Any) -> None:
     window = visit.window
     window.go("machine")
@@ -195,6 +177,11 @@ def test_back_leads_from_the_help_to_the_place_where_it_was_asked_for(visit: Mai
         leave()
         assert window.here == "machine"
         assert window.focusWidget() is asked_in
+    qtbot.keyClick(window, Qt.Key.Key_F1)
+    qtbot.keyClick(window, Qt.Key.Key_F1)
+    assert visit.help.reader.page == "index", "F1 in the help"
+    visit.help.back.click()
+    visit.help.back.click()
     qtbot.keyClick(window, Qt.Key.Key_F1)
     visit.help.open_page("lab")
     qtbot.keyClick(visit.help.reader, Qt.Key.Key_Escape)

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import psutil
 import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
@@ -120,18 +119,14 @@ def shown(qtbot: QtBot, results: Path) -> Iterator[Opened]:
     opened.window.close()
 
 
-def test_a_blinded_study_is_shown_by_code(shown: Opened) -> None:
+def test_a_blinded_study_is_shown_by_code_and_by_name_once_unblinding_is_recorded(shown: Opened, results: Path) -> None:
     assert shown.chips == ["Simulated participants", "Blinded: shown by code"]
     assert shown.titles == ["Agreement for each setting", "Answers by delay setting"]
     drawn = b"".join(card.figure.svg for card in shown.place.figures.cards)
     assert b">L1<" in drawn
     assert b">Thick<" not in drawn
     assert [one.participant for one in shown.place.sessions.rows.shown] == ["P001", "P002", "P003"]
-    assert shown.place.sessions.head.text() == "3 of 3 sessions in the figures"
     assert shown.controller.view.testing is None
-
-
-def test_unblinding_is_recorded_and_shows_names_at_once(shown: Opened, results: Path) -> None:
     shown.decide(shown.place.unblind, "AK", "collection closed")
     (record,) = reveals(results / "demo")
     assert (record["by"], record["reason"]) == ("AK", "collection closed")
@@ -143,24 +138,19 @@ def test_unblinding_is_recorded_and_shows_names_at_once(shown: Opened, results: 
         assert b",force_mean_n," in table.read_bytes()
 
 
-def test_leaving_out_changes_foot_figures_and_list(shown: Opened, results: Path) -> None:
+def test_leaving_out_changes_foot_figures_and_list_until_it_is_taken_back(shown: Opened, results: Path) -> None:
     before = shown.place.figures.cards[0].figure
+    assert shown.place.sessions.head.text() == "3 of 3 sessions in the figures"
     shown.place.sessions.rows.table.selectRow(1)
     shown.decide(shown.place.exclusions.leave_out, "AK", "fell asleep")
     assert [one.what for one in exclusions(results / "demo")] == [("P002", 1, None)]
     assert shown.place.sessions.head.text() == "2 of 3 sessions in the figures"
     assert shown.place.sessions.why.text() == "P002 is excluded."
-    assert "fell asleep" in shown.place.exclusions.lines[0].accessibleName()
-    assert shown.place.figures.cards[0].figure != before
+    (line,) = shown.place.exclusions.lines
+    assert "fell asleep" in line.accessibleName()
     assert "1 session is excluded (fell asleep)" in shown.place.figures.cards[0].figure.caption
-
-
-def test_an_exclusion_is_taken_back_from_its_row(shown: Opened, results: Path) -> None:
-    shown.place.sessions.rows.table.selectRow(1)
-    shown.decide(shown.place.exclusions.leave_out, "AK", "fell asleep")
-    back = shown.place.exclusions.lines[0].findChild(ActionButton)
-    assert back is not None
-    shown.decide(back, "CD", "wrong participant")
+    assert shown.place.figures.cards[0].figure != before
+    shown.decide(line.findChild(ActionButton), "CD", "wrong participant")
     assert exclusions(results / "demo") == ()
     assert shown.place.sessions.head.text() == "3 of 3 sessions in the figures"
     assert not shown.place.exclusions.lines
@@ -192,26 +182,42 @@ def test_tables_are_written_and_their_folder_opened(shown: Opened, tmp_path: Pat
     assert shown.place.writing is None
 
 
-@pytest.mark.nightly
-def test_what_cannot_be_written_is_said_in_the_dialog(shown: Opened, tmp_path: Path) -> None:
-    (tmp_path / "taken").write_text("x")
-    shown.click(shown.place.report)
-    dialog: Any = shown.place.writing
-    dialog.to.setText(str(tmp_path / "taken"))
-    shown.click(dialog.go_on)
-    shown.wait()
-    assert "cannot be written" in dialog.said.text()
-    assert dialog.to.isVisible()
-    dialog.reject()
+def cut_table(study: Path) -> None:
+    table = StudyFolder(study).session("P002", 1).table("demo", "responses")
+    table.write_bytes(table.read_bytes()[:-120])
 
 
-def test_with_no_study_there_is_one_sentence_and_the_way_home(qtbot: QtBot, tmp_path: Path) -> None:
-    opened = Opened(qtbot, tmp_path / "none")
-    assert opened.controller.view.trouble is not None
-    assert opened.place.figures.trouble.title.text() == "No studies yet"
-    opened.click(opened.place.figures.trouble.button)
-    assert opened.window.here == "home"
-    assert not (tmp_path / "none").exists()
+def cut_exclusions(study: Path) -> None:
+    (study / "exclusions.csv").write_text("what\n")
+
+
+def without_sessions(study: Path) -> None:
+    shutil.rmtree(study)
+    (study / "data").mkdir(parents=True)
+
+
+@pytest.mark.parametrize(
+    ("change", "title", "named", "listed"),
+    [
+        (shutil.rmtree, "No studies yet", "", 0),
+        (without_sessions, "No sessions yet", "", 0),
+        (cut_table, "The study cannot be read", "P002", 3),
+        (cut_exclusions, "The study cannot be read", "exclusions.csv", 0),
+    ],
+)
+def test_what_cannot_be_shown_is_said_in_one_sentence(
+    qtbot: QtBot, results: Path, change: Callable[[Path], object], title: str, named: str, listed: int
+) -> None:
+    change(results / "demo")
+    opened = Opened(qtbot, results)
+    trouble = opened.place.figures.trouble
+    assert trouble.title.text() == title
+    assert named in trouble.sentence.text()
+    assert (len(opened.place.sessions.rows.shown), opened.titles) == (listed, [])
+    assert opened.place.report.isEnabled() == (title == "The study cannot be read")
+    if title == "No studies yet":
+        opened.click(trouble.button)
+        assert opened.window.here == "home"
 
 
 def test_a_results_folder_that_is_none_is_told_and_looked_at_again(qtbot: QtBot, results: Path) -> None:
@@ -227,13 +233,6 @@ def test_a_results_folder_that_is_none_is_told_and_looked_at_again(qtbot: QtBot,
     assert not opened.place.figures.trouble.isVisible()
 
 
-def test_a_study_without_a_session_says_so(qtbot: QtBot, tmp_path: Path) -> None:
-    (tmp_path / "results" / "new" / "data").mkdir(parents=True)
-    opened = Opened(qtbot, tmp_path / "results")
-    assert opened.place.figures.trouble.title.text() == "No sessions yet"
-    assert not opened.place.report.isEnabled()
-
-
 def test_one_participant_is_enough_for_figures(qtbot: QtBot, tmp_path: Path) -> None:
     rehearsed(tmp_path / "results", people=1)
     opened = Opened(qtbot, tmp_path / "results")
@@ -242,24 +241,6 @@ def test_one_participant_is_enough_for_figures(qtbot: QtBot, tmp_path: Path) -> 
     opened.decide(opened.place.unblind, "AK", "closed")
     assert opened.controller.view.trouble is None
     assert opened.titles[0] == "Agreement for each liquid"
-
-
-def test_a_damaged_session_is_named_and_the_others_stay_listed(qtbot: QtBot, results: Path) -> None:
-    table = StudyFolder(results / "demo").session("P002", 1).table("demo", "responses")
-    table.write_bytes(table.read_bytes()[:-120])
-    opened = Opened(qtbot, results)
-    trouble = opened.place.figures.trouble
-    assert trouble.title.text() == "The study cannot be read"
-    assert "P002" in trouble.sentence.text()
-    assert len(opened.place.sessions.rows.shown) == 3
-    assert opened.titles == []
-
-
-def test_a_damaged_list_of_exclusions_is_told(qtbot: QtBot, results: Path) -> None:
-    (results / "demo" / "exclusions.csv").write_text("what\n")
-    opened = Opened(qtbot, results)
-    assert opened.place.figures.trouble.title.text() == "The study cannot be read"
-    assert "exclusions.csv" in opened.place.figures.trouble.sentence.text()
 
 
 def test_the_newest_study_is_shown_first_and_another_can_be_chosen(qtbot: QtBot, results: Path) -> None:
@@ -279,39 +260,24 @@ def test_the_newest_study_is_shown_first_and_another_can_be_chosen(qtbot: QtBot,
     assert opened.controller.view.chosen == results / "demo-rehearsal-1", "one comes back to where one was"
 
 
-def test_what_is_stopped_can_be_gone_on_with(qtbot: QtBot, results: Path) -> None:
-    made: list[Here] = []
+@pytest.mark.parametrize(
+    ("ends", "title"), [("stops", "Stopped"), ("crashes", "A bug in the program stopped the evaluation")]
+)
+def test_what_was_stopped_or_crashed_can_be_begun_again(qtbot: QtBot, results: Path, ends: str, title: str) -> None:
+    ending = [True]
 
-    def stopping() -> Here:
-        made.append(Here())
-        made[-1].stops = len(made) == 1
-        return made[-1]
-
-    opened = Opened(qtbot, results, stopping)
-    assert opened.place.figures.trouble.title.text() == "Stopped"
-    made[0].stops = False
-    opened.click(opened.place.figures.trouble.button)
-    opened.wait()
-    assert len(opened.titles) == 2
-
-
-def test_a_process_that_crashes_is_said_and_looked_at_again(qtbot: QtBot, results: Path) -> None:
-    made: list[Here] = []
-
-    class Crashes(Here):
+    class Ends(Here):
         def order(self, order: Order) -> int:
-            if len(made) > 1:
+            self.stops = ending[0] and ends == "stops"
+            if self.stops or not ending[0]:
                 return super().order(order)
             self.number += 1
             self.told, self.works = [(self.number, Crashed(1))], False
             return self.number
 
-    def crashing() -> Here:
-        made.append(Crashes())
-        return made[-1]
-
-    opened = Opened(qtbot, results, crashing)
-    assert opened.place.figures.trouble.title.text() == "A bug in the program stopped the evaluation"
+    opened = Opened(qtbot, results, Ends)
+    assert opened.place.figures.trouble.title.text() == title
+    ending[0] = False
     opened.click(opened.place.figures.trouble.button)
     opened.wait()
     assert len(opened.titles) == 2
@@ -362,20 +328,5 @@ def test_a_report_by_processes_of_its_own_is_cancelled_then_written_and_none_is_
     assert opened.files == [tmp_path / "report" / "report.html"]
     assert opened.files[0].is_file()
     dialog.reject()
-    opened.window.close()
-    qtbot.waitUntil(nobody_left, timeout=SOON_MS)
-
-
-@pytest.mark.nightly
-def test_a_process_that_ends_by_itself_is_told_and_begun_again(qtbot: QtBot, results: Path) -> None:
-    opened = Opened(qtbot, results, start_analysis_worker)
-    reader: Any = opened.controller.reader
-    psutil.Process(reader.process.pid).suspend()  # or it may answer before it is killed
-    opened.controller.look()
-    reader.process.kill()
-    qtbot.waitUntil(lambda: "bug in the program" in opened.place.figures.trouble.title.text(), timeout=SOON_MS)
-    opened.click(opened.place.figures.trouble.button)
-    opened.wait()
-    assert len(opened.titles) == 2
     opened.window.close()
     qtbot.waitUntil(nobody_left, timeout=SOON_MS)

@@ -7,7 +7,7 @@ import pytest
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication, QLabel
 
-from study_app.app.screenshots import capture, designer_pictures, screenshots, session_pictures
+from study_app.app.screenshots import capture, screenshots, session_pictures
 from study_app.app.screenshots.capture import Camera
 from study_app.errors import StudyError
 from tests.compiled import needs_servo
@@ -37,17 +37,6 @@ def test_a_session_is_held_and_its_cockpit_taken_in_both_themes(qapp, tmp_path, 
     assert Path.cwd() == here
     assert not [window for window in QApplication.topLevelWidgets() if window.isVisible()]
     assert sorted(tmp_path.iterdir()) == sorted(taken)
-
-
-@pytest.mark.nightly
-def test_the_designer_is_taken_with_the_problems_of_a_study(qapp, tmp_path, monkeypatch):
-    monkeypatch.setattr(designer_pictures, "SCENES", designer_pictures.SCENES[-1:])
-    monkeypatch.setattr(designer_pictures, "SIZES", ((1024, 640),))
-    taken = screenshots(tmp_path, only="designer", progress=lambda _line: None)
-    assert [path.name for path in taken] == [
-        f"designer-{scene}-{theme}-1024.png" for theme in ("light", "dark") for scene in ("problems", "new")
-    ]
-    assert [(image.width(), image.height()) for image in (QImage(str(path)) for path in taken)] == [(1024, 640)] * 4
 
 
 @pytest.mark.nightly

@@ -1,5 +1,6 @@
 """What the first windows load: neither the compiler, nor the plots, nor what the designer alone needs."""
 
+import json
 import os
 import subprocess
 import sys
@@ -10,105 +11,70 @@ import pytest
 pytestmark = pytest.mark.slow
 
 HEAVY = ("matplotlib", "numba", "pandas", "pyarrow", "pyqtgraph", "scipy", "tomlkit")
-
-HOME = """
-import sys
+PROGRAM = """
+import gc, json, sys, threading
 from pathlib import Path
-from PySide6.QtWidgets import QApplication
+from study_app import app
+from PySide6.QtCore import QObject
+
+assert callable(app.run) and callable(app.home)
+for_all = [name for name in ("main_controller", "devices_controller") if f"study_app.app.{name}" in sys.modules]
+
 from study_app.app.main_controller import MainController
+from study_app.app.session import live_session
 from study_app.gui.application import application_here
-from study_app.gui.widgets.background import wait_for_jobs
-
-application = application_here()
-visit = MainController(Path(sys.argv[1]))
-visit.window.show()
-application.processEvents()
-assert visit.window.isVisible()
-print(sorted({name.partition(".")[0] for name in sys.modules}))
-wait_for_jobs(60)
-"""
-
-NOTE = """
-import sys, threading
-from pathlib import Path
-from PySide6.QtWidgets import QApplication
-from study_app.app.session.live_session import LiveSession
-from study_app.gui.application import application_here
-from study_app.session.request import NewSession
 from study_app.gui.theme.theme import LIGHT
+from study_app.gui.widgets.background import wait_for_jobs
+from study_app.session.request import NewSession
+
+def loaded():
+    return sorted({name.partition(".")[0] for name in sys.modules})
 
 class Idle:
     def __init__(self, **_named): pass
     def start(self): pass
     def is_alive(self): return False
 
-application = application_here()
+application, results, plain = application_here(), Path(sys.argv[1]), threading.Thread
 threading.Thread = Idle
-live = LiveSession(NewSession("demo", "P001", 1, 1, "", "en", "scripted", True, None, Path(sys.argv[1])), LIGHT)
+live = live_session.LiveSession(NewSession("demo", "P001", 1, 1, "", "en", "scripted", True, None, results), LIGHT)
 live.open()
 application.processEvents()
 assert live.note.isVisible()
-print(sorted({name.partition(".")[0] for name in sys.modules}))
-"""
-
-COMMAND = """
-import sys
-from study_app import app
-before = {name for name in sys.modules if name.startswith("study_app.app.")}
-assert callable(app.run) and callable(app.home)
-print(sorted(before & {"study_app.app.main_controller", "study_app.app.devices_controller"}))
-"""
-
-BESIDE = """
-import gc, sys, threading
-from PySide6.QtCore import QObject
-from study_app.app.session.live_session import load_windows
-from study_app.gui.application import application_here
-
-application = application_here()
-beside = threading.Thread(target=load_windows)
+at_note = loaded()
+live.note.hide()
+threading.Thread = plain
+visit = MainController(results)
+visit.window.show()
+application.processEvents()
+assert visit.window.isVisible()
+at_home = loaded()
+wait_for_jobs(60)
+beside = threading.Thread(target=live_session.load_windows)
 beside.start()
 beside.join()
-windows = {"study_app.app.session.preflight_controller", "study_app.app.session.session_windows"}
-assert windows | {"pyarrow.parquet"} <= set(sys.modules)
+windows = {"study_app.app.session.preflight_controller", "study_app.app.session.session_windows", "pyarrow.parquet"}
 objects = [one for one in gc.get_objects() if isinstance(one, QObject)]
 assert application in objects
-print([one for one in objects if one.thread() != application.thread()])
+elsewhere = [repr(one) for one in objects if one.thread() != application.thread()]
+print(json.dumps([for_all, at_home, at_note, sorted(windows - set(sys.modules)), elsewhere]))
 """
 
 
-def said(program: str, folder: Path) -> str:
-    """Return the last line of a program."""
+def test_home_and_the_note_before_a_session_stand_before_anything_heavy_is_loaded(tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", program, str(folder / "results")],
-        env=os.environ | {"QT_QPA_PLATFORM": "offscreen", "XDG_CONFIG_HOME": str(folder)},
+        [sys.executable, "-c", PROGRAM, str(tmp_path / "results")],
+        env=os.environ | {"QT_QPA_PLATFORM": "offscreen", "XDG_CONFIG_HOME": str(tmp_path)},
         cwd=Path(__file__).parents[2],
         capture_output=True,
         text=True,
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    return done.stdout.splitlines()[-1]
-
-
-def loaded(program: str, folder: Path) -> list[str]:
-    """Return the heavy packages that are loaded once the first window of a program stands."""
-    names = said(program, folder)
-    assert "'PySide6'" in names
-    return [name for name in HEAVY if f"'{name}'" in names]
-
-
-def test_home_stands_before_anything_heavy_is_loaded(tmp_path: Path) -> None:
-    assert loaded(HOME, tmp_path) == []
-
-
-def test_a_session_by_command_loads_neither_the_main_window_nor_the_devices(tmp_path: Path) -> None:
-    assert said(COMMAND, tmp_path) == "[]"
-
-
-def test_the_note_before_a_session_stands_before_anything_heavy_is_loaded(tmp_path: Path) -> None:
-    assert loaded(NOTE, tmp_path) == []
-
-
-def test_loading_a_sessions_windows_beside_the_note_makes_no_object_of_that_thread(tmp_path: Path) -> None:
-    assert said(BESIDE, tmp_path) == "[]"
+    for_all, at_home, at_note, not_loaded, elsewhere = json.loads(done.stdout.splitlines()[-1])
+    assert for_all == [], "a session by command loads neither the main window nor the devices"
+    for loaded in (at_home, at_note):
+        assert "PySide6" in loaded
+        assert [name for name in HEAVY if name in loaded] == []
+    assert not_loaded == [], "a thread loads a session's windows beside the note"
+    assert elsewhere == [], "and makes no object of that thread"

@@ -1,7 +1,6 @@
 """What is set for this machine: kept at once, taken back, told in the receipt; and devices looked for in a thread."""
 
 import threading
-from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QApplication, QMainWindow
+from PySide6.QtWidgets import QMainWindow
 
 from study_app.app.devices_controller import DevicesController
 from study_app.app.main_controller import MainController
@@ -37,6 +36,8 @@ def desk(qapp):
 
 def test_what_is_set_is_kept_at_once_and_taken_back(desk, qtbot):
     assert not settings_file().exists()
+    with qtbot.assertNotEmitted(desk.changed):
+        desk.change({"sound": DEFAULTS.sound})
     with qtbot.waitSignal(desk.changed):
         desk.change({"viewing_distance_mm": 620.0})
     assert load().viewing_distance_mm == 620.0
@@ -49,33 +50,18 @@ def test_what_is_set_is_kept_at_once_and_taken_back(desk, qtbot):
     assert load() == DEFAULTS
     desk.undo()
     assert desk.undo_called == ""
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "called"),
-    [
+    for name, value, called in (
         ("photodiode", False, "photodiode square"),
         ("lsl_markers", True, "LSL markers"),
         ("lsl_samples", "always", "LSL samples"),
         ("triggers", "serial:COM3", "trigger port"),
         ("camera", "tcp://127.0.0.1:5000", "camera"),
-    ],
-)
-def test_every_setting_of_the_page_can_be_undone(desk, name, value, called):
-    desk.change({name: value})
-    assert desk.undo_called == called
-    assert getattr(load(), name) == value
-    desk.undo()
-    assert load() == DEFAULTS
-
-
-def test_what_is_set_already_is_no_change(desk, qtbot):
-    with qtbot.assertNotEmitted(desk.changed):
-        desk.change({"sound": False})
-    assert desk.undo_called == ""
-
-
-def test_an_offset_has_its_day_and_its_screen(desk):
+    ):
+        desk.change({name: value})
+        desk.remember_operator("AK")
+        assert (desk.undo_called, getattr(load(), name)) == (called, value)
+        desk.undo()
+        assert load() == MachineSettings(operator="AK"), "initials are remembered whatever is taken back"
     desk.measured(23.5, 1.2, "photodiode", "DP-1")
     assert load().display_offset == DisplayOffset(
         mean_ms=23.5, spread_ms=1.2, measured=date.today().isoformat(), screen="DP-1"
@@ -165,17 +151,19 @@ def test_a_look_that_fails_is_told(desk, qtbot):
 
 
 @pytest.fixture
-def visit(qtbot, tmp_path, monkeypatch):
+def following(qtbot, tmp_path, monkeypatch):
+    """A main window that follows the workspace that is set."""
     monkeypatch.chdir(tmp_path)
     made = MainController()
     qtbot.addWidget(made.window)
+    made.window.show()
     yield made
     made.end()
 
 
-def test_the_main_window_follows_what_is_set(visit, qtbot, tmp_path, monkeypatch):
+def test_the_main_window_follows_what_is_set(following, tmp_path, monkeypatch):
+    visit = following
     monkeypatch.delenv("LIQUID_STUDY_WORKSPACE")
-    visit.window.show()
     home = visit.window.place("home")
     assert visit.window.theme is LIGHT
     visit.machine.change({"theme": "dark"})
@@ -203,7 +191,6 @@ def test_a_folder_asked_for_by_command_counts_for_this_stay(qtbot, tmp_path, mon
 
 
 def test_the_display_test_is_one_click_from_home(visit, qtbot):
-    visit.window.show()
     qtbot.mouseClick(visit.window.place("home").device.display, Qt.MouseButton.LeftButton)
     assert visit.window.here == "machine"
     test = visit.machine.place.test
@@ -243,7 +230,6 @@ def test_a_diagnosis_ends_when_the_place_is_left(visit, qtbot, monkeypatch):
     monkeypatch.setattr("study_app.app.devices_controller.DiagnosisDialog", _with(Examined))
     visit.machine.change({"device": "falcon:FT1", "firmware": "/there/firmware.bin"})
     visit.devices.backends = lambda: [MOUSE, FALCON]
-    visit.window.show()
     visit.window.go("devices")
     with qtbot.waitSignal(visit.devices.looked):
         visit.devices.look()
@@ -286,41 +272,3 @@ def test_from_the_cockpit_a_falcon_is_examined_and_of_what_is_none_it_is_said(qt
     assert [notice.windowTitle() for notice in operator.findChildren(Notice)] == (
         ["There is nothing to diagnose"] if held is None else []
     )
-
-
-def test_a_session_opens_on_the_screen_that_is_set_unless_another_was_chosen(qapp, monkeypatch):
-    monkeypatch.setattr("study_app.app.session.live_session.choose_screens", lambda number: number)
-    monkeypatch.setattr("study_app.app.session.live_session.screen_number", lambda _settings: 2)
-    chosen = NewSession("demo", "P001", 1, 7, "", "en", "mouse", True, None, Path("nowhere"))
-    assert LiveSession(chosen, LIGHT).screens() == 2
-    assert LiveSession(replace(chosen, screen=1), LIGHT).screens() == 1
-
-
-def test_what_is_found_after_the_end_is_not_shown(qtbot, desk):
-    looked, going = threading.Event(), threading.Event()
-
-    def look():
-        going.set()
-        looked.wait(10)
-        return ()
-
-    devices = DevicesController(desk, look)
-    found = []
-    devices.looked.connect(found.append)
-    devices.look()
-    assert going.wait(10)
-    looked.set()
-    devices.end()
-    devices.look()  # as a timer may ask that was set before
-    QApplication.processEvents()
-    assert (found, devices.looking) == ([], None)
-
-
-def test_initials_are_remembered_and_survive_a_change_taken_back(qapp):
-    desk = WorkstationController()
-    desk.change({"sound": True})
-    desk.remember_operator("AK")
-    desk.remember_operator("")
-    assert settings_here()[0].operator == "AK"
-    desk.undo()
-    assert (settings_here()[0].operator, settings_here()[0].sound) == ("AK", False)

@@ -19,21 +19,6 @@ MakeLab = Callable[..., LabController]
 pytestmark = [needs_servo, pytest.mark.slow, pytest.mark.usefixtures("qapp")]
 
 
-def test_what_is_being_opened_can_be_cancelled_and_is_let_go_of(qtbot: Any) -> None:
-    devices = SlowDevices()
-    opening = LabOpening(devices)
-    said: list[str] = []
-    opening.said.connect(said.append)
-    opening.want("falcon")
-    qtbot.waitUntil(lambda: said == ["switch falcon on"], timeout=SOON_MS)
-    assert opening.busy_with == "falcon"
-    opening.cancel()
-    assert opening.busy_with is None
-    devices.gate.set()
-    opening.wait()
-    assert (devices.open, devices.closed) == (0, 1)
-
-
 def test_two_devices_are_never_opened_at_a_time(qtbot: Any) -> None:
     devices = SlowDevices()
     opening = LabOpening(devices)
@@ -78,19 +63,6 @@ def test_a_force_that_was_stopped_does_not_come_with_a_device_that_is_being_open
     assert (view.busy, view.trouble, view.may_fade_in) == ("", "No device is open", True)
     visit.place.changed.emit("liquid.density_kg_m3", 900.0, False)
     assert visit.view().trouble == "No device is open"  # an edit opens none
-
-
-def test_a_failure_gives_up_the_device_that_is_being_opened(make_lab: MakeLab, qtbot: Any, caplog: Any) -> None:
-    devices = SlowDevices()
-    visit = make_lab(open_live=devices)
-    visit.place.show()
-    qtbot.waitUntil(lambda: devices.asked == ["scripted"], timeout=SOON_MS)
-    visit.fail(RuntimeError("out of ideas"))
-    caplog.clear()
-    devices.gate.set()
-    qtbot.waitUntil(lambda: devices.closed == 1, timeout=SOON_MS)
-    assert visit.live is None
-    assert "the force is off" in visit.view().trouble
 
 
 def test_a_device_that_cannot_be_closed_is_told_of_and_holds_nobody_up(qtbot: Any) -> None:

@@ -3,7 +3,6 @@
 import pkgutil
 import threading
 import weakref
-from types import SimpleNamespace
 
 import pytest
 from PySide6.QtCore import QEvent, Qt, QTimer
@@ -38,6 +37,20 @@ def test_what_breaks_in_a_slot_is_zero_force_and_told_and_written_once(bridge, w
     assert "the clock fell off the wall" in bridge.operator.banner.what.text()
 
 
+def test_what_fails_in_the_program_is_no_fault_of_the_device_and_offers_no_reconnection(make, world, caplog):
+    asked = []
+    bridge = make(reconnect=lambda: asked.append(True))
+    begin_trial(bridge, world)
+    bridge.fail(StoreError("the sealed key is gone"))
+    caplog.clear()
+    view = bridge.view()
+    assert (view.state, view.device.ready) == ("trouble", True)
+    assert dict(view.device.rows)["Safety faults"] == "0"
+    assert not bridge.operator.banner.reconnect.isVisible()
+    bridge.operator.reconnect_asked.emit()
+    assert asked == []
+
+
 def test_an_event_that_comes_too_late_changes_nothing(bridge, world):
     before = list(world.done)
     bridge.participant.event.emit(Submitted(world.now_s))
@@ -60,16 +73,6 @@ def test_a_servo_fault_calls_the_operator(bridge, world):
     bridge.draw_frame()
     world.fault = "the device 'mouse' stopped responding again"
     assert dict(bridge.view().device.rows)["Safety faults"] == "2"
-
-
-def test_what_fails_in_the_program_is_no_fault_of_the_device(bridge, world, caplog):
-    begin_trial(bridge, world)
-    bridge.fail(StoreError("the sealed key is gone"))
-    view = bridge.view()
-    assert view.state == "trouble"
-    assert view.device.ready
-    assert dict(view.device.rows)["Safety faults"] == "0"
-    caplog.clear()
 
 
 BROKEN = "no such colour"
@@ -221,25 +224,6 @@ def test_a_thread_that_ends_by_an_exception_is_told_noted_and_ends_no_session(br
     assert not bridge.trouble
 
 
-def test_the_recorders_losses_reach_the_cockpit_without_an_event(make, world, qtbot):
-    class Losing:
-        lost = (SimpleNamespace(trial=1, reason="No space left on device"),)
-        dropped = 0
-
-        def start(self, *_arguments):
-            pass
-
-        append = frame = stop = start
-
-        def settled(self):
-            return True
-
-    bridge = make(recorder=Losing())
-    begin_trial(bridge, world)
-    bridge.show_tiles()
-    assert bridge.operator.rail.tally.beyond.text().endswith("lost: No space left on device.")
-
-
 FAULT = "the device 'memory' stopped responding"
 
 
@@ -322,13 +306,3 @@ def test_a_session_that_ends_meanwhile_stays_ended(lost, device, world, qtbot):
     assert lost.view().over
     assert not world.force_is_on
     assert world.events()[-1] == "session_ended"
-
-
-def test_a_failure_of_the_program_offers_no_reconnection(make, world, device, caplog):
-    bridge = make(reconnect=device)
-    begin_trial(bridge, world)
-    bridge.fail(ValueError("a bug"))
-    caplog.clear()
-    assert not bridge.operator.banner.reconnect.isVisible()
-    bridge.operator.reconnect_asked.emit()
-    assert device.calls == 0

@@ -102,50 +102,9 @@ def test_other_events_are_handled_while_windows_open_which_are_opened_once(qtbot
     assert session.taken == [0, "another event", 1, 2]
 
 
-def test_a_device_that_fails_between_two_steps_ends_the_session(qtbot: Any) -> None:
-    session = Stepped()
-    ended: list[bool] = []
-    session.over.connect(lambda: ended.append(True))
-    session.hear(READY)
-    session.hear(SessionError("the device sends nothing"))
-    qtbot.wait(20)
-    assert (session.taken, ended, str(session.error)) == ([0], [True], "the device sends nothing")
-
-
-class Measured(Ready):
-    """What was made ready, with facts that no check looks at."""
-
-    def facts_with(self, refresh_hz: float, scaling: float) -> Any:
-        return self.facts
-
-
 def windows() -> list[str]:
     mine = [one for one in QApplication.topLevelWidgets() if isinstance(one, OperatorWindow | ParticipantWindow)]
     return sorted(type(one).__name__ for one in mine)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("how", ["cancelled", "refused"])
-def test_no_window_stays_of_a_session_that_never_began(qtbot: Any, monkeypatch: pytest.MonkeyPatch, how: str) -> None:
-    rig: Any = SimpleNamespace(device=SimpleNamespace(workspace_m=(0.1, 0.1, 0.1)), stop=lambda: None)
-    made: list[str] = []
-    monkeypatch.setattr(live_session, "checks", lambda *_: ())
-    monkeypatch.setattr(live_session, "open_store", refuse)
-    session = LiveSession(CHOSEN, LIGHT)
-    session.over.connect(lambda: made.extend(windows()))
-    if how == "cancelled":
-        steps = session.open_windows(Measured(rig, SimpleNamespace()))
-        session._steps = steps
-        for _ in range(3):
-            next(steps)
-        session.cancel()
-    else:
-        session._open_windows(Measured(rig, SimpleNamespace()))
-        qtbot.waitUntil(lambda: session.error is not None)
-        assert str(session.error) == "the device sends nothing"
-    assert made == ["OperatorWindow", "ParticipantWindow"]
-    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
-    assert windows() == []
 
 
 @pytest.mark.slow

@@ -1,8 +1,10 @@
 """The question before a session: a servo that stops itself is told, and whoever goes back does not wait."""
 
 import threading
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -66,31 +68,36 @@ class Servo:
             raise DeviceLost("the device 'falcon' does not answer any more; the force is zero")
 
 
-class Machine:
-    """Stands for an open device with its servo."""
-
-    def __init__(self) -> None:
-        self.servo = Servo()
-
-
 @pytest.fixture
-def machine(monkeypatch: Any) -> Machine:
+def machine(monkeypatch: Any) -> Any:
+    """Stand for an open device with its servo."""
     monkeypatch.setattr(preflight_controller, "start_appraisal_worker", Answering)
-    return Machine()
+    return SimpleNamespace(servo=Servo())
 
 
 @pytest.fixture
-def asked(qapp: Any, machine: Any) -> Any:
-    made = Preflight(
-        CHOSEN, load("demo"), Ready(machine, FACTS), QGuiApplication.primaryScreen, "Participant P001", LIGHT
-    )
-    made.open()
-    yield made
-    made.close()
+def ask(qapp: Any, machine: Any) -> Iterator[Callable[..., Preflight]]:
+    """Return a function that asks before a session of the demo, of such facts and outlets."""
+    made: list[Preflight] = []
+
+    def ask(facts: Facts = FACTS, **given: Any) -> Preflight:
+        ready = Ready(machine, facts, **given)
+        made.append(Preflight(CHOSEN, load("demo"), ready, QGuiApplication.primaryScreen, "Participant P001", LIGHT))
+        made[-1].open()
+        return made[-1]
+
+    yield ask
+    for one in made:
+        one.close()
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
-def test_a_device_that_is_lost_meanwhile_is_told_once(asked: Preflight, machine: Machine, qtbot: Any) -> None:
+@pytest.fixture
+def asked(ask: Callable[..., Preflight]) -> Preflight:
+    return ask()
+
+
+def test_a_device_that_is_lost_meanwhile_is_told_once(asked: Preflight, machine: Any, qtbot: Any) -> None:
     told: list[object] = []
     asked.failed.connect(told.append)
     machine.servo.lost = True
@@ -152,12 +159,9 @@ class ConnectedLater:
         return (OutletStatus("LSL markers", listens=self.listens),)
 
 
-def test_a_recording_program_that_is_connected_meanwhile_is_shown(qapp: Any, machine: Any, qtbot: Any) -> None:
-    outlets: Any = ConnectedLater()
-    made = Preflight(
-        CHOSEN, load("demo"), Ready(machine, FACTS, outlets=outlets), QGuiApplication.primaryScreen, "P001", LIGHT
-    )
-    made.open()
+def test_a_recording_program_that_is_connected_meanwhile_is_shown(ask: Callable[..., Preflight], qtbot: Any) -> None:
+    outlets = ConnectedLater()
+    made = ask(outlets=outlets)
 
     def shown() -> list[str]:
         return [one.text() for one in made.window.findChildren(QLabel) if one.isVisible()]
@@ -166,17 +170,13 @@ def test_a_recording_program_that_is_connected_meanwhile_is_shown(qapp: Any, mac
     outlets.listens = True
     qtbot.waitUntil(lambda: "listener" in shown())
     assert "no listener" not in shown()
-    made.close()
-    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
 def test_strokes_are_asked_of_the_measured_device_and_again_when_its_delay_has_changed(
-    qapp: Any, machine: Any, monkeypatch: Any, qtbot: Any
+    ask: Callable[..., Preflight], monkeypatch: Any, qtbot: Any
 ) -> None:
     found = replace(FACTS, dynamics=Dynamics(0.0004, 20e-6, 0.3), delay_ticks=1)
-    made = Preflight(
-        CHOSEN, load("demo"), Ready(machine, found), QGuiApplication.primaryScreen, "Participant P001", LIGHT
-    )
+    made = ask(found)
     first: Any = made.appraisal.appraiser
     assert first.devices == [Dynamics(0.001, 20e-6, 0.3)]
     slower = replace(found, delay_ticks=3)
@@ -186,8 +186,6 @@ def test_strokes_are_asked_of_the_measured_device_and_again_when_its_delay_has_c
     again: Any = made.appraisal.appraiser
     assert again.devices == [Dynamics(0.003, 20e-6, 0.3)]
     assert not first.works
-    made.close()
-    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
 def test_a_mistake_in_measuring_does_not_leave_the_window_waiting(

@@ -6,13 +6,12 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from study_app import app
 from study_app.evaluation.replay import replay
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import ChoicePage, EndPage, FeedbackPage, TaskPage
 from study_app.store.verification.reproduction import reproduced
-from tests.app.people import Person, events, rows, window
+from tests.app.people import Person, attended, events, rows, window
 from tests.compiled import needs_servo
 from tests.protocol.trials.level_studies import BLOCK, HEAD
 
@@ -58,30 +57,20 @@ class Attentive(Person):
             super().look()
 
 
-def run_study(folder: Path, text: str, edits: tuple[tuple[str, str], ...]) -> int:
-    """Run a study in its windows, with such edits of its text; return the exit code."""
+def edited(folder: Path, text: str, edits: tuple[tuple[str, str], ...]) -> Path:
+    """Write a study, with such edits of its text."""
     for old, new in edits:
         assert old in text
         text = text.replace(old, new)
     (folder / "levels.toml").write_text(text)
-    return app.run(
-        str(folder / "levels.toml"),
-        participant="P001",
-        seed=5,
-        device="scripted",
-        windowed=True,
-        operator="AK",
-        results=folder / "results" / "levels",
-        progress=lambda _line: None,
-    )
+    return folder / "levels.toml"
 
 
 def test_a_session_of_pairs_is_attended_by_keys_alone(tmp_path: Path) -> None:
     results = tmp_path / "results" / "levels"
     person = Attentive()
-    code = run_study(tmp_path, HEAD + BLOCK + PAIRS, EDITS)
+    code, _ = attended(edited(tmp_path, HEAD + BLOCK + PAIRS, EDITS), results, person)
     tanks = {trial: {id(tank) for one, tank in person.tanks if one == trial} for trial, _ in person.tanks}
-    person.deleteLater()
     assert code == 0
     assert [row["response"] for row in rows(results, "responses")][-2:] == ["second", "first"]
     told = events(results)
@@ -148,9 +137,7 @@ class Adjusting(Person):
 @pytest.mark.nightly
 def test_levels_are_set_by_keys_alone(tmp_path: Path) -> None:
     results = tmp_path / "results" / "levels"
-    person = Adjusting()
-    code = run_study(tmp_path, HEAD + SETTING, (EDITS[2], *EDITS[4:]))
-    person.deleteLater()
+    code, _ = attended(edited(tmp_path, HEAD + SETTING, (EDITS[2], *EDITS[4:])), results, Adjusting())
     assert code == 0
     journal = events(results)
     assert journal[-1]["status"] == "completed"

@@ -6,13 +6,12 @@ import threading
 
 import pytest
 
-from study_app import app
 from study_app.gui.operator import OperatorWindow
 from study_app.outlets.marker import CODES
 from study_app.store import workstation
 from study_app.store.verification.verify_study import verify
 from study_app.store.workstation import MachineSettings
-from tests.app.people import Person, events, receipt_of, window
+from tests.app.people import Person, attended, events, receipt_of, window
 from tests.compiled import needs_servo
 
 pytest.importorskip("pylsl", reason="pylsl is not installed: pip install 'liquid-study[lsl]'")
@@ -38,20 +37,12 @@ def port():
     os.close(theirs)
 
 
-def run(study, results, lines):
-    return app.run(
-        study, participant="P001", seed=5, device="scripted", windowed=True, results=results, progress=lines.append
-    )
-
-
 @pytest.mark.nightly
 def test_events_are_bytes_and_the_receipt_has_their_table(short_demo, results, port):
     ours, name = port
     workstation.save(MachineSettings(lsl_markers=True, lsl_samples="single-blind", triggers=f"serial:{name}"))
-    lines: list[str] = []
-    person = Person()
-    assert run(short_demo, results, lines) == 0
-    person.deleteLater()
+    code, lines = attended(short_demo, results)
+    assert code == 0
     came = [byte for byte in os.read(ours, 65536) if byte]
     os.close(ours)
     lines_written = events(results)
@@ -84,10 +75,8 @@ def test_a_port_that_is_unplugged_stops_no_session_and_is_said_once(short_demo, 
                 shown.append((operator.rail.tally.beyond.text(),))
             super().look()
 
-    person = Unplugger()
-    lines: list[str] = []
-    assert run(short_demo, results, lines) == 0
-    person.deleteLater()
+    code, _ = attended(short_demo, results, Unplugger())
+    assert code == 0
     lines_written = events(results)
     assert lines_written[-1]["status"] == "completed"
     lost = [(one["outlet"], one["reason"]) for one in lines_written if one["event"] == "outlet_lost"]
@@ -102,10 +91,8 @@ def test_a_port_that_is_unplugged_stops_no_session_and_is_said_once(short_demo, 
 @pytest.mark.nightly
 def test_a_port_that_is_not_there_is_said_before_and_the_session_runs(short_demo, results):
     workstation.save(MachineSettings(triggers="serial:/nowhere/ttyUSB7"))
-    lines: list[str] = []
-    person = Person()
-    assert run(short_demo, results, lines) == 0
-    person.deleteLater()
+    code, lines = attended(short_demo, results)
+    assert code == 0
     assert any(line.startswith("warning  Serial port     not available; serial:/nowhere/ttyUSB7") for line in lines)
     receipt = receipt_of(results)
     assert receipt["status"] == "completed"

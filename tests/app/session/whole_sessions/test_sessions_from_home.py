@@ -12,7 +12,7 @@ from study_app.gui.home.main_window import MainWindow
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.preflight import PreflightWindow
 from study_app.session.pages import PausePage
-from tests.app.people import Leaver, Person, events, place_at_home, receipt_of, rows, window
+from tests.app.people import Leaver, Person, attended, events, looking, place_at_home, receipt_of, rows, window
 from tests.compiled import needs_servo
 
 pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("qapp", "nobody_stays", "quick_preflight")]
@@ -58,11 +58,8 @@ def test_from_home_into_a_session_and_home_again(tmp_path, monkeypatch):
             steps.append(home.sessions.shown[0].status)
             home.window().close()
 
-    timer = QTimer()
-    timer.timeout.connect(step)
-    timer.start(20)
-    assert app.home(tmp_path / "results") == 0
-    timer.stop()
+    with looking(step):
+        assert app.home(tmp_path / "results") == 0
     assert steps == ["asked", "looked", "ended", "withdrawn"]
     assert events(tmp_path / "results" / "demo")[-1]["status"] == "withdrawn"
 
@@ -89,11 +86,8 @@ def test_going_back_before_the_session_leaves_nothing(tmp_path, monkeypatch):
             steps.append("home")
             home.window().close()
 
-    timer = QTimer()
-    timer.timeout.connect(step)
-    timer.start(20)
-    assert app.home(tmp_path / "results") == 0
-    timer.stop()
+    with looking(step):
+        assert app.home(tmp_path / "results") == 0
     assert steps == ["asked", "again", "back", "home"]
     assert list(tmp_path.iterdir()) == []
 
@@ -101,9 +95,7 @@ def test_going_back_before_the_session_leaves_nothing(tmp_path, monkeypatch):
 @pytest.fixture
 def stopped(short_demo, results, monkeypatch):
     """Return a protocol whose session P001 stopped in its second trial."""
-    person = Leaver(monkeypatch)
-    app.run(short_demo, participant="P001", seed=5, device="scripted", windowed=True, results=results)
-    person.deleteLater()
+    attended(short_demo, results, Leaver(monkeypatch))
     told = events(results)
     assert told[-1]["event"] != "session_ended"
     return short_demo
@@ -173,11 +165,8 @@ def test_home_offers_first_to_go_on_with_a_session_that_stopped(stopped, results
             steps.append(home.banner.isVisible())
             home.window().close()
 
-    timer = QTimer()
-    timer.timeout.connect(step)
-    timer.start(20)
-    assert app.home(results.parent) == 0
-    timer.stop()
+    with looking(step):
+        assert app.home(results.parent) == 0
     assert steps[0] == "P001, session 1 of demo stopped in part 1, liquid setting 2 of 2"
     assert "2 of 8 answers are on disk" in steps[1]
     assert steps[2:] == ["Trial 2 of 4", ["withdrawn"], False]

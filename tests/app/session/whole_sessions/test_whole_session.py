@@ -5,6 +5,7 @@ import os
 import shutil
 import signal
 import threading
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -21,7 +22,7 @@ from study_app.gui.operator import OperatorWindow
 from study_app.gui.theme.theme import PARTICIPANT
 from study_app.store import workstation
 from study_app.store.workstation import MachineSettings
-from tests.app.people import Person, can_go_on, events, rows, window
+from tests.app.people import Person, attended, can_go_on, events, rows, window
 from tests.compiled import needs_servo
 
 pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("qapp", "nobody_stays", "quick_preflight")]
@@ -33,23 +34,10 @@ def test_a_session_runs_from_the_first_page_to_the_last_in_its_windows(short_dem
     folder = results / "data" / "sub-P001" / "ses-01"
     for _ in range(3):
         shutil.rmtree(results, ignore_errors=True)
-        traced, lines = [], []
+        traced = []
         person = Person(once=lambda _participant: traced.append((folder / "crash.txt").read_bytes()))  # noqa: B023
-        try:
-            code = app.run(
-                short_demo,
-                participant="P001",
-                seed=5,
-                device=device,
-                windowed=True,
-                operator="AK",
-                results=results,
-                progress=lines.append,
-            )
-        except StudyError:
-            code = None
-        person.deleteLater()
-        if code == 0:
+        with suppress(StudyError):
+            code, lines = attended(short_demo, results, person, device=device)
             break
     assert code == 0
     told = events(results)
@@ -79,23 +67,36 @@ def test_a_session_runs_from_the_first_page_to_the_last_in_its_windows(short_dem
     assert lines[-1] == f"session completed: {results / 'data' / 'sub-P001' / 'ses-01'}"
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
-def test_a_signal_leaves_the_session_unfinished_and_resumable(short_demo, results, number):
-    before = signal.getsignal(number)
+class Manager:
+    """The session manager of a desktop, which asks programs to end."""
+
+    def setRestartHint(self, hint):  # noqa: N802 - Qt's name
+        self.hint = hint
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP, None], ids=str)
+def test_a_signal_or_a_log_off_leaves_the_session_unfinished_and_resumable(short_demo, results, monkeypatch, number):
+    class Application(QObject):
+        asked = Signal(object)
+
+    source, manager = Application(), Manager()
+    monkeypatch.setattr(termination, "log_off_signal", lambda: source.asked)
+    before = signal.getsignal(number or signal.SIGHUP)
 
     def suspend_and_end(_participant):
         if hasattr(signal, "SIGTSTP"):
             assert signal.getsignal(signal.SIGTSTP) is not signal.SIG_DFL  # Ctrl-Z would leave the force on
-        os.kill(os.getpid(), number)
+        if number is None:
+            source.asked.emit(manager)
+        else:
+            os.kill(os.getpid(), number)
 
-    person = Person(once=suspend_and_end)
-    lines = []
-    code = app.run(short_demo, participant="P001", windowed=True, results=results, progress=lines.append)
-    person.deleteLater()
-    assert code == 128 + number
+    code, lines = attended(short_demo, results, Person(once=suspend_and_end), device="mouse")
+    assert code == 128 + (number or 1)
+    assert hasattr(manager, "hint") == (number is None)
     assert lines[-1] == f"session not finished: {results / 'data' / 'sub-P001' / 'ses-01'}"
     assert can_go_on(short_demo, results)
-    assert signal.getsignal(number) is before
+    assert signal.getsignal(number or signal.SIGHUP) is before
     assert window(OperatorWindow) is None
 
 
@@ -108,10 +109,8 @@ def test_a_lost_device_ends_the_session_with_one_line(short_demo, results, monke
         QTest.keyClick(participant.widget, Qt.Key.Key_Return)
         machines[0].device.unplug()
 
-    person = Person(once=unplug)
     with pytest.raises(StudyError, match="stopped responding"):
-        app.run(short_demo, participant="P001", windowed=True, results=results)
-    person.deleteLater()
+        attended(short_demo, results, Person(once=unplug), device="mouse")
     assert events(results)[-1]["status"] == "broken"
     assert not machines[0].servo.force_is_on
 
@@ -124,34 +123,31 @@ def test_a_lost_device_ends_the_session_with_one_line(short_demo, results, monke
         ({"device": "falcn"}, DeviceNotFound),
         ({"language": "xx"}, SessionError),
         ({"screen": 9}, DisplayError),
+        ({"results": Path("file") / "demo"}, SessionError),
     ],
 )
-def test_what_cannot_begin_leaves_nothing_behind(short_demo, results, wrong, refused):
+def test_what_cannot_begin_leaves_nothing_behind(short_demo, results, monkeypatch, tmp_path, wrong, refused):
+    monkeypatch.chdir(tmp_path)
+    Path("file").write_text("no folder")
     with pytest.raises(refused) as error:
         app.run(short_demo, **{"participant": "P001", "windowed": True, "results": results} | wrong)
     assert "\n" not in str(error.value)
+    assert ("a file is where a folder is" in str(error.value)) == ("results" in wrong)
     assert not results.exists()
+    assert window(OperatorWindow) is None
 
 
 @pytest.mark.nightly
 def test_the_receipt_says_what_is_set_for_the_machine_and_words_are_as_large_as_it_asks(short_demo, results):
     workstation.save(MachineSettings(viewing_distance_mm=1200, screen_width_mm=150))
     scales = []
-    person = Person(once=lambda participant: scales.append(participant.text_scale))
-    assert app.run(short_demo, participant="P001", windowed=True, device="scripted", results=results) == 0
-    assert person.answered
+    code, _ = attended(short_demo, results, Person(once=lambda participant: scales.append(participant.text_scale)))
+    assert code == 0
     told = json.loads((results / "data" / "sub-P001" / "ses-01" / "receipt.json").read_text())["screens"]
     assert (told["participant"]["viewing_distance_mm"], told["participant"]["width_mm"]) == (1200, 150)
     assert told["participant"]["display_offset"] is None
     assert scales[0] > 1
     assert told["participant"]["text_scale"] == pytest.approx(scales[0], abs=0.001)
-
-
-def test_a_results_folder_that_cannot_be_one_is_named(short_demo, tmp_path):
-    (tmp_path / "file").write_text("no folder")
-    with pytest.raises(SessionError, match="a file is where a folder is"):
-        app.run(short_demo, participant="P001", windowed=True, results=tmp_path / "file" / "demo")
-    assert window(OperatorWindow) is None
 
 
 def test_cancelling_the_opening_creates_nothing(short_demo, results):
@@ -179,18 +175,15 @@ def test_a_pilot_is_marked_framed_and_kept_apart(short_demo, tmp_path, monkeypat
     seen = []
 
     def look(participant):
-        seen.append((participant.isFullScreen(), participant.frame_px, participant.windowTitle()))
-        corner = participant.grab().toImage().pixelColor(2, 2)
-        seen.append(corner.name())
+        corner = participant.grab().toImage().pixelColor(2, 2).name()
+        seen.extend((participant.isFullScreen(), participant.frame_px > 0, corner, participant.windowTitle()))
         os.kill(os.getpid(), signal.SIGTERM)
 
     person = Person(once=look)
     app.run(short_demo, participant="test", pilot=True)
     person.deleteLater()
-    assert seen[0][0] is False
-    assert seen[0][1] > 0
-    assert "pilot" in seen[0][2]
-    assert seen[1] == QColor(PARTICIPANT.warn).name()
+    assert seen[:3] == [False, True, QColor(PARTICIPANT.warn).name()]
+    assert "pilot" in seen[3]
     folder = tmp_path / "results" / "demo-pilot"
     assert not (tmp_path / "results" / "demo").exists()
     assert json.loads((folder / "data" / "sub-test" / "ses-01" / "receipt.json").read_text())["pilot"] is True
@@ -198,13 +191,8 @@ def test_a_pilot_is_marked_framed_and_kept_apart(short_demo, tmp_path, monkeypat
 
 def test_the_preflight_is_told_before_anything_is_created(short_demo, results):
     told = []
-
-    def tell(line):
-        told.append((line, results.exists()))
-
     person = Person(once=lambda _participant: os.kill(os.getpid(), signal.SIGTERM))
-    app.run(short_demo, participant="P001", windowed=True, results=results, progress=tell)
-    person.deleteLater()
+    attended(short_demo, results, person, progress=lambda line: told.append((line, results.exists())))
     *before, (last, _) = told
     assert last.startswith("session not finished: ")
     names = [line[9:25].strip() for line, _ in before]
@@ -220,24 +208,3 @@ def test_a_failing_preflight_refuses_the_session(short_demo, results, monkeypatc
     with pytest.raises(SessionError, match="free space: 0 MB free"):
         app.run(short_demo, participant="P001", windowed=True, results=results)
     assert not results.exists()
-
-
-def test_a_log_off_leaves_the_session_unfinished_and_resumable(short_demo, results, monkeypatch):
-    heard = []
-
-    class Application(QObject):
-        asked = Signal(object)
-
-    source = Application()
-    monkeypatch.setattr(termination, "log_off_signal", lambda: source.asked)
-
-    class Manager:
-        def setRestartHint(self, hint):  # noqa: N802 - Qt's name
-            heard.append(hint)
-
-    person = Person(once=lambda _participant: source.asked.emit(Manager()))
-    code = app.run(short_demo, participant="P001", windowed=True, results=results)
-    person.deleteLater()
-    assert heard
-    assert code == 128 + 1
-    assert can_go_on(short_demo, results)
