@@ -88,15 +88,6 @@ def test_every_command_in_a_sentence_exists_with_its_options(page: Path) -> None
     assert not [fault for words in mentioned_commands(page) for fault in faults(words, complete=False)]
 
 
-def test_commands_with_a_mistake_are_found() -> None:
-    assert faults([PROGRAM, "reprot", "x"], complete=False)
-    assert faults([PROGRAM, "report", "x", "--into", "y"], complete=False)
-    assert faults([PROGRAM, "report", "x"], complete=True)
-    assert faults([PROGRAM, "check", "x", "y"], complete=True)
-    assert faults([PROGRAM, "timing", "--load", "much"], complete=True)
-    assert not faults([PROGRAM, "report", "x", "--to", "y"], complete=True)
-
-
 @pytest.mark.parametrize("page", PAGES)
 def test_extras_and_scripts_that_a_page_names_exist(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
@@ -146,11 +137,6 @@ def test_the_page_on_installation_has_every_extra_and_none_for_sessions_alone() 
     assert {extra for row in rows for extra in re.findall(r"\w+", row)} == set(extras)
     alone = text.partition("## A computer that only runs sessions")[2]
     assert re.findall(r"pip install (\S+)", alone)[0] == "."
-
-
-def test_every_picture_is_shown_on_a_page() -> None:
-    shown = {Path(link).name for page in pages() for link in links(page) if "pictures/" in link}
-    assert {path.name for path in (ROOT / "docs" / "pictures").iterdir()} == shown
 
 
 def test_generated_parts_are_made_when_a_page_is_read() -> None:

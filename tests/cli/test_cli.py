@@ -8,7 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import click
 import pytest
 from click.testing import CliRunner
 
@@ -78,13 +77,6 @@ def test_unknown_protocol_names_the_shipped_ones(liquid_study: Run) -> None:
     assert finished.returncode == 2
     assert "rek2042" in finished.stderr
     assert "rek2024" in finished.stderr
-
-
-def test_check_far_from_the_checkout_tells_the_study_in_words(tmp_path: Path) -> None:
-    finished = in_a_process("check", "rek2024", cwd=tmp_path)
-    assert finished.returncode == 0, finished.stderr
-    assert "62" in finished.stdout
-    assert "8 N" in finished.stdout
 
 
 def test_check_notes_how_many_texts_are_still_to_translate(tmp_path: Path, liquid_study: Run) -> None:
@@ -202,8 +194,6 @@ def test_interrupting_a_command_ends_it_with_130(liquid_study: Run, monkeypatch:
 
 
 IN_GROUPS = [name for names in GROUPS.values() for name in names.split()]
-TAKE_A_STUDY = ("export", "plot", "report", "unblind", "exclude", "include", "verify")
-TAKE_A_SESSION = ("resume", "rebuild", "reproduce", "replay")
 
 
 @pytest.fixture
@@ -231,14 +221,6 @@ def said(*words: str, code: int = 0) -> str:
     return done.output
 
 
-def options() -> dict[str, dict[str, click.Parameter]]:
-    """Return every option and argument of every command by its name as it is written."""
-    return {
-        name: {word: one for one in command.params for word in (*one.opts, *one.secondary_opts)}
-        for name, command in commands.commands.items()
-    }
-
-
 def test_help_lists_every_command_once_under_its_heading_with_its_whole_sentence() -> None:
     shown = said("--help")
     assert sorted(IN_GROUPS) == sorted(commands.commands)
@@ -246,20 +228,6 @@ def test_help_lists_every_command_once_under_its_heading_with_its_whole_sentence
         part = shown.split(f"\n{heading}:\n")[1].split("\n\n")[0]
         assert [line.split()[0] for line in part.splitlines() if not line.startswith("   ")] == names.split()
         assert "..." not in part, "a command's first sentence is cut off"
-
-
-def test_every_command_writes_to_to_and_names_who_decides_by() -> None:
-    written = {word for params in options().values() for word in params}
-    assert not written & {"--out", "--output", "--operator", "--scene", "--name", "--folder"}
-    for name in ("export", "plot", "report", "simulate", "identify", "figures", "power", "screenshots"):
-        assert "--to" in options()[name], name
-    for name in ("unblind", "exclude", "include", "run", "resume"):
-        assert "--by" in options()[name], name
-
-
-def test_every_command_of_a_study_or_session_takes_results() -> None:
-    for name in (*TAKE_A_STUDY, *TAKE_A_SESSION, "run", "rehearse", "sessions"):
-        assert "--results" in options()[name], name
 
 
 def test_a_study_goes_by_path_name_and_option(study: Path) -> None:

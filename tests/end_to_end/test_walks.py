@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable, Iterator
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +10,7 @@ import pytest
 
 pytest.importorskip("PySide6.QtWidgets", reason="Qt's system libraries are missing", exc_type=ImportError)
 
-from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import Qt
 
 from study_app.app.main_controller import MainController
 from study_app.gui.home.main_window import FULL as HOME
@@ -20,23 +18,13 @@ from study_app.gui.home.new_session_dialog import NewSessionDialog
 from study_app.gui.home.study_cards import StudyCard
 from study_app.gui.home.view import HomePlace
 from study_app.gui.operator import OperatorWindow
-from study_app.gui.operator.strip import Strip
-from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
-from study_app.gui.participant.pages.text_page import TextWidget
-from study_app.gui.participant.pointer_capture import SHARE_OF_SCREEN
-from study_app.gui.participant.window import WINDOWED_SIZE, ParticipantWindow
-from study_app.gui.preflight import PreflightWindow
 from study_app.gui.preflight.window import FULL as PREFLIGHT
-from study_app.protocol.model import Reach
-from study_app.protocol.wording.languages import words
 from study_app.session.pages import QuestionnairePage, TaskPage, TextPage
 from study_app.user_folder import settings_file
 from tests.compiled import needs_servo
 from tests.end_to_end.real_windows import needs_display, virtual_display, wait_for
-from tests.end_to_end.walking import ANSWERS, TRIALS, Pages, Person, Visitor, laid_out, place_in, tabs_to
-from tests.gui.small import ManualClock
+from tests.end_to_end.walking import ANSWERS, TRIALS, Pages, Person, Visitor, laid_out, tabs_to
 
-SCREEN_PX = 1080
 CORRECTED = {2: 5}  # statement: first answer, of every page
 
 pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.xvfb, pytest.mark.timeout(300), needs_display]
@@ -74,13 +62,6 @@ def preflight_window(program: Visitor) -> str:
 def thesis(plan: MainController) -> StudyCard:
     cards = plan.window.findChildren(StudyCard)
     return next(card for card in cards if card.facts.protocol.study.name == "rek2024")
-
-
-def rail_places(plan: MainController) -> dict[str, QPoint]:
-    """Return where the rail's buttons lie, and as "theme" its switch."""
-    laid_out(plan.window, (HOME.width(), HOME.height()))
-    rail = plan.window.rail
-    return {name: place_in(plan.window, button) for name, button in (*rail.buttons.items(), ("theme", rail.switch))}
 
 
 def dialog_of(plan: MainController, size: tuple[int, int]) -> NewSessionDialog:
@@ -142,106 +123,6 @@ class ByKeyboard(Person):
             else:
                 keys.append(str(value))
         self.press(*keys, "Return")
-
-
-class ByMouse(Person):
-    """Moves the mouse and clicks; where, is looked up in a window off screen."""
-
-    def __init__(self, program: Visitor, qtbot: Any) -> None:
-        super().__init__(program)
-        self._plan = ParticipantWindow(words("en"), clock=ManualClock(), windowed=True, strip=Strip())
-        self._plan.may_close = True
-        qtbot.addWidget(self._plan)
-        laid_out(self._plan, (WINDOWED_SIZE.width(), WINDOWED_SIZE.height()))
-
-    def click(self, window: str, *places: QPoint) -> None:
-        orders = [
-            order
-            for place in places
-            for order in ("mousemove", "--window", window, str(place.x()), str(place.y()), "click", "1")
-        ]
-        self.program.xdotool(*orders)
-
-    def _shown(self, page: TextPage | QuestionnairePage) -> QWidget:
-        self._plan.show_page(page)
-        laid_out(self._plan, (WINDOWED_SIZE.width(), WINDOWED_SIZE.height()))
-        return self._plan.widget
-
-    def choose_language(self, page: TextPage, language: str) -> None:
-        widget = self._shown(page)
-        assert isinstance(widget, TextWidget)
-        assert widget.languages is not None
-        button = widget.languages.buttons[page.languages.index(language)]
-        self.click(self.window, place_in(self._plan, button))
-
-    def read(self, page: TextPage) -> None:
-        widget = self._shown(page)
-        assert isinstance(widget, TextWidget)
-        assert widget.button is not None
-        self.click(self.window, place_in(self._plan, widget.button))
-
-    def fill_in(self, page: QuestionnairePage, values: list[int]) -> None:
-        widget = self._shown(page)
-        assert isinstance(widget, QuestionnaireWidget)
-        cells: list[QWidget] = []
-        for row, value in zip(widget.fields, values, strict=True):
-            if row.view.number in CORRECTED:
-                first = CORRECTED[row.view.number] if CORRECTED[row.view.number] != value else value % 7 + 1
-                cells.append(row.options[first - 1])
-            cells.append(row.options[value - 1])
-        self.click(self.window, *(place_in(self._plan, part) for part in (*cells, widget.button)))
-
-    def leave_tank(self) -> None:
-        self._take_focus()
-        self.move(80)
-        self.move(-80)
-        self.program.xdotool("click", "1")
-
-    def reach(self, page: TaskPage, ended: Callable[[], bool]) -> None:
-        """Begin at the tank's left wall, then go from target to target as each is lit."""
-        task = page.task
-        assert isinstance(task, Reach)
-        px_per_m = SHARE_OF_SCREEN * SCREEN_PX / page.workspace_m[1]
-        here_m = -page.workspace_m[0] / 2
-        self._take_focus()
-        self.move(-round(1.1 * page.workspace_m[0] * px_per_m))
-        while not ended():
-            reached = self._reached(page)
-            x_m = task.targets_m[reached % len(task.targets_m)][0]
-            self.move(round((x_m - here_m) * px_per_m))
-            here_m = x_m
-            wait_for(partial(self._reached_more, page, reached, ended), f"a target of trial {page.trial}", 20.0)
-
-    def _take_focus(self) -> None:
-        """Do as a window manager, which there is none here: what was clicked last has the keyboard, and the pointer."""
-        self.program.xdotool("windowfocus", self.window)
-
-    def _reached(self, page: TaskPage) -> int:
-        return sum(event["trial"] == page.trial for event in self.program.events("target_reached"))
-
-    def _reached_more(self, page: TaskPage, before: int, ended: Callable[[], bool]) -> bool:
-        return self._reached(page) > before or ended()
-
-    def move(self, right_px: int) -> None:
-        """Move the mouse, no faster than the pointer is put back into the middle of the tank from beyond a quarter."""
-        tank = self._plan.widget.geometry()  # below the strip
-        middle = self._place("getwindowgeometry", "--shell", self.window) + tank.center()
-        strays = min(tank.width(), tank.height()) // 4
-        longest = 400
-        while right_px:
-            longest = 799 - longest  # Qt drops a motion to the place of the motion before, even after a jump between
-            step = max(-longest, min(longest, right_px))
-            self.program.xdotool("mousemove_relative", "--", str(step), "0")
-            right_px -= step
-            wait_for(lambda: (self._pointer() - middle).manhattanLength() <= strays, "the pointer near the middle")
-
-    def _pointer(self) -> QPoint:
-        return self._place("getmouselocation", "--shell")
-
-    def _place(self, *asked: str) -> QPoint:
-        """Return where on the screen something is."""
-        place = dict(line.split("=") for line in self.program.xdotool(*asked).splitlines() if "=" in line)
-        return QPoint(int(place["X"]), int(place["Y"]))
 
 
 def changed(program: Visitor, before: Any) -> bool:
@@ -321,44 +202,3 @@ def see_results_and_dark_theme_by_keys(program: Visitor, person: ByKeyboard, pla
     wait_for(lambda: not changed(program, home), "home")
     person.press(*["Tab"] * to_switch, "Return")
     wait_for(lambda: changed(program, home), "the dark theme")
-
-
-@pytest.mark.nightly
-def test_the_whole_study_by_the_mouse_alone_from_home_to_home(
-    program: Visitor, plan: MainController, qtbot: Any
-) -> None:
-    person = ByMouse(program, qtbot)
-    home, wide = home_window(program), rail_places(plan)
-    plan.window.rail.narrow(True)
-    narrow = rail_places(plan)
-    plan.window.rail.narrow(False)
-    person.click(home, place_in(plan.window, thesis(plan).new))
-    asked = program.window("^New session$")
-    dialog = dialog_of(plan, program.size(asked))
-    begin = place_in(dialog, dialog.begin)
-    dialog.reject()
-    person.click(asked, begin)
-    before = PreflightWindow(2e3)
-    qtbot.addWidget(before)
-    laid_out(before, (PREFLIGHT.width(), PREFLIGHT.height()))
-    person.click(preflight_window(program), place_in(before, before.start))
-    person.window = program.window("^Study$")
-    program.wait_for_event("session_started")
-    pages = Pages(program.events("session_started")[0])
-    given = person.walk(pages)
-    operator = program.window("operator$")
-    cockpit = operator_plan(pages, program.size(operator), qtbot)
-    person.click(operator, place_in(cockpit, cockpit.buttons.close_session))
-    home = home_window(program)
-    assert program.windows(".") == [home]
-    check(program, given, simulated="false")
-    seen = program.picture()
-    person.click(home, wide["results"])
-    wait_for(lambda: changed(program, seen), "results")
-    person.click(home, narrow["home"])  # results have the rail narrow
-    wait_for(lambda: not changed(program, seen), "home")
-    person.click(home, wide["theme"])
-    wait_for(lambda: changed(program, seen), "the dark theme")
-    assert not program.orders & {"key", "keydown", "type"}
-    program.close_by_frame(home)
-    check_left(program)

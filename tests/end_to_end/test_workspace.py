@@ -36,17 +36,12 @@ def start_folder(path: Path, monkeypatch: pytest.MonkeyPatch, *subfolders: str) 
     return path
 
 
-def test_the_start_folder_is_offered_only_if_it_has_both_folders(documents, tmp_path, monkeypatch):
+def test_a_chosen_workspace_counts_from_every_start_folder(documents, tmp_path, monkeypatch):
     start_folder(tmp_path / "one", monkeypatch, "results")
-    assert offered_workspace().folder == documents / "Liquid Study"
-    clone = start_folder(tmp_path / "both", monkeypatch, "results", "protocols")
+    assert offered_workspace().folder == documents / "Liquid Study", "a start folder is offered if it has both folders"
+    clone = start_folder(tmp_path / "clone", monkeypatch, "results", "protocols")
     assert offered_workspace().folder == clone
     assert chosen_workspace() is None
-    assert not documents.exists()
-
-
-def test_a_chosen_workspace_counts_from_every_start_folder(documents, tmp_path, monkeypatch):
-    clone = start_folder(tmp_path / "clone", monkeypatch, "results", "protocols")
     keep_workspace(offered_workspace())
     (clone / "protocols" / "mine.toml").write_bytes(source_bytes("demo"))
     start_folder(tmp_path / "elsewhere", monkeypatch)
@@ -126,20 +121,15 @@ def test_the_first_start_asks_once_and_creates_nothing_before_the_answer(documen
     again.end()
 
 
-def test_a_folder_that_cannot_be_created_is_said_and_not_kept(documents, tmp_path, monkeypatch, qtbot):
-    start_folder(tmp_path / "start", monkeypatch)
-    (tmp_path / "file").write_text("")
-    with pytest.raises(StoreError, match="file"):
-        keep_workspace(Workspace(tmp_path / "file"))
-    assert chosen_workspace() is None
-    assert not settings_file().exists()
-
-
 def test_an_earlier_results_folder_becomes_the_workspace(documents, tmp_path):
     settings_file().parent.mkdir(parents=True)
     settings_file().write_text(json.dumps({"results": str(tmp_path / "lab" / "results"), "theme": "dark"}))
     assert load().workspace == str(tmp_path / "lab")
     assert workspace().folder == tmp_path / "lab"
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StoreError, match="file"):
+        keep_workspace(Workspace(tmp_path / "file"))
+    assert workspace().folder == tmp_path / "lab", "what cannot be created is not kept"
 
 
 def test_recent_protocols_are_remembered_newest_first_and_only_while_they_exist(documents, tmp_path, monkeypatch):

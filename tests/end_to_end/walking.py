@@ -5,7 +5,6 @@ same size, say where it lies.
 """
 
 import csv
-import ctypes
 import re
 import subprocess
 import sys
@@ -74,10 +73,6 @@ class Visitor(Program):
         self.orders |= set(arguments)
         return super().xdotool(*arguments)
 
-    def close_by_frame(self, window: str) -> None:
-        """Ask a window to close, as the cross in its frame does; there is no frame on a bare display."""
-        _send_delete(self.display, int(window))
-
     def picture(self) -> NDArray[np.uint8]:
         """Return what the display shows: rows, columns and the four bytes of a pixel."""
         raw = (self.folder / "Xvfb_screen0").read_bytes()
@@ -96,36 +91,6 @@ class Visitor(Program):
         (study,) = self.folder.glob("results/*")
         words = [sys.executable, "-m", "study_app", "verify", str(study)]
         return subprocess.run(words, capture_output=True, text=True, check=False)
-
-
-class _ClientMessage(ctypes.Structure):
-    _fields_ = (
-        ("type", ctypes.c_int),
-        ("serial", ctypes.c_ulong),
-        ("send_event", ctypes.c_int),
-        ("display", ctypes.c_void_p),
-        ("window", ctypes.c_ulong),
-        ("message_type", ctypes.c_ulong),
-        ("format", ctypes.c_int),
-        ("data", ctypes.c_long * 5),
-        ("room", ctypes.c_long * 24),
-    )
-
-
-def _send_delete(display: str, window: int) -> None:
-    """Send a window the message by which a window manager closes it."""
-    x11 = ctypes.CDLL("libX11.so.6")
-    x11.XOpenDisplay.restype = x11.XInternAtom.restype = ctypes.c_void_p
-    x11.XInternAtom.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int]
-    x11.XSendEvent.argtypes = [ctypes.c_void_p, ctypes.c_ulong, ctypes.c_int, ctypes.c_long, ctypes.c_void_p]
-    x11.XCloseDisplay.argtypes = [ctypes.c_void_p]
-    opened = x11.XOpenDisplay(display.encode())
-    protocols, delete = (x11.XInternAtom(opened, name, 0) for name in (b"WM_PROTOCOLS", b"WM_DELETE_WINDOW"))
-    client_message = 33
-    data = (ctypes.c_long * 5)(delete, 0, 0, 0, 0)
-    message = _ClientMessage(client_message, 0, 1, opened, window, protocols, 32, data)
-    x11.XSendEvent(opened, window, 0, 0, ctypes.byref(message))
-    x11.XCloseDisplay(opened)
 
 
 class Pages:

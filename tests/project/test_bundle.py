@@ -1,7 +1,6 @@
 """The bundle's own files: its start runs commands and modules, its recipe finds every library, its sizes are sums."""
 
 import os
-import re
 import runpy
 import subprocess
 import sys
@@ -53,22 +52,6 @@ def test_it_compiles_for_any_processor_unless_asked_otherwise() -> None:
     assert started("-c", code, NUMBA_CPU_NAME="x86-64-v2").startswith("x86-64-v2 ")
 
 
-def test_sizes_add_up_and_the_compile_cache_is_counted_apart(bundle: dict[str, Any], tmp_path: Path) -> None:
-    files = {
-        "liquid-study": 7,
-        "_internal/libarrow.so.1": 11,
-        "_internal/pyarrow/lib.so": 13,
-        "_internal/numpy.libs/libblas.so": 23,
-        "_internal/study_app/compiled/x/a.nbc": 17,
-        "_internal/study_app/cli.py": 19,
-    }
-    for name, size in files.items():
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_bytes(b"x" * size)
-    found = bundle["sizes"](tmp_path)
-    assert found == {"program": 7, "pyarrow": 24, "numpy": 23, "compile cache": 17, "study_app": 19}
-
-
 def test_only_equal_copies_of_a_library_are_dropped_and_links_are_kept(bundle: dict[str, Any], tmp_path: Path) -> None:
     (tmp_path / "pyarrow").mkdir()
     for name, there, inside in (("same", b"x", b"x"), ("other", b"x", b"y")):
@@ -103,12 +86,6 @@ def test_the_recipe_contains_the_pages_of_help(monkeypatch: pytest.MonkeyPatch) 
     pages = {f"study_app/docs/{name}.md" for name in documentation.names()}
     pictures = {f"study_app/docs/pictures/{path.name}" for path in (top / "pictures").iterdir()}
     assert (pages | pictures) - shipped == set()
-
-
-def test_the_libraries_of_a_desktop_are_names_of_libraries() -> None:
-    """A name that is none would be left out of the empty root without a word."""
-    names = runpy.run_path(str(PACKAGING / "try_in_empty_root.py"))["DESKTOP"].split()
-    assert [name for name in names if not re.fullmatch(r"lib[\w.+-]*[\w+]\.so\.\d+", name)] == []
 
 
 def test_the_recipe_names_every_library_whose_version_a_receipt_or_a_report_states() -> None:

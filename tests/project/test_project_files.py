@@ -1,6 +1,5 @@
 """The files for people who join or cite the project name what exists, and agree with the package."""
 
-import json
 import re
 import tomllib
 from collections.abc import Iterator
@@ -50,13 +49,6 @@ def test_changelog_and_citation_name_the_version_of_the_package() -> None:
     assert kinds <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
 
 
-def test_the_citation_is_valid() -> None:
-    pytest.importorskip("cffconvert", reason="cffconvert is not installed")
-    from cffconvert import Citation
-
-    Citation((ROOT / "CITATION.cff").read_text("utf-8")).validate()
-
-
 def test_decisions_are_numbered_and_have_their_parts() -> None:
     assert [int(path.name[:4]) for path in DECISIONS] == list(range(1, len(DECISIONS) + 1))
     for number, path in enumerate(DECISIONS, start=1):
@@ -73,13 +65,6 @@ def test_the_matrix_is_the_supported_pythons_on_three_systems() -> None:
     first, end = (int(minor) for minor in re.fullmatch(r">=3\.(\d+),<3\.(\d+)", wanted).groups())  # type: ignore[union-attr]
     assert matrix["python"] == [f"3.{minor}" for minor in range(first, end)]
     assert [system.split("-")[0] for system in matrix["system"]] == ["ubuntu", "windows", "macos"]
-
-
-def test_workflows_and_templates_can_be_read() -> None:
-    files = [*(ROOT / ".github").rglob("*.yml"), ROOT / ".pre-commit-config.yaml"]
-    assert len(files) >= 5
-    for path in files:
-        assert json.dumps(read_yaml(path), default=str)
 
 
 def test_pre_commit_runs_the_linters_of_the_check() -> None:

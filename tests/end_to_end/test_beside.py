@@ -1,0 +1,127 @@
+"""Work beside other work: a report beside a session that goes on, and a draft that an earlier release left."""
+
+import hashlib
+import json
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+
+from study_app.analysis.report.write_report import report
+from study_app.app.main_controller import MainController
+from study_app.gui.home.view import HomePlace
+from study_app.protocol.load import load, source_bytes
+from study_app.protocol.orders.schedule import build_schedule
+from study_app.session.resume import REHEARSED_SCREENS
+from study_app.session.simulated.answers_only import DEVICE, Answering, SimulatedTime
+from study_app.session.transitions.table import open_session
+from study_app.store.clock import SessionClock
+from study_app.store.sessions.begin import SessionStart, begin
+from study_app.store.sessions.open_session import SessionStore
+from study_app.store.verification.verify_study import verify
+from study_app.user_folder import data_folder
+from tests.studies import made_up, rehearsed
+
+pytestmark = pytest.mark.slow
+
+
+class Stepwise:
+    """Takes the lines of a session, each when it is let."""
+
+    def __init__(self, store: SessionStore) -> None:
+        self.store, self.ended = store, threading.Event()
+        self._allowed, self._written = threading.Semaphore(0), threading.Semaphore(0)
+
+    def append(self, event: str, **fields: Any) -> None:
+        self._allowed.acquire()
+        self.store.append(event, **fields)
+        self._written.release()
+
+    def finish(self, status: str, reason: str = "") -> None:
+        self._allowed.acquire()
+        self.store.finish(status, reason)
+        self.ended.set()
+        self._written.release()
+
+    def write(self, lines: int) -> None:
+        for _ in range(lines):
+            if not self.ended.is_set():
+                self._allowed.release()
+                self._written.acquire()
+
+
+@pytest.mark.usefixtures("quick_pdf")
+def test_a_report_beside_a_running_session_is_of_the_sessions_that_ended_and_disturbs_none(tmp_path: Path) -> None:
+    results = rehearsed(tmp_path / "results", people=2)
+    study, passed, felt = load("demo"), SimulatedTime(), made_up("demo")
+    start = SessionStart(
+        "P003", seed=3, operator="", language="en", device=DEVICE, screens=REHEARSED_SCREENS, simulated=True
+    )
+    with begin(results, study, source_bytes("demo"), start, clock=SessionClock(passed.ns)) as store:
+        kept, schedule = Stepwise(store), build_schedule(study, "P003", 3)
+        state = open_session(study, schedule, store.key.codes, "en", secret=store.key.nonce)
+        answering = Answering(study, state, kept, passed, lambda block, condition: felt[block, condition])
+        session = threading.Thread(target=answering.run)
+        session.start()
+        kept.write(10)
+        steps: list[str] = []
+
+        def go_on(what: str, _share: float) -> None:
+            steps.append(what)
+            kept.write(3)
+
+        said: list[str] = []
+        report(results, tmp_path / "beside", progress=go_on, warn=said.append, failed=said.append)
+        assert said == []
+        assert len(steps) > 3
+        assert not kept.ended.is_set()
+        kept.write(10_000)
+        session.join(30)
+    assert verify(results).errors == ()
+    report(results, tmp_path / "after", warn=said.append, failed=said.append)
+    assert said == []
+    reports = [json.loads((tmp_path / name / "report.json").read_bytes()) for name in ("beside", "after")]
+    assert [(one["study"]["participants"], one["study"]["sessions_left_out"]) for one in reports] == [(2, 1), (3, 0)]
+    for told, status in zip(reports, ("unfinished", "completed"), strict=True):
+        assert [one["status"] for one in told["sessions"]] == ["completed", "completed", status]
+
+
+def test_a_draft_that_release_0_2_left_is_shown_at_home_and_opened_in_the_designer(
+    qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    (tmp_path / "protocols").mkdir()
+    file, saved = tmp_path / "protocols" / "mine.toml", source_bytes("demo")
+    file.write_bytes(saved)
+    edited = saved.decode().replace('title = "A first look"', 'title = "A second look"')
+    draft = {  # as 0.2.0 wrote it
+        "file": str(file),
+        "base": hashlib.sha256(saved).hexdigest(),
+        "selected": ["study"],
+        "kept_at": "2026-11-22T10:00:00+01:00",
+        "text": edited,
+    }
+    name = hashlib.sha256(str(file).encode()).hexdigest()[:32]
+    (data_folder() / "drafts").mkdir(parents=True)
+    (data_folder() / "drafts" / f"{name}.json").write_text(json.dumps(draft), encoding="utf-8")
+    visit = MainController(tmp_path / "results")
+    qtbot.addWidget(visit.window)
+    visit.window.show()
+    home = visit.window.place("home")
+    assert isinstance(home, HomePlace)
+    qtbot.waitUntil(lambda: bool(home.grid.cards))
+    first = home.grid.cards[0]
+    assert first.facts.source == "mine"
+    assert "22" in first.facts.draft.words
+    qtbot.mouseClick(first.pen, Qt.MouseButton.LeftButton)
+    both = visit.lab_and_designer
+    qtbot.waitUntil(lambda: both.designer is not None and both.designer.editing.opened is not None, timeout=20_000)
+    assert both.designer is not None
+    opened = both.designer.editing.opened
+    assert opened is not None
+    assert opened.study.document["study"]["title"] == "A second look"
+    assert file.read_bytes() == saved
+    visit.window.close()
+    visit.end()
