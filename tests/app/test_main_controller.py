@@ -101,13 +101,24 @@ def test_a_signal_waits_two_seconds_at_most_for_a_device_that_is_being_opened(
     assert visit.code == 128 + 15
 
 
-def test_one_session_at_a_time(visit: MainController, monkeypatch: Any) -> None:
+def test_of_one_session_at_a_time_the_theme_stays_and_a_device_that_is_gone_is_told(
+    visit: MainController, monkeypatch: Any
+) -> None:
+    machine = Machine(lost=True)
     monkeypatch.setattr(live_session.LiveSession, "open", lambda _self: None)
-    visit.window.place("home").session_asked.emit(CHOSEN)
-    first = visit.live
-    visit.window.place("home").session_asked.emit(CHOSEN)
-    assert visit.live is first
-    visit.live = None
+    home = visit.window.place("home")
+    home.session_asked.emit(CHOSEN)
+    live = visit.live
+    home.session_asked.emit(CHOSEN)
+    assert visit.live is live is not None
+    live.rig = machine  # type: ignore[assignment]
+    live.theme = DARK
+    live.cancel()
+    assert machine.stopped
+    assert visit.window.isVisible()
+    assert visit.window.notice is not None
+    assert visit.window.theme is DARK
+    assert visit.machine.settings.theme == "dark"
 
 
 def test_a_session_that_was_not_begun_is_told_so(visit: MainController, monkeypatch: Any, qtbot: Any) -> None:
@@ -134,31 +145,6 @@ def test_a_mistake_before_the_first_window_leads_home_again(
     assert visit.window.notice is not None
     assert visit.window.notice.windowTitle() == "A bug in the program stopped the session"
     assert "nobody is there" in capsys.readouterr().err
-
-
-def test_a_device_that_is_gone_at_the_end_does_not_keep_the_window_away(
-    visit: MainController, monkeypatch: Any
-) -> None:
-    machine = Machine(lost=True)
-    monkeypatch.setattr(live_session.LiveSession, "open", lambda _self: None)
-    visit.window.place("home").session_asked.emit(CHOSEN)
-    live = visit.live
-    assert live is not None
-    live.rig = machine  # type: ignore[assignment]
-    live.cancel()
-    assert machine.stopped
-    assert visit.window.isVisible()
-    assert visit.window.notice is not None
-
-
-def test_a_theme_that_was_changed_in_the_cockpit_stays(visit: MainController, monkeypatch: Any) -> None:
-    monkeypatch.setattr(live_session.LiveSession, "open", lambda _self: None)
-    visit.window.place("home").session_asked.emit(CHOSEN)
-    assert visit.live is not None
-    visit.live.theme = DARK
-    visit.live.cancel()
-    assert visit.window.theme is DARK
-    assert visit.machine.settings.theme == "dark"
 
 
 def test_back_leads_from_the_help_to_the_place_where_it_was_asked_for(visit: MainController, qtbot: Any) -> None:

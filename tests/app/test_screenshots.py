@@ -5,10 +5,9 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtGui import QImage
-from PySide6.QtWidgets import QApplication, QLabel
+from PySide6.QtWidgets import QApplication
 
-from study_app.app.screenshots import capture, screenshots, session_pictures
-from study_app.app.screenshots.capture import Camera
+from study_app.app.screenshots import screenshots, session_pictures
 from study_app.errors import StudyError
 from tests.compiled import needs_servo
 
@@ -53,21 +52,3 @@ def test_a_session_that_cannot_be_taken_is_let_go_of(qapp, tmp_path, monkeypatch
         screenshots(tmp_path, only="single-blind", progress=lambda _line: None)
     assert not [window for window in QApplication.topLevelWidgets() if window.isVisible()]
     assert not [thread for thread in threading.enumerate() if thread.name == "servo"]
-
-
-def test_what_does_not_come_is_named(qapp, tmp_path, monkeypatch):
-    monkeypatch.setattr(capture, "PATIENCE_S", 0.1)
-    with pytest.raises(StudyError, match="the figures did not appear"):
-        Camera(tmp_path, print).until(lambda: None, "the figures")
-
-
-def test_a_picture_is_what_the_window_shows(qtbot, tmp_path):
-    shown = QLabel("here")
-    qtbot.addWidget(shown)
-    shown.show()
-    taking = Camera(tmp_path, print)
-    taking.take(shown, "words", (300, 100))
-    found = QImage(str(tmp_path / "words.png"))
-    assert (found.width(), found.height()) == (300, 100)
-    assert found == shown.grab().toImage().convertToFormat(found.format())
-    assert [path.name for path in tmp_path.iterdir()] == ["words.png"]

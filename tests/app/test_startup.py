@@ -17,8 +17,8 @@ from pathlib import Path
 from study_app import app
 from PySide6.QtCore import QObject
 
-assert callable(app.run) and callable(app.home)
 for_all = [name for name in ("main_controller", "devices_controller") if f"study_app.app.{name}" in sys.modules]
+assert callable(app.run) and callable(app.home)
 
 from study_app.app.main_controller import MainController
 from study_app.app.session import live_session

@@ -25,12 +25,6 @@ Finished = subprocess.CompletedProcess[str]
 Run = Callable[..., Finished]
 
 
-def in_a_process(*words: str, cwd: Path) -> Finished:
-    return subprocess.run(
-        [sys.executable, "-m", "study_app", *words], cwd=cwd, capture_output=True, text=True, check=False
-    )
-
-
 @pytest.fixture
 def liquid_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
     """Return a function that runs a command in this process and an empty folder: a start takes half a second."""
@@ -46,15 +40,6 @@ def liquid_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest
     return run
 
 
-def assert_one_line(finished: Finished, *parts: str) -> None:
-    assert finished.returncode == 2
-    assert finished.stdout == ""
-    lines = finished.stderr.splitlines()
-    assert len(lines) == 1, finished.stderr
-    for part in parts:
-        assert part in lines[0]
-
-
 def test_help_loads_neither_qt_nor_the_compiler_nor_multiprocessing(tmp_path: Path) -> None:
     program = (
         "import sys; sys.argv=['liquid-study','--help']\n"
@@ -66,17 +51,6 @@ def test_help_loads_neither_qt_nor_the_compiler_nor_multiprocessing(tmp_path: Pa
     )
     finished = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert finished.stdout.splitlines()[-1] == "[]"
-
-
-def test_unknown_command_is_one_line(tmp_path: Path) -> None:
-    assert_one_line(in_a_process("rehears", cwd=tmp_path), "rehears", "rehearse")
-
-
-def test_unknown_protocol_names_the_shipped_ones(liquid_study: Run) -> None:
-    finished = liquid_study("check", "rek2042")
-    assert finished.returncode == 2
-    assert "rek2042" in finished.stderr
-    assert "rek2024" in finished.stderr
 
 
 def test_check_notes_how_many_texts_are_still_to_translate(tmp_path: Path, liquid_study: Run) -> None:
@@ -114,39 +88,6 @@ def test_a_letter_that_the_console_lacks_stops_no_command(tmp_path: Path) -> Non
     )
     assert (told.returncode, told.stderr) == (0, b"")
     assert told.stdout.startswith(b"\\u0141\xf3d\\u017a (demo, version ")
-
-
-@pytest.mark.parametrize(
-    ("words", "parts"),
-    [
-        (("--participant", "P-1"), ("P-1", "only letters A-Z", "no dash")),
-        (("--participant", "P001", "--device", "falkon"), ("falkon", "mouse", "scripted")),
-        (("--participant", "P001", "--language", "xx"), ("xx", "en", "nl")),
-    ],
-)
-def test_run_refuses_what_it_cannot_use(
-    tmp_path: Path, liquid_study: Run, words: tuple[str, ...], parts: tuple[str, ...]
-) -> None:
-    results = tmp_path / "results"
-    assert_one_line(liquid_study("run", "rek2024", *words, "--results", str(results)), *parts)
-    assert not results.exists()
-
-
-def test_simulate_names_the_bad_row_and_writes_nothing(tmp_path: Path, liquid_study: Run) -> None:
-    (tmp_path / "path.csv").write_text("t_s,x_m,y_m,z_m\n0,0,0,0\n0.001,0,zero,0\n", encoding="utf-8")
-    words = ("rek2024", "--liquid", "water", "--path", "path.csv", "--to", "out.csv")
-    finished = liquid_study("simulate", *words)
-    assert finished.returncode == 2
-    assert "row 2" in finished.stderr or "line 3" in finished.stderr
-    assert "zero" in finished.stderr
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["path.csv"]
-
-
-def test_simulate_names_the_unknown_parameter(tmp_path: Path, liquid_study: Run) -> None:
-    words = ("rek2024", "--liquid", "water", "--path", "circle", "--to", "out.csv")
-    refused = liquid_study("simulate", *words, "--set", "densitee_kg_m3=1")
-    assert_one_line(refused, "densitee_kg_m3", "density_kg_m3")
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_replay_that_compared_nothing_does_not_say_that_all_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,7 +1,7 @@
 """The whole study of the thesis as one comes to it: from home to home and out, by keys alone and by the mouse alone."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +19,10 @@ from study_app.gui.home.study_cards import StudyCard
 from study_app.gui.home.view import HomePlace
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.preflight.window import FULL as PREFLIGHT
-from study_app.session.pages import QuestionnairePage, TaskPage, TextPage
 from study_app.user_folder import settings_file
 from tests.compiled import needs_servo
 from tests.end_to_end.real_windows import needs_display, virtual_display, wait_for
-from tests.end_to_end.walking import ANSWERS, TRIALS, Pages, Person, Visitor, laid_out, tabs_to
-
-CORRECTED = {2: 5}  # statement: first answer, of every page
+from tests.end_to_end.walking import ANSWERS, CORRECTED, TRIALS, Pages, Person, Visitor, laid_out, tabs_to
 
 pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.xvfb, pytest.mark.timeout(300), needs_display]
 
@@ -84,47 +81,6 @@ def operator_plan(pages: Pages, size: tuple[int, int], qtbot: Any) -> OperatorWi
     return made
 
 
-class ByKeyboard(Person):
-    """Presses keys; the pointer stays where it was when the display began."""
-
-    def take_keyboard(self, window: str) -> None:
-        """Do what a window manager does with a window that opens; from then on keys go where the keyboard is."""
-        self.window = window
-        self.program.xdotool("windowfocus", "--sync", window)
-
-    def press(self, *keys: str) -> None:
-        assert self.program.xdotool("getwindowfocus") == self.window
-        self.program.xdotool("key", *keys)
-
-    def choose_language(self, page: TextPage, language: str) -> None:
-        forward = page.languages.index(language) > page.languages.index(page.language)
-        self.press("Tab", "Right" if forward else "Left")
-
-    def read(self, page: TextPage) -> None:
-        self.press("Return" if page.kind == "consent" else "space")
-
-    def leave_tank(self) -> None:
-        self.press("space")
-
-    def reach(self, _page: TaskPage, _ended: Callable[[], bool]) -> None:
-        """Look on: the scripted hand reaches."""
-
-    def fill_in(self, page: QuestionnairePage, values: list[int]) -> None:
-        """Answer by digit, by arrows and space from either side, and one after going back to it."""
-        keys: list[str] = []
-        for item, value in zip(page.items, values, strict=True):
-            if item.number in CORRECTED:
-                first = CORRECTED[item.number] if CORRECTED[item.number] != value else value % 7 + 1
-                keys += [str(first), "shift+Tab", str(value)]
-            elif item.number % 3 == 0:
-                keys += ["Down", "Up", *["Right"] * value, "space"]
-            elif item.number % 3 == 1:
-                keys += ["Tab", "BackSpace", *["Left"] * (8 - value), "space"]
-            else:
-                keys.append(str(value))
-        self.press(*keys, "Return")
-
-
 def changed(program: Visitor, before: Any) -> bool:
     """Return whether much of what the display shows is no longer what it was."""
     return bool(np.mean(np.any(program.picture() != before, axis=2)) > 0.05)
@@ -158,7 +114,7 @@ def check_left(program: Visitor) -> None:
 
 @pytest.mark.nightly
 def test_the_whole_study_by_keys_alone_from_home_to_home(program: Visitor, plan: MainController, qtbot: Any) -> None:
-    person = ByKeyboard(program)
+    person = Person(program)
     pointer = program.xdotool("getmouselocation").split(" window:")[0]  # windows come and go under it
     home, main = home_window(program), plan.window
     person.take_keyboard(home)
@@ -188,7 +144,7 @@ def test_the_whole_study_by_keys_alone_from_home_to_home(program: Visitor, plan:
     check_left(program)
 
 
-def see_results_and_dark_theme_by_keys(program: Visitor, person: ByKeyboard, plan: MainController) -> None:
+def see_results_and_dark_theme_by_keys(program: Visitor, person: Person, plan: MainController) -> None:
     main, rail = plan.window, plan.window.rail
     laid_out(main, (HOME.width(), HOME.height()))
     thesis(plan).new.setFocus()  # where the dialog was opened

@@ -43,6 +43,7 @@ SHORTER = {
     "duration_s = 30": "duration_s = 1",
 }
 ANSWERS, TRIALS = 62, 12
+CORRECTED = {2: 5}  # statement: first answer, of every page
 LEAVING_S, LEAVES = 0.8, 20  # a tank is left again, if it was not, after so long, and so often
 
 
@@ -144,26 +145,48 @@ class Pages:
 
 
 class Person:
-    """Goes through the study; how a page is read, a task done and a statement answered is the subclass's affair."""
+    """Goes through the study by keys; the pointer stays where it was when the display began."""
 
     def __init__(self, program: Visitor) -> None:
         self.program = program
         self.window = ""
 
+    def take_keyboard(self, window: str) -> None:
+        """Do what a window manager does with a window that opens; from then on keys go where the keyboard is."""
+        self.window = window
+        self.program.xdotool("windowfocus", "--sync", window)
+
+    def press(self, *keys: str) -> None:
+        assert self.program.xdotool("getwindowfocus") == self.window
+        self.program.xdotool("key", *keys)
+
     def choose_language(self, page: TextPage, language: str) -> None:
-        raise NotImplementedError
+        forward = page.languages.index(language) > page.languages.index(page.language)
+        self.press("Tab", "Right" if forward else "Left")
 
     def read(self, page: TextPage) -> None:
-        raise NotImplementedError
+        self.press("Return" if page.kind == "consent" else "space")
 
     def leave_tank(self) -> None:
-        raise NotImplementedError
+        self.press("space")
 
-    def reach(self, page: TaskPage, ended: Callable[[], bool]) -> None:
-        raise NotImplementedError
+    def reach(self, _page: TaskPage, _ended: Callable[[], bool]) -> None:
+        """Look on: the scripted hand reaches."""
 
     def fill_in(self, page: QuestionnairePage, values: list[int]) -> None:
-        raise NotImplementedError
+        """Answer by digit, by arrows and space from either side, and one after going back to it."""
+        keys: list[str] = []
+        for item, value in zip(page.items, values, strict=True):
+            if item.number in CORRECTED:
+                first = CORRECTED[item.number] if CORRECTED[item.number] != value else value % 7 + 1
+                keys += [str(first), "shift+Tab", str(value)]
+            elif item.number % 3 == 0:
+                keys += ["Down", "Up", *["Right"] * value, "space"]
+            elif item.number % 3 == 1:
+                keys += ["Tab", "BackSpace", *["Left"] * (8 - value), "space"]
+            else:
+                keys.append(str(value))
+        self.press(*keys, "Return")
 
     def walk(self, pages: Pages) -> dict[tuple[int, str], int]:
         """Go from the first page to the last; return what was answered."""

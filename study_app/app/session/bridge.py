@@ -162,9 +162,7 @@ class SessionBridge(QObject):
         self._leave()
 
     def watch_screens(self) -> None:
-        """From now on, pause where the participant's window comes to cover the operator's, as Qt moves windows of a
-        screen that is removed; both are shown.
-        """
+        """From now on, pause if the participant's window comes to cover the operator's: a screen was removed."""
         for window in (self.participant, self.operator):
             window.windowHandle().screenChanged.connect(
                 lambda _screen: QTimer.singleShot(SCREEN_SETTLES_MS, self, self._check_screens)

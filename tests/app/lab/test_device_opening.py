@@ -19,10 +19,21 @@ MakeLab = Callable[..., LabController]
 pytestmark = [needs_servo, pytest.mark.slow, pytest.mark.usefixtures("qapp")]
 
 
-def test_two_devices_are_never_opened_at_a_time(qtbot: Any) -> None:
-    devices = SlowDevices()
+@pytest.mark.parametrize("stuck", [False, True])
+def test_two_devices_are_never_opened_at_a_time_and_one_that_cannot_be_closed_holds_nobody_up(
+    qtbot: Any, stuck: bool
+) -> None:
+    class Devices(SlowDevices):
+        def close(self) -> None:
+            super().close()
+            if stuck:
+                raise ServoFault("the servo is stuck: switch it off")
+
+    devices = Devices()
     opening = LabOpening(devices)
+    failed: list[str] = []
     opened: list[Any] = []
+    opening.failed.connect(lambda error: failed.append(str(error)))
     opening.opened.connect(opened.append)
     opening.want("falcon")
     qtbot.waitUntil(lambda: devices.asked == ["falcon"], timeout=SOON_MS)
@@ -32,6 +43,7 @@ def test_two_devices_are_never_opened_at_a_time(qtbot: Any) -> None:
     qtbot.waitUntil(lambda: bool(opened), timeout=SOON_MS)
     assert devices.asked == ["falcon", "mouse"]
     assert (devices.most, devices.open, devices.closed) == (1, 1, 1)
+    assert failed == (["the servo is stuck: switch it off"] if stuck else [])
 
 
 def test_leaving_while_a_device_is_being_opened_lets_go_of_it(make_lab: MakeLab, qtbot: Any) -> None:
@@ -47,7 +59,6 @@ def test_leaving_while_a_device_is_being_opened_lets_go_of_it(make_lab: MakeLab,
     assert visit.live is None
 
 
-@pytest.mark.slow
 def test_a_force_that_was_stopped_does_not_come_with_a_device_that_is_being_opened(
     make_lab: MakeLab, qtbot: Any
 ) -> None:
@@ -65,47 +76,14 @@ def test_a_force_that_was_stopped_does_not_come_with_a_device_that_is_being_open
     assert visit.view().trouble == "No device is open"  # an edit opens none
 
 
-def test_a_device_that_cannot_be_closed_is_told_of_and_holds_nobody_up(qtbot: Any) -> None:
-    class Stuck(SlowDevices):
-        def close(self) -> None:
-            super().close()
-            raise ServoFault("the servo is stuck: switch it off")
-
-    devices = Stuck()
-    opening = LabOpening(devices)
-    failed: list[Exception] = []
-    opened: list[Any] = []
-    opening.failed.connect(failed.append)
-    opening.opened.connect(opened.append)
-    opening.want("falcon")
-    qtbot.waitUntil(lambda: devices.asked == ["falcon"], timeout=SOON_MS)
-    opening.want("mouse")
-    devices.gate.set()
-    qtbot.waitUntil(lambda: bool(opened), timeout=SOON_MS)
-    assert [str(error) for error in failed] == ["the servo is stuck: switch it off"]
-
-
-def test_a_device_that_is_not_there_is_told(make_lab: MakeLab, qtbot: Any) -> None:
-    def nothing(name: str, **_: Any) -> Any:
-        raise DeviceNotFound(f"no {name} is plugged in")
-
-    visit = make_lab(open_live=nothing)
-    visit.place.show()
-    qtbot.waitUntil(lambda: visit.view().trouble == "no scripted is plugged in", timeout=SOON_MS)
-    view = visit.view()
-    assert not view.force_on
-    assert not view.device.ready
-
-
-@pytest.mark.slow
-def test_a_long_opening_without_a_word_is_explained_by_the_compilation(
+def test_a_long_opening_is_explained_by_the_compilation_and_a_device_that_is_not_there_is_told(
     make_lab: MakeLab, qtbot: Any, monkeypatch: Any
 ) -> None:
     gate = threading.Event()
 
     def compile_slowly(_name: str, **_: Any) -> Any:
         gate.wait(30.0)
-        raise DeviceNotFound("none")
+        raise DeviceNotFound("none is plugged in")
 
     monkeypatch.setattr(controller, "LONG_AFTER_S", 0.1)
     visit = make_lab(open_live=compile_slowly)
@@ -113,4 +91,6 @@ def test_a_long_opening_without_a_word_is_explained_by_the_compilation(
     assert visit.view().busy == "Opening Scripted hand"
     qtbot.waitUntil(lambda: visit.view().busy == controller.COMPILING, timeout=SOON_MS)
     gate.set()
-    qtbot.waitUntil(lambda: visit.view().trouble == "none", timeout=SOON_MS)
+    qtbot.waitUntil(lambda: visit.view().trouble == "none is plugged in", timeout=SOON_MS)
+    view = visit.view()
+    assert (view.force_on, view.device.ready) == (False, False)

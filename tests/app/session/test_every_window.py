@@ -151,21 +151,15 @@ def test_a_dialog_that_goes_leaves_the_keyboard_to_somebody(
     qtbot.waitUntil(lambda: not world.force_is_on)
 
 
-def test_a_window_that_comes_forward_ends_no_hold(bridge: Bridge, world: World, qtbot: Any) -> None:
+def test_a_window_that_comes_forward_ends_no_hold_and_the_keyboards_repetition_is_no_second_press(
+    bridge: Bridge, world: World, qtbot: Any
+) -> None:
     begin_trial(bridge, world)
-    handle = in_focus(bridge.participant, qtbot)
-    QTest.keyPress(handle, ESC)
-    in_focus(bridge.operator, qtbot)
-    qtbot.waitUntil(lambda: not world.force_is_on)
-    assert ("force_stopped", {"by": "operator"}) in world.done
-
-
-def test_the_keyboards_own_repetition_is_no_second_press(bridge: Bridge, world: World, qtbot: Any) -> None:
-    begin_trial(bridge, world)
+    QTest.keyPress(in_focus(bridge.participant, qtbot), ESC)
     handle = in_focus(bridge.operator, qtbot)
-    QTest.keyPress(handle, ESC)
     QTest.keyPress(handle, ESC)  # as a window hears it that got the keyboard while the key was down
     qtbot.waitUntil(lambda: not world.force_is_on)
+    assert ("force_stopped", {"by": "operator"}) in world.done
     assert world.events().count("force_stopped") == 1
 
 

@@ -15,7 +15,6 @@ from study_app.app.session.frame_budget import MOST_PERIODS, MOST_SHARE, FrameBu
 from study_app.app.session.garbage_collection import (
     OLDEST,
     PERIOD_MS,
-    collect_if_due,
     collecting_here,
     freeze_garbage,
     unfreeze_garbage,
@@ -136,17 +135,6 @@ def test_no_other_thread_frees_what_belongs_to_windows_open_or_closed(qtbot: Any
     allocate_elsewhere()
     assert open_ == closed == [threading.get_ident()]
     assert len(kept) == 20_000
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("automatic_collection")
-def test_nothing_is_collected_before_it_is_due() -> None:
-    gc.disable()
-    gc.collect()
-    assert collect_if_due() is None
-    kept = [[] for _ in range(5_000)]
-    assert collect_if_due() == 0
-    assert len(kept) == 5_000
 
 
 @pytest.mark.slow

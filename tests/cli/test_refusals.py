@@ -1,4 +1,4 @@
-"""``new`` and ``edit`` open the study designer; what cannot be opened is refused before any window."""
+"""What commands refuse in one line, without a window or a file; `new`, `edit` and `outlets`."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -76,12 +76,9 @@ def outlets(*words: str) -> list[str]:
     return found.output.splitlines()
 
 
-def test_without_options_it_prints_what_is_set_and_writes_nothing() -> None:
+def test_outlets_are_printed_and_options_are_kept_and_others_stay() -> None:
     assert outlets() == OFF
     assert not settings_file().exists()
-
-
-def test_options_are_kept_and_others_stay() -> None:
     save(MachineSettings(viewing_distance_mm=600))
     assert outlets("--markers", "on", "--triggers", "serial:/dev/ttyUSB0") == [
         "markers over LSL: on",
@@ -123,6 +120,16 @@ LONG = tuple(
 @pytest.mark.parametrize(
     ("words", "said"),
     [
+        (("rehears",), "No such command 'rehears'. Did you mean 'rehearse'?"),
+        (("check", "rek2042"), "rek2024"),
+        (("run", "demo", "--participant", "P-1"), "only letters A-Z"),
+        (("run", "demo", "--participant", "P001", "--device", "falkon"), "falkon"),
+        (("run", "demo", "--participant", "P001", "--language", "xx"), "demo is written in en; choose"),
+        ((*SIMULATE, "--path", "circle", "--to", "o.csv", "--set", "densitee_kg_m3=1"), "density_kg_m3"),
+        ((*SIMULATE, "--path", "zero.csv", "--to", "o.csv"), "zero"),
+        (("accuracy", "--liquid", "nothing"), "there are water, honey, light_oil"),
+        (("devices", "calibrate", "--device", "mouse", "--scale"), "only a Falcon has motors"),
+        (("devices", "calibrate", "--device", "falcon-emulated", "--scale"), "use a weight with --grams"),
         ((*SIMULATE, "--path", "circle", "--to", ""), "--to': is empty"),
         ((*SIMULATE, "--path", "circle", "--to", "o.csv", "--set", CURRENT), "velocity_mps: must be less than"),
         ((*SIMULATE, "--path", "circle", "--to", "o.csv", "--set", f"alpha={'9' * 6000}"), "alpha"),
@@ -149,11 +156,13 @@ def test_bad_input_is_one_short_line_and_nothing_is_written(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "far.csv").write_text(FAR, encoding="utf-8")
     (tmp_path / "fast.csv").write_text(FAST, encoding="utf-8")
+    (tmp_path / "zero.csv").write_text("t_s,x_m,y_m,z_m\n0,0,0,0\n0.001,0,zero,0\n", encoding="utf-8")
     monkeypatch.setattr("sys.argv", ["liquid-study", *words])
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 2
-    (line,) = capsys.readouterr().err.splitlines()
+    *heading, line = capsys.readouterr().err.splitlines()
+    assert [head.rpartition(": ")[2] for head in heading] in ([], ["1 problem"]), "of a file its name, then the problem"
     assert said in line
     assert len(line) < 600
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["far.csv", "fast.csv"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["far.csv", "fast.csv", "zero.csv"]
