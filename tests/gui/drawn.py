@@ -1,4 +1,4 @@
-"""The words that a page draws, with their places: recorded while it paints itself."""
+"""What a page draws: its pixels, and its words with their places, recorded while it paints itself."""
 
 import sys
 from collections.abc import Iterator
@@ -6,8 +6,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QPainter
+from PySide6.QtGui import QImage, QPainter
 from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
 from study_app.gui.participant.pages import page_widget
@@ -89,3 +90,14 @@ def drawn_by(window: QWidget) -> list[Drawn]:
             place = QRectF(label.rect()).translated(QPointF(label.mapTo(window, label.rect().topLeft())))
             found.append(Drawn(label, label.text(), place, place))
     return found
+
+
+def pixels(image: QImage) -> np.ndarray:
+    """Return an image as (height, width, 3) of 0 … 255."""
+    image = image.convertToFormat(QImage.Format.Format_RGB32)
+    flat = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), image.bytesPerLine() // 4, 4)
+    return flat[:, : image.width(), :3].copy()
+
+
+def shown(widget: QWidget) -> np.ndarray:
+    return pixels(widget.grab().toImage())

@@ -4,7 +4,13 @@ from typing import Any
 
 import numpy as np
 
+from study_app.protocol.forms.show_if import ShowIf
+from study_app.protocol.questions.choice import ChoiceView
+from study_app.protocol.questions.number import NumberView
 from study_app.protocol.questions.question import ItemView
+from study_app.protocol.questions.rating import RatingView
+from study_app.protocol.questions.slider import SliderView
+from study_app.protocol.questions.text import TextView
 from study_app.protocol.trials.task import AnyTask
 from study_app.protocol.trials.tasks.explore import Explore
 from study_app.protocol.trials.tasks.follow import Follow
@@ -35,14 +41,43 @@ STATEMENTS = (
 )
 
 
+FIVE = ("Not at all", "Slightly", "Somewhat", "Rather", "Very")
+HANDS = (("left", "Left"), ("right", "Right"), ("both", "Both"))
+DEVICES = (("mouse", "A mouse"), ("falcon", "A haptic device"), ("other", "Another one"))
+QUESTIONS: tuple[ItemView, ...] = (
+    NumberView("age", 1, "How old are you?", True, least=16, most=99, whole=True, unit="years"),
+    ChoiceView("hand", 2, "Which hand do you write with?", True, options=HANDS),
+    NumberView("since", 3, "Since when?", True, whole=True, show_if=ShowIf(item="hand", values="both")),
+    ChoiceView("used", 4, "What have you used before?", False, options=DEVICES, several=True),
+    RatingView("thick", 5, "How thick was it?", True, labels=FIVE, cannot_judge="Cannot judge"),
+    SliderView("pleasant", 6, "How pleasant was it?", True, low="Unpleasant", high="Pleasant", step=5),
+    TextView("comment", 7, "Anything else?", False, lines=1, longest=20),
+)
+
+
+def form(*items: ItemView, **changed: Any) -> QuestionnairePage:
+    """Return a form of these questions, or of one or two of every kind."""
+    fields: dict[str, Any] = {
+        "trial": None,
+        "title": "About you",
+        "intro": "Please tell us about yourself.",
+        "items": items or QUESTIONS,
+        "labels": (),
+        "cannot_judge": None,
+        "progress": None,
+        "form": "start",
+    }
+    return QuestionnairePage(**(fields | changed))
+
+
 class ManualClock:
     """Seconds that pass when told, a little with every look."""
 
     def __init__(self) -> None:
-        self.now_s = 100.0
+        self.now_s, self.step_s = 100.0, 0.001
 
     def __call__(self) -> float:
-        self.now_s += 0.001
+        self.now_s += self.step_s
         return self.now_s
 
 
@@ -116,3 +151,8 @@ def text_page(kind: Any = "instructions", **changed: Any) -> TextPage:
         "button": "Go on",
     }
     return TextPage(**(fields | changed))
+
+
+def follow_view(x: float = 0.0, ball: tuple[float, float, float] = (0, 0.02, 0), **changed: Any) -> TankView:
+    """Return a view of a target that is followed, at a place along x [m]."""
+    return view(ball, **({"lit": 0, "target_m": (x, 0.0, 0.0)} | changed))

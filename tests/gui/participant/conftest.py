@@ -1,25 +1,58 @@
-"""The participant's window, with and without the pointer as its device."""
+"""The participant's window, with and without the pointer as its device, and a finger."""
 
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+from PySide6.QtGui import QPointingDevice
+from PySide6.QtTest import QTest
 
 from study_app.gui.participant.pointer_capture import PointerCapture
-from tests.gui.participant.screens import Opened
+from study_app.gui.participant.tank_widget import TankWidget
+from study_app.protocol.wording.languages import words
+from tests.gui.participant.driver import Participant
+from tests.gui.small import task_page
 
 
 @pytest.fixture
-def opened(qtbot: Any) -> Any:
-    made = Opened(qtbot)
-    yield made
-    made.window.may_close = True
-    made.window.close()
+def opening(qtbot: Any) -> Iterator[Callable[..., Participant]]:
+    """Return a function that opens a window, which is closed after the test."""
+    made: list[Participant] = []
+
+    def open_(*arguments: Any, **named: Any) -> Participant:
+        made.append(Participant(qtbot, *arguments, **named))
+        return made[-1]
+
+    yield open_
+    for one in made:
+        one.close()
 
 
 @pytest.fixture
-def captured(qtbot: Any) -> Any:
-    made = Opened(qtbot, captures_pointer=True)
+def opened(opening: Callable[..., Participant]) -> Participant:
+    return opening()
+
+
+@pytest.fixture
+def captured(opening: Callable[..., Participant]) -> Iterator[Participant]:
+    made = opening(captures_pointer=True)
     yield made
-    made.window.may_close = True
-    made.window.close()
+    made.close()
     assert not made.window.findChild(PointerCapture).held
+
+
+@pytest.fixture(scope="module")
+def finger() -> QPointingDevice:
+    return QTest.createTouchDevice()
+
+
+@pytest.fixture
+def made(qtbot: Any) -> Callable[..., TankWidget]:
+    def make(page: Any = None, size: tuple[int, int] = (960, 640), language: str = "en", **named: Any) -> TankWidget:
+        widget = TankWidget(page or task_page(), words(language), **named)
+        qtbot.addWidget(widget)
+        widget.resize(*size)
+        widget.show()
+        return widget
+
+    return make

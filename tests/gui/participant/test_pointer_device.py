@@ -4,46 +4,35 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
-from PySide6.QtGui import QCursor, QMouseEvent, QWheelEvent
-from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QWidget
+from PySide6.QtGui import QCursor, QMouseEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.gui.participant.pointer_capture import NOTCHES, SHARE_OF_SCREEN, PointerCapture
-from study_app.session.pages import Page, PausePage
+from study_app.session.pages import Page
 from study_app.session.transitions.events import PauseAsked
-from tests.gui.participant.screens import Opened
+from tests.gui.participant.driver import Participant
 from tests.gui.small import questionnaire, task_page, text_page
 
 
-def test_pointer_is_free_where_it_is_not_the_device(opened: Opened) -> None:
-    opened.window.show_page(task_page())
+def test_pointer_is_free_where_it_is_not_the_device(opened: Participant) -> None:
+    opened.show(task_page())
     assert not opened.window.findChild(PointerCapture).held
-    assert opened.window.widget.cursor().shape() == Qt.CursorShape.BlankCursor
+    assert opened.page.cursor().shape() == Qt.CursorShape.BlankCursor
 
 
-def test_pointer_is_held_and_hidden_in_the_tank_alone(captured: Opened) -> None:
-    captured.window.show_page(text_page())
+def test_pointer_is_held_and_hidden_in_the_tank_alone(captured: Participant) -> None:
+    captured.show(text_page())
     assert not captured.window.findChild(PointerCapture).held
-    captured.window.show_page(task_page())
+    captured.show(task_page())
     assert captured.window.findChild(PointerCapture).held
-    assert captured.window.widget.cursor().shape() == Qt.CursorShape.BlankCursor
-    captured.window.show_page(questionnaire())
+    assert captured.page.cursor().shape() == Qt.CursorShape.BlankCursor
+    captured.show(questionnaire())
     assert not captured.window.findChild(PointerCapture).held
-    assert captured.window.widget.cursor().shape() == Qt.CursorShape.ArrowCursor
+    assert captured.page.cursor().shape() == Qt.CursorShape.ArrowCursor
 
 
-@pytest.mark.parametrize("held", [None, "pause", "force"])
-@pytest.mark.parametrize(("device", "speaks"), [("captured", False), ("opened", True)])
-def test_a_stop_speaks_of_force_but_where_the_device_is_the_mouse(
-    request: pytest.FixtureRequest, held: Any, device: str, speaks: bool
-) -> None:
-    window = request.getfixturevalue(device).window
-    window.show_page(PausePage(force_off=True, held=held))
-    shown = " ".join(one.text() for kind in (QLabel, QAbstractButton) for one in window.widget.findChildren(kind))
-    assert shown
-    assert ("force" in shown or "push" in shown) == speaks
-
-
-def other_window(captured: Opened, qtbot: Any) -> QWidget:
+def other_window(captured: Participant, qtbot: Any) -> QWidget:
     """Return another window of the program, active instead of the participant's."""
     other = QWidget()
     qtbot.addWidget(other)
@@ -54,8 +43,8 @@ def other_window(captured: Opened, qtbot: Any) -> QWidget:
 
 
 @pytest.mark.slow
-def test_the_operators_window_lets_the_pointer_go_and_the_trial_goes_on(captured: Opened, qtbot: Any) -> None:
-    captured.window.show_page(task_page())
+def test_the_operators_window_lets_the_pointer_go_and_the_trial_goes_on(captured: Participant, qtbot: Any) -> None:
+    captured.show(task_page())
     with qtbot.waitSignal(captured.window.settling.timeout):
         other = other_window(captured, qtbot)
         assert not captured.window.findChild(PointerCapture).held
@@ -63,31 +52,28 @@ def test_the_operators_window_lets_the_pointer_go_and_the_trial_goes_on(captured
     assert captured.events == []
     captured.window.activateWindow()
     qtbot.waitUntil(lambda: captured.window.findChild(PointerCapture).held)
-    assert captured.window.widget.cursor().shape() == Qt.CursorShape.BlankCursor
+    assert captured.page.cursor().shape() == Qt.CursorShape.BlankCursor
 
 
 @pytest.mark.parametrize("page", [text_page(), questionnaire()], ids=lambda page: type(page).__name__)
 def test_a_window_that_is_active_again_holds_the_pointer_in_the_tank_alone(
-    captured: Opened, qtbot: Any, page: Page
+    captured: Participant, qtbot: Any, page: Page
 ) -> None:
-    captured.window.show_page(task_page())
+    captured.show(task_page())
     other = other_window(captured, qtbot)
-    captured.window.show_page(page)
+    captured.show(page)
     other.hide()
     captured.window.activateWindow()
     qtbot.waitUntil(captured.window.isActiveWindow)
     assert not captured.window.findChild(PointerCapture).held
 
 
-def test_another_program_that_takes_the_keyboard_pauses(captured: Opened, qtbot: Any) -> None:
-    captured.window.show_page(task_page())
+def test_another_program_that_takes_the_keyboard_pauses(captured: Participant, qtbot: Any) -> None:
+    captured.show(task_page())
     other = other_window(captured, qtbot)
     with qtbot.waitSignal(captured.window.event):
         other.windowHandle().destroy()  # no window of the program has the keyboard then
     assert captured.events == [PauseAsked(captured.events[0].at_s, "participant")]
-
-
-# the pointer as a hand
 
 
 class Hand:
@@ -120,18 +106,7 @@ class Hand:
         QApplication.sendEvent(self.widget, QMouseEvent(kind, place, place, button, button, none))
 
     def wheel(self, eighths: int) -> None:
-        place, none = QPointF(self.middle), Qt.KeyboardModifier.NoModifier
-        event = QWheelEvent(
-            place,
-            place,
-            QPoint(),
-            QPoint(0, eighths),
-            Qt.MouseButton.NoButton,
-            none,
-            Qt.ScrollPhase.NoScrollPhase,
-            False,
-        )
-        QApplication.sendEvent(self.widget, event)
+        QTest.wheelEvent(self.widget.windowHandle(), self.widget.rect().center(), QPoint(0, eighths))
 
 
 @pytest.fixture

@@ -1,267 +1,327 @@
 """The participant's window: pages come whole and go whole; Esc pauses, and held down it stops the force."""
 
-from html import unescape
+import threading
+from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
-from PySide6.QtCore import QEvent, QPoint, Qt, QTimer
+from PySide6.QtCore import QEvent, QObject, QPoint, Qt, QTimer
+from PySide6.QtGui import QAccessible, QImage
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLabel, QWidget
+from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 
-from study_app.gui.participant.pages.notices import NoticeWidget, PauseWidget
-from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
-from study_app.gui.participant.pages.text_page import TextWidget
-from study_app.gui.participant.tank_widget import TankWidget
-from study_app.gui.participant.window import LEAST_SIZE, ParticipantWindow
+from study_app.gui.participant.window import LEAST_SIZE
 from study_app.gui.widgets.escape_key import HOLD_MS, EscapeHold
-from study_app.protocol.wording.languages import LANGUAGES, words
-from study_app.session.pages import EndPage, Page, PausePage, TroublePage
-from study_app.session.transitions.events import Chosen, Continue, ForceStopped, ItemShown, PauseAsked, ResumeAsked
-from tests.gui.participant.screens import Opened
+from study_app.protocol.wording.languages import words
+from study_app.session.pages import EndPage, FeedbackPage, Page, PausePage, TroublePage
+from study_app.session.transitions.events import Chosen, Continue, ForceStopped, PauseAsked, ResumeAsked
+from tests.gui.participant.driver import KEY, Participant, name_of, told_of
 from tests.gui.small import explore, questionnaire, task_page, text_page, view
 
-PAGES: list[tuple[Page, type[QWidget]]] = [
-    (text_page("consent"), TextWidget),
-    (text_page("break"), TextWidget),
-    (task_page(), TankWidget),
-    (questionnaire(), QuestionnaireWidget),
-    (PausePage(force_off=True), PauseWidget),
-    (TroublePage("One moment", "Help comes."), NoticeWidget),
-    (EndPage("Thank you", "You may let go."), NoticeWidget),
+Opening = Callable[..., Participant]
+SMALL = (1024, 640)
+PAGES: list[tuple[Page, str]] = [
+    (text_page("consent", languages=("en", "nl")), "Before you begin"),
+    (text_page("break", stays_until_s=1000.0, coming=task_page(explore())), "Before you begin"),
+    (task_page(explore()), "Move the ball through the liquid"),
+    (questionnaire(), "Liquid setting 1"),
+    (task_page(), "Hold the ball in the lit ring until it closes"),
+    (PausePage(force_off=False), "Pause"),
+    (PausePage(force_off=True), "The force is off"),
+    (task_page(), "Hold the ball in the lit ring until it closes"),
+    (questionnaire(chosen=(("item1", 4),)), "Liquid setting 1"),
+    (FeedbackPage(True), "Right"),
+    (TroublePage("One moment", "Help comes."), "One moment"),
+    (EndPage("Thank you", "You may let go."), "Thank you"),
 ]
 
 
-def test_before_the_first_page_it_says_that_it_prepares(opened: Opened) -> None:
+def test_before_the_first_page_it_says_that_it_prepares(opened: Participant) -> None:
     assert opened.window.page is None
-    assert words("en").preparing in opened.window.widget.accessibleName()
-
-
-@pytest.mark.parametrize(("page", "kind"), PAGES, ids=lambda value: type(value).__name__)
-def test_page_value_becomes_its_widget_and_fills_the_window(opened: Opened, page: Page, kind: type[QWidget]) -> None:
-    opened.window.show_page(page)
-    assert type(opened.window.widget) is kind
-    assert opened.window.page is page
-    assert opened.window.widget.geometry() == opened.window.rect()
-    assert opened.window.widget.isVisible()
-
-
-@pytest.mark.parametrize("language", LANGUAGES)
-@pytest.mark.parametrize("mouse", [False, True])
-def test_the_last_page_asks_to_let_go_of_the_device_unless_that_is_the_mouse(
-    qtbot: Any, language: str, mouse: bool
-) -> None:
-    said, shown = words(language), Opened(qtbot, captures_pointer=mouse, language=language)
-    for page in (EndPage(said.end_title, said.end_body), EndPage(said.ended_early_title, said.ended_early_body)):
-        shown.window.show_page(page)
-        lines = unescape(" ".join(line.text() for line in shown.window.widget.findChildren(QLabel)))
-        assert page.paragraph in lines
-        assert (said.let_go in lines) is not mouse
-    shown.window.may_close = True
-    shown.window.close()
+    assert words("en").preparing in opened.page.accessibleName()
 
 
 @pytest.mark.slow
-def test_no_widget_is_left_behind(opened: Opened) -> None:
-    for page, _ in PAGES * 3:
+def test_every_page_fills_the_window_names_itself_and_leaves_no_widget_behind(opened: Participant) -> None:
+    for page, name in PAGES:
+        old = opened.page
         opened.window.show_page(page)
+        assert not old.isVisible(), "in the same turn"
+        opened.settle()
+        QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+        assert opened.window.page is page
+        assert name_of(opened.page).startswith(name)
+        assert opened.page.geometry() == opened.window.rect()
+        assert opened.page.isVisible()
+        assert opened.window.windowTitle() == words("en").window_title
+        assert [child for child in opened.window.children() if isinstance(child, QWidget)] == [opened.page]
+        assert told_of(opened.window).role() == QAccessible.Role.Window
+        headings = [one for one in opened.page.findChildren(QLabel) if told_of(one).role() == QAccessible.Role.Heading]
+        assert not headings or name_of(headings[0]) in opened.page.accessibleName()
+
+
+def test_the_window_stays_one_to_a_screen_reader_whatever_is_connected_to_it(opened: Participant) -> None:
+    button = QPushButton()
+    button.clicked.connect(opened.window.come_forward)
+    opened.window.open_on()
+    assert (told_of(opened.window).role(), name_of(opened.window)) == (
+        QAccessible.Role.Window,
+        opened.window.windowTitle(),
+    )
+
+
+def on_screen(window: QWidget) -> QImage:
+    """Return what the window system has of the window: what was painted and handed over, nothing that is under way."""
+    return window.screen().grabWindow(window.winId()).toImage().convertToFormat(QImage.Format.Format_RGB32)
+
+
+def pixels(image: QImage) -> Any:
+    return np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), image.width(), 4)[..., :3].copy()
+
+
+class Watcher(QObject):
+    """Looks at the screen at every event of the program, and keeps each picture that differs from the one before.
+
+    Not at those of a painting under way, though: what it has done so far is handed to no screen yet.
+    """
+
+    def __init__(self, window: QWidget) -> None:
+        super().__init__()
+        self.window = window
+        self.pictures = [on_screen(window)]
+
+    def eventFilter(self, _watched: QObject, event: QEvent) -> bool:  # noqa: N802
+        if event.type() != QEvent.Type.Paint:
+            self.look()
+        return False
+
+    def look(self) -> None:
+        seen = on_screen(self.window)
+        if seen != self.pictures[-1]:
+            self.pictures.append(seen)
+
+
+def change(opened: Participant, page: Page) -> list[QImage]:
+    """Show a page; return every picture that the screen had meanwhile, the old page's and the new one's with them."""
+    watcher = Watcher(opened.window)
+    app = QApplication.instance()
+    assert app is not None
+    app.installEventFilter(watcher)
+    opened.window.show_page(page)
+    for _ in range(3):
         QApplication.processEvents()
         QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
-        children = [child for child in opened.window.children() if isinstance(child, QWidget)]
-        assert children == [opened.window.widget]
+        watcher.look()
+    app.removeEventFilter(watcher)
+    return watcher.pictures
 
 
-def test_old_page_is_hidden_in_the_same_turn(opened: Opened) -> None:
-    opened.window.show_page(text_page())
-    old = opened.window.widget
-    opened.window.show_page(questionnaire())
-    assert not old.isVisible()
+@pytest.mark.nightly
+@pytest.mark.slow
+def test_the_screen_shows_the_old_page_and_then_the_new_one(opening: Opening) -> None:
+    opened = opening(size=SMALL)
+    for page, _ in PAGES:
+        pictures = change(opened, page)
+        whole = opened.window.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
+        assert len(pictures) == 2, f"{len(pictures) - 2} pictures that are neither page, before {page}"
+        assert pictures[-1] == whole
 
 
-def test_keyboard_goes_where_the_page_says_and_shows_no_ring_unasked(opened: Opened) -> None:
+def test_the_first_view_adds_the_ball_and_nothing_else(opening: Opening) -> None:
+    opened = opening(task_page(), SMALL)
+    before = pixels(on_screen(opened.window))
+    opened.window.show_view(view((0.0, 0.01, 0.0), lit=None, reached=0))
+    QApplication.processEvents()
+    differs = (before != pixels(on_screen(opened.window))).any(axis=2)
+    inside = np.zeros_like(differs)
+    for name in ("ball", "shadow", "plumb"):
+        place = opened.page.things[name].place.toAlignedRect()
+        inside[place.top() : place.bottom() + 1, place.left() : place.right() + 1] = True
+    assert differs.any()
+    assert not (differs & ~inside).any()
+
+
+def waiting_for_paint(opened: Participant) -> threading.Event:
+    """Let the tank be painted until the event that is returned is set."""
+    done = threading.Event()
+    opened.window.painting = threading.Thread(target=done.wait)
+    opened.window.painting.start()
+    return done
+
+
+@pytest.mark.slow
+def test_a_tank_that_is_still_being_painted_is_waited_for_on_a_page_that_says_so(opening: Opening, qtbot: Any) -> None:
+    opened = opening(size=SMALL)
+    done = waiting_for_paint(opened)
+    assert len(change(opened, task_page(explore()))) == 2
+    assert opened.page.accessibleName() == words("en").trouble_title
+    opened.window.show_view(view(lit=None, elapsed_s=40.0))
+    opened.press(KEY.Key_Space)  # neither view nor key does anything yet
+    assert opened.window.tank is None
+    done.set()
+    qtbot.waitUntil(lambda: opened.window.tank is not None)
+    assert not opened.window.waiting.isActive()
+
+
+def test_a_page_that_comes_while_a_tank_is_waited_for_is_shown_at_once(opening: Opening) -> None:
+    opened = opening(size=SMALL)
+    done = waiting_for_paint(opened)
+    opened.window.show_page(task_page())
+    opened.window.show_page(PausePage(force_off=True))
+    done.set()
+    assert opened.window.painting is not None
+    opened.window.painting.join()
+    opened.window.waiting.timeout.emit()
+    assert opened.window.tank is None
+    assert opened.window.page == PausePage(force_off=True)
+
+
+def test_a_pause_paints_the_tank_that_it_interrupted(opened: Participant, qtbot: Any) -> None:
+    opened.show(PausePage(force_off=False, coming=task_page()))
+    qtbot.waitUntil(lambda: opened.window.painting is not None)
+
+
+def test_keyboard_goes_where_the_page_says_and_shows_no_ring_unasked(opened: Participant) -> None:
     for page in (text_page(), questionnaire(), text_page("break")):
-        opened.window.show_page(page)
-    widget = opened.window.widget
-    assert isinstance(widget, TextWidget)
-    assert widget.button is not None
-    assert opened.focus is widget.button
-    assert not widget.button.ringed
+        opened.show(page)
+    assert opened.focus is opened.page.button
+    assert not opened.page.button.ringed
 
 
-def test_page_follows_the_window_down_to_its_least_size(opened: Opened) -> None:
-    opened.window.show_page(questionnaire())
+def test_page_follows_the_window_down_to_its_least_size(opened: Participant) -> None:
+    opened.show(questionnaire())
     opened.window.resize(LEAST_SIZE)
-    assert opened.window.widget.size() == LEAST_SIZE
+    assert opened.page.size() == LEAST_SIZE
     opened.window.resize(800, 400)
     assert opened.window.size() == LEAST_SIZE
-
-
-def test_windows_title_is_neutral(opened: Opened) -> None:
-    for page, _ in PAGES:
-        opened.window.show_page(page)
-        assert opened.window.windowTitle() == words("en").window_title
-
-
-def beside(window: ParticipantWindow) -> QPoint:
-    """Return a place in the window where its page has nothing to press."""
-    return QPoint(window.width() // 2, window.height() - 12)
 
 
 @pytest.mark.parametrize(
     ("page", "key", "told"),
     [
-        (text_page("consent"), Qt.Key.Key_Return, Continue),
-        (text_page(), Qt.Key.Key_Space, Continue),
-        (PausePage(force_off=False), Qt.Key.Key_Return, ResumeAsked),
-        (questionnaire(), Qt.Key.Key_4, Chosen),
-        (task_page(explore()), Qt.Key.Key_Space, Continue),
+        (text_page("consent"), KEY.Key_Return, Continue),
+        (text_page(), KEY.Key_Space, Continue),
+        (PausePage(force_off=False), KEY.Key_Return, ResumeAsked),
+        (questionnaire(), KEY.Key_4, Chosen),
+        (task_page(explore()), KEY.Key_Space, Continue),
     ],
     ids=lambda value: type(value).__name__,
 )
-def test_click_beside_a_button_leaves_the_page_its_keys(opened: Opened, page: Page, key: Qt.Key, told: type) -> None:
-    opened.window.show_page(page)
+def test_click_beside_a_button_leaves_the_page_its_keys(opened: Participant, page: Page, key: KEY, told: type) -> None:
+    opened.show(page)
     opened.window.show_view(view(elapsed_s=60.0))
-    opened.window.grab()
-    QTest.mouseClick(
-        opened.window.windowHandle(), Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, beside(opened.window)
-    )
-    QTest.keyClick(opened.focus, key)
+    beside = QPoint(opened.window.width() // 2, opened.window.height() - 12)
+    left, none = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+    QTest.mouseClick(opened.window.windowHandle(), left, none, beside)
+    opened.press(key)
     assert told in opened.kinds
 
 
-def test_space_leaves_an_exploration_after_its_least_time(opened: Opened) -> None:
-    opened.window.show_page(task_page(explore()))
-    opened.window.show_view(view(lit=None, elapsed_s=3))
-    QTest.keyClick(opened.focus, Qt.Key.Key_Space)
-    assert opened.events == []
-    opened.window.show_view(view(lit=None, elapsed_s=31))
-    QTest.keyClick(opened.focus, Qt.Key.Key_Space)
-    assert opened.kinds == [Continue]
+@pytest.mark.parametrize("mouse", [False, True])
+def test_an_exploration_is_left_after_its_least_time_by_space_or_a_click_of_the_mouse_that_is_the_device(
+    opening: Opening, mouse: bool
+) -> None:
+    opened = opening(task_page(explore()), captures_pointer=mouse)
+    for elapsed_s, kinds in ((29.9, []), (30.0, [Continue])):
+        opened.window.show_view(view(lit=None, elapsed_s=elapsed_s))
+        if mouse:
+            opened.click(opened.page)
+        else:
+            opened.press(KEY.Key_Space)
+        assert opened.kinds == kinds
+    assert opened.buttons == ([1, 0, 0] if mouse else []), "the last click is no answer to the page that comes next"
 
 
-def test_a_click_leaves_an_exploration_where_the_mouse_is_the_device(captured: Opened, qtbot: Any) -> None:
-    captured.window.show_page(task_page(task=explore()))
-    tank = captured.window.tank
-    assert tank is not None
-    captured.window.show_view(view(elapsed_s=29.9))
-    qtbot.mouseClick(tank, Qt.MouseButton.LeftButton)
-    assert (captured.kinds, captured.buttons) == ([], [1, 0])
-    captured.window.show_view(view(elapsed_s=30.0))
-    qtbot.mouseClick(tank, Qt.MouseButton.RightButton)
-    assert captured.kinds == []
-    qtbot.mouseClick(tank, Qt.MouseButton.LeftButton)
-    assert captured.kinds == [Continue]
-    assert not any(bits & 1 for bits in captured.buttons[2:])  # it is no answer to the page that comes next
-
-
-def test_a_late_frame_of_the_tank_before_is_not_told_as_one_of_the_next(opened: Opened, qtbot: Any) -> None:
-    opened.window.show_page(task_page())
+def test_a_late_frame_of_the_tank_before_is_not_told_as_one_of_the_next(opened: Participant, qtbot: Any) -> None:
+    opened.show(task_page())
     before = opened.window.tank
     assert before is not None
-    opened.window.show_page(task_page())
+    opened.show(task_page())
     with qtbot.assertNotEmitted(opened.window.painted):
         before.painted.emit(1)
 
 
-def test_views_without_a_tank_are_ignored(opened: Opened) -> None:
-    opened.window.show_page(questionnaire())
+def test_views_without_a_tank_are_ignored(opened: Participant) -> None:
+    opened.show(questionnaire())
     opened.window.show_view(view())
     assert opened.window.tank is None
 
 
-def test_pause_lies_over_the_tank(opened: Opened) -> None:
-    opened.window.show_page(task_page())
-    opened.window.show_page(PausePage(force_off=True))
-    first = opened.window.widget
-    assert isinstance(first, PauseWidget)
-    assert first.under is not None
-    opened.window.show_page(PausePage(force_off=False))
-    again = opened.window.widget
-    assert isinstance(again, PauseWidget)
-    assert again.under is first.under
+def test_pause_lies_over_the_tank(opened: Participant) -> None:
+    opened.show(task_page())
+    opened.show(PausePage(force_off=True))
+    under = opened.page.under
+    assert under is not None
+    opened.show(PausePage(force_off=False))
+    assert opened.page.under is under
 
 
-def test_closing_by_accident_is_a_pause(opened: Opened) -> None:
-    opened.window.show_page(task_page())
+def test_closing_by_accident_is_a_pause(opened: Participant) -> None:
+    opened.show(task_page())
     assert not opened.window.close()
     assert opened.kinds == [PauseAsked]
     opened.window.may_close = True
     assert opened.window.close()
 
 
-def timed_out(window: ParticipantWindow, elapsed_s: float = 120.0) -> None:
-    window.show_page(task_page(explore()))
-    window.show_view(view(lit=None, elapsed_s=elapsed_s))
-    window.show_page(questionnaire())
-
-
 @pytest.mark.slow
-def test_time_is_up_is_told_before_the_questions(opened: Opened, qtbot: Any) -> None:
-    timed_out(opened.window)
-    assert opened.window.widget.accessibleName() == words("en").time_is_up
+def test_time_is_up_is_told_before_the_questions_unless_a_pause_comes(opened: Participant, qtbot: Any) -> None:
+    def timed_out(elapsed_s: float) -> None:
+        opened.window.show_page(task_page(explore()))
+        opened.window.show_view(view(lit=None, elapsed_s=elapsed_s))
+        opened.window.show_page(questionnaire())
+
+    timed_out(119.0)
+    assert opened.window.page == questionnaire(), "who goes on before the limit is asked at once"
+    opened.events.clear()
+    timed_out(120.0)
+    assert opened.page.accessibleName() == words("en").time_is_up
     assert opened.window.page is None
     assert opened.events == []
-    qtbot.waitUntil(lambda: isinstance(opened.window.widget, QuestionnaireWidget), timeout=5000)
-    assert opened.focus in opened.window.widget.fields
-
-
-def test_who_goes_on_before_the_limit_is_asked_at_once(opened: Opened) -> None:
-    timed_out(opened.window, 119.0)
-    assert isinstance(opened.window.widget, QuestionnaireWidget)
-
-
-@pytest.mark.slow
-def test_pause_while_time_is_up_is_told_stays(opened: Opened, qtbot: Any) -> None:
+    qtbot.waitUntil(lambda: opened.window.page == questionnaire(), timeout=5000)
+    assert opened.focus in opened.page.fields
     opened.window.time_up.setInterval(1)
-    timed_out(opened.window)
+    timed_out(120.0)
     opened.window.show_page(PausePage(force_off=False))
     qtbot.wait(50)
-    assert isinstance(opened.window.widget, PauseWidget)
+    assert opened.window.page == PausePage(force_off=False)
 
 
-def is_a_force_stop(event: Any) -> bool:
-    return isinstance(event, ForceStopped)
-
-
-@pytest.mark.parametrize("page", [text_page(), task_page(), questionnaire()], ids=lambda page: type(page).__name__)
-def test_short_escape_pauses(opened: Opened, page: Page) -> None:
-    opened.window.show_page(page)
-    QTest.keyClick(opened.focus, Qt.Key.Key_Escape)
-    assert [event for event in opened.events if not isinstance(event, ItemShown)] == [
-        PauseAsked(opened.events[-1].at_s, "participant")
-    ]
-
-
-@pytest.mark.slow
-def test_escape_held_stops_the_force_and_does_not_pause_as_well(opened: Opened, qtbot: Any) -> None:
-    opened.window.show_page(task_page())
-    with qtbot.waitSignal(opened.window.event, timeout=5 * HOLD_MS):
-        QTest.keyPress(opened.focus, Qt.Key.Key_Escape)
-    QTest.keyRelease(opened.focus, Qt.Key.Key_Escape)
-    assert opened.events == [ForceStopped(opened.events[0].at_s, "participant")]
-
-
-@pytest.mark.slow
-def test_escape_held_while_the_page_changes_stops_the_force_all_the_same(opened: Opened, qtbot: Any) -> None:
-    opened.window.show_page(task_page())
-    with qtbot.waitSignal(opened.window.event, timeout=5 * HOLD_MS, check_params_cb=is_a_force_stop):
-        QTest.keyPress(opened.focus, Qt.Key.Key_Escape)
-        opened.window.show_page(questionnaire())
-        opened.window.show_page(text_page())
-    QTest.keyRelease(opened.focus, Qt.Key.Key_Escape)
-    assert [kind for kind in opened.kinds if kind is not ItemShown] == [ForceStopped]
-
-
-def test_escape_held_while_the_window_is_left_stops_nothing(opened: Opened) -> None:
-    opened.window.show_page(task_page())
-    QTest.keyPress(opened.focus, Qt.Key.Key_Escape)
-    QApplication.sendEvent(opened.window, QEvent(QEvent.Type.WindowDeactivate))
-    QTest.keyRelease(opened.focus, Qt.Key.Key_Escape)
-    assert not opened.window.findChild(EscapeHold).findChild(QTimer).isActive()
-    assert opened.events == []
-
-
-def test_short_escape_on_a_pause_or_an_end_does_nothing(opened: Opened) -> None:
+def test_short_escape_pauses_a_page_but_no_pause_and_no_end(opened: Participant) -> None:
     for page in (PausePage(force_off=False), TroublePage("a", "b"), EndPage("a", "b")):
-        opened.window.show_page(page)
-        QTest.keyClick(opened.focus, Qt.Key.Key_Escape)
+        opened.show(page)
+        opened.press(KEY.Key_Escape)
+    assert opened.events == []
+    for page in (text_page(), task_page(), questionnaire()):
+        opened.show(page)
+        opened.press(KEY.Key_Escape)
+        assert opened.told == [PauseAsked(opened.told[0].at_s, "participant")]
+        opened.events.clear()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("follows", [(), (questionnaire(), text_page())], ids=["stays", "changes"])
+def test_escape_held_stops_the_force_and_does_not_pause_as_well_though_the_page_changes(
+    opened: Participant, qtbot: Any, follows: tuple[Page, ...]
+) -> None:
+    opened.show(task_page())
+
+    def stopped(event: Any) -> bool:
+        return isinstance(event, ForceStopped)
+
+    with qtbot.waitSignal(opened.window.event, timeout=5 * HOLD_MS, check_params_cb=stopped):
+        QTest.keyPress(opened.focus, KEY.Key_Escape)
+        for page in follows:
+            opened.window.show_page(page)
+    QTest.keyRelease(opened.focus, KEY.Key_Escape)
+    assert opened.told == [ForceStopped(opened.told[0].at_s, "participant")]
+
+
+def test_escape_held_while_the_window_is_left_stops_nothing(opened: Participant) -> None:
+    opened.show(task_page())
+    QTest.keyPress(opened.focus, KEY.Key_Escape)
+    QApplication.sendEvent(opened.window, QEvent(QEvent.Type.WindowDeactivate))
+    QTest.keyRelease(opened.focus, KEY.Key_Escape)
+    assert not opened.window.findChild(EscapeHold).findChild(QTimer).isActive()
     assert opened.events == []

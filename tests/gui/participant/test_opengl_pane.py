@@ -13,7 +13,7 @@ from tests.end_to_end.real_windows import needs_display, virtual_display
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).resolve().parents[4]
+ROOT = Path(__file__).resolve().parents[3]
 FRAMES = 30
 
 # Shows the same views in a window with and one without the surface, and prints what came of it.
@@ -27,7 +27,7 @@ from study_app.gui.display.opengl import has_card, renderer
 from study_app.gui.participant.tank_widget import TankWidget
 from study_app.protocol.wording.languages import words
 from tests.gui.small import task_page, view
-from tests.gui.participant.tank.painted import pixels
+from tests.gui.drawn import pixels
 
 sys.excepthook = lambda *error: (sys.__excepthook__(*error), os._exit(1))
 app = QApplication([])

@@ -1,31 +1,30 @@
 """Contrast, sizes and places of what the participant reads and hits, taken from the real widgets."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QRect, QRectF, Qt
+from PySide6.QtCore import QPoint, QRect, QRectF
 from PySide6.QtGui import QFontMetricsF, QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel
 
-from study_app.gui.participant.forms.option_button import RadioOption
-from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
-from study_app.gui.participant.pages.statement_field import StatementField
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.theme.theme import font
 from study_app.protocol.wording.languages import Words, words
 from study_app.session.pages import EndPage, Page, PausePage, Progress, QuestionnairePage, TroublePage
 from tests.gui.drawn import Drawn, drawn_by
-from tests.gui.small import STATEMENTS, ManualClock, explore, questionnaire, task_page, text_page, view
+from tests.gui.participant.driver import Participant
+from tests.gui.small import explore, questionnaire, task_page, text_page, view
 
 pytestmark = pytest.mark.slow
 
-SIZES = [(1366, 768), (1920, 1080), (3840, 2160)]
+Opening = Callable[..., Participant]
+SIZES = [(1366, 768), (1920, 1080)]
 SCALES = [1.0, 1.25, 1.5, 1.75, 2.0]
 PARAGRAPHS = ("In this study you move a small ball through simulated liquids and feel them push.", "No name is kept.")
 
@@ -46,41 +45,17 @@ def pages() -> dict[str, Page]:
     }
 
 
-@pytest.fixture
-def open_window(qtbot: Any) -> Iterator[Callable[..., ParticipantWindow]]:
-    made: list[ParticipantWindow] = []
-
-    def show(size: tuple[int, int], said: Words | None = None, text_scale: float = 1.0) -> ParticipantWindow:
-        window = ParticipantWindow(said or words("en"), clock=ManualClock(), windowed=True, text_scale=text_scale)
-        qtbot.addWidget(window)
-        window.resize(*size)
-        window.show()
-        window.activateWindow()
-        qtbot.waitExposed(window)
-        made.append(window)
-        return window
-
-    yield show
-    for window in made:
-        QTest.mouseMove(window, QPoint(1, 1))  # or the next test's page comes with the mouse on a cell
-        window.may_close = True
-        window.close()
-
-
-def show(window: ParticipantWindow, page: Page) -> None:
+def show(seen: Participant, page: Page) -> None:
     """Show a page with everything on it that can be: ball and ring, what is missing, what is pointed at."""
-    window.show_page(page)
-    QApplication.processEvents()
+    window = seen.window
+    seen.show(page)
     if window.tank is not None:
         lit = 1 if page == pages()["reach"] else None
         window.show_view(view((0.02, 0.0, 0.0), lit=lit, dwell=0.6, elapsed_s=3.0))
-    if isinstance(window.widget, QuestionnaireWidget):
-        window.widget.submit()
-        QTest.mouseMove([row for row in window.widget.fields if row.isVisible()][-1].options[2])
+    if isinstance(page, QuestionnairePage):
+        seen.page.submit()
+        QTest.mouseMove([row for row in seen.page.fields if row.isVisible()][-1].options[2])
     QApplication.processEvents()
-
-
-# contrast
 
 
 def luminances(image: QImage) -> np.ndarray:
@@ -105,49 +80,40 @@ def contrast(light: np.ndarray, place: QRect) -> float:
 @pytest.mark.variants(9)
 @pytest.mark.parametrize("name", pages())
 @pytest.mark.parametrize("size", SIZES, ids=str)
-def test_every_word_stands_out_from_its_ground(
-    open_window: Callable[..., ParticipantWindow], size: tuple[int, int], name: str
-) -> None:
-    window = open_window(size)
-    show(window, pages()[name])
-    found = drawn_by(window)
-    light = luminances(window.grab().toImage())
+def test_every_word_stands_out_from_its_ground(opening: Opening, size: tuple[int, int], name: str) -> None:
+    seen = opening(size=size)
+    show(seen, pages()[name])
+    found = drawn_by(seen.window)
+    light = luminances(seen.window.grab().toImage())
     assert len(found) >= 2
     weak = {one.text: contrast(light, one.ink.toAlignedRect()) for one in found}
     assert {text: ratio for text, ratio in weak.items() if ratio < 4.5} == {}
 
 
 @pytest.mark.parametrize("size", SIZES, ids=str)
-def test_edges_of_cells_and_the_ring_of_the_keyboard_stand_out(
-    open_window: Callable[..., ParticipantWindow], size: tuple[int, int]
-) -> None:
-    window = open_window(size)
-    show(window, pages()["answers"])
+def test_edges_of_cells_and_the_ring_of_the_keyboard_stand_out(opening: Opening, size: tuple[int, int]) -> None:
+    seen = opening(size=size)
+    show(seen, pages()["answers"])
+    window = seen.window
     light = luminances(window.grab().toImage())
-    for cell in window.findChildren(RadioOption):
+    for cell in (cell for row in seen.page.fields for cell in row.options):
         if cell.accessibleName() == "Cannot judge" and not cell.isChecked():
             continue  # its dashes are tested with the words beside them: the column has a name and a dash
         middle = cell.mapTo(window, cell.rect().center())
         left = cell.mapTo(window, QPoint(0, 0)).x()
         assert contrast(light, QRect(left - 4, middle.y(), 12, 1)) >= 3.0, cell.accessibleName()
-    row = next(row for row in window.findChildren(StatementField) if row.hasFocus())
+    row = next(row for row in seen.page.fields if row.hasFocus())
     top = row.mapTo(window, QPoint(row.width() // 2, 0))
     assert contrast(light, QRect(top.x(), top.y() - 3, 1, 8)) >= 3.0
-
-
-# sizes
 
 
 @pytest.mark.variants(15)
 @pytest.mark.parametrize("name", pages())
 @pytest.mark.parametrize("size", [*SIZES, (1024, 640), (880, 640)], ids=str)
-def test_whatever_can_be_hit_is_44_px_high_and_wide(
-    open_window: Callable[..., ParticipantWindow], size: tuple[int, int], name: str
-) -> None:
-    window = open_window((1024, 640))
-    window.setMinimumSize(1, 1)
-    window.resize(*size)
-    show(window, pages()[name])
+def test_whatever_can_be_hit_is_44_px_high_and_wide(opening: Opening, size: tuple[int, int], name: str) -> None:
+    seen = opening(size=size)
+    show(seen, pages()[name])
+    window = seen.window
     targets = [button for button in window.findChildren(QAbstractButton) if button.isVisible()]
     for target in targets:
         ring = 8 if type(target).__name__ in {"GoButton", "LanguageButton"} else 0
@@ -159,18 +125,15 @@ def test_whatever_can_be_hit_is_44_px_high_and_wide(
         assert not here.intersects(there)
 
 
-def test_words_are_as_large_as_they_must_be_read(open_window: Callable[..., ParticipantWindow]) -> None:
-    window = open_window((1366, 768), text_scale=1.6)
+def test_words_are_as_large_as_they_must_be_read(opening: Opening) -> None:
+    seen = opening(size=(1366, 768), text_scale=1.6)
     for page in pages().values():
-        show(window, page)
+        show(seen, page)
         least = 0.8 * QFontMetricsF(font("label", scale=1.6)).height()  # the smallest words that carry something
-        for one in drawn_by(window):
+        for one in drawn_by(seen.window):
             small = one.text in {"Esc", "Enter", "Space", "1–7", "↑ ↓"} or one.text.startswith("Please answer")
             if not small and not isinstance(one.widget, QLabel):
                 assert one.ink.height() >= least, one.text
-
-
-# places
 
 
 def longer(text: str, share: float = 0.35) -> str:
@@ -234,7 +197,7 @@ ROOMS = [*(((1366, 768), text_scale) for text_scale in SCALES), ((1920, 1080), 1
 @pytest.mark.parametrize(("size", "text_scale"), [*ROOMS, ((1024, 640), 1.0), ((1024, 640), 2.0)], ids=str)
 @pytest.mark.parametrize("said", ["en", "longer", "ar"])
 def test_no_word_is_cut_or_runs_into_another(
-    open_window: Callable[..., ParticipantWindow], size: tuple[int, int], text_scale: float, name: str, said: str
+    opening: Opening, size: tuple[int, int], text_scale: float, name: str, said: str
 ) -> None:
     page = pages()[name]
     if isinstance(page, QuestionnairePage) and said == "longer":
@@ -244,54 +207,15 @@ def test_no_word_is_cut_or_runs_into_another(
         page = replace(page, items=items, labels=ARABIC_LABELS, cannot_judge="لا أستطيع الحكم", intro=ARABIC)
     if name == "break":
         page = replace(page, language="ar" if said == "ar" else "en")  # type: ignore[type-var]
-    window = open_window(size, in_longer_words() if said == "longer" else words(said), text_scale)
-    show(window, page)
-    assert misplaced(window, drawn_by(window)) == []
+    seen = opening(None, size, in_longer_words() if said == "longer" else said, text_scale)
+    show(seen, page)
+    assert misplaced(seen.window, drawn_by(seen.window)) == []
 
 
-def test_nine_statements_stand_on_one_page_as_long_as_their_words_can_be_read(
-    open_window: Callable[..., ParticipantWindow],
-) -> None:
+def test_nine_statements_stand_on_one_page_as_long_as_their_words_can_be_read(opening: Opening) -> None:
     shown = []
     for text_scale in SCALES:
-        window = open_window((1366, 768), text_scale=text_scale)
-        show(window, questionnaire())
-        assert isinstance(window.widget, QuestionnaireWidget)
-        shown.append(sum(row.isVisible() for row in window.widget.fields))
+        seen = opening(questionnaire(), (1366, 768), text_scale=text_scale)
+        shown.append(sum(row.isVisible() for row in seen.page.fields))
     assert shown[:3] == [9, 9, 9]
     assert all(one >= other for one, other in pairwise(shown))
-
-
-# right to left
-
-
-def test_all_is_mirrored_but_the_order_of_the_scale(open_window: Callable[..., ParticipantWindow]) -> None:
-    here, there = open_window((1366, 768)), open_window((1366, 768), words("ar"))
-    page = questionnaire(cannot_judge="Cannot judge")
-    for window in (here, there):
-        show(window, page)
-    assert isinstance(here.widget, QuestionnaireWidget)
-    assert isinstance(there.widget, QuestionnaireWidget)
-    row, mirror = here.widget.fields[0], there.widget.fields[0]
-    width = row.width()
-    assert mirror.geometry() == row.geometry()
-    here_at, there_at = ([left for left, _ in one.columns] for one in (row, mirror))
-    assert there_at[:7] == sorted(there_at[:7])
-    assert there_at[7] < there_at[0]
-    assert there_at[0] == pytest.approx(width - here_at[6] - row.columns[6][1], abs=2)
-    assert there.widget.button.geometry().left() < 60 < here.widget.button.geometry().left()
-    told = {one.text: one for one in drawn_by(there)}
-    assert told[STATEMENTS[0]].ink.right() > mirror.options[6].mapTo(there, QPoint(0, 0)).x() + 120
-
-
-def test_right_and_left_keys_go_along_the_scale_in_every_language(
-    open_window: Callable[..., ParticipantWindow],
-) -> None:
-    window = open_window((1366, 768), words("ar"))
-    window.show_page(questionnaire())
-    assert isinstance(window.widget, QuestionnaireWidget)
-    row = window.widget.fields[0]
-    QTest.keyClick(row, Qt.Key.Key_Right)
-    QTest.keyClick(row, Qt.Key.Key_Right)
-    QTest.keyClick(row, Qt.Key.Key_Space)
-    assert row.value == 2

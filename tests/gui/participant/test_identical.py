@@ -1,7 +1,7 @@
 """What is felt, and how late it is seen, can be told from no picture: the same motion looks the same in every trial."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
@@ -13,12 +13,12 @@ from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
-from study_app.protocol.wording.languages import words
 from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
 from study_app.session.ports import Ports
 from study_app.session.runner import Runner
 from study_app.session.transitions.events import Begin, Chosen, Continue, Submitted, TaskDone
 from study_app.session.trial import SETTLED_S
+from tests.gui.participant.driver import Participant
 from tests.gui.small import ManualClock
 from tests.session.fakes import FakeJournal, FakeServo
 
@@ -95,25 +95,14 @@ class Held:
         return seen
 
 
-@pytest.fixture
-def window(qtbot: Any) -> Iterator[ParticipantWindow]:
-    made = ParticipantWindow(words("en"), clock=ManualClock(), windowed=True)
-    qtbot.addWidget(made)
-    made.resize(1024, 640)
-    made.show()
-    qtbot.waitExposed(made)
-    yield made
-    made.may_close = True
-    made.close()
-
-
 @pytest.mark.parametrize(
     ("block", "conditions"),
     [("liquids", ("water", "honey", "light_oil")), ("delays", ("delay_0", "delay_75", "delay_200"))],
 )
 def test_the_same_motion_makes_the_same_pixels_in_every_condition(
-    window: ParticipantWindow, protocol: Protocol, block: str, conditions: tuple[str, ...]
+    opening: Callable[..., Participant], protocol: Protocol, block: str, conditions: tuple[str, ...]
 ) -> None:
+    window = opening(size=(1024, 640)).window
     found: list[tuple[Page | None, list[QImage]]] = []
     for condition in conditions:
         held = Held(protocol, block, condition)

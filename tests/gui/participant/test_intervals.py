@@ -1,0 +1,317 @@
+"""The pages of a design's one question, feedback, and the controls where a level is set."""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import combinations, pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QEvent, QPoint, QPointF, QRect, Qt
+from PySide6.QtGui import QImage, QKeyEvent, QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QLineEdit, QWidget
+
+from study_app.gui.participant.intervals.setting_controls import STEP_MS
+from study_app.gui.participant.pointer_capture import PointerCapture
+from study_app.protocol.questions.choice import ChoiceView
+from study_app.protocol.questions.number import NumberView
+from study_app.protocol.trials.task import lasting
+from study_app.protocol.wording.languages import LANGUAGES, words
+from study_app.session.pages import ChoicePage, FeedbackPage, Interval, NumberPage, Progress, TaskPage
+from study_app.session.transitions.events import Continue, ItemShown, PauseAsked, Stepped, Submitted
+from tests.gui.participant.driver import KEY, Participant
+from tests.gui.small import follow, task_page, view
+
+Opening = Callable[..., Participant]
+FULL, SMALL = (1366, 768), (1024, 640)
+ORDINALS = ("first", "second", "third", "fourth")
+SOME = Progress(1, 1, "Pair 57", 57, 220, at_most=True)
+QUESTION = "Adjust the second one until both are equally strong."
+NONE = Qt.KeyboardModifier.NoModifier
+
+
+def choice(count: int = 2, language: str = "en") -> ChoicePage:
+    said = words(language)
+    options = tuple((name, said.design_answers[name]) for name in ORDINALS[:count])
+    return ChoicePage(1, ChoiceView("choice", 1, said.design_questions["forced_choice"], True, options=options), SOME)
+
+
+def number(language: str = "en") -> NumberPage:
+    said = words(language)
+    text = f"{said.modulus.format(number=10)} {said.design_questions['estimation']}"
+    return NumberPage(1, NumberView("strength", 1, text, True, least=1e-9), SOME)
+
+
+def values(seen: Participant) -> list[Any]:
+    return [value for _, value in seen.answers]
+
+
+@pytest.mark.parametrize("size", [SMALL, FULL])
+def test_buttons_are_large_apart_in_order_named_and_none_is_preselected(
+    opening: Opening, size: tuple[int, int]
+) -> None:
+    seen = opening(choice(4), size)
+    assert [type(event) for event in seen.events] == [ItemShown]
+    buttons = [seen.find(name) for name in ("First", "Second", "Third", "Fourth")]
+    for button in buttons:
+        assert not button.hasFocus()
+        assert button.width() >= 160
+        assert button.height() >= 96
+        assert button.font().pixelSize() >= 22
+        assert (button.accessibleName(), button.accessibleDescription()) == (button.text(), "Which one was stronger?")
+    gaps = [b.x() - a.geometry().right() - 1 for a, b in pairwise(buttons)]
+    assert min(gaps) >= 24
+    assert buttons[-1].geometry().right() < size[0]
+
+
+@pytest.mark.parametrize(
+    ("key", "language", "value"),
+    [
+        (KEY.Key_1, "en", "first"),
+        (KEY.Key_2, "en", "second"),
+        (KEY.Key_Left, "en", "first"),
+        (KEY.Key_Right, "en", "second"),
+        (KEY.Key_1, "ar", "first"),
+        (KEY.Key_Right, "ar", "first"),
+        (KEY.Key_Left, "ar", "second"),
+    ],
+)
+def test_one_key_answers_and_continues_once(opening: Opening, key: KEY, language: str, value: str) -> None:
+    seen = opening(choice(language=language), FULL, language)
+    first, second = (seen.find(words(language).design_answers[name]) for name in ORDINALS[:2])
+    assert (first.x() > second.x()) == (language == "ar")
+    held = QKeyEvent(QEvent.Type.KeyPress, KEY.Key_2, NONE, "2", True)
+    QApplication.sendEvent(seen.page, held)
+    assert values(seen) == [], "a key that is held from the page before"
+    seen.press(key, KEY.Key_2)
+    assert values(seen) == [value]
+    assert seen.kinds.count(Submitted) == 1
+
+
+def test_a_click_answers_and_of_four_the_arrows_and_enter(opening: Opening) -> None:
+    seen = opening(choice(), FULL)
+    seen.click("Second", place=QPoint(5, 5))
+    assert values(seen) == ["second"]
+    seen = opening(choice(4), FULL)
+    seen.press(KEY.Key_Right, KEY.Key_Right)
+    assert values(seen) == []
+    seen.press(KEY.Key_Return)
+    assert values(seen) == ["second"]
+
+
+@pytest.mark.parametrize(("typed", "value"), [("12", 12), ("2.5", 2.5), ("2,5", 2.5), ("1e3", 1000)])
+def test_a_number_above_0_is_taken_with_point_or_comma(opening: Opening, typed: str, value: float) -> None:
+    seen = opening(number(), FULL)
+    seen.type(typed)
+    seen.press(KEY.Key_Return)
+    assert values(seen) == [value]
+
+
+@pytest.mark.parametrize("typed", ["", "0", "-3", "many", "nan", "inf", "1e400"])
+def test_what_is_no_number_above_0_is_reported_and_not_accepted(opening: Opening, typed: str) -> None:
+    seen = opening(number(), FULL)
+    seen.type(typed)
+    seen.press(KEY.Key_Return)
+    assert values(seen) == []
+    assert "Enter a number above 0." in seen.texts
+    seen.type("4")
+    assert "Enter a number above 0." not in seen.texts
+
+
+def test_digits_on_the_screen_write_a_number_and_keep_their_order_from_right_to_left(opening: Opening) -> None:
+    seen = opening(number(), FULL)
+    for text in ("4", "2", "⌫", ".", "5", seen.page.button.text()):
+        seen.click(text)
+    assert values(seen) == [4.5]
+    seen = opening(number("ar"), FULL, "ar")
+    row = [seen.find(digit).x() for digit in "123456"]
+    assert row == sorted(row)
+
+
+@pytest.mark.parametrize("right", [True, False])
+def test_feedback_says_in_words_whether_the_answer_was_correct(opening: Opening, right: bool) -> None:
+    for language, said in LANGUAGES.items():
+        seen = opening(FeedbackPage(right), FULL, language)
+        assert seen.page.accessibleName() == (said.right if right else said.not_right)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize(("size", "text_scale"), [(SMALL, 1.0), (SMALL, 2.0), ((1366, 716), 2.0)])
+def test_everything_fits_apart_and_can_be_hit(
+    opening: Opening, language: str, size: tuple[int, int], text_scale: float
+) -> None:
+    seen = opening(None, size, language, text_scale)
+    for asked in (choice(4, language), number(language), FeedbackPage(False)):
+        seen.show(asked)
+        if isinstance(asked, NumberPage):
+            seen.press(KEY.Key_Return)  # what is wrong is reported
+        parts = [one for one in seen.page.findChildren(QWidget) if one.isVisible() and not one.findChildren(QWidget)]
+        places = [QRect(one.mapTo(seen.page, QPoint(0, 0)), one.size()) for one in parts]
+        for one, place in zip(parts, places, strict=True):
+            assert seen.page.rect().contains(place), one
+            if isinstance(one, QLabel) and one.wordWrap():
+                assert one.height() >= one.heightForWidth(one.width()) - 1, one.text()
+            elif isinstance(one, QLabel):
+                assert one.width() >= one.sizeHint().width(), one.text()
+            if isinstance(one, QAbstractButton | QLineEdit):
+                assert min(place.width(), place.height()) >= 44
+        for one, other in combinations(places, 2):
+            assert not one.intersects(other)
+
+
+@pytest.mark.parametrize("asked", [choice(), number(), FeedbackPage(True)])
+def test_escape_pauses(opened: Participant, asked: Any) -> None:
+    opened.show(asked)
+    opened.press(KEY.Key_Escape)
+    assert [event.by for event in opened.told if isinstance(event, PauseAsked)] == ["participant"]
+
+
+def interval(*, adjusts: bool = False, language: str = "en", resting: bool = False) -> TaskPage:
+    at = 2 if adjusts or resting else 1
+    announced = "Next: the second" if resting else ("First of 2", "Second of 2")[at - 1]
+    task = lasting(follow(), 60.0) if adjusts else follow()
+    question = words(language).design_questions["adjustment"]
+    return replace(task_page(task, question=question, interval=Interval(at, 2, resting, announced)), adjusts=adjusts)
+
+
+def setting(seen: Participant, language: str = "en") -> Any:
+    """Show the standard, the rest and the interval that is set, as a session does; return the controls."""
+    for page in (interval(language=language), interval(resting=True), interval(adjusts=True, language=language)):
+        seen.window.show_page(page)
+        QApplication.processEvents()
+    return seen.page.controls
+
+
+def steps(seen: Participant) -> list[int]:
+    return [event.steps for event in seen.events if isinstance(event, Stepped)]
+
+
+@pytest.mark.slow
+def test_controls_are_shown_where_a_level_is_set_and_tell_neither_number_nor_end(opened: Participant) -> None:
+    for page in (interval(), interval(resting=True)):
+        opened.show(page)
+        assert opened.page.controls.isHidden()
+    opened.show(interval(adjusts=True))
+    controls = opened.page.controls
+    assert not controls.isHidden()
+    assert opened.page.accessibleName() == f"Second of 2. {QUESTION}"
+    before = [one.text() for one in controls.findChildren(QAbstractButton)]
+    opened.press(*[KEY.Key_Right] * 60)
+    assert [one.text() for one in controls.findChildren(QAbstractButton)] == before
+    assert all(one.isEnabled() for one in controls.findChildren(QAbstractButton))
+    assert not controls.findChildren(QLabel)
+    said = [one.accessibleName() + one.accessibleDescription() for one in controls.findChildren(QWidget)]
+    assert not any(character.isdigit() for text in (*said, *before) for character in text)
+    opened.show(task_page())
+    assert opened.page.controls is None
+
+
+def test_arrows_step_at_once_and_enter_confirms(opened: Participant) -> None:
+    setting(opened)
+    opened.press(*[KEY.Key_Right] * 3, KEY.Key_Left)
+    assert steps(opened) == [1, 1, 1, -1]
+    opened.press(KEY.Key_Return)
+    assert opened.kinds[-1] is Submitted
+    opened.press(KEY.Key_Space)
+    assert Continue not in opened.kinds
+
+
+def test_a_key_that_is_held_steps_eight_times_a_second_and_stops_with_it(opened: Participant, qtbot: Any) -> None:
+    setting(opened)
+    QTest.keyPress(opened.window, KEY.Key_Right)
+    for _ in range(20):  # the system's own repetition, 30 a second or another rate
+        QApplication.sendEvent(opened.window, QKeyEvent(QEvent.Type.KeyPress, KEY.Key_Right, NONE, "", True))
+    assert steps(opened) == [1]
+    began_s = time.monotonic()
+    qtbot.waitUntil(lambda: len(steps(opened)) >= 5)
+    assert time.monotonic() - began_s >= 0.95 * 4 * 0.125
+    QTest.keyPress(opened.window, KEY.Key_Left)
+    QTest.keyRelease(opened.window, KEY.Key_Right)
+    right = len(steps(opened))
+    qtbot.waitUntil(lambda: len(steps(opened)) >= right + 2)
+    QTest.keyRelease(opened.window, KEY.Key_Left)
+    held = len(steps(opened))
+    qtbot.wait(3 * STEP_MS)
+    assert len(steps(opened)) == held
+    assert set(steps(opened)[: right - 1]) == {1}
+    assert set(steps(opened)[right:]) == {-1}, "letting go of one arrow keeps the other"
+
+
+def test_nothing_steps_in_the_rest_that_follows(opened: Participant, qtbot: Any) -> None:
+    setting(opened)
+    QTest.keyPress(opened.window, KEY.Key_Right)
+    opened.window.show_page(interval(resting=True))
+    before = len(steps(opened))
+    qtbot.wait(3 * STEP_MS)
+    QTest.keyClick(opened.window, KEY.Key_Left)
+    QTest.keyClick(opened.window, KEY.Key_Return)
+    QApplication.sendEvent(opened.window, wheel(opened.page, 120))
+    assert len(steps(opened)) == before
+    assert Submitted not in opened.kinds
+
+
+def wheel(widget: QWidget, eighths: int) -> QWheelEvent:
+    place = QPointF(widget.rect().center())
+    turn, none = QPoint(0, eighths), Qt.MouseButton.NoButton
+    return QWheelEvent(
+        place, widget.mapToGlobal(place), QPoint(), turn, none, NONE, Qt.ScrollPhase.NoScrollPhase, False
+    )
+
+
+def test_the_wheel_steps_by_notches_forwards_more(opened: Participant) -> None:
+    setting(opened)
+    unheard = wheel(opened.page, 120)
+    QApplication.sendEvent(opened.page, unheard)
+    assert not unheard.isAccepted()  # Qt gives it to the window
+    for turned in (120, -240, *[30] * 4):  # a touchpad's turns are smaller
+        QApplication.sendEvent(opened.window, wheel(opened.page, turned))
+    assert steps(opened) == [1, -2, 1]
+
+
+def test_the_mouse_presses_and_holds_the_buttons(opened: Participant, qtbot: Any) -> None:
+    controls = setting(opened)
+    opened.click(controls.less)
+    opened.click(controls.more)
+    assert steps(opened) == [-1, 1]
+    qtbot.mousePress(controls.more, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: len(steps(opened)) >= 4)
+    qtbot.mouseRelease(controls.more, Qt.MouseButton.LeftButton)
+    assert set(steps(opened)[1:]) == {1}
+    opened.click(controls.done)
+    assert opened.kinds[-1] is Submitted
+    assert opened.window.hasFocus()
+    QTest.keyClick(opened.window, KEY.Key_Escape)
+    qtbot.waitUntil(lambda: PauseAsked in opened.kinds)
+
+
+def test_where_the_mouse_is_the_device_keys_are_named_and_no_button_is_shown(captured: Participant) -> None:
+    controls = setting(captured)
+    captured.window.show_view(view(lit=0, target_m=(0.0, 0.0, 0.0)))
+    assert controls.isHidden()
+    assert captured.page.things["hint"].state == "← Less · More → · Enter: Done"
+    QTest.keyClick(captured.window, KEY.Key_Left)
+    assert steps(captured) == [-1]
+    captured.window.findChild(PointerCapture).pressed.emit(1)
+    assert captured.buttons == [1]  # the session hears it as the device's first button
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize(("size", "text_scale"), [(SMALL, 1.0), (FULL, 2.0)])
+def test_buttons_are_within_the_window_large_enough_and_cover_no_word(
+    opening: Opening, language: str, size: tuple[int, int], text_scale: float
+) -> None:
+    seen = opening(None, size, language, text_scale)
+    controls = setting(seen, language)
+    seen.window.show_view(view(lit=0, target_m=(0.0, 0.0, 0.0)))
+    seen.settle()
+    assert seen.page.rect().contains(controls.geometry())
+    buttons = (controls.less, controls.more, controls.done)
+    assert min(min(button.height(), button.width()) for button in buttons) >= 44
+    assert controls.less.x() < controls.more.x() < controls.done.x()
+    covered = controls.geometry()
+    controls.move(-covered.width(), 0)
+    below = seen.page.grab(covered).toImage().convertToFormat(QImage.Format.Format_Grayscale8)
+    greys = np.frombuffer(below.constBits(), np.uint8).reshape(below.height(), -1)[:, : below.width()]
+    assert int(greys.max()) - int(greys.min()) < 40, "a word is below the controls"

@@ -1,0 +1,385 @@
+"""Every kind of question: shown without an answer, answered in every way, asked for, brought back, legible."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QPoint
+from PySide6.QtGui import QPointingDevice
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QLineEdit, QPlainTextEdit, QSlider, QWidget
+
+from study_app.gui.participant.forms.fields import FIELDS
+from study_app.protocol.load import load
+from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
+from study_app.protocol.questions.choice import ChoiceView
+from study_app.protocol.questions.number import NumberView
+from study_app.protocol.questions.question import ItemView
+from study_app.protocol.questions.rating import RatingView
+from study_app.protocol.questions.slider import SliderView
+from study_app.session.pages import QuestionnairePage
+from study_app.session.transitions.commands import ShowPage, Write
+from study_app.session.transitions.events import Begin, Chosen, ItemShown, PauseAsked, Retracted, Submitted, TaskDone
+from study_app.session.transitions.state import Phase
+from study_app.session.transitions.table import advance, open_session
+from tests.gui.participant.driver import KEY, Participant, description_of, tap, told_of
+from tests.gui.small import FIVE, QUESTIONS, form, questionnaire
+from tests.protocol.forms.mixed import mixed_file
+
+pytestmark = pytest.mark.slow
+
+Opening = Callable[..., Participant]
+FULL = (1366, 768)
+LEAST_TARGET = 44
+
+
+def alone(index: int) -> QuestionnairePage:
+    """Return a form of one of the questions, which needs an answer."""
+    return form(replace(QUESTIONS[index], number=1, required=True))  # type: ignore[call-arg]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A page with one question of a kind and two ways to answer it: by keys, and by what is pressed."""
+
+    page: QuestionnairePage
+    keys: tuple[KEY | str, ...]
+    value: Any
+    pressed: tuple[str, ...] = ()
+    then: Any = None
+    shown: str = ""
+
+    @property
+    def item(self) -> ItemView:
+        return self.page.items[0]
+
+
+STATEMENT = questionnaire(items=(ItemView("flows", 1, "It flows.", True),), cannot_judge="Cannot judge")
+KINDS = {
+    "statement": Kind(STATEMENT, (KEY.Key_6,), 6, ("3 Somewhat disagree",), 3),
+    "rating": Kind(alone(4), (KEY.Key_3,), 3, ("4 Rather",), 4),
+    "cannot judge": Kind(alone(4), (*[KEY.Key_Right] * 6, KEY.Key_Space), None, ("Cannot judge",), None),
+    "choice": Kind(alone(1), (KEY.Key_2,), "right", ("Left",), "left"),
+    "several": Kind(alone(3), (KEY.Key_1, KEY.Key_3), ("mouse", "other"), ("A haptic device",), ("falcon",)),
+    "number": Kind(alone(0), ("42", KEY.Key_Return), 42, ("4", "⌫", "7", "5"), 75, "42"),
+    "decimals": Kind(form(NumberView("size", 1, "Large?", True)), ("1,5", KEY.Key_Return), 1.5, (), None, "1.5"),
+    "below 0": Kind(form(NumberView("size", 1, "Warm?", True)), ("-0.25", KEY.Key_Return), -0.25, (), None, "−0.25"),
+    "slider": Kind(alone(5), (KEY.Key_End, KEY.Key_PageDown, KEY.Key_Left), 45),
+    "text": Kind(alone(6), ("Fine.", KEY.Key_Return), "Fine.", (), None, "Fine."),
+}
+ALL = pytest.mark.parametrize("name", KINDS)
+
+
+def give(seen: Participant, keys: tuple[KEY | str, ...]) -> None:
+    for key in keys:
+        if isinstance(key, str):
+            seen.type(key)
+        else:
+            seen.press(key)
+
+
+def entries(seen: Participant) -> list[str]:
+    """Return what is written in the fields of the page."""
+    lines = [one.text() for one in seen.page.findChildren(QLineEdit)]
+    return lines + [one.toPlainText() for one in seen.page.findChildren(QPlainTextEdit)]
+
+
+def test_every_widget_of_a_question_is_tested() -> None:
+    assert {kind.item.widget for kind in KINDS.values()} | {"statement"} >= set(FIELDS)
+
+
+@ALL
+def test_nothing_is_preset_and_keys_alone_answer_and_submit_once(opening: Opening, name: str) -> None:
+    kind = KINDS[name]
+    seen = opening(kind.page, FULL)
+    assert [type(event) for event in seen.events] == [ItemShown]
+    assert (seen.events[0].item, seen.page.missing) == (kind.item.id, (1,))
+    assert seen.question(1).accessibleName() == f"1. {kind.item.text}"
+    assert description_of(seen.question(1)).endswith("no answer yet")
+    give(seen, kind.keys)
+    assert seen.answers[-1] == (kind.item.id, kind.value)
+    assert "no answer yet" not in description_of(seen.question(1))
+    for _ in range(3):
+        seen.press(KEY.Key_Return)
+    assert seen.kinds.count(Submitted) == 1
+    assert seen.kinds[-1] is Submitted
+    assert sum(isinstance(event, ItemShown) for event in seen.events) == 1
+
+
+@pytest.mark.parametrize("way", ["mouse", "touch", "screen reader"])
+@pytest.mark.parametrize("name", [name for name, kind in KINDS.items() if kind.pressed])
+def test_a_question_is_answered_by_one_hand_or_a_screen_reader(
+    opening: Opening, finger: QPointingDevice, qtbot: Any, name: str, way: str
+) -> None:
+    kind = KINDS[name]
+    seen = opening(kind.page, FULL)
+
+    def use(target: str) -> None:
+        if way == "mouse":
+            seen.click(target)
+        elif way == "touch":
+            tap(finger, seen.find(target))
+        else:
+            action = told_of(seen.find(target)).actionInterface()
+            action.doAction(action.actionNames()[0])
+            qtbot.waitUntil(lambda: not seen.find(target).isDown())
+
+    for target in (*kind.pressed, seen.page.button.text()):
+        use(target)
+    assert seen.answers == [(kind.item.id, kind.then)]
+    assert seen.kinds[-1] is Submitted
+
+
+@pytest.mark.parametrize("way", ["mouse", "touch", "screen reader"])
+def test_the_end_of_a_line_is_its_greatest_number(opening: Opening, finger: QPointingDevice, way: str) -> None:
+    seen = opening(KINDS["slider"].page, FULL)
+    line = seen.page.findChild(QSlider)
+    end = QPoint(line.width() - 2, line.height() // 2)
+    QTest.wheelEvent(seen.window.windowHandle(), line.mapTo(seen.window, line.rect().center()), QPoint(0, 120))
+    assert seen.answers == [], "the wheel changes no answer"
+    if way == "mouse":
+        seen.click(line, place=end)
+    elif way == "touch":
+        tap(finger, line, end)
+    else:
+        told_of(line).valueInterface().setCurrentValue(line.maximum())
+    assert seen.answers == [("pleasant", 100)]
+    assert "chosen: 100" in line.accessibleDescription()
+
+
+@ALL
+def test_an_answer_comes_back_after_a_pause_and_is_not_told_again(opening: Opening, name: str) -> None:
+    kind = KINDS[name]
+    given = opening(kind.page, FULL)
+    give(given, kind.keys)
+    seen = opening(replace(kind.page, chosen=((kind.item.id, kind.value),)), FULL)
+    assert seen.told == []
+    assert seen.page.missing == ()
+    for one in (given, seen):
+        one.page.button.setFocus()
+        one.settle()
+    assert description_of(seen.question(1)) == description_of(given.question(1))
+    if kind.shown:
+        assert kind.shown in entries(seen)
+    else:
+        assert seen.question(1).grab().toImage() == given.question(1).grab().toImage()
+
+
+@ALL
+def test_a_missing_answer_is_named_and_one_that_is_optional_is_not(opening: Opening, name: str) -> None:
+    kind = KINDS[name]
+    seen = opening(kind.page, FULL)
+    seen.click(seen.page.button)
+    what = "statement" if name == "statement" else "question"
+    assert seen.page.message == f"One {what} still needs an answer: 1."
+    assert "Please answer" in description_of(seen.question(1))
+    give(seen, kind.keys)
+    assert seen.page.message == ""
+    optional = opening(replace(kind.page, items=(replace(kind.item, required=False),)), FULL)  # type: ignore[call-arg]
+    assert description_of(optional.question(1)).endswith("optional, no answer yet")
+    optional.click(optional.page.button)
+    assert optional.kinds == [Submitted]
+
+
+@ALL
+def test_escape_pauses_and_takes_what_was_typed(opening: Opening, name: str) -> None:
+    kind = KINDS[name]
+    seen = opening(kind.page, FULL)
+    give(seen, tuple(key for key in kind.keys if isinstance(key, str)))
+    seen.press(KEY.Key_Escape)
+    assert seen.kinds[-1] is PauseAsked
+    assert len(seen.answers) == isinstance(kind.keys[0], str)
+
+
+@pytest.mark.parametrize("typed", ["12", "100", "20.5"])
+def test_a_number_that_is_not_permitted_is_reported_and_not_taken(opening: Opening, typed: str) -> None:
+    seen = opening(form(), FULL)
+    height = seen.question(1).height()
+    seen.type(typed)
+    seen.press(KEY.Key_Return)
+    seen.settle()
+    assert "Enter a whole number from 16 to 99." in seen.texts
+    assert seen.question(1).height() == height, "there was room for the sentence"
+    assert seen.answers == []
+    assert isinstance(seen.focus, QLineEdit)
+    seen.click(seen.page.button)
+    assert Submitted not in seen.kinds
+
+
+def test_an_answer_taken_back_is_no_answer(opening: Opening) -> None:
+    seen = opening(form(), FULL)
+    for _ in range(2):
+        seen.click("A mouse")
+    seen.question(7).setFocus()
+    seen.type("x")
+    seen.question(7).finish()
+    seen.press(KEY.Key_Backspace)
+    seen.question(7).finish()
+    assert seen.kinds == [Chosen, Retracted] * 2
+
+
+def test_text_keeps_to_its_length_and_takes_no_line_break_in_one_line(opening: Opening) -> None:
+    seen = opening(form(), FULL)
+    entry = seen.page.findChild(QPlainTextEdit)
+    entry.setPlainText("a\u202eb\x07 " + "c" * 40)
+    seen.question(7).finish()
+    ((_, text),) = seen.answers
+    assert len(text) <= 20
+    assert "\x07" not in text
+
+
+def test_an_answer_shows_a_question_and_hides_it_with_its_answer(opening: Opening) -> None:
+    seen = opening(form(), FULL)
+    asked = [event.item for event in seen.events]
+    assert asked == ["age", "hand", "used", "thick", "pleasant", "comment"]
+    seen.click("Both")
+    seen.settle()
+    assert seen.question(3).isVisible()
+    assert seen.events[-1] == ItemShown(seen.events[-1].at_s, "since")
+    seen.question(3).setFocus()
+    seen.type("7")
+    seen.press(KEY.Key_Return)
+    assert seen.answers[-1] == ("since", 7)
+    seen.click("Left")
+    assert not seen.question(3).isVisible()
+    assert not seen.question(3).is_answered
+    assert "7" not in entries(seen)
+    seen.click("Both")
+    assert 3 in seen.page.missing
+
+
+def test_a_form_is_answered_by_keys_alone_and_what_is_missing_is_named(opening: Opening) -> None:
+    seen = opening(form(), FULL)
+    seen.click(seen.page.button)
+    assert seen.page.message == "Four questions still need an answer: 1, 2, 5 and 6."
+    give(seen, ("42", KEY.Key_Return))
+    assert seen.page.message == "Three questions still need an answer: 2, 5 and 6."
+    give(seen, (KEY.Key_2, KEY.Key_1, KEY.Key_Down, KEY.Key_3, KEY.Key_Home, KEY.Key_Down, "Fine."))
+    seen.press(KEY.Key_Return, KEY.Key_Return)
+    wanted = {"age": 42, "hand": "right", "used": ("mouse",), "thick": 3, "pleasant": 0, "comment": "Fine."}
+    assert dict(seen.answers) == wanted
+    assert seen.kinds[-1] is Submitted
+
+
+TLX = tuple(
+    SliderView(
+        f"scale{n}", n, "How much of it was required, and how easy or demanding was it, taken as a whole? " * 2, True,
+        low="Low", high="High", step=5,
+    )
+    for n in range(1, 7)
+)  # fmt: skip
+SUS = tuple(RatingView(f"sus{n}", n, "I found the system unnecessarily complex.", True, labels=FIVE) for n in range(10))
+ELEVEN = (RatingView("r", 1, "How rough?", True, labels=tuple("abcdefghijk"), cannot_judge="Cannot judge"),)
+TWELVE = (ChoiceView("c", 1, "Which?", True, options=tuple((f"o{n}", f"The option number {n}") for n in range(12))),)
+
+
+def place_of(seen: Participant, widget: QWidget) -> Any:
+    return widget.rect().translated(widget.mapTo(seen.page, QPoint(0, 0)))
+
+
+@pytest.mark.variants(8)
+@pytest.mark.parametrize("items", [QUESTIONS, TLX, SUS, ELEVEN, TWELVE], ids=["all", "tlx", "sus", "eleven", "twelve"])
+@pytest.mark.parametrize(
+    ("size", "language", "text_scale"),
+    [(FULL, "ar", 1.0), ((1024, 640), "de", 1.0), ((1920, 1080), "fr", 1.0), (FULL, "nl", 2.0)],
+)
+def test_every_part_fits_and_can_be_hit(
+    opening: Opening, items: tuple[ItemView, ...], size: tuple[int, int], language: str, text_scale: float
+) -> None:
+    seen = opening(form(*items), size, language, text_scale)
+    seen.page.submit()  # the notes take room as well
+    shown: list[str] = []
+    for part in seen.page.parts:
+        seen.page.go_to(part[0])
+        seen.settle()
+        shown += [field.view.id for field in seen.page.part]
+        for field in part:
+            assert field.isVisible()
+            assert seen.page.rect().contains(field.geometry())
+            assert field.geometry().bottom() <= seen.page.foot.geometry().top()
+            assert field.statement.height() >= field.statement.heightForWidth(field.statement.width()) - 1
+            for label in field.findChildren(QLabel):
+                if label.isVisible() and label.wordWrap():
+                    assert label.height() >= label.heightForWidth(label.width()) - 1, label.text()
+            for kind in (QAbstractButton, QLineEdit, QPlainTextEdit, QSlider):
+                for hit in field.findChildren(kind):
+                    assert min(hit.width(), hit.height()) >= LEAST_TARGET, (type(hit), hit.size())
+                    assert seen.page.rect().contains(place_of(seen, hit))
+        for one, other in pairwise(seen.page.part):
+            assert one.geometry().bottom() < other.geometry().top() + 1
+    assert shown == [field.view.id for field in seen.page.asked]
+    assert items is not TLX or size != FULL or text_scale > 1 or len(seen.page.parts) == 1
+
+
+def test_scales_keep_their_order_from_right_to_left_and_all_else_is_mirrored(opening: Opening) -> None:
+    here, there = opening(form(), FULL), opening(form(), FULL, "ar")
+
+    def lefts(*names: str) -> list[int]:
+        return [place_of(there, there.find(name)).left() for name in names]
+
+    digits = lefts("1", "2", "3", "4", "5")
+    points = lefts(*(f"{point} {label}" for point, label in enumerate(FIVE, 1)))
+    hands = lefts("Left", "Right", "Both")
+    assert (digits, points) == (sorted(digits), sorted(points))
+    assert hands == sorted(hands, reverse=True)
+    for number in (2, 7):
+        words_here, words_there = (place_of(one, one.question(number).statement) for one in (here, there))
+        assert words_here.left() == pytest.approx(here.page.width() - words_there.right() - 1, abs=2)
+
+
+GIVEN: dict[str, tuple[KEY | str, ...]] = {
+    "number": ("33",),
+    "text": ("Fine.",),
+    "choice": (KEY.Key_1,),
+    "rating": (KEY.Key_2,),
+    "slider": (KEY.Key_Home, KEY.Key_Right),
+}
+
+
+class Session:
+    """The state machine and the window, each telling the other."""
+
+    def __init__(self, study: Any, seen: Participant) -> None:
+        self.seen = seen
+        self.answered: list[Any] = []
+        key = draw_key(study, stream(1, "key").random)
+        self.state = open_session(study, build_schedule(study, "P001", 1), key, "en")
+        seen.window.event.connect(self.post)
+
+    def post(self, event: Any) -> None:
+        self.state, commands = advance(self.state, event)
+        for command in commands:
+            if isinstance(command, Write) and command.event in ("form_answered", "responses"):
+                self.answered.append(command.fields)
+            if isinstance(command, ShowPage) and self.state.phase is not Phase.TASK:
+                self.seen.window.show_page(command.page)
+
+
+def test_a_session_with_a_question_of_every_kind_is_done_by_keys_alone(opening: Opening, tmp_path: Any) -> None:
+    seen = opening(size=FULL)
+    session = Session(load(mixed_file(tmp_path)), seen)
+    session.post(Begin(0.0))
+    for _ in range(200):
+        QApplication.processEvents()
+        if session.state.phase is Phase.COMPLETE:
+            break
+        if session.state.phase is Phase.TASK:
+            session.post(TaskDone(1.0, "complete", {}))
+            continue
+        focused = seen.focus
+        field = next((one for one in seen.page.part if one is focused or one.isAncestorOf(focused)), None)
+        if field is None:
+            seen.press(KEY.Key_Return)
+            continue
+        give(seen, GIVEN[field.view.widget])
+        if seen.focus is focused:
+            seen.press(KEY.Key_Down)
+    assert session.state.phase is Phase.COMPLETE
+    rows = [row for fields in session.answered for row in fields["items"]]
+    assert len(rows) == 3 + 2 * 3 + 6 + 10 + 1
+    assert all(row["onset_s"] is not None and row["first_s"] is not None for row in rows)
+    values = {row["item"]: row["value"] for row in rows}
+    assert (values["age"], values["hand"], values["used"]) == (33, "left", ("mouse",))
+    assert (values["thickness"], values["pleasant"], values["effort"], values["sus10"]) == (2, 5, 5, 2)

@@ -1,0 +1,257 @@
+"""The questionnaire of statements: rows and columns by keys, mouse and touch, and what a screen reader hears."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QAccessible, QPointingDevice
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from study_app.session.transitions.events import Chosen, ItemShown, Submitted
+from tests.gui.participant.driver import KEY, Participant, description_of, name_of, tap, told_of
+from tests.gui.small import LABELS, STATEMENTS, questionnaire
+
+pytestmark = pytest.mark.slow
+
+Opening = Callable[..., Participant]
+FULL, SMALL = (1366, 768), (880, 640)
+GIVEN = (6, 5, 4, None, 7, 2, 1, 4, 7)
+DUTCH_LABELS = (
+    "Helemaal mee oneens",
+    "Grotendeels mee oneens",
+    "Enigszins mee oneens",
+    "Neutraal",
+    "Enigszins mee eens",
+    "Grotendeels mee eens",
+    "Helemaal mee eens",
+)
+
+
+@pytest.fixture
+def seen(opening: Opening) -> Participant:
+    return opening(questionnaire(cannot_judge="Cannot judge"), FULL)
+
+
+def values(seen: Participant) -> list[Any]:
+    return [value for _, value in seen.answers]
+
+
+def visible(seen: Participant) -> list[int]:
+    return [row.view.number for row in seen.page.fields if row.isVisible()]
+
+
+def cell(seen: Participant, row: int, value: int | None) -> Any:
+    """Return the cell of a point, or of "cannot judge", in a row from 1."""
+    return seen.find("Cannot judge" if value is None else f"{value} {LABELS[value - 1]}", row)
+
+
+@pytest.mark.parametrize("way", ["keys", "mouse", "touch"])
+def test_all_is_answered_in_one_way_alone_and_told_in_order(
+    seen: Participant, finger: QPointingDevice, way: str
+) -> None:
+    for row, value in enumerate(GIVEN, 1):
+        if way == "mouse":
+            seen.click(cell(seen, row, value))
+        elif way == "touch":
+            tap(finger, cell(seen, row, value))
+        elif value is None:
+            seen.press(*[KEY.Key_Right] * 8, KEY.Key_Space)
+        else:
+            seen.press(KEY(KEY.Key_0 + value))
+    assert way == "touch" or seen.focus is (seen.page.button if way == "keys" else seen.question(9))
+    if way == "touch":
+        tap(finger, cell(seen, 1, 2), QPoint(2, 2))  # a change, at the corner of its cell
+        tap(finger, seen.page.button)
+    else:
+        seen.press(KEY.Key_Return, KEY.Key_Return)
+    changes = 1 if way == "touch" else 0
+    kinds = [type(event) for event in seen.events]
+    assert kinds == [ItemShown] * 9 + [Chosen] * (9 + changes) + [Submitted]
+    assert [event.item for event in seen.events[:9]] == [f"item{n}" for n in range(1, 10)]
+    assert values(seen) == [*GIVEN, *[2] * changes]
+    times = [event.at_s for event in seen.events]
+    assert times == sorted(times)
+
+
+def test_a_change_is_told_and_a_repetition_is_not(seen: Participant) -> None:
+    for value in (3, 3, 4):
+        seen.click(cell(seen, 1, value), place=QPoint(2, 2))
+    assert values(seen) == [3, 4]
+    assert [one.isChecked() for one in seen.question(1).options] == [place == 3 for place in range(8)]
+
+
+def test_arrows_move_between_rows_and_point_in_a_row(seen: Participant) -> None:
+    seen.press(KEY.Key_Up, KEY.Key_Left, KEY.Key_Down, KEY.Key_Down, KEY.Key_Up)
+    assert seen.focus is seen.question(2)
+    seen.press(*[KEY.Key_Right] * 3, KEY.Key_Left)
+    assert seen.told == []
+    assert LABELS[1] in seen.page.heading
+    seen.press(KEY.Key_Space, *[KEY.Key_Right] * 12, KEY.Key_Space)
+    assert seen.answers == [("item2", 2), ("item3", None)]
+    seen.page.button.setFocus()
+    seen.press(KEY.Key_Left, KEY.Key_Right)
+    assert seen.focus is seen.page.button
+    seen.press(KEY.Key_Up)
+    assert seen.focus is seen.question(9)
+
+
+def test_backspace_goes_back_and_changes_nothing(seen: Participant) -> None:
+    seen.press(KEY.Key_6, KEY.Key_5, KEY.Key_Backspace)
+    assert seen.focus is seen.question(2)
+    seen.press(KEY.Key_Backspace, KEY.Key_Backspace)
+    assert seen.focus is seen.question(1)
+    seen.press(KEY.Key_2)
+    assert values(seen) == [6, 5, 2]
+
+
+def test_tab_goes_from_row_to_row_to_the_button_and_back(seen: Participant) -> None:
+    order = []
+    for _ in range(10):
+        order.append(seen.focus)
+        seen.press(KEY.Key_Tab)
+    assert order == [*seen.page.fields, seen.page.button]
+    seen.question(9).setFocus()
+    QTest.keyClick(seen.focus, KEY.Key_Tab, Qt.KeyboardModifier.ShiftModifier)
+    assert seen.focus is seen.question(8)
+
+
+def test_continue_names_and_marks_what_is_missing_and_goes_there(seen: Participant) -> None:
+    for row in (1, 2, 3, 4, 6, 7, 9):
+        seen.click(cell(seen, row, 2))
+    told = len(seen.told)
+    seen.click(seen.page.button)
+    assert seen.page.message == "Two statements still need an answer: 5 and 8."
+    assert [row.view.number for row in seen.page.fields if row.missing] == [5, 8]
+    assert seen.focus is seen.question(5)
+    assert len(seen.told) == told
+    assert "Please answer · press 1 to 7" in description_of(seen.question(5))
+    foot = seen.page.foot
+    assert "5 and 8. Everything you have answered is kept. 7 of 9 answered" in foot.accessibleName()
+    assert foot.accessibleDescription() == "↑ ↓ move, 1–7 answer"
+    seen.press(KEY.Key_4)
+    assert seen.page.message == "One statement still needs an answer: 8."
+    seen.click(cell(seen, 8, None))
+    assert seen.page.message == ""
+    seen.press(KEY.Key_Return)
+    assert seen.kinds[-1] is Submitted
+
+
+def test_the_column_that_is_pointed_at_is_labelled_beside_ends_and_middle(
+    seen: Participant, finger: QPointingDevice
+) -> None:
+    fixed = (LABELS[0], LABELS[3], LABELS[6])
+    assert set(fixed) <= set(seen.page.heading)
+    before = seen.page.heading
+    QTest.mouseMove(cell(seen, 3, 2))
+    seen.click(cell(seen, 3, 2))
+    assert set(seen.page.heading) == set(before) | {LABELS[1]}
+    QTest.mouseMove(seen.page, QPoint(5, 5))
+    QApplication.processEvents()
+    assert seen.page.heading == before
+    tap(finger, cell(seen, 3, 2))
+    assert seen.page.heading == before, "a finger that is lifted points at nothing"
+
+
+def test_a_label_gives_way_to_that_of_the_column_pointed_at(opening: Opening) -> None:
+    seen = opening(questionnaire(labels=DUTCH_LABELS), (860, 640))
+    seen.press(KEY.Key_Right, KEY.Key_Right)
+    assert DUTCH_LABELS[1] in seen.page.heading
+    assert DUTCH_LABELS[0] not in seen.page.heading
+
+
+def test_answers_come_back_after_a_pause_and_the_keyboard_is_on_the_first_without_one(opening: Opening) -> None:
+    seen = opening(questionnaire(cannot_judge="Cannot judge", chosen=(("item1", 6), ("item3", None))), FULL)
+    assert cell(seen, 1, 6).isChecked()
+    assert cell(seen, 3, None).isChecked()
+    assert seen.told == []
+    assert seen.focus is seen.question(2)
+    assert seen.page.missing == (2, 4, 5, 6, 7, 8, 9)
+
+
+def test_a_small_window_shows_five_a_page_and_asks_page_by_page(opening: Opening, finger: QPointingDevice) -> None:
+    seen = opening(questionnaire(), SMALL)
+    assert visible(seen) == [1, 2, 3, 4, 5]
+    assert [event.item for event in seen.events] == [f"item{n}" for n in visible(seen)]
+    seen.press(*[KEY.Key_3] * 4, KEY.Key_Return)
+    assert seen.page.message == "One statement still needs an answer: 5."
+    seen.press(KEY.Key_3, KEY.Key_Return)
+    assert visible(seen) == [6, 7, 8, 9]
+    assert seen.focus is seen.question(6)
+    seen.settle()
+    seen.press(KEY.Key_Up)
+    assert visible(seen) == [1, 2, 3, 4, 5]
+    tap(finger, seen.find("6–9"))
+    tap(finger, seen.page.button)
+    assert seen.page.message.endswith("6, 7, 8 and 9.")
+    seen.press(*[KEY.Key_2] * 4, KEY.Key_Return)
+    assert seen.kinds == [Chosen] * 9 + [Submitted]
+    assert {event.item for event in seen.events if isinstance(event, ItemShown)} == {f"item{n}" for n in range(1, 10)}
+    seen.window.resize(*FULL)
+    assert visible(seen) == [*range(1, 10)]
+    assert seen.page.tabs == []
+
+
+def test_a_screen_reader_finds_groups_of_radio_buttons_with_names_and_states(seen: Participant) -> None:
+    labels = [*(f"{n} {label}" for n, label in enumerate(LABELS, 1)), "Cannot judge"]
+    assert name_of(seen.page) == "Liquid setting 1"
+    assert description_of(seen.page).startswith("How much do you agree")
+    for row, (field, statement) in enumerate(zip(seen.page.fields, STATEMENTS, strict=True), 1):
+        assert (told_of(field).role(), name_of(field)) == (QAccessible.Role.Grouping, f"{row}. {statement}")
+        for one, label in zip(field.options, labels, strict=True):
+            assert (told_of(one).role(), name_of(one)) == (QAccessible.Role.RadioButton, label)
+            assert description_of(one) == statement
+            assert told_of(one).state().checkable
+            assert not told_of(one).state().checked
+    seen.press(KEY.Key_3)
+    assert [bool(told_of(one).state().checked) for one in seen.question(1).options] == [n == 2 for n in range(8)]
+    assert description_of(seen.question(1)) == "chosen: 3 Somewhat disagree"
+
+
+def test_what_is_pointed_at_chosen_and_missing_is_announced(seen: Participant, monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[str] = []
+    checked: list[tuple[str, bool]] = []
+
+    def update(event: Any) -> None:
+        if event.type() == QAccessible.Event.Announcement:
+            said.append(event.message())
+        elif event.type() == QAccessible.Event.Focus:
+            checked.append((name_of(event.object()), bool(told_of(event.object()).state().checked)))
+
+    monkeypatch.setattr(QAccessible, "isActive", lambda: True)
+    monkeypatch.setattr(QAccessible, "updateAccessibility", update)
+    seen.press(KEY.Key_Right, KEY.Key_Space, KEY.Key_4)
+    assert said == ["1 Completely disagree", "chosen: 1 Completely disagree", "chosen: 4 Neutral"]
+    assert ("4 Neutral", True) in checked
+    seen.press(KEY.Key_Return)
+    assert said[-1] == "Seven statements still need an answer: 3, 4, 5, 6, 7, 8 and 9."
+
+
+def test_what_is_announced_reaches_qt(seen: Participant) -> None:
+    was = QAccessible.isActive()
+    QAccessible.setActive(True)
+    seen.press(KEY.Key_Right, KEY.Key_Space)  # an announcement that Qt refuses would be a warning, and fail
+    QAccessible.setActive(was)
+
+
+def test_right_and_left_keys_go_along_the_scale_in_every_language(opening: Opening) -> None:
+    seen = opening(questionnaire(), FULL, "ar")
+    seen.press(KEY.Key_Right, KEY.Key_Right, KEY.Key_Space)
+    assert values(seen) == [2]
+
+
+def test_all_is_mirrored_but_the_order_of_the_scale(opening: Opening) -> None:
+    page = questionnaire(cannot_judge="Cannot judge")
+    here, there = opening(page, FULL), opening(page, FULL, "ar")
+
+    def lefts(seen: Participant) -> list[int]:
+        return [one.mapTo(seen.page, QPoint()).x() for one in seen.question(1).options]
+
+    assert lefts(here) == sorted(lefts(here))
+    assert lefts(there)[:7] == sorted(lefts(there)[:7])
+    assert lefts(there)[7] < lefts(there)[0]
+    row, mirror = here.question(1), there.question(1)
+    assert mirror.geometry() == row.geometry()
+    assert mirror.columns[0][0] == pytest.approx(row.width() - sum(row.columns[6]), abs=2)
+    assert there.page.button.geometry().left() < 60 < here.page.button.geometry().left()
