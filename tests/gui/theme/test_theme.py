@@ -3,9 +3,9 @@
 import itertools
 from typing import Any
 
+import numpy as np
 import pytest
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor, QFontInfo, QFontMetricsF
+from PySide6.QtGui import QColor, QFontInfo, QImage
 from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QVBoxLayout, QWidget
 
 from study_app.gui.theme import icons
@@ -26,39 +26,26 @@ def contrast(one: str, other: str) -> float:
     return (lighter + 0.05) / (darker + 0.05)
 
 
-@pytest.mark.parametrize("theme", THEMES, ids=lambda theme: theme.name)
-@pytest.mark.parametrize(
-    ("ink", "ground"),
-    [
-        *itertools.product(("text", "text2", "text3"), ("window", "surface")),
-        *itertools.product(("text", "text2"), ("hover", "selected")),
-        ("accent", "surface"),
-        ("accent", "window"),
-        ("on_accent", "accent"),
-        ("on_accent", "accent_hover"),
-        ("on_stop", "stop"),
-        *itertools.product(("ok", "warn", "bad"), ("surface",)),
-        ("ok", "ok_bg"),
-        ("warn", "warn_bg"),
-        ("bad", "bad_bg"),
-        ("text", "warn_bg"),
-        ("text2", "warn_bg"),
-    ],
-)
-def test_text_reaches_4_5(theme: Theme, ink: str, ground: str) -> None:
-    assert contrast(getattr(theme, ink), getattr(theme, ground)) >= 4.5
+TEXTS = (
+    *itertools.product(("text", "text2", "text3"), ("window", "surface")),
+    *itertools.product(("text", "text2"), ("hover", "selected", "warn_bg")),
+    *itertools.product(("accent", "ok", "warn", "bad"), ("surface",)),
+    ("accent", "window"), ("on_accent", "accent"), ("on_accent", "accent_hover"), ("on_stop", "stop"),
+    ("ok", "ok_bg"), ("warn", "warn_bg"), ("bad", "bad_bg"), ("text", "warn_bg"),
+)  # fmt: skip
+EDGES = tuple(itertools.product(("ctl", "trace_x", "trace_y", "trace_z", "accent"), ("surface", "window")))
 
 
-@pytest.mark.parametrize("theme", THEMES, ids=lambda theme: theme.name)
-@pytest.mark.parametrize("role", ["ctl", "trace_x", "trace_y", "trace_z", "accent"])
-@pytest.mark.parametrize("ground", ["surface", "window"])
-def test_edges_of_controls_and_traces_reach_3(theme: Theme, role: str, ground: str) -> None:
-    assert contrast(getattr(theme, role), getattr(theme, ground)) >= 3.0
-
-
-@pytest.mark.parametrize("role", ["lit", "proxy_light"])
-def test_ring_and_ball_stand_out_from_the_lightest_water(role: str) -> None:
-    assert contrast(getattr(TANK, role), TANK.water_light) >= 3.0
+def test_texts_reach_4_5_and_edges_of_controls_and_traces_3() -> None:
+    weak = {
+        (theme.name, ink, ground): found
+        for theme in THEMES
+        for least, pairs in ((4.5, TEXTS), (3.0, EDGES))
+        for ink, ground in pairs
+        if (found := contrast(getattr(theme, ink), getattr(theme, ground))) < least
+    }
+    assert weak == {}
+    assert min(contrast(getattr(TANK, role), TANK.water_light) for role in ("lit", "proxy_light")) >= 3.0
 
 
 def test_inter_is_the_packages_own_and_has_its_four_weights(qapp: object) -> None:
@@ -66,24 +53,6 @@ def test_inter_is_the_packages_own_and_has_its_four_weights(qapp: object) -> Non
     for weight in (400, 500, 600, 700):
         found = QFontInfo(font("body", weight=weight))
         assert (found.family(), found.weight()) == ("Inter", weight)
-
-
-def test_tabular_figures_are_equally_wide(qapp: object) -> None:
-    metrics = QFontMetricsF(font("number"))
-    widths = [metrics.horizontalAdvance(digit) for digit in "0123456789"]
-    assert max(widths) - min(widths) < 0.1  # px: the glyphs' own rounding
-    proportional = QFontMetricsF(font("number", tabular=False))
-    assert proportional.horizontalAdvance("11111111") < proportional.horizontalAdvance("00000000")
-
-
-@pytest.mark.parametrize("theme", THEMES, ids=lambda theme: theme.name)
-def test_stylesheet_is_understood_by_qt(qtbot: object, theme: Theme) -> None:
-    widget = QWidget()
-    qtbot.addWidget(widget)  # type: ignore[attr-defined]
-    widget.setProperty("role", "window")
-    widget.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
-    widget.setStyleSheet(stylesheet(theme))
-    assert widget.grab().toImage().pixelColor(5, 5) == QColor(theme.window)
 
 
 @pytest.mark.parametrize("theme", THEMES, ids=lambda theme: theme.name)
@@ -112,12 +81,12 @@ def test_a_refused_field_with_the_keyboard_shows_both(
     assert colours == [{theme.accent, theme.bad}, {theme.bad}]
 
 
-@pytest.mark.parametrize("name", sorted(icons.PATHS))
-def test_every_icon_paints_inside_its_square(qapp: object, name: str) -> None:
-    image = icons.icon_pixmap(name, "#FF0000", 24, ratio=2.0).toImage()
-    inked = [
-        (x, y) for x in range(image.width()) for y in range(image.height()) if image.pixelColor(x, y).alpha() > 128
-    ]
-    assert len(inked) > 40
-    assert all(0 < x < 47 and 0 < y < 47 for x, y in inked)
-    assert image.pixelColor(*inked[0]).red() == 255
+def test_every_icon_paints_inside_its_square(qapp: object) -> None:
+    for name in icons.PATHS:
+        icon = icons.icon_pixmap(name, "#FF0000", 24, ratio=2.0).toImage()
+        image = icon.convertToFormat(QImage.Format.Format_RGBA8888)
+        inked = np.argwhere(np.frombuffer(image.constBits(), np.uint8).reshape(48, 48, 4)[..., 3] > 128)
+        assert len(inked) > 40, name
+        assert inked.min() > 0, name
+        assert inked.max() < 47, name
+        assert image.pixelColor(*inked[0][::-1].tolist()).red() == 255
