@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from study_app.analysis.report.write_report import report
+from study_app.protocol.forms.simulated_observer import NO_FEATURES
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
 from tests.protocol.trials.level_studies import FIVE_POINTS, SHORT, text_of, text_of_damper
 from tests.studies import once, quick_pdfs
@@ -133,7 +133,8 @@ def opened_catch(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def sealed_levels(tmp_path_factory: pytest.TempPathFactory) -> Path:
     def make(folder: Path) -> None:
         (folder / "levels.toml").write_text(text_of(SEQUENCE, *SHORT, more=FIVE_POINTS + MORE))
-        rehearse(folder / "levels.toml", participants=3, seed=2, results=folder / "study", recordings=False)
+        felt = {("pairs", name): (NO_FEATURES,) for name in ("oil", "other", "late")}
+        rehearse_answers(folder / "levels.toml", participants=3, seed=2, results=folder / "study", felt=felt)
 
     return once(tmp_path_factory, "levels", make) / "study"
 

@@ -10,7 +10,6 @@ import pytest
 
 from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.designs.psychometric_bands import psychometric_bands
-from study_app.analysis.designs.track_courses import courses
 from study_app.analysis.figures.levels.level_pictures import level_pictures
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.results.level_results import LevelsFound
@@ -59,12 +58,6 @@ def test_answers_to_catch_trials_enter_no_step_of_a_track(opened: pd.DataFrame) 
             assert following == pytest.approx(float(np.clip(level * factor, 0.02, 0.6)))
 
 
-def test_answers_at_the_standard_alone_enter_no_step_of_a_track() -> None:
-    rows = pd.DataFrame({"trial": [1, 2, 3], "level": [0.0, 0.0, 0.2], "catch": [False, False, False]})
-    rows = rows.assign(arrangement=["C", "S", "C"], success=pd.array([True, True, False], dtype="boolean"))
-    assert answers_of(rows.astype({"arrangement": "string"})) == [(0.0, True), (0.2, False)]
-
-
 def test_answers_to_catch_trials_are_apart_from_those_at_their_level(
     staircase: LevelsFound, opened: pd.DataFrame
 ) -> None:
@@ -74,14 +67,6 @@ def test_answers_to_catch_trials_are_apart_from_those_at_their_level(
     assert sum(one.n for one in shown) == len(own)
     assert {one.level for one in shown if one.catch} == {0.6}
     assert not any(one.catch for one in staircase.of_group)
-
-
-def test_courses_know_their_catch_trials(study: Study, opened: pd.DataFrame) -> None:
-    block = next(block for block in study.levels if block.id == "staircase")
-    for course in courses(block, opened, most=4):
-        assert course.catches.any()
-        assert not (course.catches & course.reversals).any()
-        assert set(course.levels[course.catches]) == {0.6}
 
 
 def test_figures_mark_catch_trials_by_crosses(study: Study, staircase: LevelsFound, opened: pd.DataFrame) -> None:

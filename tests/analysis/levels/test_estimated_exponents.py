@@ -11,9 +11,9 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from study_app.analysis.designs.estimated_exponents import estimate_slope, estimated_exponents
+from study_app.analysis.designs.estimated_exponents import estimated_exponents
 from study_app.analysis.designs.level_summaries import levels_found
-from study_app.analysis.designs.weber_exponents import jnd_slope, weber_exponents
+from study_app.analysis.designs.weber_exponents import weber_exponents
 from study_app.analysis.export.export import export
 from study_app.analysis.report.answers import level_section
 from study_app.analysis.report.answers.level_methods import level_methods
@@ -21,7 +21,6 @@ from study_app.analysis.report.findings_summary import level_findings
 from study_app.analysis.report.write_report import report
 from study_app.analysis.results.level_results import ThresholdFound
 from study_app.analysis.tables.study_tables import load_study
-from study_app.analysis.tables.tracks import tracks
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.tables.column import header
@@ -65,12 +64,6 @@ def test_the_slope_is_over_delivered_levels() -> None:
     assert one.exponent != pytest.approx(0.5, abs=0.01)
 
 
-def test_the_exponent_is_the_slope_of_mean_logarithms() -> None:
-    levels = [1.0, 1.0, math.e, math.e, math.e]
-    answers = [math.exp(value) for value in (0.0, 2.0, 1.0, 1.5, 2.0)]  # means 1 and 1.5
-    assert estimate_slope(levels, answers) == pytest.approx(0.5)
-
-
 def test_choices_modulus_trials_and_a_single_level_have_no_exponent() -> None:
     frame = rows({"P001": 0.5}, {"P001": 1.0})
     assert list(estimated_exponents(replace(block("2ifc"), id="b"), frame)) == []
@@ -104,23 +97,6 @@ def test_the_report_states_the_exponent_the_published_one_and_the_method(thickne
     assert sentence.endswith("; three participants) over viscosity.")
     assert "exponent 0.44" in published
     assert "The exponent of magnitude estimation (Stevens 1957)" in " ".join(level_methods(study.levels, [found]))
-
-
-@pytest.mark.slow
-def test_group_intervals_leave_out_the_units_that_participants_chose(thickness: Path) -> None:
-    study = load_study(thickness)
-    (found,) = levels_found(study)
-    trial_rows = tracks(study)
-    larger = trial_rows.assign(
-        value=trial_rows["value"].where(trial_rows["participant"] != "P002", other=1000 * trial_rows["value"])
-    )
-    (scaled,) = levels_found(study, larger)
-    for one, other in zip(found.of_group, scaled.of_group, strict=True):
-        assert other.value == pytest.approx(10 * one.value)  # the cube root of 1000: a geometric mean of three
-        assert other.low is not None
-        assert one.low is not None
-        assert other.low / other.value == pytest.approx(one.low / one.value)
-    assert scaled.exponents[0].exponent == pytest.approx(found.exponents[0].exponent)
 
 
 @pytest.mark.slow
@@ -178,12 +154,6 @@ def test_planted_exponents_are_found_for_fractions_and_for_differences(weber: bo
     assert (group.participant, group.n, group.exponent) == (None, 3, pytest.approx(0.6))
     low, high = stats.ttest_1samp([1.0, 0.0, 0.8], 0.0).confidence_interval(0.95)
     assert (group.low, group.high) == pytest.approx((low, high))
-
-
-def test_a_slope_is_that_of_a_regression() -> None:
-    jnds = (0.9, 1.4, 3.9, 6.1)
-    logs = [[math.log(value) for value in values] for values in (STANDARDS, jnds)]
-    assert jnd_slope(STANDARDS, jnds) == pytest.approx(stats.linregress(*logs).slope)
 
 
 def test_one_standard_and_values_have_no_exponent() -> None:

@@ -7,23 +7,18 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.figure import Figure
 
 from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.designs.thresholds import counts_of, thresholds
 from study_app.analysis.designs.track_courses import courses
-from study_app.analysis.figures.levels.level_pictures import level_pictures
-from study_app.analysis.figures.levels.panels import over_trials
-from study_app.analysis.figures.levels.weber_figure import published_fractions, weber_fractions
+from study_app.analysis.figures.levels.weber_figure import weber_fractions
 from study_app.analysis.results.level_results import LevelsFound, PublishedValue, ThresholdFound
-from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.statistics.psychometrics.posterior import fitted, narrowing
 from study_app.analysis.tables.study_tables import load_study
 from study_app.analysis.tables.tracks import tracks
 from study_app.protocol.trials.kinds import default_design
 from study_app.protocol.trials.psychometric import analysis_grid, assumed_for
 from tests.analysis.levels.test_thresholds import STIMULUS, block, rows
-from tests.compiled import needs_servo
 
 
 def found(level_kind: str, *ones: ThresholdFound) -> LevelsFound:
@@ -64,15 +59,6 @@ def test_courses_are_in_the_order_of_the_trials_and_end_at_the_threshold() -> No
     assert len(list(courses(block(), frame, most=1))) == 1
 
 
-@pytest.mark.parametrize(
-    ("ends", "shown"), [((2.7, 11.3), [3, 5, 7, 10]), ((0.05, 0.9), [0.05, 0.1, 0.2, 0.5]), ((5.5, 9.5), [6, 7, 8, 9])]
-)
-def test_ticks_of_levels_leave_room_for_their_numbers(ends: tuple[float, float], shown: list[float]) -> None:
-    axes = Figure().add_subplot()
-    over_trials(axes, replace(found("value"), spacing="log"), 4, ends, first=True)
-    assert axes.get_yticks().tolist() == pytest.approx(shown)
-
-
 def test_weber_fractions_are_levels_or_differences_over_their_standards() -> None:
     ones = [threshold(None, 4.0, 0.2), threshold(None, 8.0, 0.3), threshold("P001", 4.0, 0.1), threshold(None, 0.0, 1)]
     assert weber_fractions(found("weber", *ones), None) == [(4.0, 0.2, 0.1, 0.4), (8.0, 0.3, 0.15, 0.6)]
@@ -91,22 +77,6 @@ def test_weber_fractions_are_levels_or_differences_over_their_standards() -> Non
     ]
 
 
-def test_published_thresholds_are_weber_fractions_over_their_standard_alone() -> None:
-    values = [
-        PublishedValue("weber", 0.2, None, None, None, 71.0, 10, "A"),
-        PublishedValue("threshold", 2.0, 8.0, 1.5, 2.5, None, None, ""),
-        PublishedValue("threshold", 2.0, None, None, None, None, None, ""),
-        PublishedValue("exponent", 1.0, None, None, None, None, None, ""),
-    ]
-    of_differences = replace(found("difference"), published=tuple(values))
-    assert published_fractions(of_differences) == [(None, 0.2), (8.0, 0.25)]
-    assert published_fractions(replace(of_differences, level_kind="weber")) == [(None, 0.2)]
-    assert [one.in_words() for one in values[:2]] == [
-        "A: weber 0.2 (at 71 % correct, n = 10)",
-        "threshold 2 (standard 8, 1.5 to 2.5)",
-    ]
-
-
 def words_in(svg: Path) -> list[str]:
     return [
         re.sub(r"<[^>]+>", "", one).strip() for one in re.findall(r"<text[^>]*>.*?</text>", svg.read_text(), re.DOTALL)
@@ -114,7 +84,6 @@ def words_in(svg: Path) -> list[str]:
 
 
 @pytest.mark.slow
-@needs_servo
 def test_adaptive_blocks_have_a_panel_for_each_participant_and_standard(reported_adaptive: Path) -> None:
     for name, panels in (("tracks-staircase", 6), ("tracks-quest", 3)):
         for form in ("png", "svg", "pdf", "txt"):
@@ -127,7 +96,6 @@ def test_adaptive_blocks_have_a_panel_for_each_participant_and_standard(reported
 
 
 @pytest.mark.slow
-@needs_servo
 def test_every_answer_has_a_mark_and_every_reversal_a_ring(opened_adaptive: Path, reported_adaptive: Path) -> None:
     opened = tracks(load_study(opened_adaptive))
     own = opened[opened["block"] == "staircase"]
@@ -142,7 +110,6 @@ def test_every_answer_has_a_mark_and_every_reversal_a_ring(opened_adaptive: Path
 
 
 @pytest.mark.slow
-@needs_servo
 def test_weber_fractions_are_drawn_where_there_are_two_standards(
     opened_adaptive: Path, reported_adaptive: Path
 ) -> None:
@@ -155,13 +122,3 @@ def test_weber_fractions_are_drawn_where_there_are_two_standards(
     (block_found,) = (one for one in levels_found(load_study(opened_adaptive)) if one.block == "staircase")
     assert [point[0] for point in weber_fractions(block_found, "P002")] == [4.0, 8.0]
     assert np.all([point[1] > 0 for point in weber_fractions(block_found, None)])
-
-
-@pytest.mark.slow
-@needs_servo
-def test_constant_stimuli_have_no_figure_of_tracks(opened_levels: Path) -> None:
-    study = load_study(opened_levels)
-    own = [one for one in levels_found(study) if one.block == "viscosity"]
-    drawn = {one.name: one for one in level_pictures(study, own, ("png",), Failures())}
-    assert not [name for name in drawn if name.startswith("tracks-")]
-    assert "png" in drawn["weber-viscosity"].files

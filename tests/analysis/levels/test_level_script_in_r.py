@@ -20,9 +20,8 @@ from study_app.protocol.trials.kinds import default_design
 from study_app.protocol.trials.presentation import arrangement_text
 from tests.analysis.levels.test_sensitivities import ONE, ROVING, block
 from tests.analysis.report.read_report import numbers, run_in_r
-from tests.compiled import needs_servo
 
-pytestmark = [pytest.mark.slow, needs_servo]
+pytestmark = pytest.mark.slow
 LINE = re.compile(r"(.+?) +report +(\S+) +R +(\S+)")
 
 

@@ -120,15 +120,6 @@ def test_conditions_have_a_sensitivity_each_and_the_group_has_students_interval(
     assert (group.low, group.high) == pytest.approx((ends.low, ends.high))
 
 
-def test_equal_participants_give_no_interval_of_the_group() -> None:
-    frames = [
-        rows("2ifc", {0: share, 1: 1 - share}, ("first", "second"), f"P00{n}") for n, share in enumerate((0.7, 0.7))
-    ]
-    frames[1] = frames[1].iloc[::-1]
-    group, *_ = sensitivities(block("2ifc"), pd.concat(frames))
-    assert (group.low, group.high) == (None, None)
-
-
 def test_without_a_correct_answer_only_shares_are_known() -> None:
     stimulus = Stimulus(vary="damping_nspm", level="value", levels=(1, 20), standards=(8.0,))
     one = own(block("2ifc", stimulus), rows("2ifc", {0: 0.7, 1: 0.5}, ("first", "second")))

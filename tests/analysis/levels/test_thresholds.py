@@ -8,7 +8,6 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.designs.thresholds import counts_of, thresholds
-from study_app.analysis.results.level_results import ThresholdFound
 from study_app.analysis.statistics.psychometrics.goodness import p_of_fit
 from study_app.analysis.statistics.psychometrics.posterior import band, fitted
 from study_app.analysis.statistics.random_effects import group_mean
@@ -95,19 +94,6 @@ def test_a_percentage_that_the_function_never_has_is_not_compared() -> None:
     assert [one.compared for one in found] == [None, None]
 
 
-def test_a_steep_function_has_its_own_width() -> None:
-    draw, found = np.random.default_rng(5), []
-    for number in range(1200):
-        level = LEVELS[number % len(LEVELS)]
-        right = bool(draw.random() < success("weibull", math.log10(level), -1.0, 0.5, 0.5, 0.0))
-        found.append(("P001", "b", 8.0, level, level, True, right))
-    frame = rows({"P001": 0.1}, trials=1200).assign(success=pd.array([row[-1] for row in found], dtype="boolean"))
-    _, one = thresholds(block(), frame)
-    assert one.width is not None
-    assert one.width < 0.75
-    assert one.threshold == pytest.approx(0.1, rel=0.1)
-
-
 @pytest.mark.parametrize(("planted", "width", "beyond"), [(60.0, 60.0, None), (104.0, 20.0, "above")])
 def test_levels_that_are_evenly_spaced_have_widths_and_thresholds_in_their_unit(
     planted: float, width: float, beyond: str | None
@@ -140,12 +126,6 @@ def test_thresholds_are_at_the_levels_delivered_not_at_those_requested() -> None
 def test_a_level_that_was_not_measured_counts_as_requested() -> None:
     one = rows({"P001": 0.2}).assign(level_delivered=pd.NA).astype({"level_delivered": "Float64"})
     assert counts_of(STIMULUS, one).levels == pytest.approx([math.log10(level) for level in LEVELS])
-
-
-def test_values_below_zero_are_placed_where_they_were_delivered() -> None:
-    values = Stimulus(vary="delay_ms", level="value", levels=(-10, 10), spacing="linear")
-    one = rows({"P001": 0.2}, levels=(-8.0, -2.0, 4.0), delivered=1.25)
-    assert counts_of(values, one).levels == pytest.approx([-10, -2.5, 5])
 
 
 @pytest.mark.parametrize(("planted", "beyond"), [(0.009, "below"), (1.2, "above")])
@@ -279,13 +259,3 @@ def test_trials_that_are_excluded_leave_the_fit_and_not_the_track() -> None:
     assert (whole.n, fewer.n) == (80, 64)
     assert fewer.reversal_mean == whole.reversal_mean
     assert fewer.threshold != whole.threshold
-
-
-def test_other_methods_have_no_reversal_mean() -> None:
-    _, found = thresholds(block(), rows({"P001": 0.2}))
-    assert (found.reversal_mean, found.target_percent) == (None, None)
-
-
-def test_found_thresholds_of_the_group_know_n_and_interval_alone() -> None:
-    group, *_ = thresholds(block(), rows({"P001": 0.2}))
-    assert group == ThresholdFound(None, 8.0, 1, group.threshold, None, None)
