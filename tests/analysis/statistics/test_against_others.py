@@ -90,17 +90,3 @@ def test_scipy_page_is_our_untied_p() -> None:
     assert (ours.statistic, ours.p_untied) == pytest.approx((theirs.statistic, theirs.pvalue))
     assert ours.p is not None
     assert ours.p < theirs.pvalue  # ties as they are, not the larger p of ranks that all differ
-
-
-@pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore")
-def test_psignifit() -> None:
-    psignifit = vendor("psignifit")
-    levels = np.array([0.25, 0.41666667, 0.58333333, 0.75, 0.91666667, 1.08333333, 1.25, 1.41666667, 1.58333333, 1.75])
-    right = np.array([4, 6, 3, 8, 7, 5, 8, 9, 9, 10])
-    theirs = psignifit.psignifit(
-        np.c_[levels, right, np.full(10, 10)], sigmoid="norm", experiment_type="2AFC", stimulus_range=None
-    )
-    ours = threshold(levels, right, np.full(10, 10), shape="normal", guess=0.5, lapse=0.0)
-    estimate = theirs.parameter_estimate_MAP
-    assert (ours.effect, ours.width) == pytest.approx((estimate["threshold"], estimate["width"]), rel=0.02)

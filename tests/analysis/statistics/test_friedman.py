@@ -5,14 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import f as f_distribution
-from scipy.stats import friedmanchisquare, studentized_range
-from scipy.stats import t as t_distribution
+from scipy.stats import friedmanchisquare
 
 from study_app.analysis.statistics import friedman as module
 from study_app.analysis.statistics.agreement import kappa
 from study_app.analysis.statistics.friedman import friedman
 from study_app.analysis.statistics.global_permutation import global_permutation
-from study_app.analysis.statistics.multiple_comparisons import holm
 from study_app.errors import AnalysisError
 
 # Times to first base of 22 players by three methods (Hollander & Wolfe 1973; R, friedman.test).
@@ -25,8 +23,6 @@ TIMES = (
 BASES = np.array(TIMES.split(), dtype=float).reshape(22, 3)
 # scipy's documentation: ten people, three conditions, whole scores with ties.
 SCORES = np.array([[4, 6, 3, 4, 3, 2, 2, 7, 6, 5], [5, 6, 8, 7, 7, 8, 4, 6, 4, 5], [2, 4, 4, 3, 2, 2, 1, 4, 3, 2]]).T
-# R package rstatix, issues 264 and 265: six people, A, B, C.
-POST_HOC = np.array([[4, 6, 3, 5, 4, 5], [7, 8, 6, 7, 9, 6], [6, 9, 7, 8, 8, 9]]).T
 # Twenty people, three tasks done or not (pingouin, "cochran").
 COCHRAN = "111 101 100 001 010 101 101 100 101 001 011 111 000 110 101 001 100 101 110 101"
 # Upper tails of Friedman's statistic without ties: participants, settings, statistic, P.
@@ -70,13 +66,6 @@ def test_published_times_to_first_base() -> None:
     assert result.method == "exact permutation"
 
 
-def test_published_parts_of_the_times() -> None:
-    assert friedman(BASES[:3]).effect == pytest.approx(0.111111, abs=1e-6)
-    first = friedman(BASES[:12])  # a public test suite has 11.143 here, the value of all 22
-    assert first.statistic == pytest.approx(4.9787, abs=1e-4)
-    assert first.p_chi2 == pytest.approx(0.0830, abs=1e-4)
-
-
 def test_published_whole_scores_with_ties() -> None:
     result = friedman(SCORES)
     assert result.statistic == pytest.approx(13.351351, abs=1e-6)
@@ -115,23 +104,6 @@ def test_two_values_give_cochrans_q() -> None:
     result = friedman([[int(digit) for digit in row] for row in COCHRAN.split()])
     assert result.statistic == pytest.approx(6.705882, abs=1e-6)
     assert result.p_chi2 == pytest.approx(0.0349813, abs=1e-7)
-
-
-def test_mean_ranks_give_the_published_nemenyi_and_conover_comparisons() -> None:
-    result = friedman(POST_HOC)
-    a, b, c = result.mean_ranks
-    error = np.sqrt(3 * 4 / (6 * result.n))
-    nemenyi = [studentized_range.sf(abs(x - y) / error * np.sqrt(2), 3, np.inf) for x, y in ((a, b), (a, c), (b, c))]
-    assert nemenyi == pytest.approx([0.0545, 0.0109, 0.8322], abs=1e-4)
-    n, k = 6, 3
-    spread = (np.argsort(np.argsort(POST_HOC)) + 1.0) ** 2
-    assert result.statistic is not None
-    left = (1 - result.statistic / (n * (k - 1))) * 2 * n * (spread.sum() - n * k * (k + 1) ** 2 / 4)
-    conover = [n * abs(x - y) / np.sqrt(left / ((n - 1) * (k - 1))) for x, y in ((a, b), (a, c))]
-    assert conover == pytest.approx([4.47, 5.59], abs=0.005)
-    ps = [2 * float(t_distribution.sf(t, (n - 1) * (k - 1))) for t in conover]
-    assert ps == pytest.approx([0.001193, 0.000231], abs=5e-7)
-    assert holm([*ps, 0.289692])[:2] == pytest.approx([0.002387, 0.000692], abs=1e-6)
 
 
 @pytest.mark.slow
@@ -187,11 +159,6 @@ def test_nothing_to_compare_is_said_and_never_nan(rows: object, n: int) -> None:
     assert not result.reaches(0.05)
 
 
-def test_one_person_cannot_show_anything() -> None:
-    result = friedman([[1, 4, 7]])
-    assert (result.p, result.smallest_p) == pytest.approx((1.0, 1.0))
-
-
 def test_two_settings_and_infinite_answers_are_refused() -> None:
     with pytest.raises(AnalysisError, match="2 settings: at least 3 are needed"):
         friedman([[1, 2], [2, 3]])
@@ -229,17 +196,6 @@ def test_seven_settings_are_drawn_and_many_people_approximated() -> None:
         assert (many.p, many.smallest_p) == (many.p_chi2, None)
 
 
-@pytest.mark.variants(1)
-@pytest.mark.slow
-@pytest.mark.parametrize("k", [3, 4, 7])
-def test_the_approximation_is_near_the_drawn_p_where_it_takes_over(k: int) -> None:
-    rng = np.random.default_rng(k)
-    values = rng.integers(1, 8, (module.DRAWN_UP_TO, k)) + (rng.random((module.DRAWN_UP_TO, k)) < 0.06 * np.arange(k))
-    drawn = friedman(values)
-    assert drawn.p_chi2 is not None
-    assert drawn.p == pytest.approx(drawn.p_chi2, abs=3 * np.sqrt(drawn.p_chi2 / 9999) + 0.002)
-
-
 # R package irr, "anxiety": three raters, twenty people.
 ANXIETY = ["33345523522615221243", "36462424332333221334", "21443216111233113322"]
 
@@ -249,11 +205,6 @@ def test_published_agreement_of_three_raters() -> None:
     assert result.effect == pytest.approx(0.5396568760, abs=1e-10)
     assert (result.statistic, result.df) == (pytest.approx(30.7604419, abs=1e-7), 19)
     assert result.p_chi2 == pytest.approx(0.0428835, abs=1e-7)
-
-
-def test_raters_who_agree_or_contradict_each_other() -> None:
-    assert friedman([[1, 2, 3, 4]] * 3).effect == pytest.approx(1.0)
-    assert friedman([[1, 2, 3], [3, 2, 1]]).effect == pytest.approx(0.0)
 
 
 def test_published_kappa() -> None:
@@ -308,11 +259,6 @@ def test_the_exact_p_is_that_of_relabelling_whole_participants() -> None:
     assert result.smallest_p == pytest.approx((every >= every.max() - 1e-9).mean())
 
 
-def test_statements_that_say_the_same_give_one_answer_and_not_a_stronger_one() -> None:
-    one = made_up(1, 5, 3, seed=4)
-    assert global_permutation(np.repeat(one, 9, axis=0)).p == pytest.approx(global_permutation(one).p)
-
-
 def test_small_shifts_in_all_statements_add_up() -> None:
     rng = np.random.default_rng(5)
     values = np.clip(rng.integers(2, 6, (9, 12, 3)) + np.array([0, 0, 1]), 1, 7).astype(float)
@@ -322,11 +268,6 @@ def test_small_shifts_in_all_statements_add_up() -> None:
     assert result.p < min(p for p in singles if p is not None)
     assert result.method.startswith("Monte Carlo")
     assert result == global_permutation(values)
-
-
-def test_relabelling_the_settings_changes_nothing() -> None:
-    values = made_up(4, 6, 3, seed=2)
-    assert global_permutation(values).p == pytest.approx(global_permutation(values[:, :, [2, 0, 1]]).p)
 
 
 def test_a_missing_answer_leaves_out_one_row_and_not_the_participant() -> None:
@@ -349,8 +290,3 @@ def test_a_statement_without_variation_does_not_count() -> None:
     assert (flat.statistic, flat.p, flat.effect) == (None, None, None)
     assert flat.note.startswith("no variation")
     assert global_permutation(np.full((2, 5, 3), np.nan)).note == "no participant completed a statement"
-
-
-def test_one_setting_is_refused() -> None:
-    with pytest.raises(AnalysisError, match="at least 2"):
-        global_permutation(np.ones((2, 5, 1)))

@@ -5,8 +5,6 @@ from itertools import permutations
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.stats import false_discovery_control, kruskal, rankdata
 
 from study_app.analysis.statistics import independent_groups as module
@@ -25,16 +23,6 @@ from study_app.errors import AnalysisError
 )
 def test_published_adjustments(ps: list[float], adjusted: list[float]) -> None:
     assert holm(ps) == pytest.approx(adjusted)
-
-
-@pytest.mark.slow
-@given(st.lists(st.floats(0, 1), min_size=1, max_size=12), st.randoms(use_true_random=False))
-def test_holm_keeps_order_and_lies_between_p_and_bonferroni(ps, random) -> None:  # type: ignore[no-untyped-def]
-    adjusted = holm(ps)
-    assert all(p <= a <= min(1.0, p * len(ps)) + 1e-12 for p, a in zip(ps, adjusted, strict=True) if a is not None)
-    order = random.sample(range(len(ps)), len(ps))
-    assert holm([ps[place] for place in order]) == pytest.approx([adjusted[place] for place in order])
-    assert [adjusted[place] for place in np.argsort(ps, kind="stable")] == sorted(a for a in adjusted if a is not None)
 
 
 def test_a_test_without_p_stays_without_and_still_counts() -> None:
@@ -61,25 +49,13 @@ MATH_ANXIETY = {
     "interesting": ("25544544513441522435", 25, 10, 65),
     "uptight": ("51145224452425343353", 30, 20, 50),
     "use in future": ("35555555534353454445", 0, 20, 80),
-    "blank": ("41223113253215224151", 60, 15, 25),
-    "relates": ("24443554224352454415", 25, 10, 65),
     "worry": ("41233125454314134242", 40, 20, 40),
-    "sinking": ("41234114453311144241", 45, 15, 40),
-    "challenging": ("51334535454425244444", 15, 15, 70),
-    "nervous": ("51224214453315134242", 45, 15, 40),
-    "more classes": ("44231323311241522334", 45, 30, 25),
-    "uneasy": ("51224214453315134341", 40, 20, 40),
     "favourite": ("14331442311241512313", 50, 25, 25),
-    "enjoy": ("24332443311241522335", 40, 30, 30),
-    "confused": ("41234124254415245343", 35, 15, 50),
 }
 # What 66,690 pupils read: counts of five levels, answered; low, neutral, high.
 READING = {
     "magazines": ((6682, 13143, 13995, 20353, 11436), 30.21689, 21.33091, 48.45219),
-    "newspapers": ((12317, 12141, 10314, 15645, 15165), 37.29377, 15.72688, 46.97935),
-    "fiction": ((11131, 16164, 12818, 14569, 10658), 41.77380, 19.61739, 38.60882),
     "comic books": ((24019, 16789, 10317, 9489, 4751), 62.43096, 15.78368, 21.78536),
-    "non-fiction": ((20145, 19961, 12768, 8797, 3622), 61.42466, 19.55493, 19.02042),
 }
 PUPILS = 66690
 
@@ -192,11 +168,3 @@ def test_missing_answers_and_what_cannot_be_tested() -> None:
         assert none.note.startswith(note)
     with pytest.raises(AnalysisError, match="2 participants and 1 groups"):
         groups_differ(np.ones((2, 1)), ("A",))
-
-
-@pytest.mark.slow
-def test_p_is_uniform_at_most_where_groups_are_alike() -> None:
-    rng = np.random.default_rng(5)
-    ps = [groups_differ(rng.integers(1, 8, (10, 1)).astype(float), tuple("AAAAABBBBB")).p or 1.0 for _ in range(300)]
-    for alpha in (0.05, 0.2):
-        assert np.mean(np.array(ps) <= alpha) <= alpha + 3 * np.sqrt(alpha * (1 - alpha) / len(ps))
