@@ -85,14 +85,6 @@ def test_an_error_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found.wake > 1e-4
 
 
-def test_effects_without_a_reference_are_named() -> None:
-    found = appraisal_measurement.errors(PHYSICAL["honey"])
-    assert found.wake is None
-    assert found.force_n is not None
-    assert found.force_n < 1e-9
-    assert found.left_out == ("buoyancy", "added_mass", "history")
-
-
 @pytest.mark.parametrize(
     ("velocity", "lag_ms"),
     [(Ewma(), 9.5), (Ewma(alpha=0.5), 1.5), (Raw(), 0.5), (Line(samples=15), 7.0)],
@@ -116,12 +108,6 @@ def test_an_exploration_may_be_shaken_and_a_reach_goes_as_far_as_its_targets() -
     following = zip(reach.targets_m, (*reach.targets_m[1:], reach.targets_m[0]), strict=True)
     assert 2 * stroke.amplitude_m == pytest.approx(max(math.dist(*pair) for pair in following))
     assert stroke.frequency_hz == pytest.approx(1 / 0.6)
-
-
-def test_slow_strokes_lack_nothing_and_the_share_withheld_is_that_of_the_samples() -> None:
-    assert withheld_share(THESIS["water"], Stroke(0.5, 0.03), UNKNOWN) < 1e-6
-    assert withheld_share(THESIS["water"].model_copy(update={"liquids": ()}), SHAKE, UNKNOWN) == 0.0
-    assert 0.0 < withheld_share(THESIS["light_oil"], QUICK, UNKNOWN) <= 1.0
 
 
 def test_a_stroke_is_made_where_the_device_is_in_the_scene() -> None:

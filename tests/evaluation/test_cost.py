@@ -5,7 +5,7 @@ import itertools
 import pytest
 
 from study_app.evaluation import cost
-from study_app.evaluation.cost import hand, measure, report
+from study_app.evaluation.cost import measure, report
 from study_app.haptics.model.effects.current import Uniform
 from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.scene import Box, Liquid, Scene
@@ -71,15 +71,3 @@ def test_a_report_has_the_gates_table_with_costs_and_the_whole(monkeypatch):
     assert lines[0].startswith("river: effects named")
     assert [line.split()[3] for line in lines[2:4]] == ["2", "40"]
     assert lines[-1] == "one tick: 62 ns, 0.01 % of the tick period; 20 ns of it without liquids"
-
-
-def test_the_servos_own_tick_is_what_is_measured():
-    measured = measure(BOTH, batches=2)
-    assert measured.scene_ns > 0
-    assert measured.rest_ns > 0
-
-
-def test_the_hand_moves_turns_back_and_rests():
-    positions_m = hand(10_000)
-    assert abs(positions_m).max() == pytest.approx(0.03, rel=1e-3)
-    assert (positions_m[8100:] == positions_m[8100]).all()

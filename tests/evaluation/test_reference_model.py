@@ -20,47 +20,31 @@ def tail(velocities, *, n=4, s=4.0, y=1.0, beta_deg=45.0, span_m=0.0, decay=1.0,
     return met[-1]
 
 
-def test_nothing_is_no_wake():
-    assert not tail([]).any()
+ZERO = np.zeros(3)
+SLIGHTLY = np.array([0.8, 0.0, 0.6])  # 36.9° from x
+CURVE = [np.array([np.cos(a), 0.0, np.sin(a)]) for a in np.radians([0, 30, 60])]
 
 
-def test_one_segment_takes_the_direction_of_its_newest_element_with_all_magnitudes():
-    slightly = np.array([0.8, 0.0, 0.6])  # 36.9° from x
-    assert tail([2 * X, slightly]) == pytest.approx(slightly * 3 / 4)
-
-
-def test_two_segments_add_as_vectors():
-    assert tail([X, X, Z]) == pytest.approx([0.5, 0.0, 0.25])
-
-
-def test_the_oldest_falls_off():
-    assert tail([X, X, Z, Z, Z]) == pytest.approx([0.25, 0.0, 0.75])
-
-
-def test_zero_elements_take_places_and_break_nothing():
-    zero = np.zeros(3)
-    assert tail([X, zero, X]) == pytest.approx([0.5, 0.0, 0.0])
-    assert tail([X, X, zero, zero, zero]) == pytest.approx([0.25, 0.0, 0.0])
-    assert not tail([X, zero, zero, zero, zero]).any()
-
-
-def test_decay_is_that_of_age():
-    assert tail([X, X], decay=0.5) == pytest.approx([1.5 / 4, 0.0, 0.0])
-
-
-def test_a_slow_curve_breaks_over_the_span_where_neighbours_would_not():
-    curve = [np.array([np.cos(a), 0.0, np.sin(a)]) for a in np.radians([0, 30, 60])]
-    assert tail(curve) == pytest.approx(curve[2] * 3 / 4)
-    assert tail(curve, span_m=2e-3) == pytest.approx((2 * curve[1] + curve[2]) / 4)
-
-
-def test_the_response_acts_on_the_fill():
-    assert tail([X, X], y=2.0) == pytest.approx([0.25, 0.0, 0.0])
-    assert tail([X, X], y=0.5) == pytest.approx([0.5 * (0.25 + 0.0025) ** -0.25, 0.0, 0.0])
-
-
-def test_a_coarse_resolution_skips_elements():
-    assert tail([X] * 4, resolution_m=1.9e-3) == pytest.approx([0.5, 0.0, 0.0])
+@pytest.mark.parametrize(
+    ("velocities", "changes", "wake"),
+    [
+        ([], {}, ZERO),
+        ([2 * X, SLIGHTLY], {}, SLIGHTLY * 3 / 4),  # one segment: the newest direction with all magnitudes
+        ([X, X, Z], {}, [0.5, 0.0, 0.25]),  # two segments add as vectors
+        ([X, X, Z, Z, Z], {}, [0.25, 0.0, 0.75]),  # the oldest falls off
+        ([X, ZERO, X], {}, [0.5, 0.0, 0.0]),  # zeros take places and break nothing
+        ([X, X, ZERO, ZERO, ZERO], {}, [0.25, 0.0, 0.0]),
+        ([X, ZERO, ZERO, ZERO, ZERO], {}, ZERO),
+        ([X, X], {"decay": 0.5}, [1.5 / 4, 0.0, 0.0]),  # by age
+        (CURVE, {}, CURVE[2] * 3 / 4),
+        (CURVE, {"span_m": 2e-3}, (2 * CURVE[1] + CURVE[2]) / 4),  # breaks where neighbours would not
+        ([X, X], {"y": 2.0}, [0.25, 0.0, 0.0]),  # the response acts on the fill
+        ([X, X], {"y": 0.5}, [0.5 * (0.25 + 0.0025) ** -0.25, 0.0, 0.0]),
+        ([X] * 4, {"resolution_m": 1.9e-3}, [0.5, 0.0, 0.0]),  # a coarse resolution skips elements
+    ],
+)
+def test_wakes_are_those_worked_out_by_hand(velocities, changes, wake):
+    assert tail(velocities, **changes) == pytest.approx(np.asarray(wake))
 
 
 def test_the_force_is_the_drag_of_the_relative_velocity():

@@ -8,13 +8,10 @@ import pytest
 from scipy.integrate import quad
 
 from study_app.evaluation import reference_solutions
-from study_app.evaluation.hand_motions import stir, with_velocity
 from study_app.evaluation.reference_model import exact_wakes, respond, wakes
 from study_app.haptics.model.effects.drag import Drag
-from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Given, Liquid, MotionBox, Scene
-from tests.haptics.scenes import COMPILED
 
 HONEY = Liquid(id="honey", density_kg_m3=1420, viscosity_pa_s=10)
 BOX = MotionBox(speed_mps=0.6, acceleration_mps2=6)
@@ -129,23 +126,3 @@ def test_the_start_has_the_published_factors():
         assert -case.force_n[k, 0] / stokes_n == pytest.approx(factor, abs=5e-3)
     assert not case.counted[:10].any()
     assert case.counted[10:].all()
-
-
-def test_a_stirring_hand_brings_the_velocities_of_its_places():
-    motion = stir(10, 1000)
-    by_differences = with_velocity(Motion(motion.t_s, motion.position_m)).velocity_mps
-    assert np.abs(by_differences - motion.velocity_mps)[1:-1].max() < 2e-4
-    speed_mps = np.linalg.norm(motion.velocity_mps, axis=1)
-    assert 1.7 < speed_mps.max() < 1.9
-    assert not speed_mps[3100:3900].any()
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not COMPILED, reason="many thousands of elements")
-def test_the_exact_definition_agrees_with_the_literal_one_on_a_whole_motion():
-    water = Liquid(
-        id="water", density_kg_m3=1000, effects=("drag", "wake"), wake=Wake(length=1700, scaling=1700, exponent=0.75)
-    )
-    motion = stir(10, 1000)
-    exact = respond(scene(water), motion, exact=True).force_n
-    assert np.abs(exact - respond(scene(water), motion).force_n).max() < 1e-13

@@ -11,7 +11,7 @@ from study_app.devices.rig import Rig
 from study_app.devices.scripted import ScriptedDevice
 from study_app.errors import StoreError
 from study_app.evaluation import replay as replay_module
-from study_app.evaluation.replay import replay
+from study_app.evaluation.replay import Replayed, replay
 from study_app.haptics.model import gate
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.force_rules import FORCE_RULES, VERSIONS
@@ -78,17 +78,36 @@ def resumed_on_another_device(folder: Path) -> Path:
     return place
 
 
-@pytest.mark.slow
+def comes_out(place: Path, recordings: int) -> Replayed:
+    """Replay a session, whose recordings come out to the last bit."""
+    found = replay(place)
+    assert (found.differences, found.missing, found.uncompared) == ((), (), ())
+    assert (found.recordings, found.proved) == (recordings, True)
+    return found
+
+
+def stirred(folder: Path, device: ScriptedDevice, *, before: int, until: int) -> Path:
+    """Hold a session whose servo runs some ticks before it begins, and until its first trial; return its folder."""
+    with device, Servo(device, clock=VirtualClock(), elements=100) as servo:
+        servo.advance(before)
+        with begun(folder, device, servo) as store:
+            runner, wait = held(store, device, servo)
+            runner.post(Begin(store.clock.seconds()))
+            wait(until - before)
+            runner.post(Continue(store.clock.seconds()))
+            wait(1500)
+            runner.post(EndAsked(store.clock.seconds(), "aborted", ""))
+        place: Path = store.folder.path
+    return place
+
+
 def test_a_rehearsed_session_comes_out_to_the_last_bit(rehearsed: Path) -> None:
-    found = replay(session(rehearsed))
-    assert (found.differences, found.uncompared) == ((), ())
-    assert found.recordings == 4
+    found = comes_out(session(rehearsed), 4)
     assert found.lasted_s > 3
     assert found.seconds == sum(
         len(recording_files.read_checks(path).device_force)
         for path in session(rehearsed).glob("recordings/trial-00?.parquet")
     )
-    assert found.proved
     assert 0 < found.computed_s < found.took_s
 
 
@@ -120,17 +139,13 @@ def test_a_session_is_replayed_with_the_model_that_its_receipt_records(
     assert json.loads((place / "receipt.json").read_text())["protocol"]["scene"]["velocity"] == {"kind": "kalman"}
     monkeypatch.setattr(gate, "_budget_n", lambda _scene, total_n: 0.9 * total_n)
     monkeypatch.setattr(formats, "ESTIMATOR", "ewma")
-    found = replay(place)
-    assert (found.differences, found.uncompared) == ((), ())
-    assert found.recordings == 4
+    comes_out(place, 4)
     monkeypatch.setattr(replay_module, "as_recorded", lambda protocol, _receipt, _key: protocol)
     assert replay(place).differences
 
 
 def test_repeats_pauses_stops_and_fades_come_out_to_the_last_bit(tmp_path: Path) -> None:
-    found = replay(troubled(tmp_path / "results"))
-    assert (found.differences, found.uncompared) == ((), ())
-    assert found.recordings == 5
+    comes_out(troubled(tmp_path / "results"), 5)
 
 
 @pytest.mark.parametrize("liquid", STRESSED)
@@ -138,16 +153,12 @@ def test_forces_that_limits_change_come_out_to_the_last_bit(tmp_path: Path, liqu
     place = stressed(tmp_path / "results", liquid)
     limiters = recording_files.read_samples(place / "recordings" / "trial-001.parquet").limiters
     assert all((limiters & bit).any() for bit in (LIMITER_SLOPE, LIMITER_ENERGY, LIMITER_SLEW))
-    found = replay(place)
-    assert (found.differences, found.uncompared) == ((), ())
-    assert (found.recordings, found.proved) == (1, True)
+    comes_out(place, 1)
 
 
 def test_a_session_that_goes_on_with_another_device_comes_out_to_the_last_bit(tmp_path: Path) -> None:
     place = resumed_on_another_device(tmp_path / "results")
-    found = replay(place)
-    assert (found.differences, found.uncompared) == ((), ())
-    assert (found.recordings, found.proved) == (2, True)
+    comes_out(place, 2)
     receipt = json.loads((place / "receipt.json").read_text())
     (place / "receipt.json").write_text(json.dumps(receipt | {"resumed": []}))
     with pytest.raises(StoreError, match="lacks the device since"):
@@ -177,21 +188,8 @@ def test_each_part_of_a_session_is_replayed_by_the_force_rules_that_its_receipt_
 
 
 def test_a_session_on_a_device_that_measures_velocity_comes_out_to_the_last_bit(tmp_path: Path) -> None:
-    with (
-        TachometerDevice() as device,
-        Servo(device, clock=VirtualClock(), elements=100) as servo,
-        begun(tmp_path / "results", device, servo) as store,
-    ):
-        runner, wait = held(store, device, servo)
-        runner.post(Begin(store.clock.seconds()))
-        wait(500)
-        runner.post(Continue(store.clock.seconds()))
-        wait(1500)
-        runner.post(EndAsked(store.clock.seconds(), "aborted", ""))
-        place: Path = store.folder.path
-    found = replay(place)
-    assert (found.differences, found.uncompared) == ((), ())
-    assert (found.recordings, found.proved) == (1, True)
+    place = stirred(tmp_path / "results", TachometerDevice(), before=0, until=500)
+    comes_out(place, 1)
 
     def nudge(columns: dict[str, Any]) -> None:
         columns["device_velocity_x_mps"][-5:] += 1e-9
@@ -203,16 +201,4 @@ def test_a_session_on_a_device_that_measures_velocity_comes_out_to_the_last_bit(
 @pytest.mark.parametrize("ticks", [200, 450, 550, 650])
 def test_a_trial_soon_after_a_short_preflight_comes_out_to_the_last_bit(tmp_path: Path, ticks: int) -> None:
     """The recording begins while the servo's start fade is under way, of which 0.1 s are over by then."""
-    with ScriptedDevice() as device, Servo(device, clock=VirtualClock(), elements=100) as servo:
-        servo.advance(100)
-        with begun(tmp_path / "results", device, servo) as store:
-            runner, wait = held(store, device, servo)
-            runner.post(Begin(store.clock.seconds()))
-            wait(ticks - 100)
-            runner.post(Continue(store.clock.seconds()))
-            wait(1500)
-            runner.post(EndAsked(store.clock.seconds(), "aborted", ""))
-            place: Path = store.folder.path
-    found = replay(place)
-    assert (found.differences, found.uncompared) == ((), ())
-    assert (found.recordings, found.proved) == (1, True)
+    comes_out(stirred(tmp_path / "results", ScriptedDevice(), before=100, until=ticks), 1)

@@ -10,10 +10,8 @@ from pyarrow import parquet
 
 from study_app.errors import StoreError
 from study_app.evaluation.replay import replay
-from study_app.session.simulated.rehearsal import rehearse
 from tests.compiled import needs_servo
-from tests.evaluation.recorded_sessions import copied, rewrite, session, troubled
-from tests.faults.support import short
+from tests.evaluation.recorded_sessions import copied, rewrite, troubled
 from tests.store.forging import Lines, forge
 
 pytestmark = [needs_servo, pytest.mark.slow]
@@ -83,13 +81,6 @@ def test_what_goes_on_from_a_lost_recording_is_not_said_to_differ(tmp_path: Path
         for attempt in (2, 3, 4)  # each began while the one before it could still be felt
     )
     assert (found.recordings, found.differences) == (1, ())
-
-
-def test_a_session_without_recordings_proves_nothing(tmp_path: Path) -> None:
-    rehearse(short.write(tmp_path), participants=1, seed=1, results=tmp_path / "results", recordings=False)
-    found = replay(session(tmp_path / "results"))
-    assert (found.recordings, found.seconds, found.proved) == (0, 0, False)
-    assert (found.differences, found.missing, found.uncompared) == ((), (), ())
 
 
 @pytest.mark.parametrize("name", ["device", "protocol", "seed", "participant"])

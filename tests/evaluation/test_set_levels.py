@@ -1,7 +1,5 @@
 """Levels that a participant set follow from the steps, every force from the recording; whoever changes one is found."""
 
-import csv
-import io
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -12,11 +10,9 @@ import pytest
 
 from study_app.evaluation.recorded_intervals import places_of, steps_of
 from study_app.evaluation.replay import replay
-from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import rehearse, resume
 from study_app.store.blinded.blinding import read_key
 from study_app.store.blinded.sealing import opened
-from study_app.store.blinded.unblinding import unblind
 from study_app.store.blinded.whole_protocol import whole_protocol
 from study_app.store.journals import journal
 from study_app.store.receipt import read
@@ -172,18 +168,6 @@ def test_a_session_that_was_killed_and_resumed_is_set_as_one_that_was_not(
     assert replay(session).differences == ()
 
 
-def test_settings_are_in_the_tables_only_after_unblinding(session: Path) -> None:
-    def intervals() -> list[dict[str, str]]:
-        return [*csv.DictReader(io.StringIO(next(session.glob("*intervals*")).read_text()))]
-
-    assert "setting" not in intervals()[0]
-    unblind(session.parents[2], "somebody", "to test")
-    rows = intervals()
-    assert [row["setting"] == "n/a" for row in rows] == [True, False] * 3
-    assert {row["value_delivered"] for row in rows if row["setting"] != "n/a"} == {"n/a"}
-    assert verify(session.parents[2], None).errors == ()
-
-
 @pytest.mark.parametrize(
     "edits", [(ALONE, DELAY), (WATER, VISCOSITY), (ALONE,)], ids=["delay", "viscosity with a wake", "alone"]
 )
@@ -217,11 +201,3 @@ def test_a_level_that_was_set_is_found_in_a_note(session: Path) -> None:
     (session / "note.txt").write_text(f"it was {level!r}", encoding="utf-8")
     warnings = [str(one) for one in verify(session.parents[2], None).warnings]
     assert any("note.txt, line 1 reveals a condition, although the key is sealed" in one for one in warnings)
-
-
-@pytest.mark.nightly
-def test_settings_without_a_servo_follow_too(protocol: Path, tmp_path: Path) -> None:
-    study = rehearse_answers(protocol, participants=1, seed=2, results=tmp_path / "study")
-    found = reproduced(session_of(study))
-    assert (found.differences, found.followed) == ([], ["matching: 3 of 3 levels follow from the answers"])
-    assert verify(study, None).errors == ()

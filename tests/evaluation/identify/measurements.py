@@ -69,6 +69,3 @@ def write_csv(path, motion, force_n, *, velocities=True, comment=""):
         writer.writerow(columns)
         writer.writerows(zip(*columns.values(), strict=True))
     return path
-
-
-# --- What is found ---------------------------------------------------------------------------------------------------

@@ -1,7 +1,6 @@
 """Liquids from measured motion and force: found again, as sure as said, and doubted where numbers mean little."""
 
 import math
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +8,9 @@ import pytest
 from scipy.stats import t as student
 
 from study_app.errors import StudyError
-from study_app.evaluation.identify import measured_force, parameters, search
+from study_app.evaluation.identify import measured_force
 from study_app.evaluation.identify.fit import fit
 from study_app.haptics.model import paths
-from study_app.haptics.model.effects.local_wake import LocalWake
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.overrides import override_all
 from study_app.haptics.model.scene import Box, Liquid, Scene
@@ -84,28 +82,6 @@ def test_a_viscosity_an_order_away_and_an_added_mass():
     assert found.distinguishable
 
 
-@pytest.mark.nightly
-def test_a_local_wake_whose_force_has_plateaus_over_its_length():
-    """A search that does not look about after its first descent ends on one of them, at 627."""
-    local_wake = LocalWake(length=650, scaling=700)
-    lake = Liquid(id="lake", density_kg_m3=1000, effects=("drag", "local_wake"), local_wake=local_wake)
-    scene, motion = Scene(liquids=(lake,)), paths.path("reach", reaches=4)
-    start = override_all(scene, {"length": 30, "scaling": 300})
-    found = fit(start, "lake", ["length", "scaling"], motion, noisy(scene, motion, 0.02))
-    assert found.values["length"] == pytest.approx(650, rel=0.02)
-    assert found.values["scaling"] == pytest.approx(700, rel=0.02)
-
-
-def test_a_motion_along_a_line_may_have_its_force_along_that_line():
-    motion = paths.path("stop", moving_s=0.6, rest_s=0.6)
-    force_n = noisy(TANK, motion, 0.02)
-    along = fit(TANK, "tank", ["drag_coefficient"], motion, force_n[:, 0])
-    assert along.axes == (0,)
-    assert along.residual_n.shape == (len(motion.t_s), 3)
-    lower, upper = along.intervals["drag_coefficient"]
-    assert lower < 0.42 < upper
-
-
 def test_slower_and_uneven_rows_tell_the_same():
     motion = REACH
     force_n, rng = noisy(TANK, motion, 0.005), np.random.default_rng(SEED)
@@ -138,9 +114,6 @@ def test_centred_velocities_are_those_of_a_parabola():
     assert slopes == pytest.approx(np.column_stack([6 * t_s - 1, 0 * t_s, -np.ones(60)]), abs=1e-9)
 
 
-# --- How sure --------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.nightly
 @pytest.mark.parametrize("following", [0.0, 0.9])
 def test_nineteen_of_twenty_intervals_hold_the_truth(following):
@@ -160,19 +133,6 @@ def test_nineteen_of_twenty_intervals_hold_the_truth(following):
     # Two deviations of the binomial distribution to both sides of 0.95; intervals too wide would hold all.
     assert (held >= 91).all()
     assert (held <= 99).all()
-
-
-def test_the_wider_the_noise_the_wider_the_interval():
-    widths = []
-    for deviation_n in (0.01, 0.1, 1.0):
-        found = fit(BALL, "tank", ["drag_coefficient"], REACH, noisy(BALL, REACH, deviation_n))
-        lower, upper = found.intervals["drag_coefficient"]
-        widths.append(upper - lower)
-    for narrow, wide in pairwise(widths):
-        assert wide == pytest.approx(10 * narrow, rel=0.2)
-
-
-# --- What is doubted -------------------------------------------------------------------------------------------------
 
 
 def test_two_factors_of_the_same_force_cannot_be_distinguished():
@@ -207,17 +167,6 @@ def test_a_length_beyond_what_was_measured_ends_at_the_edge():
     assert any("edge of its range, 200 (no more than" in warning for warning in found.warnings)
 
 
-def test_a_scaling_never_falls_below_its_length():
-    """Measured: a liquid that outruns the ball. The model has none such."""
-    pushed = force_of(TANK, REVERSE)
-    pushed[800:1300] *= -1
-    found = fit(TANK, "tank", ["length", "scaling"], REVERSE, pushed)
-    assert found.values["length"] <= found.values["scaling"]
-    alone = fit(TANK, "tank", ["scaling"], REVERSE, force_of(override_all(TANK, {"scaling": 300}), REVERSE))
-    assert alone.values["scaling"] == pytest.approx(300)
-    assert any("no less than length" in warning for warning in alone.warnings)
-
-
 def test_a_missing_effect_shows_in_residuals_that_follow_one_another():
     lacking = override_all(OIL, {"effects": ("drag",)})
     found = fit(lacking, "oil", ["viscosity_pa_s"], REACH, noisy(OIL, REACH, 0.01))
@@ -238,30 +187,6 @@ def test_a_sharp_turn_that_velocities_from_places_blur_is_doubted():
     assert fit(TANK, "tank", ["drag_coefficient"], REVERSE, force_n).warnings == ()
 
 
-# --- What may be fitted ----------------------------------------------------------------------------------------------
-
-
-def test_ranges_are_those_of_the_scenes_models():
-    names = ["drag_coefficient", "wake.length", "scaling", "decay", "body.density_kg_m3", "density_kg_m3"]
-    found = {it.name: it for it in parameters.find(TANK, "tank", names)}
-    ranges = {name: (it.least, it.most, it.above, it.whole) for name, it in found.items()}
-    assert ranges == {
-        "drag_coefficient": (0, 10, False, False),
-        "wake.length": (1, 100_000, False, True),
-        "scaling": (1, 1e9, False, False),
-        "decay": (0.5, 1, False, False),
-        "body.density_kg_m3": (0.01, 25_000, False, False),
-        "density_kg_m3": (0.01, 25_000, False, False),
-    }
-    assert (found["body.density_kg_m3"].table, found["density_kg_m3"].table) == ("body", "liquid")
-
-
-def test_parameters_are_set_where_simulate_would_set_them():
-    for name, value in (("length", 77), ("drag_coefficient", 0.2), ("density_kg_m3", 800.0), ("exponent", 2.0)):
-        found = parameters.find(TANK, "tank", [name])
-        assert parameters.replace(TANK, "tank", found, [value]) == override_all(TANK, {name: value})
-
-
 @pytest.mark.parametrize(
     ("names", "said"),
     [
@@ -278,6 +203,10 @@ def test_parameters_are_set_where_simulate_would_set_them():
 def test_what_cannot_be_fitted_is_said(names, said):
     with pytest.raises(StudyError, match=said):
         fit(TANK, "tank", names, REVERSE, force_of(TANK, REVERSE))
+    with pytest.raises(StudyError, match="no liquid 'lake': there is tank"):
+        fit(TANK, "lake", ["drag_coefficient"], REVERSE, force_of(TANK, REVERSE))
+    with pytest.raises(StudyError, match="it is a device, which may have no end"):
+        measured_force.read(Path("/dev/null"))  # /dev/zero would fill the memory
 
 
 @pytest.mark.parametrize(
@@ -296,44 +225,9 @@ def test_what_was_not_measured_is_said(change, said):
         fit(TANK, "tank", ["drag_coefficient"], motion, force_n)
 
 
-def test_another_liquid_is_named():
-    with pytest.raises(StudyError, match="no liquid 'lake': there is tank"):
-        fit(TANK, "lake", ["drag_coefficient"], REVERSE, force_of(TANK, REVERSE))
-
-
-def test_between_whole_lengths_the_force_is_interpolated_and_at_them_it_is_simulated():
-    known = measured_force.Measured(REVERSE, force_of(TANK, REVERSE))
-    problem = search.ForceProblem(TANK, "tank", parameters.find(TANK, "tank", ["length"]), known)
-    whole = [force_of(override_all(TANK, {"length": n}), REVERSE) for n in (250, 251)]
-    for length, expected_n in ((250, whole[0]), (251, whole[1]), (250.25, 0.75 * whole[0] + 0.25 * whole[1])):
-        assert problem.force_n(np.array([math.log(length)])) == pytest.approx(expected_n, abs=1e-9)
-
-
 def test_effects_left_to_choice_are_chosen_once_and_named():
     box = Box(size_m=(9, 9, 9))
     auto = Scene(liquids=(Liquid(id="oil", density_kg_m3=900, viscosity_pa_s=0.1, region=box, effects="auto"),))
     found = fit(auto, "oil", ["density_kg_m3"], REACH, force_of(auto, REACH))
     assert found.scene.liquids[0].effects != "auto"
     assert found.values["density_kg_m3"] == pytest.approx(900)
-
-
-def test_every_number_has_a_range_to_be_searched_in():
-    tail = LocalWake(length=300, scaling=400)
-    liquid = Liquid(
-        id="tank", density_kg_m3=1000, viscosity_pa_s=1, effects=("drag", "local_wake", "history"), local_wake=tail
-    )
-    names = ["reach_m", "viscosity_pa_s", "density_kg_m3", "scaling", "exponent", "spreading_m2ps", "drag_coefficient"]
-    for found in parameters.find(Scene(liquids=(liquid,)), "tank", names):
-        least, most = search.u_range(found)
-        assert -math.inf < least < most < math.inf
-
-
-def test_a_device_is_not_read():
-    """One such as /dev/zero has no end."""
-    with pytest.raises(StudyError, match="it is a device, which may have no end"):
-        measured_force.read(Path("/dev/null"))
-
-
-def test_a_file_that_the_system_does_not_look_at_is_refused(tmp_path):
-    with pytest.raises(StudyError, match=r"cannot read .*: File name too long; name a CSV file"):
-        measured_force.read(tmp_path / f"{'x' * 300}.csv")

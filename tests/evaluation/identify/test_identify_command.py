@@ -5,9 +5,8 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
-from study_app.evaluation.identify import fit_figure, measured_force, preset
+from study_app.evaluation.identify import fit_figure, preset
 from study_app.evaluation.identify.fit import fit
-from study_app.haptics.model import paths
 from study_app.haptics.model.effects.current import Uniform
 from study_app.haptics.model.overrides import override_all
 from study_app.haptics.model.scene import Box, Kalman, Liquid, Scene
@@ -62,16 +61,6 @@ def test_the_preset_is_the_fitted_scene(scene, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_preset_says_how_sure_its_numbers_are(fitted):
-    found, path = fitted
-    lines = preset.preset(found, path).splitlines()
-    lower, upper = found.intervals["drag_coefficient"]
-    value = found.values["drag_coefficient"]
-    assert f"drag_coefficient = {value!r}  # 95 %: {lower:.5g} … {upper:.5g}" in lines
-    assert lines[0].startswith("# Fitted to tank.csv (SHA-256 ")
-
-
-@pytest.mark.slow
 def test_the_residuals_in_the_table_are_measured_less_fitted(fitted, tmp_path):
     found, path = fitted
     written = preset.write(found, tmp_path / "new", path)
@@ -98,9 +87,6 @@ def test_the_figure_is_whole_and_shows_the_residual(fitted):
     assert np.array_equal(shown["z"], found.residual_n[:, 2])
 
 
-# --- The command -----------------------------------------------------------------------------------------------------
-
-
 def identify(*words):
     return CliRunner().invoke(commands, ["identify", *map(str, words)], catch_exceptions=False)
 
@@ -117,17 +103,6 @@ def test_from_a_file_to_a_preset(tmp_path):
     written = load_scene(tmp_path / "out" / "honey.toml", "honey")
     assert written.body.drag_coefficient == pytest.approx(0.61, rel=0.01)
     assert written == true.model_copy(update={"body": written.body, "velocity": Kalman()})
-
-
-def test_a_motion_along_one_line_is_read_from_its_velocities(tmp_path):
-    motion = paths.path("stop", moving_s=0.4, rest_s=0.4)
-    force_n = force_of(TANK, motion)
-    path = tmp_path / "line.csv"
-    rows = np.column_stack([motion.t_s, motion.velocity_mps[:, 0], force_n[:, 0]])
-    np.savetxt(path, rows, delimiter=",", header="# solved\nt_s,velocity_mps,force_n", comments="", fmt="%.17g")
-    read = measured_force.read(path)
-    assert read.motion.position_m == pytest.approx(motion.position_m, abs=1e-3)
-    assert np.array_equal(read.force_n, force_n * [1, 0, 0])
 
 
 @pytest.mark.slow
