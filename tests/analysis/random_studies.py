@@ -1,21 +1,27 @@
-"""Random studies of any kind, and the check that their evaluation and texts hold no exception and no NaN."""
+"""Random studies of any kind, and what every finding must keep to in any study: no exception, no NaN, no template."""
 
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from study_app.analysis.evaluate import evaluate
+from study_app.analysis.figures.report_figures import pictures
+from study_app.analysis.findings import all_findings
 from study_app.analysis.report import findings_summary, number_files
 from study_app.analysis.report.block_section import block
+from study_app.analysis.report.first_page.claims import answers
 from study_app.analysis.report.first_page.first_page import first_page
 from study_app.analysis.report.json_values import plain
 from study_app.analysis.report.methods_paragraph import methods
 from study_app.analysis.report.r_script import r_script
+from study_app.analysis.results.block_results import Results
 from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.tables.study_tables import Study
 from tests.analysis.made_up import DECIDED, ITEMS, Presented, delays, liquids, study
+from tests.analysis.report.read_report import FORBIDDEN, seen
 
 
 def drawn(rng: np.random.Generator) -> Study:
@@ -43,18 +49,41 @@ def drawn(rng: np.random.Generator) -> Study:
 
 def check(number: int) -> None:
     """Evaluate the random study of this number, and write its texts."""
-    made = drawn(np.random.default_rng(number))
+    keeps_contract(drawn(np.random.default_rng(number)))
+
+
+def keeps_contract(made: Study, forms: Sequence[str] = ()) -> Results:
+    """Evaluate a study, write all its texts and draw its figures in these forms; return what is found.
+
+    Each finding has a value only in blocks that it is about, and only codes to speak of while the key is sealed.
+    """
     results = evaluate(made, planning=False)
-    assert results.failures == (), number
+    assert results.failures == ()
     json.dumps(plain(results), allow_nan=False)
-    findings_summary.findings(results)
-    methods(made, results)
-    r_script(made, results)
-    number_files.tests_csv(results)
     failures = Failures()
+    figures = list(pictures(made, results, forms, failures)) if forms else []
+    texts = [*findings_summary.findings(results), methods(made, results), *findings_summary.limits(made, results)]
     page = first_page(results, findings_summary.limits(made, results), failures)
-    assert failures.found == [], number
-    assert not re.search(r"\bnan\b|\bNone\b|\binf\b", re.sub(r'src="[^"]*"', "", page)), number
+    texts.append(seen(re.sub(r'src="[^"]*"', 'src="#part-"', page)))
     for found in results.blocks:
-        page = " ".join(block(found, results, ()))
-        assert "Not there: its computation failed" not in page, number
+        section = " ".join(block(found, results, figures, failures))
+        texts.append(seen(re.sub(r'src="[^"]*"', 'src="#part-"', section)))
+        for finding in all_findings():
+            if found.kind not in (finding.kinds if found.revealed else finding.sealed):
+                assert finding.of(found) == finding.empty, finding.key
+            told = [*finding.sentences(found, made.decided), *finding.limits(found), *finding.methods(found, results)]
+            assert all(text.endswith(".") for text in told), finding.key
+            assert all(row["block"] == found.id for row in finding.rows(found)), finding.key
+    asked = [(one.block, one.question) for one in answers(results)]
+    assert len(set(asked)) == len(asked)
+    assert failures.found == []
+    for picture in figures:
+        assert picture.caption.endswith(".")
+        assert all(picture.files[form] for form in forms)
+        texts.append(picture.caption)
+    for text in texts:
+        assert (wrong := FORBIDDEN.search(text)) is None, text[max(0, wrong.start() - 80) : wrong.end() + 40]
+    script = r_script(made, results)
+    assert all(script.count(left) == script.count(right) for left, right in ("()", "{}"))
+    assert number_files.tests_csv(results)
+    return results

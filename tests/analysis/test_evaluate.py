@@ -2,7 +2,6 @@
 
 import json
 import random
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,7 +26,7 @@ from study_app.analysis.findings.settings_differ import FINDING as OMNIBUS
 from study_app.analysis.report.json_values import plain
 from study_app.analysis.results import item_test
 from study_app.analysis.results.block_results import BlockFound, Results
-from study_app.analysis.results.conduct import delivered, orders
+from study_app.analysis.results.conduct import orders
 from study_app.analysis.statistics.friedman import friedman
 from study_app.analysis.statistics.multiple_comparisons import false_discovery, holm
 from study_app.analysis.statistics.paired import paired
@@ -73,9 +72,6 @@ def without(table: str, folder: Path) -> Folder:
     return make_results(folder, parse((head + kept).encode(), "rek2024.toml"))
 
 
-# --- families and verdicts ---
-
-
 def test_primary_statements_are_a_holm_family_and_the_others_exploratory() -> None:
     draw = random.Random(1)  # noqa: S311 - reproducible
     outcomes = {
@@ -107,9 +103,6 @@ def test_what_could_not_have_been_shown_is_out_of_reach() -> None:
 def test_results_hold_no_number_that_is_none() -> None:
     with pytest.raises(AnalysisError, match="a fault of the program"):
         plain({"a": (1.0, float("nan"))})
-
-
-# --- blocks ---
 
 
 @pytest.fixture(scope="module")
@@ -167,49 +160,6 @@ def test_of_five_no_pair_and_no_model_is_there_and_it_says_why(rek: Folder) -> N
     assert [one.what for one in delays.absent] == ["mixed model of the delay"]
 
 
-@pytest.mark.parametrize("people", [1, 2, 6, 7])
-def test_any_number_of_people_can_be_evaluated(rek: Folder, people: int) -> None:
-    results = found(opened(rek, people))
-    json.dumps(plain(results), allow_nan=False)
-    assert [one.n for one in results.blocks] == [people, people]
-    pairs = any(
-        one.what == "comparison of two settings" and "cannot show" in one.why for one in results.blocks[0].absent
-    )
-    assert pairs == (people < 7)
-
-
-def test_while_sealed_only_codes_are_compared(rek: Folder) -> None:
-    twelve(rek, people=6)
-    results = found(rek)
-    for block in results.blocks:
-        assert block.names == tuple(block.settings[place].code for place in range(len(block.settings)))
-        assert len(OMNIBUS.of(block)) == len(block.items)
-        assert {one.outcome.test for one in OMNIBUS.of(block)} == {"Friedman"}
-        assert {
-            PAIRS.of(block),
-            RECOGNITION.of(block),
-            TREND.of(block),
-            LOWEST.of(block),
-            CONTRASTS.of(block),
-            AGAIN.of(block).mixed,
-        } == {(), None}
-        assert (OVERALL.of(block), THRESHOLD.of(block), block.delays_ms) == (None, None, ())
-        assert all("after unblinding" in one.why for one in block.absent)
-    assert results.performance is None
-    assert [one.what for one in results.blocks[1].absent] == [
-        *("test of a trend (Page)", "lowest delay that shows", "test of equivalence", "detection threshold")
-    ]
-    assert {(one.code, one.delay_ms, one.achieved_ms) for one in results.delivered} == {(None, None, None)}
-
-
-def test_codes_and_names_give_the_same_friedman(rek: Folder) -> None:
-    twelve(rek, people=6)
-    sealed, _ = blocks(rek)
-    rek.open()
-    known, _ = blocks(rek)
-    assert [one.outcome.p for one in OMNIBUS.of(sealed)] == pytest.approx([one.outcome.p for one in OMNIBUS.of(known)])
-
-
 def test_nothing_decided_makes_everything_exploratory(tmp_path: Path) -> None:
     results = found(opened(without("all", tmp_path / "rek2024"), 8))
     liquids, delays = results.blocks
@@ -242,30 +192,6 @@ def test_equal_answers_are_no_variation_and_no_evidence(rek: Folder, level: int)
     assert {one.found.verdict for one in CONTRASTS.of(delays)} == {"equivalent"}  # eleven of eleven did not move
     assert RECOGNITION.of(liquids) is not None
     assert RECOGNITION.of(liquids).found.undecided == 33
-
-
-@pytest.mark.nightly
-def test_levels_that_nobody_chose_change_nothing(rek: Folder, tmp_path: Path) -> None:
-    other = make_results(tmp_path / "other", rek.protocol)
-    for number in range(1, 8):
-        person = f"P{number:03d}"
-        rek.add(person, _among_low(person, stretched=False))
-        other.add(person, _among_low(person, stretched=True))
-    rek.open()
-    other.open()
-    for one, two in zip(blocks(rek), blocks(other), strict=True):
-        for mine, theirs in zip((*OMNIBUS.of(one), *TREND.of(one)), (*OMNIBUS.of(two), *TREND.of(two)), strict=True):
-            assert mine.outcome.p == pytest.approx(theirs.outcome.p)
-
-
-def _among_low(person: str, *, stretched: bool) -> Callable[[str, str], Answer]:
-    """Return answers of 1 to 3, or the same ones as 3, 5 and 7."""
-
-    def answer(condition: str, item: str) -> int:
-        low = random.Random(f"{person} {condition} {item}").randrange(1, 4)  # noqa: S311 - reproducible
-        return 2 * low + 1 if stretched else low
-
-    return answer
 
 
 def test_missing_answers_drop_the_participant_and_are_never_neutral(rek: Folder) -> None:
@@ -326,38 +252,9 @@ def test_where_one_liquid_differs_the_others_are_seldom_told_apart(n: int) -> No
     assert wrong <= binom.ppf(0.999, 100, 0.05)
 
 
-# --- how it was run ---
-
-
-def test_delays_as_they_were_achieved(rek: Folder) -> None:
-    opened(rek, 3)
-    at = {(one.block, one.delay_ms): one for one in delivered(load_study(rek.folder))}
-    assert (at["delays", 125.0].achieved_ms, at["delays", 125.0].trials, at["delays", 125.0].valid) == (128.5, 3, 3)
-    rek.add("P100", lambda _condition, _item: 4, changes={"delay_error_mean_ms": -40.0, "valid": False})
-    at = {(one.block, one.delay_ms): one for one in delivered(load_study(rek.folder))}
-    one = at["delays", 125.0]
-    assert (one.error_worst_ms, one.error_mean_ms, one.valid) == (-40.0, (3 * 3.5 - 40) / 4, 3)
-
-
 def test_orders_are_counted_as_run(rek: Folder) -> None:
     twelve(rek)
     counts = orders(load_study(rek.folder))["delays"]
     assert counts.orders == 12
     assert [sum(line) for line in counts.positions] == [12] * 7
     assert sum(map(sum, counts.follows)) == 12 * 6
-
-
-def test_what_progress_raises_ends_it(rek: Folder) -> None:
-    opened(rek, 2)
-    told: list[tuple[str, float]] = []
-    evaluate(load_study(rek.folder), progress=lambda what, share: told.append((what, share)))
-    assert told
-    assert [share for _, share in told] == sorted(share for _, share in told)
-    assert all(0 <= share <= 1 for _, share in told)
-
-    def stop(_what: str, _share: float) -> None:
-        raise KeyboardInterrupt
-
-    progress: Callable[[str, float], object] = stop
-    with pytest.raises(KeyboardInterrupt):
-        evaluate(load_study(rek.folder), progress=progress)

@@ -19,7 +19,6 @@ from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.results.words import said_of_presentations
 from study_app.analysis.tables.study_tables import Study
 from tests.analysis.made_up import ITEMS, delays, everybody, liquids, study
-from tests.analysis.random_studies import check
 
 pytestmark = pytest.mark.slow
 
@@ -40,13 +39,6 @@ def evaluated(made: Study) -> tuple[Results, BlockFound]:
     results = evaluate(made, planning=False)
     assert results.failures == ()
     return results, results.blocks[0]
-
-
-def test_one_presentation_needs_no_word() -> None:
-    made = study(delays(LEVELS), list(everybody(delays(LEVELS), 10, rising(1))))
-    _, found = evaluated(made)
-    assert (found.presentations, found.sessions, found.replicated_ms) == ((1, 1), (1,), ())
-    assert said_of_presentations(found) == ()
 
 
 def test_repetitions_are_said_and_single_answers_are_used_where_levels_count() -> None:
@@ -109,13 +101,3 @@ def test_of_two_settings_the_higher_one_is_named() -> None:
     page = " ".join(block(found, results, ()))
     assert "above 0 where Liquid1 was rated higher than Liquid2" in page
     assert ITEMS[0] == OMNIBUS.of(found)[0].item
-
-
-STUDIES = 12
-"""tests/benchmarks/analysis/random_studies.py checks 2,000."""
-
-
-@pytest.mark.variants(6)
-@pytest.mark.parametrize("number", range(STUDIES))
-def test_no_exception_leaves_the_evaluation_of_any_study(number: int) -> None:
-    check(number)

@@ -2,7 +2,6 @@
 
 import csv
 import shutil
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -79,16 +78,6 @@ def test_its_answers_and_forces_are_those_of_a_rehearsal_today(rehearsal_of: Cal
         for kept, made in zip(known(sample, SAMPLE.path), known(again, folder), strict=True):
             assert len(made) > 10
             assert kept == pytest.approx(made, rel=1e-3), MAKE_AGAIN
-
-
-def test_git_keeps_the_sample_and_ignores_other_results() -> None:
-    if not (ROOT / ".git").exists() or shutil.which("git") is None:
-        pytest.skip("no git here")
-    places = ["results/sample-rek2024/data/x", "results/README.md", "results/rek2024/data/x", "results/x.csv"]
-    asked = subprocess.run(
-        ["git", "-C", str(ROOT), "check-ignore", "--no-index", *places], capture_output=True, text=True, check=False
-    )
-    assert asked.stdout.split() == places[2:]
 
 
 def test_its_results_have_the_fields_of_format_1_alone() -> None:

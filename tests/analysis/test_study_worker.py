@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from study_app import figure_style as style
 from study_app.analysis.export.export import export
 from study_app.analysis.figures import captions
 from study_app.analysis.study_worker import carry_out
@@ -80,13 +79,6 @@ def test_studies_are_found_whatever_else_lies_there(study: Path) -> None:
     assert found.studies[0].newest_s > found.studies[1].newest_s == 0.0
 
 
-def test_no_results_folder_is_no_study_and_an_unreadable_one_says_so(tmp_path: Path) -> None:
-    assert of_kind(StudiesFound, told(FindStudies(tmp_path / "none")))[0].studies == ()
-    (tmp_path / "file").write_text("x")
-    with pytest.raises(StoreError, match="file"):
-        told(FindStudies(tmp_path / "file"))
-
-
 def test_while_sealed_nothing_is_told_but_codes_and_nothing_is_tested(study: Path) -> None:
     answers = told(ReadStudy(study))
     (sessions,), (found,) = of_kind(SessionsFound, answers), of_kind(StudyFound, answers)
@@ -118,15 +110,6 @@ def test_once_open_names_are_told_and_what_tests_add_is_drawn_again(study: Path)
     assert next(one.title for one in of_kind(FigureDrawn, answers)) == captions.title(block)
 
 
-def test_every_print_colour_that_is_told_is_in_the_figures_or_the_style(study: Path) -> None:
-    answers = told(ReadStudy(study))
-    (found,) = of_kind(StudyFound, answers)
-    drawn = b"".join(figure.svg for figure in of_kind(FigureDrawn, answers)).decode().lower()
-    for role in ("text", "text2", "grid", "accent", "band"):
-        assert found.colours[role].lower() in drawn, role
-    assert found.colours["band"] == style.BAND
-
-
 def test_trials_can_be_named_for_leaving_out_and_then_do_not_count(study: Path) -> None:
     (found,) = of_kind(StudyFound, told(ReadStudy(study)))
     number, words = found.trials["P001", 1][0]
@@ -148,13 +131,6 @@ def test_what_the_store_refuses_changes_nothing(study: Path) -> None:
         told(OpenKey(study, "AK", " "))
     assert exclusions(study) == ()
     assert not StudyFolder(study).reveals.exists()
-
-
-def test_a_study_without_a_whole_session_says_so_in_place_of_figures(study: Path) -> None:
-    for one in ("P001", "P002", "P003"):
-        told(LeaveOut(study, one, 1, None, "AK", "asleep"))
-    drawn = of_kind(FigureDrawn, told(ReadStudy(study)))
-    assert [(one.svg, one.caption) for one in drawn] == [(b"", "No completed session has answers here yet.")] * 2
 
 
 def test_sessions_are_told_even_where_the_study_cannot_be_read(study: Path) -> None:

@@ -6,11 +6,10 @@ import pytest
 
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.findings.contrast_with_control import FINDING as CONTRASTS
-from study_app.analysis.report.block_section import block
 from study_app.analysis.report.findings_summary import findings
 from study_app.analysis.report.methods_paragraph import methods
 from study_app.analysis.report.r_script import r_script
-from study_app.analysis.results.words import all_of, percent
+from study_app.analysis.results.words import all_of
 from study_app.analysis.tables.study_tables import Study
 from tests.analysis.made_up import DECIDED, delays, everybody, liquids, study
 
@@ -40,30 +39,11 @@ def test_decisions_that_changed_are_told_as_that_and_not_as_none() -> None:
     assert "a bound of ±1 point, decided before the first session, and 90 % intervals" in told
 
 
-@pytest.mark.parametrize(("alpha", "level"), [(0.05, "90 %"), (0.0005, "99.9 %"), (0.025, "95 %")])
-def test_alpha_is_told_whole(alpha: float, level: str) -> None:
-    made = study_of(8, alpha=alpha)
-    results = evaluate(made, planning=False)
-    assert f"alpha = {alpha:g}, " in methods(made, results)
-    page = " ".join(block(results.blocks[0], results, ()))
-    assert f"intervals of {level}." in page
-    assert "p < .05" not in page
-    assert percent(1 - 2 * alpha) == level
-
-
 def test_pooled_versions_of_a_protocol_are_named() -> None:
     made = study_of(4)
     people = made.participants.assign(protocol_version=["1", "1", "2", "2"])
     both = replace(made, participants=people)
     assert "versions 1 and 2, pooled" in methods(both, evaluate(both, planning=False))
-
-
-def test_a_difference_that_could_not_be_shown_has_no_p() -> None:
-    few = study_of(4)
-    results = evaluate(few, planning=False)
-    (found,) = results.blocks
-    assert {one.verdict for one in CONTRASTS.of(found)} == {"out of reach"}
-    assert "<td>out of reach</td>" in " ".join(block(found, results, ())).replace(' class="n"', "")
 
 
 def test_the_verdict_of_unanimity_holds_after_the_correction() -> None:

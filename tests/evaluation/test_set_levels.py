@@ -5,10 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
-from study_app.evaluation.recorded_intervals import places_of, steps_of
 from study_app.evaluation.replay import replay
 from study_app.session.simulated.rehearsal import rehearse, resume
 from study_app.store.blinded.blinding import read_key
@@ -16,7 +14,6 @@ from study_app.store.blinded.sealing import opened
 from study_app.store.blinded.whole_protocol import whole_protocol
 from study_app.store.journals import journal
 from study_app.store.receipt import read
-from study_app.store.recording_files import read_samples
 from study_app.store.verification.leaks import certain_telltales, find_leaks, recorded_numbers
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
@@ -74,29 +71,6 @@ def test_settings_follow_every_force_is_computed_again_and_the_study_is_sound(st
     assert proved.recordings == 6
     checked = verify(study, None)
     assert (checked.errors, checked.warnings) == ((), ())
-
-
-def test_the_recording_says_at_which_tick_each_step_took_effect(study: Path) -> None:
-    session = session_of(study)
-    lines, key = lines_of(session), read_key(study)
-    protocol = whole_protocol(read(session / "receipt.json")["protocol"], key)
-    started = next(line for line in lines if line["event"] == "trial_started") | {"interval": 2}
-    steps = steps_of(protocol, key, started, lines)
-    made = [line for line in lines if line["event"] == "stepped" and line["trial"] == started["trial"]]
-    assert len(steps) == len(made) > 2
-    recorded = next(
-        line for line in lines if line["event"] == "recorded" and line["trial"] == 1 and line.get("interval") == 2
-    )
-    samples = read_samples(session / recorded["recording"])
-    places = places_of(samples, steps)
-    assert [place for place, _ in places] == [int(np.flatnonzero(samples.scene == step.serial)[0]) for step in steps]
-    dampings = [scene.liquids[0].drag.damping_nspm for _, scene in places]
-    ends = [*(place for place, _ in places[1:]), len(samples) - 300]
-    for (place, _), damping, until in zip(places, dampings, ends, strict=True):
-        own = samples[place + 60 : until]
-        v = own.velocity_mps / protocol.scene.scale
-        measured = -(own.device_force_n * v).sum() / (v * v).sum()
-        assert measured == pytest.approx(damping, rel=0.03)
 
 
 def other_setting(lines: Lines) -> None:

@@ -11,10 +11,10 @@ from study_app.analysis.export.export import export
 from study_app.analysis.export.frame_csv import table_bytes
 from study_app.errors import AnalysisError
 from study_app.store.output_files import write_files
-from study_app.store.tables.column import Column, header, unsealed
-from study_app.store.tables.columns import RESPONSES, SEALED, TRIALS
+from study_app.store.tables.column import Column
+from study_app.store.tables.columns import SEALED
 from study_app.store.tables.formulas import unguarded
-from tests.analysis.conftest import CANNOT_JUDGE, DELAY_ERROR_MS, Results
+from tests.analysis.conftest import Results
 
 pytestmark = pytest.mark.slow
 
@@ -39,38 +39,6 @@ def to(tmp_path: Path) -> Path:
     return tmp_path / "deep" / "out"
 
 
-def test_every_row_of_every_participant_is_there_with_its_values(rek: Results, to: Path) -> None:
-    rek.add("P001", lambda condition, item: 2 if condition == "honey" else 6)
-    rek.add("P002", lambda *_: 7, status="withdrawn", trials=4)
-    assert {path.name for path in export(rek.folder, to)} == NAMES == {path.name for path in to.iterdir()}
-    found = rows(to, "responses")
-    assert len(found) == 62 + 27
-    assert list(found[0]) == [*header(RESPONSES), *JUDGED]
-    honey = rek.code("honey", "liquids")
-    for row in found:
-        expected = "7" if row["participant"] == "P002" else "2" if row["code"] == honey else "6"
-        assert row["response"] == expected
-        assert row["counted"] == ("true" if row["participant"] == "P001" else "false")
-    assert [row["session_status"] for row in found[-2:]] == ["withdrawn", "withdrawn"]
-    assert len(rows(to, "trials")) == 12 + 4
-    assert list(rows(to, "trials")[0]) == [*header(unsealed(TRIALS)), *JUDGED]
-
-
-def test_cells_are_those_of_the_sessions_own_tables(rek: Results, to: Path) -> None:
-    rek.add(
-        "P001", lambda *_: 6, changes={"force_mean_n": 0.1 + 0.2, "notes": '=1+1, "so"\nnew line π 😀', "targets": None}
-    )
-    rek.open()
-    export(rek.folder, to)
-    with rek.trials("P001").open(encoding="utf-8", newline="") as file:
-        own = list(csv.DictReader(file, strict=True))
-    exported = rows(to, "trials")
-    assert [{name: row[name] for name in header(TRIALS)} for row in exported] == own
-    assert unguarded(own[0]["notes"]).startswith("=1+1")
-    assert exported[0]["force_mean_n"] == "0.30000000000000004"
-    assert exported[0]["notes"] == "'" + '=1+1, "so"\nnew line π 😀'
-
-
 def test_what_earlier_versions_wrote_in_clear_is_not_handed_out_sealed(rek: Results, to: Path) -> None:
     """Their tables have the columns that tell a condition: files that are handed out have them after unblinding."""
     rek.add("P001", lambda *_: 6, changes={"force_mean_n": 4.8151623})
@@ -83,22 +51,6 @@ def test_what_earlier_versions_wrote_in_clear_is_not_handed_out_sealed(rek: Resu
     rek.open()
     export(rek.folder, to)
     assert {row["force_mean_n"] for row in rows(to, "trials")} == {"4.8151623"}
-
-
-def test_the_aggregate_counts_all_levels_and_what_is_missing(small: Results, to: Path) -> None:
-    small.add("A", lambda condition, item: {"smooth": 7, "warm": None}[item])
-    small.add("B", lambda condition, item: {"smooth": CANNOT_JUDGE, "warm": 4}[item])
-    export(small.folder, to)
-    found = rows(to, "aggregate", "small")
-    assert [(row["code"], row["item"]) for row in found] == [
-        (code, item) for code in ("L1", "L2") for item in ("smooth", "warm")
-    ]
-    smooth = found[0]
-    assert [smooth[f"count_{level}"] for level in range(1, 8)] == ["0", "0", "0", "0", "0", "0", "2"]
-    assert {
-        name: smooth[name] for name in ("n", "presented", "cannot_judge", "missing", "median", "agree_percent")
-    } == {"n": "2", "presented": "4", "cannot_judge": "2", "missing": "0", "median": "7.0", "agree_percent": "100.0"}
-    assert found[1]["missing"] == "2"
 
 
 def test_what_is_excluded_is_exported_with_its_reason_and_not_counted(rek: Results, to: Path) -> None:
@@ -144,26 +96,6 @@ def test_a_text_is_no_formula_in_a_spreadsheet_and_a_negative_number_a_number(re
     frame = pd.DataFrame({"text": ["-1"], "number": [-1.5]})
     columns = (Column("text", "text", ""), Column("number", "number", ""))
     assert table_bytes(Delivered("numbers", columns, frame)) == b"text,number\n'-1,-1.5\n"
-
-
-def test_opened_rows_say_condition_liquid_and_delay_asked_for_and_achieved(rek: Results, to: Path) -> None:
-    rek.add("P001", lambda *_: 6)
-    rek.open()
-    export(rek.folder, to)
-    for name in ("responses", "trials"):
-        for row in rows(to, name):
-            condition = rek.key.condition(row["block"], row["code"])
-            assert row["condition"] == condition
-            requested = float(condition.removeprefix("delay_")) if condition.startswith("delay_") else 0.0
-            assert float(row["delay_ms"]) == requested
-            assert float(row["delay_achieved_ms"]) == requested + DELAY_ERROR_MS
-            assert row["liquid"] == {"honey": "honey", "light_oil": "light_oil", "practice": "syrup"}.get(
-                condition, "water"
-            )
-    aggregate = rows(to, "aggregate")
-    assert [row["condition"] for row in aggregate[::9][:3]] == ["water", "honey", "light_oil"]
-    assert [float(row["delay_ms"]) for row in aggregate[27::5]] == [0, 50, 75, 100, 125, 150, 200]
-    assert json.loads((to / "codebook.json").read_text())["key_opened"][0]["by"] == "AB"
 
 
 def test_a_delay_that_was_not_measured_is_not_claimed(rek: Results, to: Path) -> None:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from pyarrow import parquet
 
 from study_app.analysis.export import spss
 from study_app.analysis.export.export import export
@@ -56,23 +55,6 @@ def half_answered(small: Results) -> Results:
     return small
 
 
-def test_wide_has_a_row_a_participant_and_a_column_an_item_and_setting(small: Results, to: Path) -> None:
-    export(half_answered(small).folder, to, extras=["wide"])
-    rows = cells(table(to, "small", "wide", "csv"))
-    assert list(rows[0]) == [
-        "participant",
-        "simulated",
-        *(f"{item}__{code}" for code in ("L1", "L2") for item in ("smooth", "warm")),
-    ]
-    assert [row["participant"] for row in rows] == ["A", "B", "C"]
-    assert [row["smooth__L1"] for row in rows[:2]] == ["7", "n/a"]
-    assert [row["warm__L1"] for row in rows[:2]] == ["n/a", "4"]
-    assert rows[2][f"smooth__{small.code('heavyzembla', 'feel')}"] == "3"
-    small.open()
-    export(small.folder, to, extras=["wide"])
-    assert {"smooth__heavyzembla", "warm__lightquorn"} < set(cells(table(to, "small", "wide", "csv"))[0])
-
-
 def test_wide_gives_the_median_of_repetitions_and_leaves_out_what_does_not_count(small: Results, to: Path) -> None:
     answers = iter([1, 1, 2, 2, 4, 4, 5, 5] + [7] * 99)
     small.add("A", lambda *_: next(answers))
@@ -99,67 +81,6 @@ def test_blocks_that_ask_the_same_keep_their_columns_apart(tmp_path: Path, to: P
     assert "feel__smooth__heavyzembla" in names
     assert "again__smooth__heavyzembla" in names
     assert len(set(names)) == 8
-
-
-def test_parquet_keeps_whole_numbers_flags_and_texts_where_some_are_missing(small: Results, to: Path) -> None:
-    export(half_answered(small).folder, to, extras=["parquet", "wide"])
-    for name in ("responses", "trials", "aggregate", "wide"):
-        held = pd.read_parquet(table(to, "small", name, "parquet"), dtype_backend="numpy_nullable")
-        rows = cells(table(to, "small", name, "csv"))
-        assert list(held) == list(rows[0])
-        assert len(held) == len(rows)
-    responses = pd.read_parquet(table(to, "small", "responses", "parquet"), dtype_backend="numpy_nullable")
-    assert str(responses["response"].dtype) == "Int8"
-    assert str(responses["cannot_judge"].dtype) == "boolean"
-    written = [row["response"] for row in cells(table(to, "small", "responses", "csv"))]
-    assert ["n/a" if pd.isna(value) else str(value) for value in responses["response"]] == written
-    trials = pd.read_parquet(table(to, "small", "trials", "parquet"), dtype_backend="numpy_nullable")
-    assert set(trials.loc[trials["participant"] == "A", "notes"]) == {NOTE}
-    assert trials.loc[trials["participant"] == "B", "notes"].isna().all()
-    field = parquet.read_schema(table(to, "small", "responses", "parquet")).field("onset_s")
-    assert field.metadata == {
-        b"description": b"Time when the statement was shown, on the session's clock.",
-        b"unit": b"s",
-    }
-
-
-def test_sav_has_labels_levels_measures_and_codes_of_missing_answers(small: Results, to: Path) -> None:
-    export(half_answered(small).folder, to, extras=["sav"])
-    path = table(to, "small", "responses", "sav")
-    plain, about = sav(path)
-    rows = cells(table(to, "small", "responses", "csv"))
-    expected = [None if row["response"] == "n/a" else float(row["response"]) for row in rows]
-    assert [None if np.isnan(value) else value for value in plain["response"]] == expected
-    coded, coded_about = sav(path, missing=True)
-    codes = [
-        float(row["response"])
-        if row["response"] != "n/a"
-        else float(CANNOT_JUDGE if row["cannot_judge"] == "true" else NOT_ANSWERED)
-        for row in rows
-    ]
-    assert coded["response"].tolist() == codes
-    assert {CANNOT_JUDGE, NOT_ANSWERED} < set(codes)
-    assert [one["lo"] for one in coded_about.missing_ranges["response"]] == [CANNOT_JUDGE, NOT_ANSWERED]
-    levels = about.variable_value_labels["response"]
-    assert (levels[1], levels[7], levels[98], levels[99]) == ("a", "g", "Cannot judge", "No answer")
-    assert about.variable_measure["response"] == "ordinal"
-    assert about.variable_measure["item"] == "nominal"
-    assert about.column_names_to_labels["onset_s"] == "Time when the statement was shown, on the session's clock. [s]"
-    assert about.file_label == "A small study (small 2)"
-    assert about.file_encoding == "UTF-8"
-
-
-def test_whole_numbers_are_shown_whole_in_sav_and_missing_ones_are_spss_own(small: Results, to: Path) -> None:
-    small.add("A", lambda *_: 5)
-    path = small.responses("A")
-    path.write_text(path.read_text(encoding="utf-8").replace(",practice,1,", ",practice,n/a,"), encoding="utf-8")
-    export(small.folder, to, extras=["sav"])
-    found, about = sav(table(to, "small", "responses", "sav"), missing=True)
-    parts = [row["part"] for row in cells(table(to, "small", "responses", "csv"))]
-    assert "n/a" in parts
-    assert ["n/a" if np.isnan(value) else f"{value:.0f}" for value in found["part"]] == parts
-    assert about.original_variable_types["part"] == "F2.0"
-    assert about.variable_value_labels["cannot_judge"] == {0.0: "false", 1.0: "true"}
 
 
 def test_texts_of_any_script_and_length_survive_in_sav(small: Results, to: Path) -> None:
@@ -240,15 +161,6 @@ def test_nothing_hidden_is_in_any_format_while_the_key_is_sealed(small: Results,
             content = str(pd.read_parquet(path).to_dict()).lower().encode()
         for word in HIDDEN:
             assert word.encode() not in content, path.name
-
-
-@pytest.mark.nightly
-def test_the_same_results_give_the_same_tables_again(small: Results, to: Path, tmp_path: Path) -> None:
-    half_answered(small)
-    first, again = (export(small.folder, folder, extras=ALL) for folder in (to, tmp_path / "again"))
-    for one, other in zip(first, again, strict=True):
-        if one.suffix != ".sav":  # holds the time of its making
-            assert one.read_bytes() == other.read_bytes(), one.name
 
 
 def test_a_study_without_anybody_who_counts_is_exported_too(small: Results, to: Path) -> None:

@@ -10,14 +10,13 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.analysis.export.export import export
-from study_app.analysis.export.materials import materials
-from study_app.analysis.export.psychds_dataset import FOLDER
-from study_app.analysis.tables.study_tables import load_study
+from study_app.analysis.export.psychds_dataset import FOLDER, variables
 from study_app.cli import commands
 from study_app.errors import AnalysisError
 from study_app.protocol.source.files import shipped_file
 from study_app.store.blinded.blinding import reveal
 from study_app.store.output_files import FileCopy, write_files
+from study_app.store.tables.column import Column, optional
 from study_app.store.verification.psychds import validate
 from tests.studies import rehearsed
 
@@ -104,25 +103,6 @@ def test_missing_footage_is_named_with_its_hash(kitchen: Path, tmp_path: Path) -
         assert f"Missing in `materials`: waves.mp4 (SHA-256 {digest}; {why}). Add them." in readme
 
 
-def test_only_the_footage_of_the_study_is_read_and_never_at_once(
-    kitchen: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    protocols, hashed = tmp_path / "protocols", list[str]()
-    text = (protocols / "kitchen.toml").read_text(encoding="utf-8")
-    other = text.replace('"kitchen"', '"aquarium"', 1).replace("waves.mp4", "fish.mp4", 1)
-    (protocols / "aquarium.toml").write_text(other, encoding="utf-8")
-    (protocols / "fish.mp4").write_bytes(b"fish")
-
-    def watched(path: Path) -> str:
-        hashed.append(path.name)
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-
-    monkeypatch.setattr("study_app.protocol.source.liquid_files.file_hash", watched)
-    shared = materials(load_study(kitchen))
-    assert set(hashed) == {"waves.mp4"}
-    assert shared.files["waves.mp4"] == FileCopy(protocols / "waves.mp4", hashlib.sha256(FOOTAGE).hexdigest())
-
-
 def test_footage_that_changes_while_it_is_copied_leaves_nothing(tmp_path: Path) -> None:
     source, to = tmp_path / "waves.mp4", tmp_path / "out"
     copied = FileCopy(source, hashlib.sha256(FOOTAGE).hexdigest())
@@ -174,3 +154,19 @@ def test_descriptions_name_standard_properties_authors_and_licence(kitchen: Path
         assert named["author"] == ["A. Kox", "B. Lam"]
     assert settings["analysis"]["alpha"] == 0.05
     assert not settings["analysis"].keys() & {"made", "changed"}
+
+
+def test_units_and_ranges_hold_in_every_table() -> None:
+    (one,) = variables(
+        {
+            "study-x_description-a_data.csv": (Column("n", "integer", "Points.", "s", minimum=1, maximum=7),),
+            "study-x_description-b_data.csv": (optional("n", "number", "Seconds.", minimum=0),),
+            "study-x_description-c_data.csv": (optional("n", "number", "Points.", minimum=2, maximum=9),),
+        }
+    )
+    assert one == {
+        "@type": "PropertyValue",
+        "name": "n",
+        "description": "In a, c: Points. In b: Seconds.",
+        "minValue": 0,
+    }

@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 from study_app import figure_style as style
-from study_app.analysis.figures import answer_figures, captions, diverging_bars
+from study_app.analysis.figures import answer_figures, captions
 from study_app.analysis.tables.study_tables import load_study
-from study_app.errors import AnalysisError
 from tests.analysis.conftest import CANNOT_JUDGE, Answer, Results, twelve
 from tests.analysis.figures.drawn import by_person, gids, panel, segments, shown, words
 
@@ -25,13 +24,6 @@ def test_disagreement_ends_and_agreement_begins_at_the_line_and_neutral_stands_a
     assert {level: colour for level, (_, _, colour) in found.items()} == dict(
         zip(range(1, 8), style.LEVEL_COLOURS, strict=True)
     )
-
-
-def test_levels_that_never_occur_are_not_drawn_and_do_not_shift_colours(rek: Results) -> None:
-    by_person(rek, [4, 5, 6, 7])
-    found = segments(panel(answer_figures.liquids(load_study(rek.folder)), "L2"), 9)
-    assert sorted(found) == [4, 5, 6, 7]
-    assert [found[level][2] for level in (4, 5, 6, 7)] == list(style.LEVEL_COLOURS[3:])
 
 
 def test_blinded_panels_are_titled_by_code_and_opened_ones_by_name(rek: Results) -> None:
@@ -55,12 +47,6 @@ def test_simulated_participants_are_called_so_in_the_heading_and_real_ones_are_n
 ) -> None:
     by_person(rek, [4])
     assert "SIMULATED participants" in words(draw(load_study(rek.folder)))
-
-
-def test_real_participants_are_not_called_simulated(real: Results) -> None:
-    by_person(real, [4])
-    for draw in (answer_figures.liquids, answer_figures.delays):
-        assert not any("SIMULATED" in word for word in words(draw(load_study(real.folder))))
 
 
 def test_a_row_with_missing_answers_tells_its_own_n(small: Results) -> None:
@@ -158,42 +144,3 @@ def test_no_text_leaves_the_figure_or_touches_another(rek: Results, fonts, opene
         for text in figure.texts:
             if not text.get_text().startswith("n "):
                 assert not any(text.get_window_extent().overlaps(axes.bbox) for axes in figure.axes), text.get_text()
-
-
-def test_labels_are_at_least_as_large_as_a_journal_asks(rek: Results) -> None:
-    by_person(rek, [4, 5])
-    for draw in (answer_figures.liquids, answer_figures.delays):
-        figure = draw(load_study(rek.folder))
-        assert min(text.get_fontsize() for text in shown(figure)) >= 5.5
-        assert figure.get_size_inches()[0] == pytest.approx(7.16)
-
-
-def test_the_legend_shortens_what_the_labels_share() -> None:
-    english = (
-        "Completely disagree,Mostly disagree,Somewhat disagree,Neutral,Somewhat agree,Mostly agree,Completely agree"
-    )
-    assert diverging_bars.legend_labels(english.split(",")) == [
-        "Completely disagree",
-        "Mostly",
-        "Somewhat",
-        "Neutral",
-        "Somewhat",
-        "Mostly",
-        "Completely agree",
-    ]
-    disagree = "Helemaal mee oneens,Grotendeels mee oneens,Enigszins mee oneens"
-    dutch = f"{disagree},Neutraal,Enigszins mee eens,Grotendeels mee eens,Helemaal mee eens"
-    assert diverging_bars.legend_labels(dutch.split(","))[1:6] == [
-        "Grotendeels",
-        "Enigszins",
-        "Neutraal",
-        "Enigszins",
-        "Grotendeels",
-    ]
-    assert diverging_bars.legend_labels(list("abcdefg")) == list("abcdefg")
-
-
-def test_a_study_without_delays_says_so(small: Results) -> None:
-    small.add("A", lambda *_: 3)
-    with pytest.raises(AnalysisError, match="no part that compares delays"):
-        answer_figures.delays(load_study(small.folder))

@@ -1,7 +1,5 @@
 """Figures written as files: captions, exclusions, the same bytes each time, nothing hidden."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -20,24 +18,8 @@ from study_app.analysis.figures import (
 from study_app.analysis.tables.study_tables import load_study
 from study_app.errors import AnalysisError
 from tests.analysis.conftest import HIDDEN, Results, twelve
-from tests.analysis.figures.drawn import by_person, gids, panel, segments, words
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.mark.nightly
-def test_plot_writes_both_figures_in_three_forms_with_captions(rek: Results, tmp_path: Path) -> None:
-    twelve(rek, people=3)
-    written = plotting.plot(rek.folder, tmp_path / "new" / "out")
-    assert sorted(path.name for path in written) == sorted(
-        f"{name}.{kind}" for name in ("liquids", "delays") for kind in ("png", "svg", "pdf", "txt")
-    )
-    assert all(path.stat().st_size > 200 for path in written)
-    caption = (tmp_path / "new" / "out" / "liquids.txt").read_text()
-    assert "nine statements on three settings" in caption
-    assert "SIMULATED" in caption
-    assert "n = 3 participants" in caption
-    assert {path.name for path in (tmp_path / "new" / "out").iterdir()} == {path.name for path in written}
 
 
 def test_captions_say_what_is_missing_left_out_and_beyond_limits(rek: Results) -> None:
@@ -72,35 +54,6 @@ def test_captions_say_how_many_are_excluded_and_why(rek: Results) -> None:
     assert "n = 2 participants, every setting rated by all" in delays
 
 
-def test_of_many_reasons_a_caption_tells_the_most_frequent(rek: Results) -> None:
-    reasons = [*"abcdefg", "g"]
-    for number, reason in enumerate(reasons, start=1):
-        rek.add(f"P{number:03d}", lambda *_: 6)
-        rek.exclude(f"P{number:03d}", reason=reason)
-    rek.add("P009", lambda *_: 6)
-    study = load_study(rek.folder)
-    expected = "8 sessions are excluded (2 × g; 1 × a; 1 × b; 1 × c; 1 × d; 2 × other)."
-    assert expected in captions.caption(study, study.blocks[0])
-
-
-def test_an_excluded_trial_is_an_empty_cell_and_shows_in_n(rek: Results) -> None:
-    by_person(rek, [3, 4])
-    rek.exclude("P002", trial=rek.trial("P002", "delay_75"))
-    rek.exclude("P002", trial=rek.trial("P002", "water"))
-    rek.open()
-    study = load_study(rek.folder)
-    axes = panel(answer_figures.delays(study), "item2")
-    assert [list(np.isnan(line.get_ydata())) for line in gids(axes, r"participant\d+")] == [
-        [False] * 7,
-        [delay == 75 for delay in (0, 50, 75, 100, 125, 150, 200)],
-    ]
-    assert "n 1–2" in [text.get_text() for text in axes.texts]
-    figure = answer_figures.liquids(study)
-    water = rek.code("water", "liquids")
-    assert sorted(segments(panel(figure, water), 1)) == [3]
-    assert words(figure).count("n 1") == len(study.blocks[0].items)
-
-
 def test_the_caption_of_opened_delays_says_how_late_they_really_were(rek: Results) -> None:
     rek.add("P001", lambda *_: 4, changes={"delay_error_mean_ms": -2.25})
     rek.add("P002", lambda *_: 4, changes={"delay_error_mean_ms": 4.25})
@@ -109,18 +62,6 @@ def test_the_caption_of_opened_delays_says_how_late_they_really_were(rek: Result
     rek.open()
     study = load_study(rek.folder)
     assert "by +1.0 ms on average (trials: −2.2 to +4.2 ms)" in captions.caption(study, study.blocks[1])
-
-
-@pytest.mark.nightly
-def test_the_same_results_give_the_same_bytes_in_another_process_too(rek: Results, tmp_path: Path) -> None:
-    twelve(rek, people=2)
-    first = {path.name: path.read_bytes() for path in plotting.plot(rek.folder, tmp_path / "first")}
-    again = f"plot({str(rek.folder)!r}, {str(tmp_path / 'second')!r})"
-    code = f"from study_app.analysis.figures.plotting import plot; {again}"
-    subprocess.run(
-        [sys.executable, "-W", "error", "-c", code], check=True, env={"PYTHONHASHSEED": "7", "HOME": str(tmp_path)}
-    )
-    assert {path.name: path.read_bytes() for path in (tmp_path / "second").iterdir()} == first
 
 
 def test_nothing_hidden_is_in_any_blinded_file(small: Results, tmp_path: Path) -> None:
@@ -168,11 +109,6 @@ def test_every_count_stands_in_its_cell_with_its_share_of_the_row() -> None:
     assert texts(figure, "name2") == ["4  (80%)", "0", "3  (60%)"]
     assert texts(figure, "name6") == ["1  (20%)"] * 3
     assert texts(figure, "name7") == ["0", "0", "1  (20%)"]
-
-
-def test_columns_without_any_answer_are_left_out_but_names_and_undecided_stay() -> None:
-    figure = matrix(tuple((*row[:6], 0) for row in TABLE))
-    assert [axes.get_label() for axes in figure.axes] == [f"name{place}" for place in range(1, 7)]
 
 
 def test_the_right_name_is_framed_in_every_row() -> None:

@@ -64,6 +64,38 @@ def claim(block: BlockFound) -> str:
     return meaning(block, found(block))[-1]
 
 
+AGAINST, NO_SUPPORT = "speak against the sentence", "do not support the sentence “delays up to 50 ms do not matter”"
+
+
+@pytest.mark.parametrize(
+    ("differences", "expected", "said", "unsaid"),
+    [
+        (CALM, "increasing", "at 50 ms the mean answers to these statements stay within the bound", NO_SUPPORT),
+        (CALM, "increasing", "equivalent for “Different”", AGAINST),
+        (SCATTERED, "increasing", NO_SUPPORT, AGAINST),
+        (AWAY, "increasing", AGAINST, NO_SUPPORT),
+        ([-one for one in AWAY], "increasing", NO_SUPPORT, AGAINST),
+        (
+            [-one for one in AWAY],
+            "increasing",
+            "Against the direction stated before the study: “Different” differs at 50 ms (−3.40",
+            AGAINST,
+        ),
+        ([-one for one in AWAY], None, AGAINST, "Against the direction"),
+        ([-one for one in AWAY], "decreasing", AGAINST, "Against the direction"),
+        ([0] * 5, "increasing", "no interval: all 5 differences are equal", AGAINST),
+        ([2] * 5, "increasing", "no interval: all 5 differences are equal", AGAINST),
+        ([0, 1, 0, -1] * 3, "increasing", "by every test, but 14 participants are needed to call it so", "by t alone"),
+    ],
+)
+def test_the_claim_about_one_delay_follows_verdict_and_direction(
+    differences: list[int], expected: Direction | None, said: str, unsaid: str
+) -> None:
+    told = claim(delays({50: differences}, expected=expected))
+    assert said in told
+    assert unsaid not in told
+
+
 def test_a_difference_at_a_shorter_delay_speaks_against_the_longer_one() -> None:
     assert "do not support" in claim(delays({50: SCATTERED, 100: SCATTERED}))
     block = delays({50: AWAY, 100: SCATTERED * 2})
@@ -71,14 +103,6 @@ def test_a_difference_at_a_shorter_delay_speaks_against_the_longer_one() -> None
     (*verdicts, told) = by_delay(block)[1]
     assert verdicts == ["100 ms", "–", "–", "Different", "–"]
     assert "speak against the sentence “delays up to 100 ms do not matter”: “Different” differs at 50 ms (+3.40" in told
-
-
-def test_a_trend_up_to_a_shorter_delay_speaks_against_the_longer_one() -> None:
-    steps = step_down([[1, 3, 5]] * 9, [0, 50, 100])
-    assert steps.lowest_ms == 50
-    told = claim(delays({50: SCATTERED, 100: SCATTERED}, (Lowest("different", steps),)))
-    assert "speak against the sentence" in told
-    assert "“Different” follows the delay already up to 50 ms" in told
 
 
 def test_a_trend_that_shows_only_within_its_statement_speaks_against_nothing() -> None:
@@ -93,15 +117,6 @@ def test_a_trend_that_shows_only_within_its_statement_speaks_against_nothing() -
     assert "“Different” 50 ms. Each is an upper bound" in " ".join(findings(found(delays({50: CALM}, (alone,)))))
     limit = meaning(block, found(block))[1]
     assert "already below" not in limit
-
-
-def test_a_difference_against_the_stated_direction_is_told_and_speaks_against_nothing() -> None:
-    away = [-one for one in AWAY]
-    told = claim(delays({50: away}))
-    assert "do not support the sentence “delays up to 50 ms do not matter”" in told
-    assert "Against the direction stated before the study: “Different” differs at 50 ms (−3.40" in told
-    assert "speak against the sentence" in claim(delays({50: away}, expected=None))
-    assert "speak against the sentence" in claim(delays({50: away}, expected="decreasing"))
 
 
 def test_one_of_many_comparisons_that_differs_by_chance_speaks_against_nothing() -> None:
@@ -142,25 +157,8 @@ def test_what_only_t_calls_equivalent_is_told_as_inconclusive(rek: Results) -> N
     )
 
 
-def test_what_every_check_calls_equivalent_is_told_as_such() -> None:
-    told = claim(delays({50: CALM}))
-    assert "equivalent for “Different”" in told
-    assert "at 50 ms the mean answers to these statements stay within the bound" in told
-
-
-@pytest.mark.parametrize("level", [0, 2])
-def test_differences_without_spread_have_no_interval_and_say_why(level: int) -> None:
-    assert "no interval: all 5 differences are equal" in claim(delays({50: [level] * 5}))
-
-
 def test_every_delay_has_its_own_sentence() -> None:
     rows = by_delay(delays({50: CALM, 125: SCATTERED, 300: AWAY}))
     assert rows[0][-1].startswith("What can be said: at 50 ms the mean answers")
     assert "do not support the sentence “delays up to 125 ms do not matter”, and do not refute it" in rows[1][-1]
     assert rows[2][-1].startswith("These data speak against the sentence “delays up to 300 ms do not matter”: ")
-
-
-def test_what_too_few_people_show_by_every_test_is_not_called_equivalent() -> None:
-    told = claim(delays({50: [0, 1, 0, -1] * 3}))
-    assert "within the bound by every test, but 14 participants are needed to call it so" in told
-    assert "by t alone" not in told

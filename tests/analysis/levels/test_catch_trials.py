@@ -9,13 +9,11 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.designs.level_summaries import levels_found
-from study_app.analysis.designs.psychometric_bands import psychometric_bands
 from study_app.analysis.figures.levels.level_pictures import level_pictures
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.results.level_results import LevelsFound
 from study_app.analysis.tables.study_tables import Study, load_study
 from study_app.analysis.tables.tracks import TRACK, answers_of, tracks
-from study_app.psychophysics.families import success
 
 pytestmark = pytest.mark.slow
 
@@ -78,24 +76,6 @@ def test_figures_mark_catch_trials_by_crosses(study: Study, staircase: LevelsFou
     assert _crosses(tracks_drawn) == caught.sum()
     assert "crosses: catch trials" in levels_drawn.caption
     assert _crosses(levels_drawn) == len({(one.participant, one.standard) for one in staircase.own_thresholds})
-
-
-@pytest.mark.nightly
-def test_a_block_of_one_standard_has_a_band_around_each_function(
-    study: Study, staircase: LevelsFound, opened: pd.DataFrame
-) -> None:
-    quest = next(found for found in levels_found(study) if found.block == "quest")
-    block = next(block for block in study.levels if block.id == "quest")
-    bands = psychometric_bands(block, opened, quest.people, (-1.5, -0.2))
-    assert set(bands) == set(quest.people)
-    for one in quest.own_thresholds:
-        u, low, high = bands[str(one.participant)]
-        psi = success("weibull", u, np.log10(one.threshold), one.width or 1, 1 / 3, one.lapse or 0)
-        assert (low <= high).all()
-        assert ((low <= psi + 0.02) & (psi - 0.02 <= high)).all()
-    captions = {picture.name: picture.caption for picture in level_pictures(study, [quest, staircase], ["svg"])}
-    assert "with the 95 % band" in captions["levels-quest"]
-    assert "with the 95 % band" not in captions["levels-staircase"]
 
 
 def _crosses(picture: Picture) -> int:

@@ -15,7 +15,6 @@ from study_app.analysis.figures.levels.weber_figure import weber_fractions
 from study_app.analysis.results.level_results import LevelsFound, PublishedValue, ThresholdFound
 from study_app.analysis.statistics.psychometrics.posterior import fitted, narrowing
 from study_app.analysis.tables.study_tables import load_study
-from study_app.analysis.tables.tracks import tracks
 from study_app.protocol.trials.kinds import default_design
 from study_app.protocol.trials.psychometric import analysis_grid, assumed_for
 from tests.analysis.levels.test_thresholds import STIMULUS, block, rows
@@ -93,20 +92,6 @@ def test_adaptive_blocks_have_a_panel_for_each_participant_and_standard(reported
         assert words.count("standard 4") == (3 if name == "tracks-staircase" else 0)
     assert "Rings: reversals" in (reported_adaptive / "tracks-staircase.txt").read_text()
     assert "Rings" not in (reported_adaptive / "tracks-quest.txt").read_text()
-
-
-@pytest.mark.slow
-def test_every_answer_has_a_mark_and_every_reversal_a_ring(opened_adaptive: Path, reported_adaptive: Path) -> None:
-    opened = tracks(load_study(opened_adaptive))
-    own = opened[opened["block"] == "staircase"]
-    svg = (reported_adaptive / "tracks-staircase.svg").read_text()
-    _, *parts = re.split(r'<g id="(\w+)_\d+">', re.sub(r"<defs>.*?</defs>", "", svg, flags=re.DOTALL))
-    marks = sum(
-        part.count("<use ") + part.count("<path ")
-        for name, part in zip(parts[::2], parts[1::2], strict=True)
-        if name == "PathCollection"
-    )
-    assert marks == len(own) + int(own["reversal"].sum())
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import norm, ttest_1samp
+from scipy.stats import norm
 
 from study_app.analysis.designs.sensitivities import sensitivities
 from study_app.analysis.results.level_results import SensitivityFound
@@ -99,25 +99,6 @@ def test_designs_without_a_criterion_have_d_prime_from_the_share_correct(design:
     assert one.d_prime == pytest.approx(1.5, abs=5e-3)
     assert one.criterion is None
     assert sum(one.shares.values()) == pytest.approx(1)
-
-
-@pytest.mark.nightly
-def test_conditions_have_a_sensitivity_each_and_the_group_has_students_interval() -> None:
-    shares = {"P001": 0.6, "P002": 0.75, "P003": 0.9}
-    frames = [
-        rows("2ifc", {0: share, 1: 1 - share}, ("first", "second"), person).assign(track=name, standard=None)
-        for person, share in shares.items()
-        for name in ("late", "thick")
-    ]
-    found = list(sensitivities(block("2ifc", None, ()), pd.concat(frames)))
-    assert [(one.comparison, one.participant) for one in found] == [
-        (name, person) for name in ("late", "thick") for person in (None, *shares)
-    ]
-    group, *people = found[:4]
-    d_primes = [one.d_prime for one in people]
-    assert group.d_prime == pytest.approx(np.mean(d_primes))
-    ends = ttest_1samp(d_primes, 0).confidence_interval(0.95)
-    assert (group.low, group.high) == pytest.approx((ends.low, ends.high))
 
 
 def test_without_a_correct_answer_only_shares_are_known() -> None:

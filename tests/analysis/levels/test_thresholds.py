@@ -152,21 +152,6 @@ def test_noise_trials_determine_the_guess_rate_of_yes_no() -> None:
     assert one.threshold == pytest.approx(0.2, rel=0.25)
 
 
-def test_answers_that_enter_no_psychometric_function_have_no_threshold() -> None:
-    for design in ("samedifferent", "estimation"):
-        assert block(design).assumed is None
-        assert list(thresholds(block(design), rows({"P001": 0.2}))) == []
-
-
-@pytest.mark.parametrize(("design", "shape"), [("2ifc", "normal"), ("4ifc", "normal"), ("oddity", None), ("abx", None)])
-def test_of_values_only_a_choice_of_more_has_a_threshold(design: str, shape: str | None) -> None:
-    around = Stimulus(vary="damping_nspm", level="value", levels=(4.0, 16.0), standards=(8.0,))
-    assumed, of_distances = block(design, around).assumed, block(design).assumed
-    assert (None if assumed is None else assumed.family) == shape
-    assert of_distances is not None
-    assert of_distances.family == "weibull"
-
-
 def test_family_and_prior_on_the_width_are_those_that_questplus_states() -> None:
     plain = rows({"P001": 0.2}, trials=60)
     _, default = thresholds(replace(block(), method=QuestPlus()), plain)

@@ -7,12 +7,11 @@ from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from study_app.analysis.power import threshold_studies
-from study_app.analysis.power.threshold_studies import BATCH, Case, plans, study_batch, sweep
+from study_app.analysis.power.threshold_studies import BATCH, plans, sweep
 from study_app.analysis.power.threshold_tables import Precisions, threshold_markdown
 from study_app.cli import commands
 from study_app.errors import AnalysisError
@@ -78,19 +77,6 @@ def test_the_errors_are_those_that_check_expects() -> None:
     assert alone is not None
     assert found.spread == pytest.approx(alone.spread * math.log(10), rel=0.15)
     assert found.half(0) == pytest.approx(alone.of_group(20), rel=0.15)
-
-
-@pytest.mark.slow
-def test_smaller_studies_have_the_first_participants_and_fewer_studies_are_the_first_ones() -> None:
-    many, few = swept(study(), (10,), (3, 9), BATCH + 4), swept(study(), (10,), (3, 9), BATCH + 1)
-    assert (few.studies, many.studies) == (BATCH + 1, BATCH + 4)
-    for one, other in zip(few.found["thicker", 10].errors, many.found["thicker", 10].errors, strict=False):
-        assert np.array_equal(one, other)
-    assert len(few.found["thicker", 10].halves) == BATCH + 1
-    plan = plans(study(), (10,))["thicker"][10]
-    large = study_batch(Case("thicker", plan, (1, 0, 10, 0)), (3, 9))
-    assert [one.shape for one in large.errors] == [(9, 2)] * BATCH
-    assert np.array_equal(large.errors[0], many.found["thicker", 10].errors[0])
 
 
 def test_exponents_and_d_primes_have_the_spread_that_check_expects() -> None:

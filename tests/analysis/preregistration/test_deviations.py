@@ -54,12 +54,6 @@ def test_a_study_that_kept_to_it_has_no_deviation(answered: Results) -> None:
 
 
 @pytest.mark.slow
-def test_without_a_preregistration_nothing_is_said(answered: Results) -> None:
-    assert deviations(load_study(answered.folder)) is None
-    assert list(section(load_study(answered.folder))) == []
-
-
-@pytest.mark.slow
 def test_fewer_participants_and_another_number_than_the_protocols_are_deviations(answered: Results) -> None:
     committed(answered, 12)
     assert found_in(answered) == ("fewer participants: 3 are analysed, 12 were planned",)

@@ -44,11 +44,6 @@ def study(folder: Path) -> Study:
     return load_study(folder)
 
 
-def test_rehearsed_study_is_sound(folder: Path) -> None:
-    found = verify(folder)
-    assert [str(one) for one in found.errors] == []
-
-
 def test_order_is_reproduced_where_answers_hid_questions(tmp_path: Path) -> None:
     condition = 'id = "pleasant"\nshow_if = { item = "thickness", at_least = 3 }'
     protocol = mixed_file(tmp_path, ('id = "pleasant"', condition))

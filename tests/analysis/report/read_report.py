@@ -47,14 +47,19 @@ class Text(HTMLParser):
             self.told.append(data)
 
 
-def read(folder: Path) -> str:
-    """Return what the page tells, having checked that it is one file without scripts."""
+def seen(html: str) -> str:
+    """Return what a reader of this HTML sees, having checked that it is whole and has no scripts."""
     page = Text()
-    page.feed((folder / "report.html").read_text(encoding="utf-8"))
+    page.feed(html)
     assert page.open == []
     assert not page.tags & {"script", "link", "iframe", "object", "form"}
     assert all(place.startswith(("data:image/png;base64,", "#part-")) for place in page.fetched)
-    told = re.sub(r"\s+", " ", " ".join(page.told))
+    return re.sub(r"\s+", " ", " ".join(page.told))
+
+
+def read(folder: Path) -> str:
+    """Return what the page tells."""
+    told = seen((folder / "report.html").read_text(encoding="utf-8"))
     assert (found := FORBIDDEN.search(told)) is None, told[max(0, found.start() - 80) : found.end() + 40]
     return told
 

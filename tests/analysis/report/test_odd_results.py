@@ -1,6 +1,5 @@
 """The report of few participants, missing answers and odd input: honest, or one clear error."""
 
-import re
 import shutil
 from pathlib import Path
 
@@ -16,53 +15,11 @@ from study_app.protocol.forms.simulated_observer import NO_FEATURES
 from study_app.protocol.load import parse, source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
-from tests.analysis.conftest import CANNOT_JUDGE, Answer, Results, make_results, twelve
-from tests.analysis.report.read_report import numbers, read, rows, run_in_r
+from tests.analysis.conftest import CANNOT_JUDGE, Results, make_results, twelve
+from tests.analysis.report.read_report import read
 from tests.protocol.groups.grouped import GROUPS, STUDY
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("figures_of_the_page")]
-
-
-@pytest.mark.nightly
-def test_of_five_it_says_what_cannot_be_shown_and_what_a_delay_can_mean(rek: Results, tmp_path: Path) -> None:
-    twelve(rek, people=5).open()
-    report(rek.folder, tmp_path / "report")
-    told = read(tmp_path / "report")
-    assert "5 participants cannot show it: the smallest p that 5 pairs can give is 0.0625" in told
-    assert "no bootstrap interval and no mixed model" in told
-    assert re.search(r"What “\d+ ms” can and cannot mean", told)
-    assert "is no evidence that" in told
-    assert "80 % power would take about" in told
-    assert "inconclusive" in told
-    assert "nothing was asked about delays between them" in told
-
-
-@pytest.mark.nightly
-def test_one_participant_all_equal_and_missing_answers_give_a_report_that_says_so(rek: Results, tmp_path: Path) -> None:
-    rek.add("P001", lambda _condition, _item: 4)
-    rek.open()
-    report(rek.folder, tmp_path / "one")
-    alone = read(tmp_path / "one")
-    assert "concern this person alone" in alone
-    assert not re.search(r"\b1 participants", alone)
-    assert run_in_r(tmp_path / "one").returncode == 0
-    assert "1 pairs" not in alone
-
-    def gaps(condition: str, item: str) -> Answer:
-        return None if (condition, item) in (("honey", "immersive"), ("delay_50", "harder")) else 4
-
-    for number_ in range(2, 7):
-        rek.add(f"P{number_:03d}", gaps)
-    report(rek.folder, tmp_path / "equal")
-    told = read(tmp_path / "equal")
-    assert "not tested (no variation: every participant answered alike under all settings)" in told
-    assert "no statement could be tested (no variation: every participant answered alike under all settings)" in told
-    assert "“Feels like a liquid”, “Immersive”, “Adequate force”" in told
-    assert "could not be tested: no variation" in told
-    assert "equivalence needs at least 14 participants (11 where all differences are equal)" in told
-    assert "Skillings-Mack" in told
-    assert "Effects of the mixed model" not in told
-    numbers(tmp_path / "equal")
 
 
 def test_methods_distinguish_primary_and_exploratory_statements(tmp_path: Path) -> None:
@@ -139,29 +96,6 @@ def test_another_study_mixed_in_or_an_empty_folder_is_one_clear_error(
     with pytest.raises(AnalysisError, match="holds no sessions"):
         report(tmp_path / "empty", tmp_path / "report")
     assert not (tmp_path / "report").exists()
-
-
-@pytest.mark.nightly
-def test_missing_answers_are_counted_where_they_are_and_what_is_one_way_is_said_so(
-    rek: Results, tmp_path: Path
-) -> None:
-    def gaps(condition: str, item: str) -> Answer:
-        if (condition, item) in (("honey", "immersive"), ("honey", "like_tar"), ("delay_50", "harder")):
-            return None
-        return {"water": 1, "honey": 6}.get(condition, 1 + (len(condition) * len(item)) % 7)
-
-    for number_ in range(1, 9):
-        rek.add(f"P{number_:03d}", gaps)
-    rek.open()
-    report(rek.folder, tmp_path / "report")
-    told = read(tmp_path / "report")
-    assert "n = 8 participants, every liquid presented to all, 16 of 216 ratings missing" in told
-    assert "n = 8 participants, every delay presented to all, 8 of 280 ratings missing" in told
-    assert "−1.00 – (all 8 one way)" in told
-    pairs = [row for row in rows(tmp_path / "report", "tests.csv") if row["question"] == "two settings differ"]
-    assert {row["note"] for row in pairs if row["effect"] != "n/a"} == {"all 8 pairs that differ went one way"}
-    done = run_in_r(tmp_path / "report")
-    assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.fixture(scope="module")

@@ -8,13 +8,11 @@ import shutil
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 from fontTools.ttLib import TTFont
 
 from study_app.analysis.report.write_report import report
 from study_app.analysis.results.words import counted, listed, number, p_equals, p_value
 from study_app.analysis.tables.study_tables import load_study
-from study_app.cli import commands
 from study_app.errors import AnalysisError
 from tests.analysis.conftest import HIDDEN, Results, twelve
 from tests.analysis.report.read_report import answered_by_two, numbers, read, run_in_r
@@ -67,15 +65,6 @@ def test_the_typeface_is_in_the_page_with_every_sign(of_twelve: Path) -> None:
     signs = {sign for sign in read(of_twelve) if sign.isprintable()}
     for _, data in fonts:
         assert signs <= {chr(code) for code in TTFont(io.BytesIO(base64.b64decode(data))).getBestCmap()}
-
-
-@pytest.mark.nightly
-def test_the_same_results_give_the_same_bytes(rek: Results, tmp_path: Path) -> None:
-    twelve(rek, people=3).open()
-    for name in ("one", "two"):
-        report(rek.folder, tmp_path / name)
-    for path in (tmp_path / "one").iterdir():
-        assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes(), path.name
 
 
 def test_while_sealed_nothing_is_told_that_blinding_hides(small: Results, tmp_path: Path) -> None:
@@ -132,16 +121,6 @@ def test_what_progress_raises_ends_the_report_at_every_step_and_nothing_is_writt
             report(small.folder, tmp_path / "not", progress=cancel)
         assert len(asked) == step + 1
         assert not (tmp_path / "not").exists()
-
-
-def test_the_command_writes_it_and_tells_errors_in_one_line(small: Results, tmp_path: Path) -> None:
-    answered_by_two(small)
-    done = CliRunner().invoke(commands, ["report", str(small.folder), "--to", str(tmp_path / "report")])
-    assert done.exit_code == 0, done.output
-    assert "report.html" in done.output
-    assert (tmp_path / "report" / "report.html").is_file()
-    failed = CliRunner().invoke(commands, ["report", str(tmp_path / "nowhere"), "--to", str(tmp_path / "x")])
-    assert isinstance(failed.exception, AnalysisError)
 
 
 @pytest.mark.parametrize(

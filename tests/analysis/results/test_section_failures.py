@@ -70,14 +70,6 @@ def test_a_test_that_fails_takes_no_other_with_it(opened: Results, monkeypatch: 
         assert results.performance is not None
 
 
-def test_what_progress_raises_is_no_failure(opened: Results) -> None:
-    def stop(_what: str, _share: float) -> None:
-        raise ValueError("stopped")
-
-    with pytest.raises(ValueError, match="stopped"):
-        evaluate(load_study(opened.folder), progress=stop)
-
-
 @pytest.mark.nightly
 def test_a_report_with_failures_is_written_and_ends_with_three(
     opened: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -104,16 +96,3 @@ def test_a_report_with_failures_is_written_and_ends_with_three(
     names = {path.name for path in to.iterdir()}
     assert {"tests.csv", "recognition.png", "codebook.json", "methods.txt"} <= names
     assert not {"report.R", "motion.csv", "liquids.png"} & names
-
-
-@pytest.mark.nightly
-def test_an_export_to_share_says_which_sections_of_its_report_failed(
-    opened: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("study_app.analysis.report.number_files.motion_csv", fail)
-    done = CliRunner().invoke(commands, ["export", str(opened.folder), "--to", str(tmp_path / "out"), "--psych-ds"])
-    assert done.exit_code == 3, done.output
-    assert "error: motion.csv: its computation failed (ValueError" in done.output
-    names = {path.name for path in (tmp_path / "out" / "psych-ds" / "results").iterdir()}
-    assert "report.html" in names
-    assert "motion.csv" not in names

@@ -1,7 +1,5 @@
 """A merged study in the analysis: participants of all sites, codes that mean the same, and the site as a factor."""
 
-import csv
-import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -13,13 +11,11 @@ from scipy.stats import kruskal
 from study_app.analysis.designs.site_thresholds import site_thresholds
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.export import export
-from study_app.analysis.figures.plotting import plot
 from study_app.analysis.findings.factors.site_comparison import FINDING as SITES
 from study_app.analysis.preregistration.commitment import FILE, Commitment, written
 from study_app.analysis.preregistration.deviations import deviations
 from study_app.analysis.report.write_report import report
 from study_app.analysis.results.level_results import LevelsFound, ThresholdFound
-from study_app.analysis.tables.group_means import group_counts, group_means
 from study_app.analysis.tables.study_tables import Study, load_study, pooled
 from study_app.errors import StoreError
 from study_app.session.simulated.answers_only import rehearse_answers
@@ -141,22 +137,6 @@ def test_answers_are_pooled_by_condition(opened: Path) -> None:
 
 
 @pytest.mark.nightly
-def test_exported_tables_have_the_site(opened: Path, tmp_path: Path) -> None:
-    export(opened, tmp_path, extras=["wide", "parquet", "sav", "psych-ds"], failed=pytest.fail)
-    for name in ("responses", "trials", "wide"):
-        with (tmp_path / f"study-rek2024_description-{name}_data.csv").open(encoding="utf-8") as file:
-            rows = list(csv.DictReader(file))
-        assert {(row["participant"][:2], row["site"]) for row in rows} == {("A-", "A"), ("B-", "B")}
-    book = json.loads((tmp_path / "codebook.json").read_bytes())
-    assert book["study"]["sites"] == ["A", "B"]
-    assert [one["site"] for one in book["key_opened"]] == ["A", "B"]
-    columns = book["files"]["study-rek2024_description-responses_data.csv"]
-    assert columns[2]["name"] == "site"
-    assert (tmp_path / "psych-ds/materials/rek2024.toml").is_file()
-    plot(opened, tmp_path / "plots")
-
-
-@pytest.mark.nightly
 def test_the_report_compares_sites_and_r_agrees(opened: Path, tmp_path: Path) -> None:
     report(opened, tmp_path, failed=pytest.fail)
     page = read(tmp_path)
@@ -174,15 +154,6 @@ def test_the_report_compares_sites_and_r_agrees(opened: Path, tmp_path: Path) ->
         for one in block["by_site"]["level"]
     )
     assert "sites, profile H" in done.stdout
-
-
-def test_sites_are_described(opened: Path) -> None:
-    found = load_study(opened)
-    assert group_counts(found, "site") == {"A": 3, "B": 3}
-    one = next(group_means(found, "site"))
-    rows = found.responses.query("counted and block == @one.block and item == @one.item and code == @one.code")
-    own = rows[rows["participant"].str.startswith("A-")]["response"].astype(float)
-    assert (one.group, one.n, one.mean) == ("A", 3, pytest.approx(own.mean()))
 
 
 def test_exclusions_and_withdrawals_of_a_site_are_those_of_the_merged_study(opened: Path, tmp_path: Path) -> None:
@@ -238,22 +209,6 @@ def test_two_settings_are_compared_by_their_differences() -> None:
     (first, *_) = SITES.of(block).profile
     assert first.outcome.test == "Kruskal-Wallis of differences"
     assert first.verdict == "suggested"
-
-
-@pytest.mark.nightly
-def test_the_mixed_model_has_the_site_as_a_factor() -> None:
-    from study_app.analysis.findings.other_assumptions import FINDING as OTHERS
-
-    rng = np.random.default_rng(4)
-
-    def at(higher: int) -> Study:
-        settings = delays([0, 50, 100])
-        return study(settings, list(everybody(settings, 9, lambda *_: int(rng.integers(1, 5)) + higher)))
-
-    (block,) = evaluate(pooled_of(at(0), at(2)), planning=False).blocks
-    assert all(one.outcome.method.endswith("; sites as a factor") for one in OTHERS.of(block).mixed)
-    (alone,) = evaluate(at(0), planning=False).blocks
-    assert not any("sites" in one.outcome.method for one in OTHERS.of(alone).mixed)
 
 
 def test_thresholds_are_compared_between_sites_at_each_standard() -> None:

@@ -28,25 +28,14 @@ COCHRAN = "111 101 100 001 010 101 101 100 101 001 011 111 000 110 101 001 100 1
 # Upper tails of Friedman's statistic without ties: participants, settings, statistic, P.
 TAILS = [
     (3, 3, 6.0, 0.02778),
-    (4, 3, 6.5, 0.04167),
     (4, 3, 8.0, 0.00463),
-    (5, 3, 5.2, 0.09336),
     (5, 3, 6.4, 0.03935),
-    (5, 3, 7.6, 0.02392),
     (5, 3, 8.4, 0.00849),
-    (5, 3, 10.0, 0.00077),
     (6, 3, 7.0, 0.02894),
-    (6, 3, 9.0, 0.00810),
-    (6, 3, 12.0, 0.00013),
     (8, 3, 6.25, 0.04691),
-    (8, 3, 9.0, 0.00990),
-    (10, 3, 6.2, 0.04556),
     (10, 3, 9.6, 0.00747),
     (3, 4, 7.4, 0.03299),
-    (3, 4, 9.0, 0.00174),
     (4, 4, 7.8, 0.03639),
-    (4, 4, 9.6, 0.00687),
-    (5, 4, 7.8, 0.04434),
     (5, 4, 9.96, 0.00874),
 ]
 answers = st.integers(2, 4).flatmap(
@@ -125,16 +114,6 @@ def test_the_exact_p_is_that_of_all_rearrangements(rows: list[list[int]]) -> Non
     assert result.smallest_p == pytest.approx(np.mean([value == max(every) for value in every]))
 
 
-@pytest.mark.slow
-@given(answers, st.permutations([0, 1, 2]), st.randoms(use_true_random=False))
-@settings(max_examples=40, deadline=None)
-def test_labels_people_and_the_direction_of_the_scale_do_not_matter(rows, order, random) -> None:  # type: ignore[no-untyped-def]
-    first = friedman(rows)
-    shuffled = random.sample(rows, len(rows))
-    second = friedman([[8 - row[place] for place in order] for row in shuffled])
-    assert (first.statistic, first.p, first.effect) == pytest.approx((second.statistic, second.p, second.effect))
-
-
 @given(answers)
 @settings(max_examples=40, deadline=None)
 def test_ties_are_corrected_as_scipy_does(rows: list[list[int]]) -> None:
@@ -142,13 +121,6 @@ def test_ties_are_corrected_as_scipy_does(rows: list[list[int]]) -> None:
     if result.statistic is not None:
         expected = friedmanchisquare(*np.array(rows).T)
         assert (result.statistic, result.p_chi2) == pytest.approx((expected.statistic, expected.pvalue))
-
-
-def test_missing_answers_drop_the_participant_and_nothing_else() -> None:
-    with_gaps = np.vstack([SCORES.astype(float), [1, np.nan, 7], [np.nan] * 3])
-    result = friedman(with_gaps)
-    assert (result.n, result.dropped) == (10, 2)
-    assert result.p == friedman(SCORES).p
 
 
 @pytest.mark.parametrize(("rows", "n"), [([[4, 4, 4], [2, 2, 2]], 2), (np.empty((0, 3)), 0), ([[1, np.nan, 2]], 0)])
@@ -257,17 +229,6 @@ def test_the_exact_p_is_that_of_relabelling_whole_participants() -> None:
     assert result.statistic == pytest.approx(every[0])
     assert result.p == pytest.approx((every >= every[0] - 1e-9).mean())
     assert result.smallest_p == pytest.approx((every >= every.max() - 1e-9).mean())
-
-
-def test_small_shifts_in_all_statements_add_up() -> None:
-    rng = np.random.default_rng(5)
-    values = np.clip(rng.integers(2, 6, (9, 12, 3)) + np.array([0, 0, 1]), 1, 7).astype(float)
-    result = global_permutation(values)
-    singles = [friedman(item).p for item in values]
-    assert result.p is not None
-    assert result.p < min(p for p in singles if p is not None)
-    assert result.method.startswith("Monte Carlo")
-    assert result == global_permutation(values)
 
 
 def test_a_missing_answer_leaves_out_one_row_and_not_the_participant() -> None:

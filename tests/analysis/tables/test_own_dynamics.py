@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from study_app.analysis.results.level_results import OwnDynamics
 from study_app.analysis.tables import planned_analysis
 from study_app.analysis.tables.performance import performance
-from study_app.analysis.tables.reaches import Targets, path_length_m, reaches, submovements
+from study_app.analysis.tables.reaches import Targets, path_length_m, reaches
 from study_app.analysis.tables.study_tables import load_study
 from study_app.errors import AnalysisError
 from study_app.session.simulated.rehearsal import rehearse
@@ -142,18 +142,6 @@ def test_what_leaves_the_target_is_entered_anew_and_overshoots() -> None:
 def test_a_dwell_that_is_too_short_is_no_reach() -> None:
     assert reaches(*line((0, -30), (0.4, -30), (0.6, 30), (1.0, 30)), TWO) == ()
     assert reaches(np.zeros(0, np.int64), np.zeros((0, 3)), TWO) == ()
-
-
-def test_humps_of_speed_are_counted_and_noise_is_not() -> None:
-    seconds = np.arange(1500) / 1000
-    for humps in (1, 2, 3):
-        speed = np.abs(np.sin(np.pi * humps * seconds / 1.5)) ** 2
-        positions = np.zeros((1500, 3))
-        positions[:, 0] = np.cumsum(speed) / 1e5
-        quantum = np.rint(positions / 38e-6) * 38e-6
-        assert submovements(seconds, positions) == humps
-        assert submovements(seconds, quantum) == humps
-    assert submovements(seconds[:20], np.zeros((20, 3))) == 1
 
 
 def test_a_circle_has_the_length_of_its_circumference() -> None:

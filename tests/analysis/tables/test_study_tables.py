@@ -41,17 +41,6 @@ def test_answers_come_back_by_code_with_all_statements_and_settings(rek: Results
         assert (row["n"], row["median"], row[f"count_{level}"]) == (2, level, 2)
 
 
-def test_while_sealed_a_setting_is_its_code_and_nothing_else(rek: Results) -> None:
-    rek.add("P001", by_condition)
-    study = load_study(rek.folder)
-    assert not study.settings
-    assert all(
-        (setting.condition, setting.liquid, setting.delay_ms) == (None, None, None)
-        for block in study.blocks
-        for setting in block.settings
-    )
-
-
 def test_opened_settings_have_names_delays_ascending_and_liquids_as_in_the_protocol(rek: Results) -> None:
     rek.add("P001", by_condition)
     rek.open()
@@ -136,15 +125,6 @@ def test_repetitions_cannot_judge_and_unanswered_items_are_counted(small: Result
     assert (warm["n"], warm["cannot_judge"], warm["missing"], warm["count_1"]) == (2, 0, 2, 2)
 
 
-def test_an_item_left_out_of_the_file_is_missing(rek: Results) -> None:
-    rek.add("P001", lambda *_: 6)
-    path = rek.responses("P001")
-    lines = path.read_text().splitlines(keepends=True)
-    path.write_text("".join(line for line in lines if ",immersive," not in line))
-    row = cell(load_study(rek.folder), "L1", "immersive")
-    assert (row["n"], row["missing"]) == (0, 1)
-
-
 @pytest.mark.parametrize("status", ["unfinished", "withdrawn", "aborted", "broken"])
 def test_sessions_that_were_not_completed_are_kept_and_do_not_count(rek: Results, status: str) -> None:
     rek.add("P001", lambda *_: 6)
@@ -161,16 +141,6 @@ def test_two_sessions_of_one_participant_are_one_participant(rek: Results) -> No
     study = load_study(rek.folder)
     row = cell(study, "L1", "immersive")
     assert (study.n, row["n"], row["participants"], row["presented"]) == (1, 2, 1, 2)
-
-
-def test_of_two_sessions_only_the_excluded_one_is_left_out(rek: Results) -> None:
-    rek.add("P001", lambda *_: 6)
-    rek.add("P001", lambda *_: 2, session=2)
-    rek.exclude("P001", session=2)
-    study = load_study(rek.folder)
-    assert (study.people, len(study.excluded_sessions)) == (("P001",), 1)
-    row = cell(study, "L1", "immersive")
-    assert (row["n"], row["median"], row["presented"]) == (1, 6, 1)
 
 
 def test_an_excluded_trial_takes_all_its_attempts_and_is_one_presentation(rek: Results) -> None:
@@ -232,18 +202,6 @@ def test_a_list_of_exclusions_that_makes_no_sense_is_refused(rek: Results) -> No
         load_study(rek.folder)
 
 
-def test_texts_are_english_where_the_study_has_it(small: Results) -> None:
-    small.add("A", lambda *_: 3)
-    block = load_study(small.folder).blocks[0]
-    assert block.items[0].short == "Smooth"
-    assert block.cannot_judge == "Cannot judge"
-    assert block.labels[0] == "a"
-
-
-def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    assert "nowhere is not a folder" in refusal(tmp_path / "nowhere")
-
-
 def test_an_empty_or_foreign_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "holiday.txt").write_text("x")
     assert "holds no sessions" in refusal(tmp_path)
@@ -297,12 +255,6 @@ def test_a_table_of_an_earlier_version_is_read_as_if_its_later_columns_held_noth
     assert "does not begin with the columns" in refusal(rek.folder)
 
 
-def test_bytes_that_are_no_text_are_refused(rek: Results) -> None:
-    rek.add("P001", lambda *_: 4)
-    rek.responses("P001").write_bytes(b"\xff\xfe\x00")
-    assert "is damaged" in refusal(rek.folder)
-
-
 def test_a_missing_table_is_refused(rek: Results) -> None:
     rek.add("P001", lambda *_: 4)
     rek.trials("P001").unlink()
@@ -354,15 +306,4 @@ def test_a_bad_cell_is_found_in_whichever_file_and_row_it_stands(rek: Results, m
     with pytest.raises(
         AnalysisError, match=r"subject-P004.*row 7, column changes: '99999999999999999999' is not a whole"
     ):
-        load_study(rek.folder)
-
-
-def test_a_foreign_row_is_found_in_whichever_file_it_stands(rek: Results) -> None:
-    for number in range(1, 4):
-        rek.add(f"P{number:03d}", lambda *_: 4)
-    path = rek.trials("P003")
-    head, *rows, end = path.read_text(encoding="utf-8").split("\n")
-    rows[4] = rows[4].replace("P003", "P002", 1)
-    path.write_text("\n".join([head, *rows, end]), encoding="utf-8")
-    with pytest.raises(AnalysisError, match=r"subject-P003.*row 5, column participant: 'P002' instead of 'P003'"):
         load_study(rek.folder)

@@ -31,22 +31,6 @@ from tests.haptics.scenes import COMPILED
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")]
 
 
-@pytest.mark.nightly
-def test_known_parameters_of_a_wake_are_found_again_in_noise():
-    names = ["drag_coefficient", "length", "scaling"]
-    start = override_all(TANK, {"drag_coefficient": 0.8, "length": 40, "scaling": 2000})
-    found = fit(start, "tank", names, REVERSE, noisy(TANK, REVERSE, 0.02))
-    for name, true in zip(names, (0.42, 300, 400), strict=True):
-        lower, upper = found.intervals[name]
-        assert found.values[name] == pytest.approx(true, abs=upper - lower)  # four deviations
-        assert lower < found.values[name] < upper
-        assert upper - lower < 0.02 * true
-    assert isinstance(found.values["length"], int)
-    assert found.rms_n == pytest.approx(0.02 * math.sqrt(2), rel=0.05)
-    assert found.distinguishable
-    assert found.warnings == ()
-
-
 def test_without_noise_they_are_found_exactly():
     names = ["length", "scaling", "exponent"]
     start = override_all(TANK, {"length": 100, "scaling": 100, "exponent": 0.7})

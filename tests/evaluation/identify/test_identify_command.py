@@ -5,7 +5,7 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
-from study_app.evaluation.identify import fit_figure, preset
+from study_app.evaluation.identify import preset
 from study_app.evaluation.identify.fit import fit
 from study_app.haptics.model.effects.current import Uniform
 from study_app.haptics.model.overrides import override_all
@@ -70,21 +70,6 @@ def test_the_residuals_in_the_table_are_measured_less_fitted(fitted, tmp_path):
     for k, axis in enumerate("xyz"):
         assert rows[f"fitted_{axis}_n"] == pytest.approx(force_n[:, k], abs=1e-12)
         assert rows[f"residual_{axis}_n"] == pytest.approx(found.measured_n[:, k] - force_n[:, k], abs=1e-12)
-
-
-@pytest.mark.slow
-def test_the_figure_is_whole_and_shows_the_residual(fitted):
-    found, _ = fitted
-    drawn = fit_figure.draw(found)
-    drawn.draw_without_rendering()
-    frame = drawn.bbox
-    boxes = [axes.get_tightbbox() for axes in drawn.axes] + [it.get_window_extent() for it in drawn.texts]
-    for box in boxes:
-        assert frame.x0 <= box.x0 < box.x1 <= frame.x1
-        assert frame.y0 <= box.y0 < box.y1 <= frame.y1
-    shown = {line.get_label(): line.get_ydata() for line in drawn.axes[1].lines}
-    assert np.array_equal(shown["x"], found.residual_n[:, 0])
-    assert np.array_equal(shown["z"], found.residual_n[:, 2])
 
 
 def identify(*words):
