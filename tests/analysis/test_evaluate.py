@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from study_app.analysis.designs.block_tests import of_tables
+from study_app.analysis.designs.block_tests import MANY, of_tables
 from study_app.analysis.designs.verdicts import judged
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.findings.contrast_with_control import FINDING as CONTRASTS
@@ -29,6 +29,7 @@ from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.results.conduct import orders
 from study_app.analysis.statistics.friedman import friedman
 from study_app.analysis.statistics.multiple_comparisons import false_discovery, holm
+from study_app.analysis.statistics.outcome import DRAWS
 from study_app.analysis.statistics.paired import paired
 from study_app.analysis.tables.compared_blocks import Block, Item, Setting
 from study_app.analysis.tables.planned_analysis import Decided
@@ -258,3 +259,18 @@ def test_orders_are_counted_as_run(rek: Folder) -> None:
     assert counts.orders == 12
     assert [sum(line) for line in counts.positions] == [12] * 7
     assert sum(map(sum, counts.follows)) == 12 * 6
+
+
+@pytest.mark.parametrize(("statements", "alpha"), [(5, 0.05), (40, 0.05), (9, 0.001), (100, 0.01)])
+@pytest.mark.parametrize("people", [20, MANY + 1])
+def test_draws_are_so_many_that_they_decide_nothing(statements: int, alpha: float, people: int) -> None:
+    items = tuple(Item(f"s{number}", f"Statement {number}.", f"S{number}") for number in range(statements))
+    settings = tuple(Setting(f"L{number}") for number in range(1, 4))
+    block = Block("liquids", "Liquids", "liquids", settings, items, tuple("1234567"), None)
+    rng = np.random.default_rng(3)
+    values = {item.id: rng.integers(1, 8, (people, 3, 1)).astype(float) for item in items}
+    names = tuple(f"P{number:04d}" for number in range(people))
+    asked = of_tables(block, replace(DECIDED, alpha=alpha), names, values)
+    assert statements / (1 + asked.draws) <= alpha / 20
+    assert 1 / (1 + asked.draws_over_all) <= alpha / 20
+    assert asked.draws >= DRAWS

@@ -1,5 +1,6 @@
 """What a scene costs and how true it is, here and in the process that answers a lab."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -7,23 +8,27 @@ import numba
 import numpy as np
 import pytest
 
-if numba.config.DISABLE_JIT:
-    pytest.skip("costs are those of compiled code", allow_module_level=True)
-
 from study_app.errors import StudyError
-from study_app.evaluation import appraisal_measurement
+from study_app.evaluation import appraisal_measurement, cost
 from study_app.evaluation.appraisal import Costs
 from study_app.evaluation.appraisal_measurement import withheld_share
 from study_app.evaluation.appraisal_worker import Question, appraise, start_appraisal_worker
+from study_app.evaluation.cost import measure, report
+from study_app.evaluation.expected_error import error_report, expected
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
-from study_app.haptics.model.liquid import Box
+from study_app.haptics.model.effects.current import Uniform
+from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Ewma, Kalman, Line, Raw
+from study_app.haptics.model.scene import Box, Ewma, Given, Kalman, Line, Liquid, MotionBox, Raw, Scene
 from study_app.haptics.runtime.offline import samples_along
 from study_app.protocol.load import load, load_scenes
 from study_app.protocol.trials.tasks.explore import Explore
 from study_app.protocol.trials.tasks.reach import Reach
 from study_app.protocol.trials.tasks.stroke import Stroke
+from tests.haptics.materials import PRESETS, tank
+
+if numba.config.DISABLE_JIT:
+    pytest.skip("costs are those of compiled code", allow_module_level=True)
 
 THESIS, PHYSICAL = load_scenes("rek2024"), load_scenes("physical_liquids")
 SHAKE = Stroke(5.0, 0.03)
@@ -173,3 +178,81 @@ def test_what_cannot_be_measured_is_said() -> None:
     with pytest.raises(StudyError, match="no stable force is known"):
         appraise(Question(wild), told.append, lambda: False)
     assert told == []
+
+
+STROKES = MotionBox(speed_mps=0.6, acceleration_mps2=6)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.slow
+def test_non_newtonian_liquids_are_compared_with_their_law_added_mass_and_buoyancy(name):
+    whole = tank(name, scale=3.0, effects=("non_newtonian", "added_mass", "buoyancy"), motion=STROKES)
+    found = expected(whole)
+    assert found.causes.law < 0.05
+    assert 0.03 < found.error_share < 0.2 + found.causes.limits
+    known = expected(whole.model_copy(update={"velocity": Given()}))
+    assert known.error_share < 0.05 + known.causes.limits
+    lacking = expected(tank(name, scale=3.0, motion=STROKES))
+    assert lacking.causes.law > found.causes.law + 0.02
+    assert f"{PRESETS[name][1].kind} law (no reference in unsteady flow)" in error_report(whole)
+
+
+RIVER = Liquid(
+    id="river",
+    density_kg_m3=1000,
+    viscosity_pa_s=1e-3,
+    effects=("drag", "wake"),
+    wake=Wake(length=100, scaling=100),
+    current=Uniform(velocity_mps=(1, 0, 0)),
+)
+POOL = Liquid(id="pool", density_kg_m3=900, region=Box(size_m=(1, 1, 1)), effects="auto")
+BOTH = Scene(scale=3, liquids=(RIVER, POOL))
+
+
+class Clock:
+    """Says how long each batch took, by the scene it was of: a stopwatch under the test's control."""
+
+    def __init__(self, monkeypatch, cost_ns):
+        self.now_ns = 0
+        monkeypatch.setattr(cost.time, "perf_counter_ns", lambda: self.now_ns)
+
+        def run(bench, ticks):
+            self.now_ns += ticks * cost_ns(bench.scene)
+
+        original = cost.Bench.__init__
+
+        def begin(bench, scene):
+            bench.scene = scene
+            original(bench, scene)
+
+        monkeypatch.setattr(cost.Bench, "__init__", begin)
+        monkeypatch.setattr(cost.Bench, "run", run)
+
+
+PRICES = {"drag": 2, "wake": 40, "current": 5, "buoyancy": 3, "surface": 7, "added_mass": 11, "history": 90}
+
+
+def test_each_effect_costs_what_it_adds(monkeypatch):
+    Clock(monkeypatch, lambda scene: 20 + sum(PRICES[it] for liquid in scene.liquids for it in liquid.effects))
+    measured = measure(BOTH, batches=3)
+    expected = {("river", name): PRICES[name] for name in PRICES if name != "surface"}
+    expected |= {("pool", name): PRICES[name] for name in ("drag", "buoyancy", "surface", "added_mass")}
+    assert measured.effects_ns == expected
+    assert measured.rest_ns == 20
+    chosen = ("drag", "buoyancy", "added_mass")  # the pool's surface is out of reach
+    assert measured.scene_ns == 20 + 2 + 40 + sum(PRICES[it] for it in chosen)
+
+
+def test_the_median_is_told_not_the_mean(monkeypatch):
+    times = itertools.cycle([10, 10, 1000])
+    Clock(monkeypatch, lambda scene: next(times))
+    assert measure(Scene(), batches=9).rest_ns == 10
+
+
+def test_a_report_has_the_gates_table_with_costs_and_the_whole(monkeypatch):
+    Clock(monkeypatch, lambda scene: 20 + sum(PRICES[it] for liquid in scene.liquids for it in liquid.effects))
+    lines = report(Scene(liquids=(RIVER,)), batches=1).splitlines()
+    assert lines[0].startswith("river: effects named")
+    assert [line.split()[3] for line in lines[2:4]] == ["2", "40"]
+    assert lines[-1] == "one tick: 62 ns, 0.01 % of the tick period; 20 ns of it without liquids"

@@ -26,9 +26,6 @@ NAMES = {
 }
 
 
-JUDGED = ("session_status", "excluded", "exclusion_reason", "counted")
-
-
 def rows(to: Path, name: str, study: str = "rek2024") -> list[dict[str, str]]:
     with (to / f"study-{study}_description-{name}_data.csv").open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file, strict=True))

@@ -221,21 +221,6 @@ def tracks_of_staircases(method: UpDown, trials: int) -> pd.DataFrame:
     return frame.astype({"level_delivered": "Float64", "success": "boolean"})
 
 
-def test_reversal_means_of_the_tracks_are_averaged_in_u_with_the_percentage_of_the_rule() -> None:
-    method = UpDown(tracks=2, trials=80, step_up=1.4)
-    frame = tracks_of_staircases(method, 80)
-    _, found = thresholds(replace(block(), method=method), frame.sample(frac=1, random_state=1))
-    means = []
-    for number in (1, 2):
-        own = frame[frame["track"] == f"8/{number}"]
-        answers = [(math.log10(level), bool(right)) for level, right in zip(own["level"], own["success"], strict=True)]
-        means.append(method.staircase(STIMULUS, number).mean_of_reversals(answers, 8))
-    assert None not in means
-    assert found.reversal_mean == pytest.approx(10 ** np.mean(means))
-    assert found.target_percent == pytest.approx(80.35, abs=0.01)
-    assert 0.05 < found.reversal_mean < 0.5
-
-
 def test_trials_that_are_excluded_leave_the_fit_and_not_the_track() -> None:
     method = UpDown(tracks=2, trials=80, step_up=1.4)
     frame = tracks_of_staircases(method, 80)

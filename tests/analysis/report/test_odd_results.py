@@ -35,29 +35,13 @@ def test_methods_distinguish_primary_and_exploratory_statements(tmp_path: Path) 
     assert both.format("four") in told
 
 
-@pytest.mark.parametrize(
-    ("valid", "within", "told"),
-    [
-        (None, "not measured", "Whether trials kept to the protocol's limits of timing was not measured."),
-        pytest.param(
-            *(True, "1 of 1", "No trial that counts exceeded the protocol's limits of timing."),
-            marks=pytest.mark.nightly,
-        ),
-        pytest.param(
-            *(False, "0 of 1", "Ten trials exceeded the protocol's limits of timing and are in these numbers."),
-            marks=pytest.mark.nightly,
-        ),
-    ],
-)
-def test_what_was_not_measured_is_neither_within_limits_nor_beyond(
-    rek: Results, tmp_path: Path, valid: bool | None, within: str, told: str
-) -> None:
-    rek.add("P001", lambda *_: 4, changes={"valid": valid})
+def test_what_was_not_measured_is_neither_within_limits_nor_beyond(rek: Results, tmp_path: Path) -> None:
+    rek.add("P001", lambda *_: 4, changes={"valid": None})
     rek.open()
     report(rek.folder, tmp_path / "report")
     page = read(tmp_path / "report")
-    assert told in page
-    assert f" {within} " in page
+    assert "Whether trials kept to the protocol's limits of timing was not measured." in page
+    assert " not measured " in page
 
 
 def test_answers_off_the_scale_are_missing_and_never_neutral(small: Results, tmp_path: Path) -> None:

@@ -1,0 +1,343 @@
+import re
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from study_app import figure_style as style
+from study_app.analysis.figures import (
+    answer_figures,
+    captions,
+    movement_plots,
+    plotting,
+    recognition_matrix,
+    small_multiples,
+)
+from study_app.analysis.tables.study_tables import load_study
+from study_app.errors import AnalysisError
+from tests.analysis.conftest import CANNOT_JUDGE, HIDDEN, Answer, Results, twelve
+
+pytestmark = pytest.mark.slow
+
+
+def test_disagreement_ends_and_agreement_begins_at_the_line_and_neutral_stands_apart(rek: Results) -> None:
+    by_person(rek, [1, 2, 2, 3, 4, 4, 5, 6, 6, 6, 7])
+    axes = panel(answer_figures.liquids(load_study(rek.folder)), "L1")
+    found = segments(axes, 1)
+    assert {level: width for level, (_, width, _) in found.items()} == {1: 1, 2: 2, 3: 1, 4: 2, 5: 1, 6: 3, 7: 1}
+    assert [found[level][0] for level in (1, 2, 3)] == [-4, -3, -1]
+    assert [found[level][0] for level in (5, 6, 7)] == [0, 1, 4]
+    assert found[4][0] > 5
+    assert {level: colour for level, (_, _, colour) in found.items()} == dict(
+        zip(range(1, 8), style.LEVEL_COLOURS, strict=True)
+    )
+
+
+def test_blinded_panels_are_titled_by_code_and_opened_ones_by_name(rek: Results) -> None:
+    by_person(rek, [4, 5])
+    blinded = words(answer_figures.liquids(load_study(rek.folder)))
+    assert [word for word in blinded if word in ("L1", "L2", "L3", "Water", "Honey", "Light oil")] == ["L1", "L2", "L3"]
+    assert "Blinded: by code" in blinded
+    rek.open()
+    opened = words(answer_figures.liquids(load_study(rek.folder)))
+    assert [word for word in opened if word in ("L1", "L2", "L3", "Water", "Honey", "Light oil")] == [
+        "Water",
+        "Honey",
+        "Light oil",
+    ]
+    assert "Blinded: by code" not in opened
+
+
+@pytest.mark.parametrize("draw", [answer_figures.liquids, answer_figures.delays])
+def test_simulated_participants_are_called_so_in_the_heading_and_real_ones_are_not(
+    rek: Results, small: Results, draw, tmp_path: Path
+) -> None:
+    by_person(rek, [4])
+    assert "SIMULATED participants" in words(draw(load_study(rek.folder)))
+
+
+def test_a_row_with_missing_answers_tells_its_own_n(small: Results) -> None:
+    small.add("A", lambda condition, item: 3 if item == "smooth" else CANNOT_JUDGE)
+    small.add("B", lambda condition, item: 5)
+    study = load_study(small.folder)
+    figure = answer_figures.liquids(study)
+    assert words(figure).count("n 2") == 2
+    assert "n = 2 participants, 4 missing" in words(figure)
+    told = captions.caption(study, study.blocks[0])
+    assert "n = 2 participants, 4 presentations of a setting, 4 of 16 ratings missing" in told
+    assert "Cannot judge: 4; not answered: 0." in told
+
+
+def test_delays_lie_on_a_true_scale_with_a_line_per_participant_and_the_median(rek: Results) -> None:
+    levels = {0: 1, 50: 2, 75: 2, 100: 3, 125: 5, 150: 6, 200: 7}
+
+    def answer(shift: int):
+        def given(condition: str, item: str) -> Answer:
+            delay = int(condition.removeprefix("delay_")) if condition.startswith("delay_") else 0
+            return min(7, levels[delay] + shift)
+
+        return given
+
+    for number, shift in enumerate((0, 0, 1), start=1):
+        rek.add(f"P{number}", answer(shift))
+    rek.open()
+    axes = panel(answer_figures.delays(load_study(rek.folder)), "item1")
+    lines = gids(axes, r"participant\d+")
+    assert len(lines) == 3
+    for line in lines:
+        assert list(line.get_xdata()) == list(levels)
+    assert np.abs(lines[0].get_ydata() - list(levels.values())).max() < 0.2
+    (median,) = gids(axes, "median")
+    assert list(median.get_xdata()) == list(levels)
+    assert list(median.get_ydata()) == list(levels.values())
+    (band,) = gids(axes, "quartiles")
+    corners = {tuple(corner) for path in band.get_paths() for corner in path.vertices.tolist()}
+    assert {(0.0, 1.0), (0.0, 1.5), (125.0, 5.0), (125.0, 5.5), (200.0, 7.0)} <= corners
+    labels = [label.get_text() for label in axes.get_xticklabels()]
+    assert labels == ["0", "50", "100", "150", "200"]
+    assert axes.transData.transform((100, 0))[0] - axes.transData.transform((0, 0))[0] == pytest.approx(
+        axes.transData.transform((200, 0))[0] - axes.transData.transform((100, 0))[0]
+    )
+
+
+def test_blinded_delays_are_dots_by_code_in_code_order_without_lines(rek: Results) -> None:
+    by_person(rek, [2, 2, 2, 5])
+    axes = panel(answer_figures.delays(load_study(rek.folder)), "item1")
+    codes = [f"D{number}" for number in range(1, 8)]
+    assert [label.get_text() for label in axes.get_xticklabels()] == codes
+    for place, code in enumerate(codes):
+        (dots,) = gids(axes, code)
+        assert dots.get_linestyle() == "None"
+        assert len(dots.get_xdata()) == 4
+        assert np.abs(np.asarray(dots.get_xdata()) - place).max() < 0.5
+        assert sorted(np.round(dots.get_ydata())) == [2, 2, 2, 5]
+    grid = [line for line in axes.lines if len(line.get_xdata()) == 2 and list(line.get_xdata()) == [0, 1]]
+    assert [
+        line for line in axes.lines if line not in grid and line.get_linestyle() != "None" and len(line.get_xdata()) > 1
+    ] == []
+
+
+def test_a_missing_answer_breaks_a_line_and_shows_in_n(rek: Results) -> None:
+    by_person(rek, [3, 4])
+    code = rek.code("delay_75", "delays")
+    path = rek.responses("P002")
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(line for line in lines if f",{code},harder," not in line))
+    rek.open()
+    axes = panel(answer_figures.delays(load_study(rek.folder)), "item2")
+    assert [np.isnan(line.get_ydata()).sum() for line in gids(axes, r"participant\d+")] == [0, 1]
+    assert "n 1–2" in [text.get_text() for text in axes.texts]
+
+
+@pytest.mark.parametrize("fonts", [style.screen_fonts(), style.PRINT_FONTS], ids=["screen", "print"])
+@pytest.mark.parametrize("opened", [pytest.param(False, marks=pytest.mark.nightly), True], ids=["blinded", "opened"])
+@pytest.mark.parametrize("people", [pytest.param(1, marks=pytest.mark.nightly), 30])
+def test_no_text_leaves_the_figure_or_touches_another(rek: Results, fonts, opened: bool, people: int) -> None:
+    twelve(rek, people=people)
+    if opened:
+        rek.open()
+    study = load_study(rek.folder)
+    for figure in (answer_figures.liquids(study, fonts=fonts), answer_figures.delays(study, fonts=fonts)):
+        figure.canvas.draw()  # tick labels have their places only then
+        boxes = [(text.get_text(), text.get_window_extent().padded(-1)) for text in shown(figure)]
+        width, height = figure.bbox.size
+        for word, box in boxes:
+            assert box.x0 >= 0, word
+            assert box.y0 >= 0, word
+            assert box.x1 <= width, word
+            assert box.y1 <= height, word
+        for (word, box), (other, beside) in combinations(boxes, 2):
+            assert not box.overlaps(beside), (word, other)
+        for text in figure.texts:
+            if not text.get_text().startswith("n "):
+                assert not any(text.get_window_extent().overlaps(axes.bbox) for axes in figure.axes), text.get_text()
+
+
+def test_captions_say_what_is_missing_left_out_and_beyond_limits(rek: Results) -> None:
+    rek.add("P001", lambda *_: 6, changes={"valid": False})
+    rek.add("P002", lambda *_: 6, status="withdrawn", trials=3)
+    path = rek.responses("P001")
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(line for line in lines if ",immersive," not in line))
+    study = load_study(rek.folder)
+    caption = captions.caption(study, study.blocks[0])
+    assert "not answered: 3" in caption
+    assert "1 session is left out" in caption
+    assert "3 of 3 trials exceeded the protocol's limits" in caption
+
+
+def test_captions_say_how_many_are_excluded_and_why(rek: Results) -> None:
+    for number in range(1, 6):
+        rek.add(f"P{number:03d}", lambda *_: 6)
+    rek.exclude("P001", reason="tired")
+    rek.exclude("P002", reason="held the\nwrong  handle, " + "very " * 40)
+    rek.exclude("P003", reason="tired")
+    rek.exclude("P004", trial=rek.trial("P004", "honey"), reason="the phone rang")
+    study = load_study(rek.folder)
+    liquids, delays = (captions.caption(study, block) for block in study.blocks)
+    for caption in (liquids, delays):
+        assert "3 sessions are excluded (2 × tired; 1 × held the wrong handle, very very" in caption
+        assert " v…)." in caption
+        assert "left out, not having been completed" not in caption
+    assert "1 trial is excluded, its answers missing here (the phone rang)." in liquids
+    assert "n = 1 to 2 of 2 participants in a setting" in liquids
+    assert "trial is excluded" not in delays
+    assert "n = 2 participants, every setting rated by all" in delays
+
+
+def test_the_caption_of_opened_delays_says_how_late_they_really_were(rek: Results) -> None:
+    rek.add("P001", lambda *_: 4, changes={"delay_error_mean_ms": -2.25})
+    rek.add("P002", lambda *_: 4, changes={"delay_error_mean_ms": 4.25})
+    study = load_study(rek.folder)
+    assert "achieved" not in captions.caption(study, study.blocks[1])
+    rek.open()
+    study = load_study(rek.folder)
+    assert "by +1.0 ms on average (trials: −2.2 to +4.2 ms)" in captions.caption(study, study.blocks[1])
+
+
+def test_nothing_hidden_is_in_any_blinded_file(small: Results, tmp_path: Path) -> None:
+    small.add("A", lambda *_: 3)
+    for path in plotting.plot(small.folder, tmp_path / "out"):
+        content = path.read_bytes().lower()
+        for word in HIDDEN:
+            assert word.encode() not in content, path.name
+    small.open()
+    plotting.plot(small.folder, tmp_path / "out")
+    assert b"Lightquorn" not in (tmp_path / "out" / "liquids.svg").read_bytes()
+    assert b">Quorn<" in (tmp_path / "out" / "liquids.svg").read_bytes()
+
+
+def test_without_a_completed_session_plot_says_so_and_writes_nothing(rek: Results, tmp_path: Path) -> None:
+    rek.add("P001", lambda *_: 4, status="unfinished", trials=3)
+    with pytest.raises(AnalysisError, match="P001 session 1 unfinished"):
+        plotting.plot(rek.folder, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+TABLE = ((0, 4, 0, 0, 0, 1, 0), (3, 0, 0, 0, 1, 1, 0), (0, 3, 0, 0, 0, 1, 1))
+
+
+def matrix(table: tuple[tuple[int, ...], ...] = TABLE) -> Figure:
+    return recognition_matrix.draw(
+        table,
+        ["Water", "Honey", "Light oil"],
+        ["Like honey", "Like water", "Like slime", "Like oil", "Like tar"],
+        [1, 0, 3],
+        title="Names",
+        marks=[],
+        counts=["n = 5"],
+        foot="",
+        fonts=style.PRINT_FONTS,
+    ).figure
+
+
+def texts(figure: Figure, label: str) -> list[str]:
+    return [text.get_text() for axes in figure.axes if axes.get_label() == label for text in axes.texts]
+
+
+def test_every_count_stands_in_its_cell_with_its_share_of_the_row() -> None:
+    figure = matrix()
+    assert texts(figure, "name2") == ["4  (80%)", "0", "3  (60%)"]
+    assert texts(figure, "name6") == ["1  (20%)"] * 3
+    assert texts(figure, "name7") == ["0", "0", "1  (20%)"]
+
+
+def test_the_right_name_is_framed_in_every_row() -> None:
+    framed = {
+        (axes.get_label(), patch.get_gid())
+        for axes in matrix().axes
+        for patch in axes.patches
+        if patch.get_linewidth() > 1
+    }
+    assert framed == {("name2", "name2-setting1"), ("name1", "name1-setting2"), ("name4", "name4-setting3")}
+
+
+@pytest.mark.parametrize("lowest_ms", [50.0, 200.0])
+def test_the_lowest_delay_is_marked_at_its_place_on_the_true_scale(rek: Results, lowest_ms: float) -> None:
+    twelve(rek, people=3)
+    rek.open()
+    figure = answer_figures.delays(load_study(rek.folder), lowest={"different": lowest_ms})
+    marks = [line for axes in figure.axes for line in axes.lines if str(line.get_gid()).endswith("-lowest")]
+    (mark,) = marks
+    assert np.asarray(mark.get_xdata()).tolist() == [lowest_ms, lowest_ms]
+    assert mark.get_gid() == "item1-lowest"
+    assert f"≤ {lowest_ms:g}" in texts(figure, "item1")
+
+
+def test_motion_is_drawn_for_every_participant_with_its_own_scale() -> None:
+    values = np.array([[0.8, 0.9, 1.0], [0.85, np.nan, 1.1]])
+    figure = movement_plots.draw(
+        [movement_plots.Measured("Time, s", values), movement_plots.Measured("Flat", np.ones((2, 3)))],
+        [0.0, 100.0, 200.0],
+        title="Motion",
+        marks=[],
+        counts=["n = 2"],
+        foot="",
+        fonts=style.PRINT_FONTS,
+    ).figure
+    first, second = figure.axes
+    gids = {str(line.get_gid()): line for line in first.lines}
+    assert np.asarray(gids["measure1-participant1"].get_ydata()).tolist() == [0.8, 0.9, 1.0]
+    assert np.asarray(gids["measure1-median"].get_ydata()).tolist() == pytest.approx([0.825, 0.9, 1.05])
+    low, high = first.get_ylim()
+    assert low < 0.8
+    assert high > 1.1
+    assert [tick.get_text() for tick in second.get_yticklabels()] == ["1"]
+    assert second.get_ylim() == (0.5, 1.5)
+
+
+def test_of_many_participants_some_are_drawn_and_the_median_is_of_all() -> None:
+    values = np.tile(np.array([1.0, 2.0, 3.0]), (500, 1))
+    values[::2] += 1
+    figure = movement_plots.draw(
+        [movement_plots.Measured("Time, s", values)],
+        [0.0, 100.0, 200.0],
+        title="Motion",
+        marks=[],
+        counts=["n = 500"],
+        foot="",
+        fonts=style.PRINT_FONTS,
+    ).figure
+    gids = {str(line.get_gid()): line for line in figure.axes[0].lines}
+    drawn = [gid for gid in gids if "participant" in gid]
+    assert len(drawn) == small_multiples.MOST_LINES
+    assert {"measure1-participant1", "measure1-participant500"} <= set(drawn)
+    assert np.asarray(gids["measure1-median"].get_ydata()).tolist() == [1.5, 2.5, 3.5]
+    assert small_multiples.line_words(500) == "60 of the 500 participants, evenly chosen in the order of their ids"
+    assert small_multiples.line_words(60) == "participants"
+
+
+def words(figure: Figure) -> list[str]:
+    return [text.get_text() for text in shown(figure)]
+
+
+def shown(figure: Figure) -> list[Text]:
+    return [text for text in figure.findobj(Text) if text.get_text().strip() and text.get_visible()]
+
+
+def panel(figure: Figure, name: str) -> Axes:
+    return next(axes for axes in figure.axes if axes.get_label() == name)
+
+
+def segments(axes: Axes, row: int) -> dict[int, tuple[float, float, str]]:
+    """Level → left edge, width, colour of the bars of a row (from 1)."""
+    found = {}
+    for patch in axes.patches:
+        match = re.fullmatch(rf".*-row{row}-level(\d)", patch.get_gid() or "")
+        if match:
+            found[int(match[1])] = (patch.get_x(), patch.get_width(), to_hex(patch.get_facecolor()))
+    return found
+
+
+def gids(axes: Axes, ending: str) -> list:
+    return [artist for artist in axes.get_children() if re.fullmatch(rf".*-{ending}", artist.get_gid() or "")]
+
+
+def by_person(results: Results, levels: list[int]) -> None:
+    for number, level in enumerate(levels, start=1):
+        results.add(f"P{number:03d}", lambda condition, item, level=level: level)
