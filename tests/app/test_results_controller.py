@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
@@ -328,5 +329,20 @@ def test_a_report_by_processes_of_its_own_is_cancelled_then_written_and_none_is_
     assert opened.files == [tmp_path / "report" / "report.html"]
     assert opened.files[0].is_file()
     dialog.reject()
+    opened.window.close()
+    qtbot.waitUntil(nobody_left, timeout=SOON_MS)
+
+
+@pytest.mark.nightly
+def test_a_process_that_is_killed_is_told_and_begun_again(qtbot: QtBot, results: Path) -> None:
+    opened = Opened(qtbot, results, start_analysis_worker)
+    reader: Any = opened.controller.reader
+    psutil.Process(reader.process.pid).suspend()  # or it may answer before it is killed
+    opened.controller.look()
+    reader.process.kill()
+    qtbot.waitUntil(lambda: "bug in the program" in opened.place.figures.trouble.title.text(), timeout=SOON_MS)
+    opened.click(opened.place.figures.trouble.button)
+    opened.wait()
+    assert len(opened.titles) == 2
     opened.window.close()
     qtbot.waitUntil(nobody_left, timeout=SOON_MS)
