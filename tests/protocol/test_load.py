@@ -13,70 +13,11 @@ from study_app.haptics.model.overrides import override, value_of
 from study_app.haptics.model.scene import Ewma, Kalman, Line, Liquid, Scene
 from study_app.haptics.model.steady_state import steady
 from study_app.protocol.describe import describe
-from study_app.protocol.load import load, load_scene, parse, protocol_hash, shipped, source_bytes
-from study_app.protocol.orders import constrained
+from study_app.protocol.load import load, load_scene, parse, protocol_hash, source_bytes
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.scene_file import scene_text
 from study_app.protocol.source.liquid_files import bundled, unbundled
-from tests.protocol.faulty_protocols import BROKEN, CASES, Case
-from tests.protocol.sound import EVERY_ORDER, ORDER, SOUND
-
-
-def problems_of(text: str | bytes):
-    with pytest.raises(ProtocolError) as caught:
-        parse(text if isinstance(text, bytes) else text.encode(), "file.toml")
-    return caught.value.problems
-
-
-def line_of(fragment: str, text: str) -> int:
-    assert text.count(fragment) == 1, f"{fragment!r} is there {text.count(fragment)} times"
-    return text[: text.index(fragment)].count("\n") + 1
-
-
-def test_the_sound_protocol_is_sound():
-    assert parse(SOUND.encode(), "file.toml").study.name == "small"
-
-
-@pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
-def test_every_problem_is_named_with_its_line(case: Case):
-    text = case.text
-    found = problems_of(text)
-    assert [problem.place for problem in found] == [expected.place for expected in case.expected]
-    for problem, expected in zip(found, case.expected, strict=True):
-        assert expected.words in str(problem)
-        assert problem.line == (None if expected.at is None else line_of(expected.at, text))
-
-
-def test_an_impossible_constraint_is_refused_without_looking_for_an_order(monkeypatch: pytest.MonkeyPatch):
-    """The largest block there can be is refused after no step of a search at all: what is possible is known."""
-
-    def search(*_: object) -> None:
-        raise AssertionError("it looked for an order")
-
-    monkeypatch.setattr(constrained, "propose", search)
-    monkeypatch.setattr(constrained, "arrange", search)
-    impossible = SOUND.replace(ORDER, 'order = "constrained"\nmin_distance = 1000\nrepetitions = 100')
-    (problem,) = problems_of(impossible)
-    assert (problem.place, problem.line) == ("blocks.feel.min_distance", line_of("min_distance", impossible))
-    assert problem.message == "is 1000, but with 2 conditions only 1 to 2 is possible"
-
-
-@pytest.mark.parametrize(("name", "text", "line", "words"), BROKEN, ids=[broken[0] for broken in BROKEN])
-def test_broken_toml_gives_line_and_column(name: str, text: str, line: int, words: str):
-    (problem,) = problems_of(text)
-    assert problem.line == line, name
-    assert words in problem.message
-
-
-def test_text_that_is_not_utf_8_is_refused_with_its_line():
-    (problem,) = problems_of(SOUND.replace("Klein", "Kl\udce9in").encode("utf-8", "surrogateescape"))
-    assert problem.line == line_of("Kl", SOUND)
-    assert "UTF-8" in str(problem)
-
-
-def test_windows_line_ends_change_nothing():
-    text = SOUND.replace("rate_hz = 1000", "rate = 1000")
-    assert problems_of(text.replace("\n", "\r\n")) == problems_of(text)
+from tests.protocol.sound import EVERY_ORDER, SOUND
 
 
 def test_a_name_is_looked_up_in_the_working_folder_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -123,10 +64,6 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, monkeypatch: pytest
 def test_the_hash_is_of_the_bytes():
     assert protocol_hash(b"") == "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"
     assert protocol_hash(SOUND.encode()) != protocol_hash(SOUND.encode() + b"\n")
-
-
-def test_shipped_protocols_are_listed_by_name():
-    assert {"demo", "rek2024"} <= set(shipped())
 
 
 def test_a_scene_is_one_liquid_of_a_protocol():
@@ -191,28 +128,6 @@ def test_whatever_is_changed_gives_a_protocol_or_a_list_of_problems(changes: lis
         assert build_schedule(protocol, "P1", 1).trials
         assert describe(protocol)
     assert all(problem.message and problem.place for problem in problems)
-
-
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        ("a = " + "[" * 3000 + "]" * 3000, "file: is nested too deeply"),
-        ("format = " + "9" * 6000, "file: holds a whole number beyond 64 bits"),
-        ("format = 1\n[limits]\nlateness_ms = " + "9" * 4000, "file: holds a whole number beyond 64 bits"),
-    ],
-)
-def test_what_python_cannot_hold_is_a_problem_of_the_file(text: str, sentence: str) -> None:
-    with pytest.raises(ProtocolError, match=sentence):
-        parse(text.encode(), "odd")
-
-
-@pytest.mark.parametrize("value", ["q" * 6000, "q " * 3000, "task.x" * 1000])
-def test_a_message_repeats_200_characters_of_a_value_at_most(value: str) -> None:
-    text = source_bytes("demo").decode()
-    (line, *_) = (line for line in text.splitlines() if line.startswith("task = "))
-    with pytest.raises(ProtocolError) as raised:
-        parse(text.replace(line, f'task = "{value}"', 1).encode(), "odd")
-    assert max(len(str(problem)) for problem in raised.value.problems) < 500
 
 
 @pytest.mark.parametrize(

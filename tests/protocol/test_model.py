@@ -8,26 +8,19 @@ from typing import Any
 import pytest
 from pydantic import BaseModel, GetCoreSchemaHandler, ValidationError
 
-from study_app.errors import ProtocolError
 from study_app.haptics.model.overrides import number_names
 from study_app.haptics.model.ranges import Frozen
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, parse, source_bytes
-from study_app.protocol.model import Limits, Protocol
+from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.quantities import quantity, quantity_words
-from study_app.protocol.source.json_schema import schema
 from study_app.protocol.table import Table
 from study_app.protocol.texts import tidy
 from study_app.store.receipt import without_conditions
 from tests.protocol.sound import SOUND
 
 SMALL = parse(SOUND.encode(), "small.toml")
-
-
-def test_a_completeness_that_is_not_asked_for_stands_in_no_file():
-    assert "targets_percent" not in Limits().model_dump(mode="json")
-    assert Limits(targets_percent=80).model_dump(mode="json")["targets_percent"] == 80
 
 
 def test_a_protocol_never_changes():
@@ -85,22 +78,6 @@ def test_one_string_is_a_text_in_any_language():
     assert SMALL.text("Same", "nl") == "Same"
 
 
-def test_a_study_without_main_block_is_refused():
-    text = SOUND
-    for letter, part in (("L", 1), ("D", 2)):
-        text = text.replace(f'code_prefix = "{letter}"\n', "").replace(f"part = {part}\n", 'phase = "baseline"\n')
-    text = text.replace('["is_thin", "is_thick"]', '["is_thin"]').replace('["on_time", "both"]', '["is_thin"]')
-    with pytest.raises(ProtocolError, match="there is no main block"):
-        parse(text.encode(), "small.toml")
-
-
-def test_a_language_the_program_cannot_speak_is_refused():
-    text = SOUND.replace('"nl"]', '"fi"]').replace("nl = ", "fi = ").replace("labels.nl", "labels.fi")
-    with pytest.raises(ProtocolError, match=r'line 8: study.languages.2: the program has no words in "fi"') as caught:
-        parse(text.encode(), "small.toml")
-    assert len(caught.value.problems) == 1
-
-
 THREADS = 8
 
 
@@ -137,29 +114,11 @@ def told(line: str) -> bytes:
     return DEMO.replace(SAYS, line).encode()
 
 
-def test_a_study_is_double_blind_unless_it_says_otherwise() -> None:
-    assert parse(told(""), "demo").study.blinding == "double"
-    assert parse(told(SAYS), "demo").study.blinding == "double"
-    assert parse(told('blinding = "single"'), "demo").study.blinding == "single"
-
-
-@pytest.mark.parametrize("word", ['"none"', '"Double"', "false"])
-def test_nothing_but_the_two_is_taken(word: str) -> None:
-    with pytest.raises(ProtocolError, match=r"study\.blinding"):
-        parse(told(f"blinding = {word}"), "demo")
-
-
 @pytest.mark.parametrize("blinding", ["double", "single"])
 def test_the_receipt_keeps_which_it_was(blinding: str) -> None:
     protocol = parse(told(f'blinding = "{blinding}"'), "demo")
     assert without_conditions(protocol)["study"]["blinding"] == blinding
     assert f"{blinding}-blind" in describe(protocol)
-
-
-def test_editors_are_told_both_and_the_default() -> None:
-    node = schema()["$defs"]["StudyHead"]["properties"]["blinding"]
-    assert (node["enum"], node["default"]) == (["double", "single"], "double")
-    assert "the participant does not know" in node["description"]
 
 
 OF_THE_LOOP = {"format", "rate_hz", "fade_s"}

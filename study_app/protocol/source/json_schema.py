@@ -45,4 +45,6 @@ def schema(of: type[BaseModel] = Protocol) -> dict[str, Any]:
                     part["if"], part["then"] = {"not": {"anyOf": NEED_NO_DENSITY}}, {"required": part.pop("required")}
     if of is Protocol:
         relax(described)
+        items = described["$defs"]["Questionnaire"]["properties"]["items"]["items"]
+        items["anyOf"] = items.pop("oneOf")  # a statement, which has no kind, is a text too, whose kind has a default
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}

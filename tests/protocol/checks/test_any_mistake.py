@@ -37,12 +37,3 @@ def is_refused(text: str) -> bool:
 @pytest.mark.parametrize("text", [HEAD + BLOCK, STUDY + GROUPS, MIXED], ids=["levels", "groups", "questions"])
 def test_any_mistake_is_a_protocol_error(text: str) -> None:
     assert sum(map(is_refused, mistakes(text))) > len(text.splitlines())
-
-
-def test_show_if_of_a_rating_without_the_language_of_the_study_is_a_protocol_error() -> None:
-    rating = '{ id = "thick", kind = "rating", scale = "five", text = "Thick?", short = "Thick" }, '
-    text = STUDY.replace("[questionnaires.end]", '[scales.five]\nlabels.nl = ["a", "b"]\n\n[questionnaires.end]')
-    text = text.replace('items = [{ id = "comment",', f'items = [{rating}{{ id = "comment",')
-    text = text.replace("required = false", 'show_if = { item = "thick", is = 1 }')
-    with pytest.raises(ProtocolError, match=r"scales\.five\.labels"):
-        parse(text.encode(), "wrong")

@@ -17,8 +17,6 @@ from study_app.protocol.checks.expected_means import (
     expected_mean,
     mean_plan,
 )
-from study_app.protocol.checks.expected_precision import imprecise
-from study_app.protocol.describe import describe
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.designs.rating_of_interval import Rated
@@ -49,7 +47,6 @@ methods.few = { kind = "constant", levels = 4, repetitions = 12 }
 blocks.rate = { stimulus = "damping", design = "rated", method = "few" }
 stimuli.damping = { vary = "damping_nspm", STIMULUS }
 """
-PLANNED = "analysis = { participants = 10, precision = 0.1 }\n"
 
 
 def compared(design: str = "2ifc", repetitions: int = 40, more: str = "") -> Protocol:
@@ -171,54 +168,11 @@ def test_the_spread_of_d_a_is_that_of_ratings_that_the_report_analyses() -> None
     assert np.std([one for one in found if one is not None]) == pytest.approx(expected.spread, rel=0.12)
 
 
-def test_a_block_of_ratings_has_the_points_of_its_scale_and_the_ratings_of_each_level() -> None:
-    plan = plan_of(rated(), "rate")
-    assert plan == RatingPlan(points=5, trials=12)
-    assert plan.with_trials(40).trials == 40
-    found = expected_mean(plan)
-    said = " ".join(describe(rated(PLANNED)).split())
-    assert (
-        f"Expected precision at d_a = 1: one participant ±{found.half:.2g}; 10 participants "
-        f"±{100 * found.of_group(10):.0f} % (95 % intervals)" in said
-    )
-    (sentence,) = imprecise(rated(PLANNED), rated().blocks["rate"])
-    assert sentence.startswith("methods.few.repetitions: 12 trials per level give ±")
-
-
 def test_one_level_or_standards_that_levels_are_added_to_have_no_expected_d_a() -> None:
     one, weber = rated().model_copy(), rated(stimulus="levels = [0.1, 0.6], standards = [4, 8]")
     alone = {"few": Constant(levels=(2.0,), repetitions=12)}
     assert mean_plan(one.model_copy(update={"methods": alone}), one.blocks["rate"]) is None
     assert mean_plan(weber, weber.blocks["rate"]) is None
-
-
-def test_check_prints_the_intervals() -> None:
-    said = " ".join(describe(load("thickness")).split())
-    found = expected_mean(plan_of(load("thickness"), "thickness"))
-    assert (
-        f"Expected precision exponent of 0.44: one participant ±{found.half:.2g}; 20 participants "
-        f"±{100 * found.of_group(20):.0f} % (95 % intervals)" in said
-    )
-    found = expected_mean(plan_of(compared()))
-    said = " ".join(describe(compared(more=PLANNED)).split())
-    half = f"{100 * found.of_group(10):.0f}"
-    assert f"Expected precision at d′ = 1: one participant ±{found.half:.2g}; 10 participants ±{half} %" in said
-
-
-def test_too_few_repetitions_for_the_planned_precision_are_a_warning() -> None:
-    short = compared(more=PLANNED)
-    found = expected_mean(plan_of(short))
-    (sentence,) = imprecise(short, short.blocks["pairs"])
-    assert sentence == (
-        f"blocks.pairs.repetitions: 40 trials per comparison give ±{100 * found.of_group(10):.0f} % with 10 "
-        f"planned participants, not ±10 %: {found.participants_for(0.1)} participants would on average"
-    )
-    assert sentence in describe(short)
-    thickness = load("thickness")
-    assert thickness.analysis is not None
-    wanted = thickness.analysis.model_copy(update={"precision": 0.05})
-    (sentence,) = imprecise(thickness.model_copy(update={"analysis": wanted}), thickness.blocks["thickness"])
-    assert sentence.startswith("methods.nine.repetitions: 36 trials give ±9 % with 20 planned participants, not ±5 %: ")
 
 
 def test_an_exponent_that_was_not_published_is_one_half_and_a_modulus_is_no_trial() -> None:

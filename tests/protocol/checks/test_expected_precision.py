@@ -12,8 +12,7 @@ from study_app.protocol.checks.expected_precision import (
     precision_rows,
     threshold_plan,
 )
-from study_app.protocol.describe import describe
-from study_app.protocol.load import examined, load, parse, read_document
+from study_app.protocol.load import examined, parse, read_document
 
 TEXT = """
 format = 2
@@ -74,58 +73,12 @@ def test_more_trials_make_every_method_more_precise(method, design):
     assert 0.5 < few.spread * 1.96 / few.half < 1.5  # the intervals are as wide as the errors
 
 
-def test_tracks_and_catch_trials_are_those_of_the_block():
-    plan = plan_of(study('kind = "questplus", tracks = 2'))
-    assert (plan.trials, plan.catch, plan.method.tracks) == (60, 0, 2)
-    caught = plan_of(study(block=", catch = { share = 0.1 }"))
-    assert caught.catch == 6
-    assert caught.with_trials(30).catch == 3
-
-
 @pytest.mark.slow
 def test_long_tracks_are_scaled_from_shorter_ones():
     plan = plan_of(study('kind = "questplus", trials = 1000'))
     long, short = expected(plan), expected(plan.with_trials(200))
     assert long.trials == 1000
     assert long.spread == pytest.approx(short.spread / math.sqrt(5))
-
-
-@pytest.mark.slow
-def test_check_prints_the_intervals_of_one_participant_and_of_the_group():
-    said = " ".join(describe(study(more=PLANNED)).split())
-    found = expected(plan_of(study()))
-    assert (
-        f"Expected precision one participant ×/÷ {10**found.half:.1f}; 20 participants ±16 % (95 % intervals)" in said
-    )
-    said = " ".join(describe(load("viscosityjnd")).split())
-    assert "participants ±" in said
-    assert "over all standards (95 % intervals)" in said
-
-
-@pytest.mark.slow
-def test_check_prints_units_where_levels_are_not_spaced_by_logarithms():
-    text = TEXT.replace("levels = [0.02, 0.6]", 'level = "difference", levels = [1, 8], spacing = "linear"')
-    protocol = parse(
-        text.replace("METHOD", 'kind = "questplus"').replace("DESIGN", "2ifc").replace("BLOCK", "").encode(), "x"
-    )
-    assert " N·s/m (95 % intervals)" in " ".join(describe(protocol).split())
-
-
-@pytest.mark.slow
-def test_too_few_trials_for_the_planned_precision_are_a_warning():
-    short = study('kind = "questplus", trials = 20', PLANNED)
-    (sentence,) = imprecise(short, short.blocks["thicker"])
-    found = expected(plan_of(short))
-    people, trials = found.participants_for(0.15), found.trials_for(0.15, 20)
-    assert sentence == (
-        f"methods.m.trials: 20 trials per standard give ±{100 * found.of_group(20):.0f} % with 20 planned "
-        f"participants, not ±15 %: about {trials} trials or {people} participants would on average"
-    )
-    assert 22 < 100 * found.of_group(20) < 28
-    assert 40 < people < 60
-    assert sentence in describe(short)
-    enough = study('kind = "questplus", trials = 120', PLANNED)
-    assert not list(imprecise(enough, enough.blocks["thicker"]))
 
 
 @pytest.mark.slow
@@ -146,16 +99,3 @@ def test_where_limits_clip_the_levels_no_precision_is_expected():
         assert dict(precision_rows(clipped, clipped.blocks["thicker"])) == {
             "Expected precision": "none: the levels of most thresholds are clipped"
         }
-
-
-@pytest.mark.slow
-def test_a_precision_that_no_trials_reach_asks_for_participants_alone():
-    short = study('kind = "questplus", trials = 20', "analysis = { participants = 4, precision = 0.05 }\n")
-    (sentence,) = imprecise(short, short.blocks["thicker"])
-    assert "trials, or" not in sentence
-    assert sentence.endswith(" participants would on average")
-
-
-@pytest.mark.parametrize("name", ["rek2024", "demo"])
-def test_studies_of_statements_have_no_precision(name):
-    assert "Expected precision" not in describe(load(name))

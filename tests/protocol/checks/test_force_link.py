@@ -1,15 +1,12 @@
 """The force link in a protocol: its keys, what check refuses and warns of, and what an interval presents of it."""
 
-from collections.abc import Sequence
-
 import pytest
 
-from study_app.errors import ProtocolError
 from study_app.haptics.model.force_link import PROMPT, ForceLink
 from study_app.protocol.checks.delay_warnings import STIRRED, delay_warnings
 from study_app.protocol.checks.returned_energy import longest_ms, returned_j
 from study_app.protocol.describe import describe
-from study_app.protocol.load import load, parse, source_bytes
+from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.presentation import delays_force, link_seed, scene_of
 from study_app.protocol.trials.stimuli import Stimulated
@@ -64,107 +61,12 @@ def study(*edits: tuple[str, str]) -> Protocol:
     return parse(text.encode(), "late.toml")
 
 
-def problems(*edits: tuple[str, str]) -> Sequence[tuple[str, str, str]]:
-    with pytest.raises(ProtocolError) as caught:
-        study(*edits)
-    return [(one.place, one.message, one.hint) for one in caught.value.problems]
-
-
 def test_the_returned_energy_is_that_of_a_late_damper() -> None:
     for delay_ms, energy_mj in ((80, 0.21), (100, 0.40), (150, 1.28)):
         assert 1e3 * returned_j(4, PACED, delay_ms / 1000) == pytest.approx(energy_mj, abs=0.005)
     assert longest_ms(4, PACED) == 108
     assert longest_ms(0.1, PACED) == 200
     assert STIRRED.speed_mps == pytest.approx(0.2, rel=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("edits", "place", "message", "hint"),
-    [
-        (
-            [("levels = [2, 100]", "levels = [2, 150]")],
-            "stimuli.delay.levels",
-            "4 N·s/m delayed by 150 ms returns 1.3 mJ per motion reversal; the passivity controller removes it",
-            "at most 108 ms, which return 0.5 mJ",
-        ),
-        (
-            [("levels = [2, 100]", "levels = [2, 201]")],
-            "stimuli.delay.levels",
-            "201 ms above a standard of 0 is 201; force_delay_ms may be at most 200",
-            "at most 200",
-        ),
-        (
-            [
-                (
-                    'vary = "force_delay_ms"\nlevels = [2, 100]',
-                    'vary = "force_loss"\nstandards = [0.2]\nlevels = [0.5, 2]',
-                )
-            ],
-            "stimuli.delay.levels",
-            "level 2 gives 0.6; force_loss may be at most 0.5",
-            "at most 0.5",
-        ),
-        (
-            [('vary = "force_delay_ms"', 'vary = "force_dely_ms"')],
-            "stimuli.delay.vary",
-            'there is no number "force_dely_ms" in condition "damper"',
-            'did you mean "force_delay_ms"?',
-        ),
-        (
-            [("force_delay_ms = 10", "force_delay_ms = 201")],
-            "conditions.water.force_delay_ms",
-            "is 201, must be at most 200",
-            "",
-        ),
-    ],
-)
-def test_check_names_the_mistake(edits: list[tuple[str, str]], place: str, message: str, hint: str) -> None:
-    ((found_place, found, found_hint),) = problems(*edits)
-    assert (found_place, found) == (place, message)
-    assert hint in found_hint
-
-
-def test_the_keys_belong_to_format_2() -> None:
-    text = (
-        source_bytes("demo")
-        .decode()
-        .replace("[conditions.thin]", "[conditions.thin]\nforce_loss = 0.1\nforce_jitter_ms = 3")
-    )
-    with pytest.raises(ProtocolError) as caught:
-        parse(text.encode(), "old.toml")
-    found = {(one.place, one.message) for one in caught.value.problems}
-    assert found == {
-        ("conditions.thin.force_loss", "belongs to format 2"),
-        ("conditions.thin.force_jitter_ms", "belongs to format 2"),
-    }
-    demo = load("demo").conditions["thin"].model_dump()
-    assert not any(name.startswith("force_") for name in demo)
-
-
-def test_a_condition_beyond_the_stored_table_is_warned_of_in_newtons_and_percent() -> None:
-    assert not [*delay_warnings(study())]
-    (water,) = delay_warnings(study(("force_delay_ms = 10", "force_delay_ms = 50")))
-    assert water.startswith("conditions.water.force_delay_ms: with 50 ms the passivity controller withholds about 76 %")
-    assert water.endswith("N at 0.2 m/s): choose at most 10 ms, or delay the picture")
-    assert "of 3.4 N" in water
-    longer = study(('liquid = "damper"\n', 'liquid = "damper"\nforce_delay_ms = 0\n'), ("force_delay_ms = 10\n", ""))
-    assert not [*delay_warnings(longer)]
-    late = STUDY.replace('liquid = "damper"', 'liquid = "damper"\nforce_delay_ms = 150').replace(
-        'condition = "damper"\nvary = "force_delay_ms"\nlevels = [2, 100]',
-        'condition = "water"\nvary = "force_delay_ms"\nlevels = [0.5, 1]',
-    )
-    (damper,) = delay_warnings(parse(late.encode(), "late.toml"))
-    assert "a force of 0.5 N at 0.13 m/s returns 1.3 mJ per motion reversal" in damper
-    assert "choose at most 108 ms" in damper
-
-
-def test_a_link_is_described_and_makes_conditions_differ() -> None:
-    one = study(("force_delay_ms = 10", "force_delay_ms = 10\nforce_jitter_ms = 3\nforce_loss = 0.1"))
-    assert "force 10 ms late, force jitter 3 ms, 10 % of forces lost" in describe(one)
-    same = [('liquid = "damper"\n', 'liquid = "water"\n'), ("levels = [2, 100]", "levels = [2, 50]")]
-    study(*same)
-    ((place, message, _),) = problems(*same, ("force_delay_ms = 10\n", ""))
-    assert (place, message) == ("blocks.named.conditions.2", '"damper" presents the same as "water"')
 
 
 def test_an_interval_presents_its_link() -> None:

@@ -5,7 +5,6 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from study_app.errors import ProtocolError
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Ewma, Foaw, Given, Kalman, Line, Raw, Scene
 from study_app.haptics.model.steady_state import steady
@@ -40,19 +39,6 @@ design = "2ifc"
 method = "few"
 task = "stir"
 """
-CONDITIONS = ('stimulus = "damping"\ndesign = "2ifc"\nmethod = "few"', 'conditions = ["damper"]')
-REACH = (
-    'kind = "follow"\namplitude_mm = 25',
-    'kind = "reach"\ntargets_mm = [[-20, 0, 0], [20, 0, 0]]\nradius_mm = 5\ndwell_s = 0.2\ncount = 2\n'
-    'instruction = "Reach."',
-)
-EWMA = ("[liquids.damper]", '[scene.velocity]\nkind = "ewma"\n[liquids.damper]')
-DELAYED = ('vary = "damping_nspm"\nstandards = [8]\nlevels = [0.02, 0.6]', 'vary = "force_delay_ms"\nlevels = [2, 50]')
-VISCOUS = (
-    'drag = { law = "linear", damping_nspm = 8 }',
-    'density_kg_m3 = 1260\nviscosity_pa_s = 1\ndrag = { law = "haider-levenspiel" }',
-)
-SLOW = ("amplitude_mm = 25", "amplitude_mm = 20\nfrequency_hz = 0.5")
 HIDDEN = ('liquid = "damper"\n[tasks', 'liquid = "damper"\nball = "hidden"\n[tasks')
 
 
@@ -62,98 +48,6 @@ def study(edits: Iterable[tuple[str, str]]) -> Protocol:
         assert old in text
         text = text.replace(old, new)
     return parse(text.encode(), "pace.toml")
-
-
-@pytest.mark.parametrize(
-    ("edits", "place", "message", "hint"),
-    [
-        (
-            [("[8]", "[40]"), ("amplitude_mm = 25", "amplitude_mm = 20")],
-            "stimuli.damping.levels",
-            "standard 40 at levels 0.34 and 0.6 gives up to 64 N·s/m at the hand; the slope limit (1000 Hz, kalman, "
-            "1 tick) is 53",
-            "levels to 0.325, or the standard to 33.1",
-        ),
-        (
-            [("[8]", "[32]")],
-            "stimuli.damping.levels",
-            "standard 32 at levels 0.34 and 0.6 is up to 9.7 N at 1.2 times the paced 0.157 m/s; device.force_limit_n "
-            "is 8",
-            "amplitude_mm = 20.7 or frequency_hz = 0.82",
-        ),
-        (
-            [DELAYED, ("damping_nspm = 8", "damping_nspm = 60"), ("amplitude_mm = 25", "amplitude_mm = 10")],
-            "stimuli.damping.levels",
-            '"damper" gives 60 N·s/m at the hand; the slope limit (1000 Hz, kalman, 1 tick) is 53',
-            "damping_nspm = 53",
-        ),
-        (
-            [CONDITIONS, ("damping_nspm = 8", "damping_nspm = 45")],
-            "blocks.thicker.conditions",
-            '"damper" is 8.5 N at 1.2 times the paced 0.157 m/s; device.force_limit_n is 8',
-            "amplitude_mm = 23.5 or frequency_hz = 0.94",
-        ),
-        (
-            [EWMA, ("amplitude_mm = 25", "amplitude_mm = 10\nfrequency_hz = 3")],
-            "tasks.stir.frequency_hz",
-            "at 3 Hz the velocity estimator passes 96.9 % of a damper's force",
-            "at most 1.6 Hz, where it passes 99 %",
-        ),
-        (
-            [("amplitude_mm = 25", "amplitude_mm = 60")],
-            "tasks.stir.amplitude_mm",
-            "60 mm with radius 6 mm leaves the tank",
-            "device.workspace_mm reaches to 50 mm",
-        ),
-        (
-            [HIDDEN, REACH],
-            "conditions.damper.ball",
-            'is hidden, but block "thicker" has a reaching task: it cannot be aimed',
-            'a task of kind "follow" or "explore"',
-        ),
-        (
-            [
-                ("[8]", "[3.5]"),
-                VISCOUS,
-                ('vary = "damping_nspm"', 'vary = "viscosity_pa_s"'),
-                ("repetitions = 2", "repetitions = 2\nlevels = [0.1, 0.2, 0.3, 0.6]"),
-                SLOW,
-            ],
-            "stimuli.damping.levels",
-            "standard 3.5 at levels 0.2, 0.3 and 0.6 is up to 5.1 N at 1.2 times the paced 0.0628 m/s; the slope limit "
-            "(1000 Hz, kalman, 1 tick) leaves 4.0 N",
-            "levels to 0.124",
-        ),
-        (
-            [
-                ("[8]", "[40, 45]"),
-                ("amplitude_mm = 25", "amplitude_mm = 15"),
-                ("repetitions = 2", "repetitions = 2\nlevels = [0.1, 0.2, 0.3, 0.5, 0.6]"),
-            ],
-            "stimuli.damping.levels",
-            "standard 40 at levels 0.5 to 0.6 and standard 45 at levels 0.2 to 0.6 give up to 72 N·s/m at the hand; "
-            "the slope limit (1000 Hz, kalman, 1 tick) is 53",
-            "levels to 0.177, or the standard to 33.1",
-        ),
-    ],
-)
-def test_each_row_is_reported_at_its_line(edits: list[tuple[str, str]], place: str, message: str, hint: str) -> None:
-    with pytest.raises(ProtocolError) as refused:
-        study(edits)
-    (problem,) = refused.value.problems
-    assert problem.place.startswith(place)
-    assert (problem.message, problem.hint) == (message, hint)
-    assert problem.line is not None
-
-
-def test_each_level_is_named_once_with_the_limit_that_clips_it() -> None:
-    with pytest.raises(ProtocolError) as refused:
-        study([("[8]", "[40]"), ("repetitions = 2", "repetitions = 2\nlevels = [0.1, 0.2, 0.6]")])
-    said = [problem.message for problem in refused.value.problems]
-    assert said == [
-        "standard 40 at level 0.6 gives 64 N·s/m at the hand; the slope limit (1000 Hz, kalman, 1 tick) is 53",
-        "standard 40 at levels 0.1 and 0.2 is up to 9.0 N at 1.2 times the paced 0.157 m/s; device.force_limit_n is 8",
-    ]
 
 
 @pytest.mark.parametrize(
@@ -178,19 +72,6 @@ def test_what_a_hint_suggests_passes_and_is_not_clipped(edits: list[tuple[str, s
     drag = damper.drag.model_copy(update={"damping_nspm": strongest})
     felt: Scene = scene.model_copy(update={"liquids": (damper.model_copy(update={"drag": drag}),)})
     assert steady(felt, FASTER * task.fastest_stroke((0.1, 0.06, 0.06)).speed_mps).limit is None
-
-
-@pytest.mark.parametrize(
-    ("line", "place"),
-    [
-        ('[conditions.x]\nliquid = "water"\nball = "hidden"', "conditions.x.ball: belongs to format 2"),
-        ('[tasks.x]\nkind = "follow"', 'tasks.x.kind: "follow" belongs to format 2'),
-    ],
-)
-def test_new_keys_and_values_belong_to_format_2(line: str, place: str) -> None:
-    with pytest.raises(ProtocolError) as refused:
-        parse(f'format = 1\nstudy.name = "old"\n{line}\n'.encode(), "old.toml")
-    assert any(place in str(problem) for problem in refused.value.problems)
 
 
 SWINGS = 4

@@ -2,58 +2,11 @@
 
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
+from tests.protocol.edited_studies import text_of
 
-GROUPS = """
-[groups.first_thin]
-sequence = ["hello", "thin", "thick", "end"]
-
-[groups.first_thick]
-sequence = ["hello", "thick", "thin"]
-"""
-STUDY = """\
-format = 2
-study.name = "grouped"
-
-[liquids.water]
-density_kg_m3 = 1000
-
-[liquids.honey]
-density_kg_m3 = 1400
-
-[tasks.stir]
-kind = "explore"
-min_s = 1
-max_s = 3
-instruction = "Stir."
-
-[scales.agreement]
-labels.en = ["a", "b", "c", "d", "e", "f", "g"]
-
-[questionnaires.judgement]
-intro = "How was it?"
-scale = "agreement"
-items = [{ id = "heavy", text = "It is heavy.", short = "Heavy" }]
-
-[questionnaires.end]
-intro = "Last questions"
-items = [{ id = "comment", kind = "text", text = "Any comment?", short = "Comment", required = false }]
-
-[pages.hello]
-kind = "consent"
-title = "Hello"
-body = "Read this."
-
-[blocks.thin]
-conditions = ["water", "honey"]
-order = "shuffled"
-questionnaire = "judgement"
-
-[blocks.thick]
-conditions = ["honey", "water"]
-repetitions = 2
-order = "shuffled"
-questionnaire = "judgement"
-"""
+_WHOLE = text_of("grouped")
+STUDY = _WHOLE[: _WHOLE.index("\n[groups.")]
+GROUPS = _WHOLE.removeprefix(STUDY)
 
 
 def grouped(*edits: tuple[str, str], groups: str = GROUPS) -> Protocol:

@@ -5,8 +5,7 @@ from collections import Counter
 
 import pytest
 
-from study_app.errors import ProtocolError, StudyError
-from study_app.protocol.describe import describe
+from study_app.errors import StudyError
 from study_app.protocol.groups.allocation import group_of
 from study_app.protocol.groups.own_protocol import own_protocol, variants
 from study_app.protocol.groups.session_steps import every_step, refuse_beyond_last, steps_of
@@ -18,7 +17,7 @@ from study_app.protocol.orders.durations import expected_duration_s
 from study_app.protocol.orders.schedule import build_schedule, draw_key
 from study_app.protocol.streams import stream
 from study_app.store.receipt import without_conditions
-from tests.protocol.groups.grouped import GROUPS, grouped
+from tests.protocol.groups.grouped import grouped
 
 SESSIONS = 'sequences = [["hello", "thin"], ["thick", "thin", "end"]]\n'
 HEAD = "format = 2\n"
@@ -90,66 +89,12 @@ def test_a_study_of_one_sequence_is_as_it_was() -> None:
     assert study.steps == study.sequence
 
 
-def test_describe_has_duration_and_answers_of_each_group_and_session() -> None:
-    text = describe(grouped())
-    assert "Group first_thin (about 2 min, 7 answers)" in text
-    assert "Group first_thick (about 1 min, 6 answers)" in text
-    assert "first_thick, share 1" in text
-    assert "Session 2 (about 1 min, 7 answers)" in describe(sessions())
-
-
 def test_design_judges_each_group_over_its_own_participants() -> None:
     judged = list(balances(grouped(), numbered(7), 1))
     assert [one.session for one in judged] == ["group first_thin", "group first_thick"]
     assert sorted(one.participants for one in judged) == [3, 4]
     (alone,) = balances(grouped(), numbered(1), 1)
     assert alone.participants == 1
-
-
-@pytest.mark.parametrize(
-    ("groups", "place", "words"),
-    [
-        ('[groups.one]\nsequence = ["hello", "thin", "thick", "end"]\n', "groups", "there is only one group"),
-        (GROUPS.replace('"thick", ', "").replace(', "thin"]', "]"), "groups", 'block "thick" is in no group'),
-        (GROUPS.replace("[groups.first_thick]", "[groups.first_thick]\nsequences = [[]]"), None, "at least 1"),
-        (
-            GROUPS.replace('"hello", "thick"', '"hello", "thik"'),
-            "groups.first_thick.sequence.2",
-            'no page or block "thik"',
-        ),
-        (GROUPS.replace('"thick", "thin"', '"thin", "thin"'), "groups.first_thick.sequence.3", "comes twice"),
-        (GROUPS.replace('"hello", ', ""), "pages.hello", "comes nowhere in sequence"),
-        (GROUPS + "share = 0\n", "groups.first_thick.share", "must be at least 1"),
-        (GROUPS + 'sequences = [["thin"]]\n', "groups.first_thick.sequences", "either sequence or sequences"),
-    ],
-)
-def test_check_names_what_is_wrong_with_groups(groups: str, place: str | None, words: str) -> None:
-    with pytest.raises(ProtocolError) as raised:
-        grouped(groups=groups)
-    problems = {problem.place: str(problem) for problem in raised.value.problems}
-    assert words in "\n".join(problems.values())
-    assert place is None or words in problems[place]
-
-
-@pytest.mark.parametrize(
-    ("added", "place", "words"),
-    [
-        ('sequence = ["hello"]\n', "sequence", "is used by no group"),
-        (f'sequence = ["hello"]\n{SESSIONS}', "sequences", "give either sequence or sequences"),
-    ],
-)
-def test_check_names_a_sequence_that_nobody_has(added: str, place: str, words: str) -> None:
-    with pytest.raises(ProtocolError) as raised:
-        grouped((HEAD, HEAD + added))
-    assert any(problem.place == place and words in problem.message for problem in raised.value.problems)
-
-
-@pytest.mark.parametrize("key", ["groups", "sequences"])
-def test_groups_and_sequences_belong_to_format_2(key: str) -> None:
-    added = (HEAD, f"format = 1\n{SESSIONS}") if key == "sequences" else (HEAD, "format = 1\n")
-    with pytest.raises(ProtocolError) as raised:
-        grouped(added)
-    assert any(problem.place == key and problem.message == "belongs to format 2" for problem in raised.value.problems)
 
 
 SECRET = bytes(range(32))

@@ -9,77 +9,11 @@ from study_app.protocol.trials.due import Due, next_level
 from study_app.protocol.trials.keyed import Key
 from study_app.protocol.trials.method import Heard
 from study_app.protocol.trials.tracks import design_of
+from tests.protocol.edited_studies import text_of as text_of_study
 
-HEAD = """\
-format = 2
-sequence = ["viscosity"]
-
-[study]
-name = "levels"
-version = "1"
-languages = ["en"]
-title = "Which one is thicker?"
-
-[device]
-workspace_mm = [100, 60, 60]
-
-[scene]
-scale = 2
-
-[limits]  # what explorations of oil deliver is not what these tests are about
-level_error_percent = 100
-withheld_percent = 100
-
-[liquids.thin]
-density_kg_m3 = 1000
-viscosity_pa_s = 1
-effects = ["drag"]
-drag = { law = "haider-levenspiel" }
-
-[liquids.thick]
-density_kg_m3 = 1260
-viscosity_pa_s = 4
-effects = ["drag"]
-drag = { law = "haider-levenspiel" }
-
-[conditions.oil]
-liquid = "thin"
-
-[conditions.other]
-liquid = "thick"
-
-[conditions.late]
-liquid = "thin"
-delay_ms = 100
-
-[tasks.stir]
-kind = "explore"
-min_s = 1
-max_s = 3
-instruction = "Stir."
-
-[stimuli.viscosity]
-condition = "oil"
-vary = "viscosity_pa_s"
-standards = [1, 2]
-levels = [0.1, 0.8]
-
-[methods.few]
-kind = "constant"
-levels = [0.2, 0.4, 0.8]
-repetitions = 8
-"""
-BLOCK = """
-[blocks.viscosity]
-part = 1
-title = "Viscosity"
-setting_label = "Pair"
-code_prefix = "V"
-task = "stir"
-stimulus = "viscosity"
-design = "2ifc"
-method = "few"
-"""
+LEVELS = text_of_study("levels")
+HEAD = LEVELS[: LEVELS.index("\n[blocks")]
+BLOCK = LEVELS.removeprefix(HEAD)
 FIVE_POINTS = """
 [scales.thickness]
 labels.en = ["very thin", "thin", "medium", "thick", "very thick"]
@@ -124,7 +58,7 @@ SECRET = bytes(range(32))
 
 def text_of(*edits: tuple[str, str], more: str = "") -> str:
     """Return the study's text with edits and more tables."""
-    text = HEAD + BLOCK + more
+    text = LEVELS + more
     for old, new in edits:
         assert old in text
         text = text.replace(old, new)

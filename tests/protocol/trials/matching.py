@@ -2,35 +2,9 @@
 
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
+from tests.protocol.edited_studies import text_of as text_of_study
 
-TEXT = """\
-format = 2
-study.name = "matching"
-
-[liquids.damper]
-drag = { law = "linear", damping_nspm = 6 }
-
-[tasks.stir]
-kind = "follow"
-cycles = 1
-
-[stimuli.damping]
-vary = "damping_nspm"
-level = "value"
-levels = [2, 18]
-
-[methods.set]
-kind = "adjustment"
-repetitions = 4
-
-[designs.match]
-kind = "adjustment"
-
-[blocks.matching]
-stimulus = "damping"
-design = "match"
-method = "set"
-"""
+TEXT = text_of_study("matching")
 ALONE = ('kind = "adjustment"\n\n[blocks', 'kind = "adjustment"\nstandard = false\n\n[blocks')
 """Without the interval of the standard."""
 DELAY = ('vary = "damping_nspm"\nlevel = "value"\nlevels = [2, 18]', 'vary = "delay_ms"\nlevels = [20, 200]')

@@ -6,9 +6,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from study_app.errors import ProtocolError
-from study_app.protocol.checks.level_warnings import level_warnings
-from study_app.protocol.describe import describe
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.trials.due import next_level
@@ -151,104 +148,6 @@ def test_a_step_up_is_a_tenth_of_the_span() -> None:
     ]
     assert inner == pytest.approx([math.log10(8) / 10] * len(inner))
     assert len(inner) > 3
-
-
-@pytest.mark.parametrize(
-    ("method", "edits", "place", "message", "hint"),
-    [
-        (
-            'kind = "updown"\nbegin = [0.2, 0.3, 0.4]\ntracks = 2',
-            (),
-            "methods.few.begin",
-            "3 levels for 2 tracks",
-            "one for each track, 0.1 to 0.8",
-        ),
-        (
-            'kind = "questplus"\nbegin = 0.9',
-            (),
-            "methods.few.begin",
-            "0.9 is not within levels",
-            "one for each track, 0.1 to 0.8",
-        ),
-        (
-            'kind = "updown"\nstep_up = 0.9',
-            (),
-            "methods.few.step_up",
-            "is 0.9; on log spacing a step is a factor above 1",
-            "such as 1.4",
-        ),
-        (
-            'kind = "questplus"\ntrials = 61\ntracks = 2',
-            (),
-            "methods.few.trials",
-            "61 trials cannot be divided among 2 tracks",
-            "a multiple of 2",
-        ),
-        (
-            'kind = "questplus"\nwidths = [4, 0.5]',
-            (),
-            "methods.few.widths",
-            "4 and 0.5: the first width must be the smaller",
-            "",
-        ),
-        (
-            'kind = "questplus"\nfamily = "weibull"',
-            (("levels = [0.1, 0.8]", 'levels = [0.1, 0.8]\nspacing = "linear"'),),
-            "methods.few.family",
-            '"weibull" is a function of the logarithm of a level',
-            'spacing = "log", or "normal"',
-        ),
-        (
-            'kind = "questplus"',
-            (('design = "2ifc"', 'design = "samedifferent"'),),
-            "blocks.viscosity.method",
-            '"samedifferent" has no track: correct answers determine no level',
-            'method = "constant"',
-        ),
-        *(
-            (
-                f'kind = "{kind}"',
-                (('design = "2ifc"', f'design = "{design}"'), ("standards = [1, 2]", 'level = "value"')),
-                "blocks.viscosity.method",
-                f'"{design}" at levels of values is answered correctly above and below the standard: '
-                "there is no threshold",
-                'method = "constant", or level = "weber" or "difference"',
-            )
-            for kind, design in (("questplus", "oddity"), ("updown", "abx"))
-        ),
-    ],
-)
-def test_each_mistake_in_a_method_is_one_fault(
-    method: str, edits: tuple[tuple[str, str], ...], place: str, message: str, hint: str
-) -> None:
-    with pytest.raises(ProtocolError) as refused:
-        adaptive(method, *edits)
-    (problem,) = refused.value.problems
-    assert (problem.place, problem.message, problem.hint) == (place, message, hint)
-    assert problem.line is not None
-
-
-def test_check_warns_of_a_ratio_that_converges_for_small_steps_alone_and_of_a_single_track() -> None:
-    found = list(level_warnings(adaptive('kind = "updown"\nratio = 1')))
-    assert (
-        "methods.few.ratio: 2down1up with ratio 1 converges to 70.7 % for small steps alone: "
-        "omit ratio: 80.4 % for any step" in found
-    )
-    assert "methods.few.tracks: participants can predict a single up–down track: choose tracks = 2" in found
-    assert not [one for one in level_warnings(adaptive('kind = "updown"\ntracks = 2')) if "methods." in one]
-
-
-@pytest.mark.slow
-def test_check_says_at_what_percentage_a_method_aims() -> None:
-    assert "(updown: converges to 80.4 % correct), 120 trials" not in describe(adaptive('kind = "updown"'))
-    assert "(updown: converges to 80.4 % correct), 60 trials per standard" in describe(adaptive('kind = "updown"'))
-    shown = describe(adaptive('kind = "questplus"\ntracks = 2'))
-    assert "(questplus: threshold at 75 % correct), 60 trials per standard in 2 tracks" in shown
-    value = ("standards = [1, 2]", 'level = "value"')
-    shown = describe(adaptive('kind = "questplus"', value))
-    assert "(questplus: threshold at 50 % comparison chosen)" in shown
-    assert "% comparison chosen" in describe(adaptive('kind = "updown"', value))
-    assert "threshold at" not in describe(adaptive('kind = "questplus"', ('design = "2ifc"', 'design = "yesno"')))
 
 
 FROM_ZERO = ("levels = [0.1, 0.8]", 'levels = [0, 0.8]\nspacing = "linear"')

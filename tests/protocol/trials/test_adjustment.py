@@ -4,8 +4,6 @@ import math
 
 import pytest
 
-from study_app.errors import ProtocolError
-from study_app.protocol.checks.level_warnings import level_warnings
 from study_app.protocol.describe import describe
 from study_app.protocol.trials.methods.adjustment import START_SHARE, Adjustment
 from study_app.protocol.trials.stimuli import Stimulus
@@ -16,15 +14,6 @@ from tests.protocol.trials.matching import ALONE, DELAY, matching
 
 LOW, HIGH = math.log10(2), math.log10(18)
 WIDE = (HIGH - LOW) * START_SHARE
-DAMPING = DELAY[0]
-TWO = "[tasks", '[conditions]\none.liquid = "damper"\nlate = { liquid = "damper", delay_ms = 90 }\n\n[tasks'
-WAKE = (
-    "drag = { law",
-    """density_kg_m3 = 1000
-effects = ["drag", "wake"]
-wake = { length = 400, scaling = 1000, exponent = 0.5, breaking_angle_deg = 45, breaking_span_m = 0.068, decay = 0.99 }
-drag = { law""",
-)
 
 
 def starts(secret: bytes) -> list[float]:
@@ -79,65 +68,6 @@ def test_a_step_is_a_fortieth_of_the_span_or_a_factor_on_log_spacing() -> None:
     stimulus = Stimulus.model_validate({"vary": "b", "level": "value", "levels": (2.0, 18.0)})
     assert Adjustment().step(stimulus) == pytest.approx((HIGH - LOW) / 40)
     assert Adjustment(step_size=1.1).step(stimulus) == pytest.approx(math.log10(1.1))
-
-
-@pytest.mark.parametrize(
-    ("edits", "place", "message"),
-    [
-        ([('method = "set"\n', "")], "blocks.matching.method", 'set by the participant (method = "adjustment")'),
-        ([('design = "match"', 'design = "2ifc"')], "blocks.matching.method", "a level that the participant sets"),
-        (
-            [
-                TWO,
-                ("[stimuli.damping]", '[stimuli.damping]\ncondition = "one"'),
-                ('stimulus = "damping"\n', 'conditions = ["one", "late"]\nstandard = "one"\n'),
-                ('method = "set"\n', ""),
-            ],
-            "blocks.matching.design",
-            "adjusts a number, and the block varies none (give stimulus = \"…\" instead of conditions)",
-        ),
-        ([("levels = [2, 18]", "levels = [6, 18]")], "stimuli.damping.levels", "on both sides of the standard 6"),
-        ([('level = "value"\nlevels = [2, 18]', "levels = [0.1, 0.5]")], "stimuli.damping.levels", 'level = "value"'),
-        ([("repetitions = 4", "step_size = 0.9")], "methods.set.step_size", "a step is a factor above 1"),
-        ([("repetitions = 4", "step_size = 4")], "methods.set.step_size", "more than half the range"),
-        ([("repetitions = 4", "most_s = 1")], "methods.set.most_s", "must be at least 2"),
-        (
-            [
-                WAKE,
-                (DAMPING, DAMPING.replace("damping_nspm", "wake.length").replace("[2, 18]", "[100, 900]")),
-            ],
-            "methods.set.step_size",
-            '"wake.length" cannot change while it is presented',
-        ),
-        (
-            [(DAMPING, 'vary = "force_delay_ms"\nlevel = "value"\nlevels = [1, 9]\nstandards = [5]')],
-            "methods.set.step_size",
-            '"force_delay_ms" cannot change while it is presented',
-        ),
-        ([(ALONE[0], ALONE[0].replace("\n\n", '\nfeedback = "always"\n\n'))], "designs.match.feedback", "no answer"),
-        ([('method = "set"', 'method = "set"\ncatch = { share = 0.2 }')], "blocks.matching.catch", "no correct answer"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_set_is_one_fault_with_its_place(edits: list[tuple[str, str]], place: str, message: str) -> None:
-    with pytest.raises(ProtocolError) as caught:
-        matching(*edits)
-    (problem,) = caught.value.problems
-    assert problem.place.startswith(place)
-    assert message in f"{problem.message} ({problem.hint})"
-
-
-def test_a_number_whose_effect_keeps_its_state_can_be_set() -> None:
-    decay = DAMPING, DAMPING.replace("damping_nspm", "wake.decay").replace("[2, 18]", "[0.9, 0.999]")
-    assert matching(WAKE, decay).stimuli["damping"].vary == "wake.decay"
-
-
-def test_check_describes_settings_and_warns_of_an_odd_number() -> None:
-    said = " ".join(describe(matching()).split())
-    assert "ADJUSTMENT of damping_nspm, standard 6: 2 intervals, 0.6 s apart" in said
-    assert "40 steps from end to end, started near either, at most 60 s each" in said
-    odd = matching(("repetitions = 4", "repetitions = 5"))
-    assert any("5 settings cannot start equally often" in one for one in level_warnings(odd))
-    assert not any("settings" in one for one in level_warnings(matching()))
 
 
 def test_without_the_standard_there_is_one_interval_and_a_delay_may_start_at_the_present_one() -> None:

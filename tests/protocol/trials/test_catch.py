@@ -5,9 +5,7 @@ from itertools import pairwise
 
 import pytest
 
-from study_app.errors import ProtocolError
 from study_app.protocol.blocks import Catch
-from study_app.protocol.checks.level_warnings import level_warnings
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.trials.due import next_level
@@ -118,29 +116,3 @@ def test_a_track_that_has_ended_presents_no_catch_trial_and_no_noise() -> None:
 def test_a_track_counts_its_catch_trials() -> None:
     protocol = study(LONG, CATCH)
     assert [(one.slots, len(one.catch)) for one in tracks_of(protocol, protocol.blocks["viscosity"])] == [(66, 6)] * 2
-
-
-def test_a_share_that_gives_none_is_warned_of() -> None:
-    few = study(("repetitions = 8", "repetitions = 4"), ("task =", "catch = { share = 0.05 }\ntask ="))
-    warned = "blocks.viscosity.catch.share: 0.05 of 12 trials gives no catch trial: choose 0.09"
-    assert warned in list(level_warnings(few))
-    chosen = study(("repetitions = 8", "repetitions = 4"), ("task =", "catch = { share = 0.09 }\ntask ="))
-    assert len(tracks_of(chosen, chosen.blocks["viscosity"])[0].catch) == 1
-
-
-@pytest.mark.parametrize(
-    ("edits", "said"),
-    [
-        ([("task =", "catch = { share = 0.9 }\ntask =")], "catch.share: is 0.9"),
-        ([("task =", "catch = { wrong_most = 2 }\ntask =")], "catch.wrong_most: is 2"),
-        ([CATCH, ('design = "2ifc"', 'design = "samedifferent"')], None),
-        ([CATCH, ("levels = [0.1, 0.8]", 'levels = [1.1, 1.8]\nlevel = "value"')], "has no correct answer"),
-    ],
-)
-def test_what_is_wrong_is_named(edits: list[tuple[str, str]], said: str | None) -> None:
-    edits = [*edits, ("levels = [0.2, 0.4, 0.8]", "levels = [1.2, 1.4, 1.8]")] if "1.1" in str(edits) else edits
-    if said is None:
-        assert study(*edits).blocks["viscosity"].catch is not None
-        return
-    with pytest.raises(ProtocolError, match=said):
-        study(*edits)

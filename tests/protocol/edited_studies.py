@@ -1,0 +1,91 @@
+"""Studies with edits, and what `check` says of each, in files that people review: ``--regenerate`` writes them anew.
+
+A file of ``cases`` names its study in the first line. A case is a name (``=== name``), lines that are replaced (``-``)
+by others (``+``), ``...`` between two replacements, and what is said (``>``): every problem, or "accepted" and the
+lines of the description that the description of the study without edits does not have.
+"""
+
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+from study_app.errors import ProtocolError
+from study_app.protocol.describe import describe
+from study_app.protocol.load import parse, source_bytes
+
+STUDIES = Path(__file__).parent / "studies"
+CASES = Path(__file__).parent / "cases"
+
+
+class Case(NamedTuple):
+    """A study with edits and what is said of it."""
+
+    study: str
+    name: str
+    edits: tuple[tuple[str, str], ...]
+    said: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """Return the edited text; each replaced run of lines is there once."""
+        text = "\n" + text_of(self.study)
+        for old, new in self.edits:
+            assert text.count(old) == 1, f"{self.name}: {old!r} is there {text.count(old)} times"
+            text = text.replace(old, new)
+        return text.removeprefix("\n")
+
+
+@cache
+def text_of(study: str) -> str:
+    """Return the text of a study of the folder, or of one that ships."""
+    file = STUDIES / f"{study}.toml"
+    return file.read_text(encoding="utf-8") if file.exists() else source_bytes(study).decode()
+
+
+def said_of(text: str, study: str) -> list[str]:
+    """Return the problems of a text, or what describing it says beyond the study without edits."""
+    try:
+        protocol = parse(text.encode(), "study.toml")
+    except ProtocolError as error:
+        return [str(problem) for problem in error.problems]
+    return ["accepted", *(line for line in _lines(describe(protocol)) if line not in _described(study))]
+
+
+@cache
+def _described(study: str) -> frozenset[str]:
+    return frozenset(_lines(describe(parse(text_of(study).encode(), study))))
+
+
+def _lines(text: str) -> list[str]:
+    return [" ".join(line.split()) for line in text.splitlines()]
+
+
+def cases_of(file: Path) -> Iterator[Case]:
+    """Yield the cases of a file."""
+    head, *parts = file.read_text(encoding="utf-8").split("\n=== ")
+    for part in parts:
+        name, *lines = part.removesuffix("\n").split("\n")
+        edits = "\n".join(line for line in lines if not line.startswith(">")).split("\n...\n")
+        said = tuple(line.removeprefix("> ") for line in lines if line.startswith(">"))
+        yield Case(head.removeprefix("study: ").strip(), name, tuple(map(_edit, edits)), said)
+
+
+def _edit(hunk: str) -> tuple[str, str]:
+    old, new = ("".join(f"{line[2:]}\n" for line in hunk.split("\n") if line.startswith(sign)) for sign in ("-", "+"))
+    return f"\n{old}", f"\n{new}"
+
+
+def regenerate(file: Path) -> None:
+    """Write what is said of each case anew."""
+    cases = list(cases_of(file))
+    parts = [f"study: {cases[0].study}\n"]
+    for case in cases:
+        edits = "...\n".join(_signed("-", old) + _signed("+", new) for old, new in case.edits)
+        said = "".join(f"> {line}\n" for line in said_of(case.text, case.study))
+        parts.append(f"=== {case.name}\n{edits}{said}")
+    file.write_text("\n".join(parts), encoding="utf-8")
+
+
+def _signed(sign: str, text: str) -> str:
+    return "".join(f"{sign} {line}\n" if line else f"{sign}\n" for line in text.removeprefix("\n").splitlines())

@@ -1,0 +1,140 @@
+"""What check says of studies: problems of each mistake, and the description of each sound study, whole."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from study_app.cli import main
+from study_app.errors import ProtocolError
+from study_app.protocol.describe import describe
+from study_app.protocol.load import load, parse
+from tests.protocol.edited_studies import CASES, STUDIES, Case, cases_of, regenerate, said_of, text_of
+from tests.protocol.sound import SOUND
+
+DESCRIBED = Path(__file__).parent / "described"
+FILES = sorted(CASES.glob("*.txt"))
+SLOW = {"compared", "methods", "precision", "rated"}
+"""Files whose studies are described with simulated observers."""
+SHIPPED = ("demo", "physical2", "rek2024", "slime", "thickness", "viscosityjnd")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _written_anew(pytestconfig: pytest.Config) -> None:
+    if pytestconfig.getoption("regenerate"):
+        for file in FILES:
+            regenerate(file)
+        for name in (*SHIPPED, *(path.stem for path in STUDIES.glob("*.toml"))):
+            (DESCRIBED / f"{name}.txt").write_text(_description(name), encoding="utf-8")
+
+
+def _description(name: str) -> str:
+    return describe(parse(text_of(name).encode(), name)) + "\n"
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, id=f"{file.stem}: {case.name}", marks=[pytest.mark.slow] if file.stem in SLOW else [])
+        for file in FILES
+        for case in cases_of(file)
+    ],
+)
+def test_check_says_the_same_as_before(case: Case) -> None:
+    assert said_of(case.text, case.study) == list(case.said)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(path.stem for path in DESCRIBED.glob("*.txt")))
+def test_a_study_is_described_as_before(name: str) -> None:
+    assert _description(name) == (DESCRIBED / f"{name}.txt").read_text(encoding="utf-8")
+
+
+def problems_of(text: str | bytes) -> tuple[str, ...]:
+    with pytest.raises(ProtocolError) as refused:
+        parse(text if isinstance(text, bytes) else text.encode(), "file.toml")
+    return tuple(map(str, refused.value.problems))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "words"),
+    [
+        ('"small"', '"small', 5, "column"),
+        ("scale = 10", "scale = 10\nscale = 11", 17, "column 11: Cannot overwrite a value"),
+        ("[liquids.other]", "[liquids.thick]", 26, "column"),
+        ("scale = 10", "scale =", 16, "column 8: Invalid value"),
+        ("Klein", "Kl\udce9in", 6, "UTF-8"),
+    ],
+)
+def test_broken_toml_gives_line_and_column(old: str, new: str, line: int, words: str) -> None:
+    (problem,) = problems_of(SOUND.replace(old, new).encode("utf-8", "surrogateescape"))
+    assert problem.startswith(f"line {line}: ")
+    assert words in problem
+
+
+def test_windows_line_ends_change_nothing() -> None:
+    text = SOUND.replace("rate_hz = 1000", "rate = 1000")
+    assert problems_of(text.replace("\n", "\r\n")) == problems_of(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a = " + "[" * 3000 + "]" * 3000, "file: is nested too deeply"),
+        ("format = " + "9" * 6000, "file: holds a whole number beyond 64 bits"),
+        (SOUND.replace('en = "Small"', f'en = "{"a" * 5000}"'), "more than 500"),
+        (SOUND.replace('en = "Read this."', f'en = "{"read " * 5000}"'), "more than 20000"),
+        (SOUND.replace("[tasks.explore]", f"[tasks.{'a' * 5000}]"), "is longer than 60"),
+        (SOUND.replace('version = "1.0"', f'version = "{"1" * 5000}"'), "longer than 40"),
+        (SOUND.replace('task = "reach"', f'task = "{"task.x" * 1000}"'), "there is no task"),
+    ],
+    ids=lambda value: value[:30],
+)
+def test_what_is_too_long_is_a_problem_in_a_short_line(text: str, said: str) -> None:
+    problems = problems_of(text)
+    assert any(said in problem for problem in problems), problems
+    assert max(map(len, problems)) < 500
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["\u05e2\u200e 1\u200f", "\u0645\u06cc\u200c\u062e", "\U0001f469\u200d\U0001f52c", "Ł. Rek", "a\nb", "ß – “q” … ²"],
+)
+def test_a_title_in_any_script_is_a_title(text: str) -> None:
+    written = SOUND.replace('title = { en = "Small"', f'title = {{ en = """{text}"""')
+    assert parse(written.encode(), "file.toml").study.title
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "ticks", "code", "said"),
+    [
+        ("levels = [0.02, 0.6]", "levels = [0.02, 0.6]\nstandards = [16]", "1", 0, "Duration"),
+        ("levels = [0.02, 0.6]", "levels = [0.02, 0.6]\nstandards = [16]", "2", 2,
+         "gives up to 25.6 N·s/m at the hand; the slope limit (1000 Hz, kalman, 2 ticks) is 20.6"),
+        ("", "", "5", 2, "5 is not in the range"),
+        ("levels = [0.02, 0.6]", "levels = [0.6, 0.02]", "1", 2, "stimuli.damping.levels"),
+    ],
+)  # fmt: skip
+def test_the_command_prints_problems_and_judges_levels_for_a_delay(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    old: str,
+    new: str,
+    ticks: str,
+    code: int,
+    said: str,
+) -> None:
+    path = tmp_path / "rows.toml"
+    path.write_text(text_of("rows").replace(old, new, 1), encoding="utf-8")
+    monkeypatch.setattr(sys, "argv", ["liquid-study", "check", str(path), "--delay-ticks", ticks])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == code
+    printed = capsys.readouterr()
+    assert said in printed.out + printed.err
+
+
+@pytest.mark.parametrize("name", ["rek2024", "demo"])
+def test_the_thesis_studies_need_no_warning(name: str) -> None:
+    assert "Warnings" not in describe(load(name))
