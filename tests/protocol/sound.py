@@ -21,11 +21,3 @@ body = { en = "Let go.", nl = "Laat los." }
     .replace('order = "shuffled"\ntask = "reach"', 'order = "williams"\ntask = "reach"')
 )
 """The sound protocol with constraints, breaks, assigned rows and items in random order."""
-
-DECIDED = """\
-[analysis]
-names = ["warm", "cold"]
-rising = ["warm"]
-noticed = "cold"
-
-"""

@@ -10,12 +10,6 @@ from study_app.protocol.trials.tasks.explore import Explore
 from study_app.protocol.trials.tasks.stroke import Stroke
 from tests.compiled import needs_servo
 
-THICK = "[liquids.thick]\ndensity_kg_m3 = 1400\n"
-
-
-def thick(keys: str) -> tuple[str, str]:
-    return THICK, THICK + keys + "\n"
-
 
 @needs_servo
 @pytest.mark.parametrize("name", shipped())

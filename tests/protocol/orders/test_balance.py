@@ -7,7 +7,6 @@ from study_app.protocol.orders.balance import balance, describe_balance, evennes
 from tests.protocol.sound import ORDER, SOUND
 
 REK = load("rek2024")
-SMALL = parse(SOUND.encode(), "small")
 
 
 def ordered(order: str, conditions: int = 3, repetitions: int = 1) -> Protocol:
