@@ -13,7 +13,6 @@ from study_app.haptics.model.ranges import Frozen
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, parse, source_bytes
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.table import Table
 from study_app.protocol.texts import tidy
@@ -33,37 +32,10 @@ def test_a_protocol_survives_json(protocol: Protocol):
     assert Protocol.model_validate_json(protocol.model_dump_json()) == protocol
 
 
-def test_code_reads_si_units():
-    assert SMALL.device.workspace_m == (0.1, 0.06, 0.06)
-    assert SMALL.delay_s("both") == 0.12
-    reach = SMALL.tasks["reach"]
-    assert reach.kind == "reach"
-    assert (reach.targets_m, reach.radius_m) == (((-0.03, 0, 0), (0.03, 0, 0)), 0.006)
-
-
 def test_a_scene_holds_the_liquids_of_its_condition_in_order():
     scene = SMALL.scene_for("both")
     assert [liquid.id for liquid in scene.liquids] == ["thin", "thick"]
     assert (scene.scale, scene.rate_hz, scene.force_limit_n) == (10, 1000, 8)
-
-
-def test_blocks_come_in_the_order_of_the_sequence():
-    assert [block.id for block in SMALL.blocks_in_order] == ["warm_up", "feel", "look"]
-    assert [block.id for block in SMALL.main_blocks] == ["feel", "look"]
-    assert SMALL.parts == 2
-
-
-def test_responses_count_repetitions():
-    assert orders_of(SMALL).answers == 2 * 2 * 2 + 2 * 2
-
-
-def test_items_are_found_by_id():
-    questionnaire = SMALL.questionnaires["short"]
-    assert SMALL.text(questionnaire.item("cold").text, "nl") == "Het is koud."
-    with pytest.raises(KeyError, match="tepid"):
-        questionnaire.item("tepid")
-    assert SMALL.questionnaire_of("feel") is questionnaire
-    assert SMALL.questionnaire_of("warm_up") is None
 
 
 def test_lines_of_the_file_do_not_matter_in_a_text():
@@ -72,10 +44,6 @@ def test_lines_of_the_file_do_not_matter_in_a_text():
     first, second = SMALL.paragraphs(body, "en")
     assert first == "You will now feel three liquids, one after the other. We do not tell you which they are."
     assert second.startswith("Explore each")
-
-
-def test_one_string_is_a_text_in_any_language():
-    assert SMALL.text("Same", "nl") == "Same"
 
 
 THREADS = 8

@@ -1,6 +1,5 @@
 """The protocols that ship: the thesis' study exactly, and a demonstration of three minutes."""
 
-import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -9,13 +8,12 @@ import pytest
 
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.scene import Ewma, Kalman
-from study_app.protocol.load import load, load_scene, load_scenes, parse
+from study_app.protocol.load import load, load_scene, load_scenes
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule
 from study_app.protocol.source import files
 from study_app.protocol.source.files import at_hand, shipped
 from study_app.viewmodels.home import is_shipped
-from tests.protocol.sound import SOUND
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 NAMES = sorted(path.stem for path in PROTOCOLS.glob("*.toml"))
@@ -46,60 +44,6 @@ def test_what_ships_is_sound_and_named_like_its_file(name: str):
     assert orders_of(protocol).answers == sum(len(step.items) for step in steps if isinstance(step, Trial | FormStep))
 
 
-NAMED = {
-    "liquids",
-    "conditions",
-    "tasks",
-    "scales",
-    "questionnaires",
-    "pages",
-    "blocks",
-    "stimuli",
-    "designs",
-    "methods",
-}
-
-
-def keys_with_comments(text: str) -> tuple[set[str], set[str]]:
-    """Return the kinds of key of a file (names of tables and indices left out), and those with a comment by them."""
-    kinds: set[str] = set()
-    commented: set[str] = set()
-    table, above, in_string = "", False, False
-    for line in text.splitlines():
-        quotes = line.count('"""')
-        if in_string:
-            in_string = quotes == 0
-            continue
-        if header := re.match(r"\[+([\w.]+)\]+", line):
-            steps = header[1].split(".")
-            named = steps[0] in NAMED
-            table = ".".join([steps[0], *(steps[2:] if named else steps[1:])])
-            kind = table
-        elif key := re.match(r"(\w+)(?:\.\w+)? *=", line):
-            kind = f"{table}.{key[1]}".removesuffix(".en").removesuffix(".nl")
-            kinds.add(kind)
-        else:
-            above = line.startswith("#") or (above and bool(line.strip()))
-            continue
-        if above or re.search(r"\s# ", line):
-            commented.add(kind)
-        above = False
-        in_string = quotes == 1
-    return kinds, commented
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_every_kind_of_key_is_commented_there_or_in_a_file_that_it_names(name: str):
-    text = (PROTOCOLS / f"{name}.toml").read_text(encoding="utf-8")
-    kinds, commented = keys_with_comments(text)
-    assert len(kinds) > 30
-    words = " ".join(text.replace("#", " ").split())
-    if explained := re.search(r"keys are explained in (\w+)\.toml and (\w+)\.toml", words):
-        for other in explained.groups():
-            commented |= keys_with_comments((PROTOCOLS / f"{other}.toml").read_text(encoding="utf-8"))[1]
-    assert kinds - commented == set()
-
-
 PHYSICAL = load("physical_liquids")
 
 
@@ -121,14 +65,6 @@ def test_the_scene_of_a_liquid_has_all_that_the_file_says():
     assert scenes["honey"] == PHYSICAL.scene_for("honey")
     assert (scenes["honey"].motion.speed_mps, scenes["honey"].accuracy.relative) == (0.6, 0.05)
     assert scenes["honey"].force_limit_n == 8
-
-
-@pytest.mark.parametrize(
-    "estimator", ['kind = "line"', 'kind = "foaw"\ntolerance_m = 1e-5', 'kind = "raw"', 'kind = "ewma"\nalpha = 0.2']
-)
-def test_a_study_may_choose_its_estimator(estimator: str):
-    protocol = parse(SOUND.replace("scale = 10", f"scale = 10\n[scene.velocity]\n{estimator}").encode(), "small.toml")
-    assert protocol.scene_for("is_thin").velocity.kind == estimator.split('"')[1]
 
 
 def test_a_scene_file_may_say_auto_and_give_its_motion(tmp_path):

@@ -1,5 +1,6 @@
 """A small study with everything a session can meet, and the steps to walk through it."""
 
+import tomllib
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from study_app.session.preflight import Facts, Screen
 from study_app.session.transitions.events import Begin, Chosen, Continue, ItemShown, Submitted, TaskDone
 from study_app.session.transitions.state import Phase, SessionState
 from study_app.session.transitions.table import advance, open_session
+from tests.protocol.edited_studies import text_of
 
 # Numbers that occur nowhere by chance, so that a leak can be searched for.
 ODD_DELAY_MS = 137.0
@@ -33,79 +35,8 @@ WELL = Facts(
 )
 """What the pre-flight finds on a computer on which everything is well."""
 
-SCALE = [f"point {number}" for number in range(1, 8)]
-
-
-def _item(name: str, *, required: bool = True) -> dict[str, Any]:
-    return {"id": name, "text": f"Statement {name}.", "short": name, "required": required}
-
-
-def _block(**keys: Any) -> dict[str, Any]:
-    return {"title": "Block", "setting_label": "Setting", "task": "explore", **keys}
-
-
-TABLES: dict[str, Any] = {
-    "format": 1,
-    "study": {"name": "small", "title": "Small", "version": "1", "languages": ["en"]},
-    "device": {"workspace_mm": [100, 60, 60]},
-    "liquids": {"thin": {"density_kg_m3": ODD_DENSITY}, "thick": {"density_kg_m3": 1450.3}},
-    "conditions": {
-        "is_thin": {"liquid": "thin"},
-        "is_thick": {"liquid": "thick"},
-        "on_time": {"liquid": "thin", "delay_ms": 0},
-        "is_late": {"liquid": "thin", "delay_ms": ODD_DELAY_MS},
-    },
-    "tasks": {
-        "explore": {"kind": "explore", "min_s": 1, "max_s": 3, "instruction": "Explore."},
-        "reach": {
-            "kind": "reach",
-            "targets_mm": [[-20, 0, 0], [20, 0, 0]],
-            "radius_mm": 5,
-            "dwell_s": 0.25,
-            "count": 2,
-            "timeout_s": 10,
-            "instruction": "Reach.",
-        },
-        "warm_up": {
-            "kind": "reach",
-            "targets_mm": [[-20, 0, 0], [20, 0, 0]],
-            "radius_mm": 5,
-            "dwell_s": 0.25,
-            "duration_s": 2,
-            "instruction": "Reach.",
-        },
-    },
-    "scales": {"judged": {"labels": {"en": SCALE}, "cannot_judge": "Cannot judge"}, "plain": {"labels": {"en": SCALE}}},
-    "questionnaires": {
-        "feel": {
-            "intro": "How was it?",
-            "scale": "judged",
-            "items": [_item("liquid"), _item("strong"), _item("spare", required=False)],
-        },
-        "see": {"title": "What you saw", "intro": "How was it?", "scale": "plain", "items": [_item("different")]},
-    },
-    "pages": {
-        "welcome": {"kind": "consent", "title": "Welcome", "body": "One.\n\nTwo.", "button": "I agree"},
-        "thanks": {"kind": "debrief", "title": "Thanks", "body": "Bye."},
-    },
-    "blocks": {
-        "practice": _block(phase="practice", conditions=["is_thick"]),
-        "feeling": _block(
-            part=1, code_prefix="L", conditions=["is_thin", "is_thick"], order="shuffled", questionnaire="feel"
-        ),
-        "baseline": _block(phase="baseline", part=2, conditions=["on_time"], task="warm_up"),
-        "seeing": _block(
-            part=2,
-            code_prefix="D",
-            conditions=["on_time", "is_late"],
-            order="shuffled",
-            task="reach",
-            questionnaire="see",
-        ),
-    },
-    "sequence": ["welcome", "practice", "feeling", "baseline", "seeing", "thanks"],
-}
-
+TABLES: dict[str, Any] = tomllib.loads(text_of("session"))
+SCALE = TABLES["scales"]["plain"]["labels"]["en"]
 RESPONSES = 2 * 3 + 2 * 1
 
 

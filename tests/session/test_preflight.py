@@ -20,6 +20,7 @@ from study_app.session import preflight_measurements
 from study_app.session.preflight import Facts, Screen, checks, refused
 from study_app.session.preflight_measurements import measure
 from tests.compiled import needs_servo
+from tests.protocol.edited_studies import text_of
 from tests.session import small
 
 
@@ -209,21 +210,7 @@ def test_a_disk_that_takes_nothing_is_a_failure_with_its_reason(
     assert "the disk is full" in refused(checks(facts, small.protocol()))
 
 
-DAMPERS = """\
-format = 2
-study.name = "dampers"
-[liquids.damper]
-drag = { law = "linear", damping_nspm = 16 }
-[tasks.stir]
-kind = "follow"
-[stimuli.damping]
-vary = "damping_nspm"
-levels = [0.02, 0.6]
-[blocks.thicker]
-stimulus = "damping"
-design = "2ifc"
-method = "constant"
-"""
+DAMPERS = text_of("strong")
 
 
 def test_levels_beyond_the_limit_of_the_measured_delay_are_refused_with_the_highest_that_is_not() -> None:

@@ -1,16 +1,13 @@
 """Format 2: what it may leave out, what a file of format 1 may not hold, and what questions need of each other."""
 
-from pathlib import Path
-
 import pytest
 
 from study_app.haptics.model.scene import Ewma, Kalman
 from study_app.protocol.forms.show_if import ShowIf, shown
 from study_app.protocol.instruments.instrument import instrument, instruments
-from study_app.protocol.load import load, parse
-from study_app.protocol.orders.block_orders import orders_of
+from study_app.protocol.load import parse
 from study_app.protocol.questions.number import NumberView
-from tests.protocol.forms.mixed import MIXED, mixed_file
+from tests.protocol.forms.mixed import MIXED
 from tests.protocol.sound import SOUND
 
 
@@ -68,10 +65,6 @@ def test_instrument_without_texts_takes_those_of_the_study(name: str) -> None:
         f"About {item['id']}" for item in instrument(name)["items"]
     ]
     assert set(form.scores) == set(instrument(name)["scores"])
-
-
-def test_mixed_study_is_loaded_from_its_file(tmp_path: Path) -> None:
-    assert orders_of(load(mixed_file(tmp_path))).answers == 4 + 2 * 3 + 6 + 10 + 1
 
 
 def view(name: str, condition: ShowIf | None = None) -> NumberView:

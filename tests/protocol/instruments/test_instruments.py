@@ -1,14 +1,9 @@
 """Standard questionnaires: sources, licences, texts that may be shipped, and worked scores."""
 
-from pathlib import Path
-
 import pytest
 
-from study_app.protocol.describe import describe
 from study_app.protocol.instruments.instrument import instrument, instruments
 from study_app.protocol.instruments.scores import Score, score
-from study_app.protocol.load import parse
-from study_app.protocol.model import Protocol
 
 ITEMS = {"nasa-tlx": 6, "nasa-tlx-weighted": 21, "sus": 10, "ipq": 14, "panas": 20, "ssq": 16, "ueq": 26}
 WITH_TEXTS = {"nasa-tlx", "nasa-tlx-weighted", "sus"}
@@ -184,56 +179,3 @@ def test_missing_answer_gives_no_score() -> None:
     answers = same("sus", 3)
     del answers["sus4"]
     assert computed("sus", "sus", answers) is None
-
-
-def study_with(name: str) -> Protocol:
-    """Return a study that presents an instrument, with texts of its own where none are shipped."""
-    found = instrument(name)
-    ids = [f"{{ text = '{item['id']}', low = 'Low', high = 'High', id = '{item['id']}' }}," for item in found["items"]]
-    items = "" if found["languages"] else "items = [\n{}\n]".format("\n".join(ids))
-    return parse(STUDY.format(name=name, items=items).encode(), "study.toml")
-
-
-STUDY = """\
-format = 2
-study.name = "asked"
-sequence = ["after", "stir"]
-[liquids.damper]
-drag = {{ law = "linear", damping_nspm = 8 }}
-[tasks.stir]
-kind = "follow"
-[questionnaires.after]
-instrument = "{name}"
-intro = "Please answer."
-{items}
-[stimuli.damping]
-vary = "damping_nspm"
-levels = [0.02, 0.3]
-[blocks.stir]
-stimulus = "damping"
-design = "2ifc"
-method = "constant"
-"""
-
-
-@pytest.mark.parametrize("name", ["nasa-tlx", "ipq", "sus"])
-def test_check_names_the_source_and_what_is_from_memory(name: str) -> None:
-    found, words = instrument(name), describe(study_with(name))
-    assert f"  Source: {found['source']}" in words.splitlines()
-    assert f"  Compared: {found['compared']}" in words.splitlines()
-    warned = [line for line in words.splitlines() if "from memory" in line]
-    assert len(warned) == ("from_memory" in found)
-    assert all(found["from_memory"] in line and "questionnaires.after" in line for line in warned)
-
-
-def test_only_the_reversed_items_of_ipq_are_from_memory() -> None:
-    assert {name for name in instruments() if "from_memory" in instrument(name)} == {"ipq"}
-    for item in ("sp2", "inv3", "real1"):
-        assert item in instrument("ipq")["from_memory"]
-
-
-def test_documentation_names_what_every_instrument_was_compared_with() -> None:
-    page = (Path(__file__).resolve().parents[3] / "docs" / "questions.md").read_text(encoding="utf-8")
-    for name in instruments():
-        (row,) = [line for line in page.splitlines() if line.startswith(f"| `{name}` |")]
-        assert ("**from memory**" in row) == ("from_memory" in instrument(name))

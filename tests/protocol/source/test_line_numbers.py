@@ -3,8 +3,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from study_app.protocol.source.line_numbers import Places
 
@@ -119,72 +117,6 @@ def keys_of(node: Any, path: tuple[str | int, ...] = ()):
         if isinstance(step, str):
             yield (*path, step)
         yield from keys_of(value, (*path, step))
-
-
-class Writer:
-    """Writes tables as TOML and remembers on which line each key went; ``blank`` lines and comments are mixed in."""
-
-    def __init__(self, draw: st.DrawFn) -> None:
-        self.draw = draw
-        self.lines: list[str] = []
-        self.expected: dict[tuple[str | int, ...], int] = {}
-
-    def write(self, text: str, path: tuple[str | int, ...]) -> None:
-        self.lines += self.draw(st.sampled_from([[], [""], ["# a = 1"], ["", "  # [b]"]]))
-        self.lines += text.split("\n")
-        self.expected[path] = len(self.lines) - text.count("\n")
-
-    def table(self, table: dict[str, Any], path: tuple[str | int, ...]) -> None:
-        for key, value in table.items():
-            if not isinstance(value, dict) and not is_rows(value):
-                self.write(f"{key_text(key)} = {value_text(value)}", (*path, key))
-        for key, value in table.items():
-            header = ".".join(key_text(step) for step in (*path, key) if isinstance(step, str))
-            if isinstance(value, dict):
-                self.write(f"[{header}]", (*path, key))
-                self.table(value, (*path, key))
-            elif is_rows(value):
-                for index, row in enumerate(value):
-                    self.write(f"[[{header}]]", (*path, key, index))
-                    self.table(row, (*path, key, index))
-
-
-def is_rows(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and all(isinstance(entry, dict) for entry in value)
-
-
-def key_text(key: str) -> str:
-    return '"' + key.replace("\\", "\\\\").replace('"', '\\"') + '"'
-
-
-def value_text(value: Any) -> str:
-    if isinstance(value, str):
-        return '"""\n' + value.replace("\\", "\\\\").replace('"', '\\"') + '"""'
-    if isinstance(value, list):
-        return "[" + ", ".join(value_text(entry) for entry in value) + "]"
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{key_text(key)} = {value_text(entry)}" for key, entry in value.items()) + "}"
-    return str(value).lower()
-
-
-names = st.text(st.sampled_from("ab.[]#=\"' "), min_size=1, max_size=4)
-scalars = st.integers() | st.booleans() | st.text(st.sampled_from("ab\n[]{},#=\"'\\"), max_size=8)
-values = st.recursive(
-    scalars, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(names, inner, max_size=3), max_leaves=12
-)
-
-
-@pytest.mark.slow
-@given(st.data())
-def test_lines_of_any_document(data: st.DataObject):
-    document = data.draw(st.dictionaries(names, values, max_size=4))
-    writer = Writer(data.draw)
-    writer.table(document, ())
-    text = "\n".join(writer.lines)
-    assert tomllib.loads(text) == document
-    places = Places(text)
-    for path, line in writer.expected.items():
-        assert places.line(path) == line, (path, text)
 
 
 @pytest.mark.parametrize("header", ["[", "[]", "[[", "[[]]", "[ = "])

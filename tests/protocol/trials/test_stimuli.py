@@ -13,7 +13,6 @@ from study_app.protocol.trials.designs.rating_of_interval import Rated
 from study_app.protocol.trials.kinds import DESIGN_KINDS, default_design
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.protocol.trials.tasks.follow import Follow
-from tests.protocol.trials.level_studies import key_of, run, study
 
 
 def stimulus(**keys: Any) -> Stimulus:
@@ -160,17 +159,6 @@ def test_simulated_observer_without_noise_answers_correctly(kind: str):
 def test_yes_counts_as_success_whatever_was_presented():
     built = design("yesno")
     assert [built.success(0, "yes"), built.success(1, "yes"), built.success(0, "no")] == [True, True, False]
-
-
-@pytest.mark.parametrize("kind", ["2ifc", "3ifc", "4ifc", "abx", "oddity", "samedifferent"])
-@pytest.mark.parametrize("seed", range(3))
-def test_arrangements_are_counterbalanced_in_every_run_of_a_track(kind: str, seed: int):
-    protocol = study(('design = "2ifc"', f'design = "{kind}"'), ("standards = [1, 2]", "standards = [2]"))
-    presented = [due.arrangement for due in run(protocol, key_of(protocol), seed=seed)]
-    run_length = 2 * len(design(kind).arrangements)
-    assert len(presented) == 24
-    for first in range(0, len(presented) - run_length + 1, run_length):
-        assert set(Counter(presented[first : first + run_length]).values()) == {2}
 
 
 @pytest.mark.parametrize(

@@ -76,11 +76,6 @@ def test_nothing_but_what_a_person_gave_waits_for_the_disk() -> None:
     assert len(world.journal.of("target_reached")) > 0
 
 
-def test_lines_carry_the_time_of_the_event_they_tell(world: World) -> None:
-    world.runner.post(Begin(12.5))
-    assert world.journal.lines[-1]["t_s"] == 12.5
-
-
 def test_a_page_that_answers_while_it_is_presented_is_heard_after_the_commands_under_way(world: World) -> None:
     kept_at_once: list[Any] = []
 
@@ -176,16 +171,6 @@ def test_a_task_is_left_when_its_end_was_drawn_as_late_as_it_may_be_in_its_block
     world.run(0.001, RIGHT)
     assert world.state.phase is Phase.ANSWERING
     assert world.journal.of("trial_ended")[-1]["duration_s"] == pytest.approx(0.55, abs=0.002)
-
-
-def test_the_end_of_a_delayed_task_is_drawn_before_it_is_left() -> None:
-    world = at_block("seeing", delayed=True)
-    world.run(0.3, LEFT)
-    world.run(0.251, RIGHT)
-    end_ns = world.servo.now_ns()
-    assert world.runner.view(end_ns).task.reached == 1
-    world.run(0.138, RIGHT)
-    assert world.runner.view(end_ns + 139_000_000).task.reached == 2
 
 
 def test_button_four_stops_the_force_before_anything_is_written(practising: World) -> None:

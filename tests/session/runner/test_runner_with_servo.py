@@ -78,10 +78,6 @@ def bench() -> Iterator[Bench]:
         yield Bench(servo, device)
 
 
-def test_a_trial_is_felt(bench: Bench) -> None:
-    assert bench.run(800).max() > 0.5
-
-
 def test_there_is_no_force_before_the_first_painted_frame_and_then_it_fades_in(bench: Bench) -> None:
     bench.run(800)
     bench.paints = False

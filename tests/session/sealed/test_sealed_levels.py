@@ -28,111 +28,12 @@ from study_app.viewmodels.servo_health import Vitals
 from study_app.viewmodels.session.stages import stages
 from tests.compiled import needs_servo
 from tests.outlets.collector import collecting
-from tests.protocol.trials.level_studies import FIVE_POINTS, SHORT, text_of
+from tests.protocol import edited_studies
+from tests.protocol.trials.level_studies import SHORT, text_of
 from tests.session.sealed.numbers_written import Trials, every_number, told
 
 pytestmark = [pytest.mark.nightly, pytest.mark.slow, needs_servo]
 
-MORE = """
-[stimuli.delay]
-condition = "oil"
-vary = "delay_ms"
-spacing = "linear"
-levels = [20, 200]
-
-[stimuli.force]
-condition = "oil"
-vary = "force_delay_ms"
-levels = [10, 60]
-
-[conditions.uneven]
-liquid = "thick"
-force_jitter_ms = 12.5
-force_loss = 0.125
-
-[methods.five]
-kind = "constant"
-levels = 5
-repetitions = 1
-
-[blocks.detect]
-task = "stir"
-stimulus = "delay"
-design = "yesno"
-method = "five"
-
-[blocks.force]
-task = "stir"
-stimulus = "force"
-design = "2ifc"
-method = "five"
-
-[blocks.rate]
-task = "stir"
-stimulus = "value"
-design = "rated"
-method = "five"
-
-[blocks.number]
-task = "stir"
-stimulus = "value"
-design = "estimation"
-method = "five"
-
-[stimuli.around]
-condition = "oil"
-vary = "viscosity_pa_s"
-level = "value"
-levels = [0.5, 8]
-
-[methods.set]
-kind = "adjustment"
-repetitions = 2
-
-[blocks.match]
-task = "stir"
-stimulus = "around"
-design = "adjustment"
-method = "set"
-
-[blocks.pairs]
-task = "stir"
-design = "2ifc"
-conditions = ["oil", "other", "late", "uneven"]
-standard = "oil"
-repetitions = 2
-
-[methods.staircase]
-kind = "updown"
-trials = 12
-
-[methods.quest]
-kind = "questplus"
-trials = 12
-tracks = 2
-
-[blocks.chosen]
-task = "stir"
-stimulus = "viscosity"
-standards = [1]
-design = "3ifc"
-method = "staircase"
-catch = { share = 0.25 }
-
-[blocks.expected]
-task = "stir"
-stimulus = "viscosity"
-standards = [2]
-design = "yesno"
-method = "quest"
-catch = { share = 0.2 }
-"""
-SEQUENCE = (
-    'sequence = ["viscosity"]',
-    'sequence = ["viscosity", "detect", "force", "rate", "number", "match", "pairs", "chosen", "expected"]',
-)
-LENIENT = ("level_error_percent = 100", "level_error_percent = 100\nlevel_error_ms = 100")
-"""Explorations of a third of a second are too short to measure the delay of a force."""
 SESSIONS = 12
 HIDDEN = {"sealed", "resolved", "key_hash", "at", "previous", "fingerprint"}
 """What may differ: sealed fields, hashes, and the time of day."""
@@ -143,7 +44,7 @@ Said: TypeAlias = dict[str, Any]
 @pytest.fixture(scope="module")
 def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("levels") / "levels.toml"
-    path.write_text(text_of(SEQUENCE, LENIENT, *SHORT, more=FIVE_POINTS + MORE))
+    path.write_text(edited_studies.text_of("every_design"))
     return path
 
 

@@ -8,57 +8,21 @@ import pytest
 
 from study_app.evaluation.replay import replay
 from study_app.haptics.model.layout import LIMITER_FADE
-from study_app.protocol.describe import describe
 from study_app.protocol.load import load
 from study_app.protocol.model import Follow
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.folders import StudyFolder
 from study_app.store.recording_files import read_samples
 from tests.compiled import needs_servo
+from tests.protocol.edited_studies import text_of
 
 pytestmark = [pytest.mark.slow, needs_servo]
-
-STUDY = """\
-format = 2
-study = { name = "dampers", title = "Dampers" }
-scene = { scale = 3, fade_s = 0.3 }
-sequence = ["dampers"]
-
-[liquids.thin]
-drag = { law = "linear", damping_nspm = 4 }
-[liquids.thick]
-drag = { law = "linear", damping_nspm = 16 }
-
-[conditions.thin]
-liquid = "thin"
-ball = "hidden"
-[conditions.thick]
-liquid = "thick"
-ball = "hidden"
-
-[tasks.stir]
-kind = "follow"
-cycles = 2
-
-[scales.agreement]
-labels.en = ["1", "2", "3", "4", "5"]
-[questionnaires.felt]
-intro = "How was it?"
-item_order = "fixed"
-items = [{ id = "thick", kind = "rating", scale = "agreement", text = "It felt thick.", short = "Thick" }]
-
-[blocks.dampers]
-conditions = ["thin", "thick"]
-repetitions = 2
-order = "shuffled"
-questionnaire = "felt"
-"""
 
 
 @pytest.fixture(scope="module")
 def study_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("dampers") / "dampers.toml"
-    path.write_text(STUDY, encoding="utf-8")
+    path.write_text(text_of("dampers"), encoding="utf-8")
     return path
 
 
@@ -104,10 +68,3 @@ def test_replay_finds_no_difference(results: Path) -> None:
     found = [replay(session.path) for session in StudyFolder(results).sessions()]
     assert found
     assert {(one.differences, one.uncompared, one.recordings) for one in found} == {((), (), 4)}
-
-
-def test_check_says_what_is_done(study_file: Path) -> None:
-    described = describe(load(study_file))
-    assert "follow a target of 6 mm that swings ±20 mm at 1 Hz: 2 swings after 1 s" in described
-    assert "ball hidden" in described
-    assert "16 N·s/m at the hand" in described

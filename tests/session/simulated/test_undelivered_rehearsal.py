@@ -17,36 +17,11 @@ from study_app.store.journals import journal
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
+from tests.protocol.edited_studies import text_of
 from tests.store.forging import change, cut
 
 pytestmark = [pytest.mark.slow, needs_servo]
 
-STUDY = """\
-format = 2
-study.name = "clipped"
-device.force_limit_n = 2.5
-scene = { scale = 3, fade_s = 0.3 }
-[limits]
-level_error_percent = 5  # free motions are faster than paced ones: the velocity estimator's lag takes up to 3 %
-[liquids.damper]
-drag = { law = "linear", damping_nspm = 4 }
-[tasks.stir]
-kind = "explore"
-min_s = 1
-max_s = 4
-instruction = "Stir."
-[stimuli.damping]
-vary = "damping_nspm"
-levels = [0.1, 4]
-[methods.few]
-kind = "constant"
-levels = 2
-repetitions = 2
-[blocks.thicker]
-stimulus = "damping"
-design = "2ifc"
-method = "few"
-"""
 STRONG = 4.0
 ATTEMPTS = 3
 
@@ -54,7 +29,7 @@ ATTEMPTS = 3
 @pytest.fixture(scope="module")
 def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("clipped") / "clipped.toml"
-    path.write_text(STUDY, encoding="utf-8")
+    path.write_text(text_of("clipped"), encoding="utf-8")
     return path
 
 
