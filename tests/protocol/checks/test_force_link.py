@@ -12,44 +12,9 @@ from study_app.protocol.trials.presentation import delays_force, link_seed, scen
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tasks.stroke import Stroke
 from study_app.store.verification.leaks import telltales
+from tests.protocol.edited_studies import text_of
 
-STUDY = """\
-format = 2
-study.name = "late"
-[device]
-workspace_mm = [100, 60, 60]
-[scene]
-scale = 10
-[liquids.water]
-density_kg_m3 = 1000
-effects = ["drag", "wake"]
-wake = { length = 1700, scaling = 1700, exponent = 0.75 }
-[liquids.damper]
-drag = { law = "linear", damping_nspm = 4 }
-[conditions.water]
-liquid = "water"
-force_delay_ms = 10
-[conditions.damper]
-liquid = "damper"
-[tasks.stir]
-kind = "follow"
-[stimuli.delay]
-condition = "damper"
-vary = "force_delay_ms"
-levels = [2, 100]
-[methods.few]
-kind = "constant"
-levels = 4
-repetitions = 2
-[blocks.pairs]
-stimulus = "delay"
-method = "few"
-[blocks.named]
-conditions = ["water", "damper"]
-standard = "damper"
-design = "2ifc"
-repetitions = 2
-"""
+STUDY = text_of("late")
 PACED = Stroke(1.0, 0.02)
 
 

@@ -14,31 +14,9 @@ from study_app.protocol.levels.presented_levels import FASTER
 from study_app.protocol.load import parse
 from study_app.protocol.model import Follow, Protocol
 from tests.haptics.scenes import UNBENT, scene
+from tests.protocol.edited_studies import text_of
 
-STUDY = """\
-format = 2
-sequence = ["thicker"]
-study.name = "pace"
-[liquids.damper]
-drag = { law = "linear", damping_nspm = 8 }
-[conditions.damper]
-liquid = "damper"
-[tasks.stir]
-kind = "follow"
-amplitude_mm = 25
-[stimuli.damping]
-vary = "damping_nspm"
-standards = [8]
-levels = [0.02, 0.6]
-[methods.few]
-kind = "constant"
-repetitions = 2
-[blocks.thicker]
-stimulus = "damping"
-design = "2ifc"
-method = "few"
-task = "stir"
-"""
+STUDY = text_of("pace")
 HIDDEN = ('liquid = "damper"\n[tasks', 'liquid = "damper"\nball = "hidden"\n[tasks')
 
 

@@ -1,28 +1,23 @@
-"""Trials of intervals: what is presented, rests, answers, feedback, and trials that are passed over."""
+"""Trials of intervals: printed texts, trials passed over or given up, and sessions that were interrupted."""
 
+from collections import Counter
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
 from study_app.errors import SessionError
 from study_app.protocol.orders.schedule import Trial
-from study_app.protocol.trials.answered import heard_in
-from study_app.session.resume import Start, resume_at
+from study_app.session.resume import resume_at
 from study_app.session.transitions.commands import Finish, Write
 from study_app.session.transitions.events import Begin, ResumeAsked, TaskDone, TimeUp
-from study_app.session.transitions.state import Phase, SessionState
+from study_app.session.transitions.state import FINAL, Phase, SessionState
 from study_app.session.transitions.table import advance
 from tests.session import pairs
 from tests.session.transitions.states import written
+from tests.session.transitions.transcribed import to_trial
 
 DONE = TaskDone(10.0, "complete", {})
-
-
-def in_main(state: SessionState) -> SessionState:
-    """Return the session in the first interval of the main block's second trial."""
-    while not (state.phase is Phase.TASK and state.trial.block == "viscosity" and state.trial.index == 2):
-        state, _ = advance(state, pairs.next_event(state, 0.0))
-    return state
 
 
 def test_the_first_trial_of_a_block_begins_without_the_rest_between_trials() -> None:
@@ -35,7 +30,7 @@ def test_the_first_trial_of_a_block_begins_without_the_rest_between_trials() -> 
 
 
 def test_a_presented_level_is_in_no_printed_command_or_state() -> None:
-    state = in_main(pairs.opened())
+    state = to_trial(pairs.opened(), "viscosity", 2)
     assert state.due is not None
     again, commands = advance(advance(state, DONE)[0], TimeUp(20.0))
     values = [f"{one.value:.6g}"[:6] for one in state.due.intervals if one.value not in (1.0, 2.0)]
@@ -54,8 +49,7 @@ def test_practice_ends_with_its_criterion_and_what_is_left_is_passed_over_with_i
 
 
 def test_a_break_is_skipped_only_where_nothing_was_presented_since_the_page_before() -> None:
-    edits = (("break_every = 2", "break_every = 4"),)
-    lines = pairs.whole(pairs.opened(pairs.protocol(more=_edited(pairs.PRACTICE, edits))))
+    lines = pairs.whole(pairs.opened(pairs.protocol(more=pairs.PRACTICE.replace("break_every = 2", "break_every = 4"))))
     passed = [line.get("trial", line.get("page")) for line in lines if line["event"] == "passed_over"]
     assert passed == [3, 4, 5, 6]  # trials 1 and 2 were presented before the break
     assert [line["page"] for line in lines if line["event"] == "page_shown"] == ["rest"]
@@ -72,48 +66,6 @@ def test_a_missed_criterion_goes_on_or_ends_the_session(missed: str, status: str
     finish = next((one for one in commands if isinstance(one, Finish)), None)
     assert (finish.status if finish else "completed") == status
     assert finish is None or "training" in finish.reason
-
-
-@pytest.mark.slow
-def test_a_session_goes_on_at_any_line_as_one_that_was_not_interrupted() -> None:
-    study = pairs.protocol()
-    lines = [{"event": "session_started", "t_s": 0.0}, *pairs.whole(pairs.opened(study))]
-    due = {line["trial"]: line["arrangement"] for line in lines if line["event"] == "trial_started"}
-    schedule = pairs.opened(study).plan.schedule
-    for count in range(1, len(lines)):
-        kept = lines[:count]
-        start = resume_at(study, schedule, kept)
-        heard = heard_in(study, kept)
-        rest = pairs.opened(study, start=Start(start.step, start.presented, heard))
-        state, commands = advance(rest, Begin(0.0))
-        if state.phase is Phase.PAUSED:
-            state, _ = advance(state, ResumeAsked(0.0, "participant"))
-        assert {one.fields["reason"] for one in commands if isinstance(one, Write) and "reason" in one.fields} <= {
-            "criterion_met"
-        }
-        done = {line["trial"] for line in kept if line["event"] == "responses"}
-        more = {line["trial"]: line["arrangement"] for line in _rest(state) if line["event"] == "trial_started"}
-        assert {number: due[number] for number in due if number not in done and number in more} == more
-
-
-def _edited(text: str, edits: tuple[tuple[str, str], ...]) -> str:
-    for old, new in edits:
-        assert old in text
-        text = text.replace(old, new)
-    return text
-
-
-def _rest(state: SessionState) -> list[dict[str, object]]:
-    if state.due is None:
-        return pairs.whole(state)
-    present = {"event": "trial_started", "trial": state.trial.number, "arrangement": _arranged(state)}
-    return [present, *pairs.whole(state)]
-
-
-def _arranged(state: SessionState) -> str:
-    assert state.design is not None
-    assert state.due is not None
-    return "".join("C" if one else "S" for one in state.design.arrangements[state.due.arrangement])
 
 
 def test_a_study_with_levels_needs_the_keys_secret() -> None:
@@ -135,3 +87,84 @@ def test_no_feedback_is_shown_where_a_level_is_a_value_so_that_no_answer_is_corr
     assert "feedback_shown" in by_weber
     assert "feedback_shown" not in by_value
     assert "responses" in by_value
+
+
+NO_SEALS: Any = object()
+"""A key, where nothing is sealed."""
+
+
+def done(at_s: float, *invalid: str, **measured: Any) -> TaskDone:
+    return TaskDone(at_s, "complete", measured, invalid)
+
+
+def test_a_break_after_trials_that_were_all_given_up_is_shown_in_a_resumed_session_too() -> None:
+    protocol = pairs.protocol()
+    fails = frozenset((trial, attempt) for trial in (1, 2) for attempt in range(3))
+    lines = [line for _, line in events_of(pairs.opened(protocol), fails)]
+    ended = [number for number, line in enumerate(lines) if line["event"] == "trial_ended" and line["trial"] == 2][2]
+    assert lines[ended + 1] == {"event": "page_shown", "t_s": lines[ended]["t_s"], "page": "rest"}
+    began = {"event": "session_started", "t_s": 0.0, "language": "en"}
+    schedule = pairs.opened(protocol).plan.schedule
+    start = resume_at(protocol, schedule, [began, *lines[: ended + 1]], NO_SEALS)
+    state, commands = advance(pairs.opened(protocol, start=start), Begin(0.0))
+    assert (state.phase, written(commands)) == (Phase.READING, ["page_shown"])
+
+
+def events_of(state: SessionState, fails: frozenset[tuple[int, int]]) -> Iterator[tuple[SessionState, dict[str, Any]]]:
+    """Yield each state with a line of the journal of a session in which some attempts at trials fail."""
+    at_s = 0.0
+    while state.phase not in FINAL:
+        event = pairs.next_event(state, at_s)
+        if isinstance(event, TaskDone) and (state.trial.number, state.invalid) in fails:
+            event = done(at_s, "level_error_percent")
+        state, commands = advance(state, event)
+        for one in commands:
+            if isinstance(one, Write):
+                yield state, {"event": one.event, "t_s": at_s, **one.fields}
+        at_s += 100.0
+
+
+FAILS = frozenset({(8, 0), (9, 0), (9, 1), (10, 0), (10, 1), (10, 2)})
+
+
+@pytest.mark.slow
+def test_a_session_killed_after_any_line_gives_up_the_same_trials_as_one_that_was_not() -> None:
+    protocol = pairs.protocol()
+    lines = [line for _, line in events_of(pairs.opened(protocol), FAILS)]
+    given_up = {line["trial"] for line in lines if line["event"] == "trial_ended"} - {
+        line["trial"] for line in lines if line["event"] == "responses"
+    }
+    assert given_up == {10}
+    schedule = pairs.opened(protocol).plan.schedule
+    began = {"event": "session_started", "t_s": 0.0, "language": "en"}
+    whole, invalid = answers(lines), undelivered(lines)
+    assert invalid == {8: 1, 9: 2, 10: 3}
+    for count in range(1, len(lines)):
+        start = resume_at(protocol, schedule, [began, *lines[:count]], NO_SEALS)
+        state, _ = advance(pairs.opened(protocol, start=start), Begin(0.0))
+        if state.phase is Phase.PAUSED:
+            state, _ = advance(state, ResumeAsked(0.0, "operator"))
+        resumed = [line for _, line in events_of(state, FAILS)]
+        assert answers([*lines[:count], *resumed]) == whole, lines[count - 1]
+        assert undelivered([*lines[:count], *resumed]) == invalid, lines[count - 1]
+        assert presented([*resumed, *lines]) == presented(lines), lines[count - 1]
+
+
+def presented(lines: list[dict[str, Any]]) -> set[tuple[int, float, str]]:
+    """Return the level and the arrangement of each trial: one for all its attempts."""
+    started = [line for line in lines if line["event"] == "trial_started"]
+    return {(line["trial"], line["level"], line["arrangement"]) for line in started}
+
+
+def undelivered(lines: list[dict[str, Any]]) -> Counter[int]:
+    """Return how many attempts at each trial were not delivered as requested."""
+    return Counter(line["trial"] for line in lines if line["event"] == "trial_ended" and line["outcome"] == "invalid")
+
+
+def answers(lines: list[dict[str, Any]]) -> dict[int, list[Any]]:
+    """Return what was answered, by trial."""
+    found = {}
+    for line in lines:
+        if line["event"] == "responses":
+            found[line["trial"]] = [item["value"] for item in line["items"]]
+    return found

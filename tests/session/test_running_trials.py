@@ -1,4 +1,4 @@
-"""A video in a trial: the delay asked for holds for it too; late and lost frames are counted, ages recorded."""
+"""A trial that runs: a ball that is hidden and a video, drawn as late as everything else; video frames are counted."""
 
 from typing import Any
 
@@ -8,6 +8,8 @@ from study_app.errors import VideoError
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tasks.explore import Explore
+from study_app.protocol.trials.tasks.follow import Follow
+from study_app.session.tasks import TaskView
 from study_app.session.transitions.commands import StartTrial
 from study_app.session.trial import SETTLED_S, RunningTrial
 from study_app.session.trial_recording import Recording
@@ -15,9 +17,71 @@ from study_app.video.frames import VideoFrame
 from study_app.video.statistics import VideoStatistics
 from tests.session.fakes import FakeServo
 
+SWING = Follow(kind="follow")
 TASK = Explore(kind="explore", instruction="Move", min_s=1, max_s=60)
 DELAY_S = 0.1
 PERIOD_NS = 33_000_000
+
+
+def begun(task: Any, recorder: Any = None, **more: Any) -> tuple[RunningTrial, FakeServo]:
+    """Return a trial whose first frame has not been painted, after half a second of samples."""
+    servo = FakeServo([])
+    servo.run(0.5)
+    reader = servo.telemetry.reader()
+    command = StartTrial(1, 1, task, Stimulated("presented"), DELAY_S, DELAY_S)
+    recording = Recording(recorder, servo.rate_hz)
+    trial = RunningTrial(
+        command, Scene(), late_s=0.05, servo=servo, reader=reader, recording=recording, paints=False, **more
+    )
+    reader.read()
+    return trial, servo
+
+
+def painted(task: Any, *, hides_ball: bool) -> tuple[RunningTrial, FakeServo]:
+    """Return a trial whose first frame was painted."""
+    trial, servo = begun(task, hides_ball=hides_ball)
+    trial.frame(servo.now_ns(), servo.now_ns())
+    return trial, servo
+
+
+def hidden_after(trial: RunningTrial, servo: FakeServo, seconds: float) -> list[tuple[float, bool]]:
+    """Return (elapsed time that is drawn, whether the ball is hidden) every 10 ms."""
+    seen = []
+    for _ in range(round(seconds * 100)):
+        servo.run(0.01)
+        trial.follow(servo.telemetry.read())
+        view = trial.view(servo.now_ns())
+        seen.append((view.task.elapsed_s, view.ball_hidden))
+    return seen
+
+
+@pytest.mark.slow
+def test_a_hidden_ball_is_drawn_during_the_lead_and_not_after_it() -> None:
+    trial, servo = painted(SWING, hides_ball=True)
+    seen = hidden_after(trial, servo, 5.0)
+    assert {hidden for elapsed_s, hidden in seen if elapsed_s < SWING.lead_s} == {False}
+    assert {hidden for elapsed_s, hidden in seen if elapsed_s >= SWING.lead_s} == {True}
+    newest_s = seen[150][0]
+    assert newest_s == pytest.approx(1.51 - DELAY_S - SETTLED_S, abs=0.0021)  # hidden as late as it is drawn
+
+
+@pytest.mark.slow
+def test_a_ball_that_is_shown_stays() -> None:
+    trial, servo = painted(SWING, hides_ball=False)
+    assert not any(hidden for _, hidden in hidden_after(trial, servo, 4.5))
+
+
+def test_without_a_lead_a_hidden_ball_is_never_drawn() -> None:
+    trial, servo = painted(TASK, hides_ball=True)
+    assert all(hidden for _, hidden in hidden_after(trial, servo, 1.0))
+
+
+def test_the_target_is_drawn_where_it_was() -> None:
+    trial, servo = painted(SWING, hides_ball=True)
+    hidden_after(trial, servo, 2.0)
+    drawn: TaskView = trial.view(servo.now_ns()).task
+    assert drawn.target_m == pytest.approx(SWING.target_m(drawn.elapsed_s))
+    assert trial.task.elapsed_s - drawn.elapsed_s == pytest.approx(DELAY_S + SETTLED_S, abs=0.0011)
 
 
 def frame(number: int, due_ns: int, age_ns: int | None = None) -> VideoFrame:
@@ -62,28 +126,9 @@ class Recorded:
         """Do nothing."""
 
 
-def begun(video: Any, recorder: Recorded) -> tuple[RunningTrial, FakeServo]:
-    servo = FakeServo([])
-    servo.run(0.5)
-    reader = servo.telemetry.reader()
-    trial = RunningTrial(
-        StartTrial(1, 1, TASK, Stimulated("seen"), DELAY_S, DELAY_S),
-        Scene(),
-        late_s=0.05,
-        servo=servo,
-        reader=reader,
-        recording=Recording(recorder, servo.rate_hz),
-        paints=False,
-        video=video,
-        videos=True,
-    )
-    reader.read()
-    return trial, servo
-
-
 def test_the_video_is_as_late_as_the_ball_and_both_are_recorded() -> None:
     video, recorder = FakeVideo(), Recorded()
-    trial, servo = begun(video, recorder)
+    trial, servo = begun(TASK, recorder, video=video, videos=True)
     assert video.calls == ["rewind"]
     view = trial.view(servo.now_ns())
     asked_ns = servo.now_ns() - round((DELAY_S + SETTLED_S) * 1e9)
@@ -104,7 +149,7 @@ def test_the_video_is_as_late_as_the_ball_and_both_are_recorded() -> None:
 
 
 def test_a_trial_without_a_video_has_no_numbers_of_one() -> None:
-    trial, servo = begun(None, Recorded())
+    trial, servo = begun(TASK, Recorded(), videos=True)
     view = trial.view(servo.now_ns())
     trial.frame(servo.now_ns(), view.sample_time_ns)
     assert view.video is None
@@ -116,7 +161,7 @@ def test_a_camera_that_stops_stops_the_trial() -> None:
         def frame_at(self, moment_ns: int) -> VideoFrame | None:
             raise VideoError("the camera stopped")
 
-    trial, servo = begun(Stopped(), Recorded())
+    trial, servo = begun(TASK, Recorded(), video=Stopped(), videos=True)
     with pytest.raises(VideoError, match="the camera stopped"):
         trial.view(servo.now_ns())
 
