@@ -84,10 +84,12 @@ def test_a_motion_lacks_the_first_and_the_last_20_ms_alone() -> None:
     t_s, position_m = swing()
     moved = motion(t_s, position_m, 1 / RATE_HZ)
     assert moved.times_s == pytest.approx(t_s[20:-20])
+    assert motion(*swing(lasts_s=3.04), 1 / RATE_HZ).rms_speed_mps == pytest.approx(2 * np.pi * 0.02 / 2**0.5, rel=1e-4)
 
 
 def test_a_motion_is_judged_from_a_time_on() -> None:
     moved = motion(*swing(), 1 / RATE_HZ)
+    assert moved.after(0.5, 1.0).times_s == pytest.approx(np.arange(500, 1001) / RATE_HZ)
     later = moved.after(moved.times_s[700])
     assert later.times_s == pytest.approx(moved.times_s[700:], abs=0)
     assert later.velocity_mps == pytest.approx(moved.velocity_mps[700:], abs=0)
