@@ -4,6 +4,7 @@ import re
 import tomllib
 from typing import Any
 
+import jsonschema
 import pytest
 
 from study_app.protocol.load import SceneFile, shipped
@@ -12,8 +13,6 @@ from study_app.protocol.source.schema_reference import format_markdown
 from study_app.protocol.trials.kinds import DESIGN_KINDS
 from tests.protocol.edited_studies import CASES, STUDIES, cases_of, text_of
 from tests.protocol.forms.mixed import MIXED
-
-jsonschema = pytest.importorskip("jsonschema")
 
 SCHEMA = schema()
 VALIDATOR = getattr(jsonschema, "Draft202012Validator", jsonschema.Draft7Validator)(SCHEMA)
