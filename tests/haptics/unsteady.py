@@ -1,7 +1,6 @@
 """Liquids with unsteady drag, motions in them, and how far symmetry, energy and the length of a tick are kept."""
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import UNBENT, liquid, moving, scene, vectors
@@ -44,14 +43,6 @@ def random_motion(seed, ticks=3000, rest=300):
     return 0.3 * random.uniform(0.05, 1) * (sum(waves) * smooth).T
 
 
-def rotation_error(seed, ticks):
-    """Return the greatest difference between the force of a rotated motion and the rotated force, over the greatest."""
-    velocity = random_motion(seed, ticks=ticks, rest=20) + np.array([0.1, 0.2, 0.05])
-    by = Rotation.random(rng=np.random.default_rng(seed))
-    straight = force(tank("glycerin"), velocity)
-    return abs(force(tank("glycerin"), by.apply(velocity)) - by.apply(straight)).max() / abs(straight).max()
-
-
 def highest_gain(name, seeds):
     """Return the greatest net work on the hand since rest over ½ m_a v²."""
     found = 0.0
@@ -62,17 +53,3 @@ def highest_gain(name, seeds):
         top = (velocity**2).sum(axis=1).max()
         found = max(found, work_j.max() / (0.5 * FLUIDS[name][0] * ADDED_M3 * top)) if top > 0 else found
     return found
-
-
-def tick_error(name, interval_s):
-    """Return the greatest difference between the force of a stroke in such ticks and in 1 ms, over the greatest."""
-
-    def stroke(interval_s):
-        t_s = np.arange(0, 2, interval_s)
-        return np.outer(np.sin(6 * t_s), [0.3, 0.0, 0.4]), t_s
-
-    (usual, t_s), (other, other_s) = stroke(1e-3), stroke(interval_s)
-    expected = force(tank(name), usual)
-    found = force(tank(name), other, np.full(len(other), interval_s))
-    errors = [abs(np.interp(t_s, other_s, found[:, k]) - expected[:, k])[10:-10].max() for k in range(3)]
-    return max(errors) / abs(expected).max()

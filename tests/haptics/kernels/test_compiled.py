@@ -2,7 +2,6 @@ import os
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -10,15 +9,7 @@ import pytest
 from numba.core.errors import NumbaError
 
 from study_app.haptics.kernels import compiled
-from study_app.haptics.kernels.compiled import (
-    KEPT_FOLDERS,
-    SWEPT_AT_ONCE,
-    UNUSED_S,
-    kernel,
-    part,
-    sweep_caches,
-    workings,
-)
+from study_app.haptics.kernels.compiled import kernel, part
 from tests.haptics.scenes import COMPILED
 
 pytestmark = pytest.mark.slow
@@ -35,89 +26,6 @@ def test_code_of_the_servo_that_would_allocate_does_not_compile(decorator):
 
     with pytest.raises((NumbaError, NotImplementedError)):
         make(3)
-
-
-@about_compiled_code
-def test_evaluation_may_make_arrays():
-    @workings
-    def make(count):
-        return np.zeros(count)
-
-    assert len(make(3)) == 3
-
-
-def caches(folder: Path, ages_s: list[float]) -> list[Path]:
-    """Make caches of other sources that were last used so long ago; the oldest names sort in any order."""
-    made = []
-    for number, age_s in enumerate(ages_s):
-        path = folder / f"{(number * 7919) % 10_007:016x}"
-        (path / "haptics").mkdir(parents=True)
-        (path / "haptics" / "tick.nbi").write_bytes(b"x")
-        os.utime(path, (time.time() - age_s,) * 2)
-        made.append(path)
-    return made
-
-
-def there(paths: list[Path]) -> list[bool]:
-    return [path.exists() for path in paths]
-
-
-def test_the_newest_caches_stay_and_the_oldest_go_a_few_at_a_time(tmp_path: Path) -> None:
-    own = tmp_path / ("f" * 16)
-    own.mkdir()
-    old = caches(tmp_path, [UNUSED_S * (2 + number) for number in range(KEPT_FOLDERS + SWEPT_AT_ONCE)])
-    (tmp_path / "somebody-elses").mkdir()
-    sweep_caches(own)
-    assert there(old) == [True] * KEPT_FOLDERS + [False] * SWEPT_AT_ONCE
-    sweep_caches(own)
-    assert there(old) == [True] * (KEPT_FOLDERS - 1) + [False] * (SWEPT_AT_ONCE + 1)
-    sweep_caches(own)
-    assert sum(there(old)) == KEPT_FOLDERS - 1
-    assert sorted(path.name for path in tmp_path.iterdir() if path not in old) == ["f" * 16, "somebody-elses"]
-
-
-def test_what_was_used_within_a_day_stays_however_much_it_is(tmp_path: Path) -> None:
-    own = tmp_path / ("f" * 16)
-    own.mkdir()
-    recent = caches(tmp_path, [UNUSED_S * 0.9] * 3 * KEPT_FOLDERS)
-    sweep_caches(own)
-    assert all(there(recent))
-
-
-def test_a_cache_that_a_program_begins_with_meanwhile_is_given_back(tmp_path: Path) -> None:
-    (path,) = caches(tmp_path, [UNUSED_S * 9])
-    seen_at = path.stat().st_mtime
-    os.utime(path)
-    compiled.remove_cache(path, seen_at)
-    assert (path / "haptics" / "tick.nbi").read_bytes() == b"x"
-    assert list(tmp_path.iterdir()) == [path]
-
-
-def test_what_a_killed_program_had_begun_to_remove_goes(tmp_path: Path) -> None:
-    own = tmp_path / ("f" * 16)
-    own.mkdir()
-    half = tmp_path / ".0123456789abcdef.0a1b2c3d.gone"
-    half.mkdir()
-    old = caches(tmp_path, [UNUSED_S * 2] * (KEPT_FOLDERS - 1))
-    sweep_caches(own)
-    assert not half.exists()
-    assert all(there(old))
-
-
-def test_programs_that_begin_at_once_sweep_without_a_word_and_use_one_cache(tmp_path: Path) -> None:
-    old = caches(tmp_path, [UNUSED_S * 40] * (KEPT_FOLDERS + 12))
-    begin = [sys.executable, "-c", "from study_app.haptics.kernels import compiled"]
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
-    programs = [
-        subprocess.Popen(begin, env=environment, stderr=subprocess.PIPE, cwd=Path(__file__).parents[3])
-        for _ in range(4)
-    ]
-    for program in programs:
-        _, said = program.communicate(timeout=120)
-        assert (program.returncode, said) == (0, b"")
-    (own,) = [path for path in tmp_path.iterdir() if path not in old]
-    assert len(own.name) == 16
-    assert KEPT_FOLDERS - 1 <= sum(there(old)) <= len(old) - SWEPT_AT_ONCE
 
 
 def said_at_start(folder: Path, environment: dict[str, str]) -> tuple[str, str]:
@@ -198,16 +106,6 @@ def started(package: Path, variables: dict[str, str]) -> tuple[Path, int]:
 def copy_of_package(to: Path) -> Path:
     shutil.copytree(PACKAGE, to / "study_app", ignore=shutil.ignore_patterns("__pycache__", "gui", "analysis", "app"))
     return to / "study_app"
-
-
-@pytest.mark.nightly
-@about_compiled_code
-def test_a_package_that_moved_finds_what_it_compiled(tmp_path: Path) -> None:
-    own = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-    first, second = copy_of_package(tmp_path / "a"), copy_of_package(tmp_path / "b")
-    made, hits = started(first, own)
-    assert hits == 0
-    assert started(second, own) == (made, 1)
 
 
 @pytest.mark.nightly

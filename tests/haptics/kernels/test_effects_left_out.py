@@ -41,12 +41,6 @@ def is_poisoned(record):
     return copy.tobytes() == record.tobytes()
 
 
-def test_the_memory_of_every_effect_is_known():
-    names = set(pack(scene(POOL)).liquids.dtype.names) | set(pack(scene(POOL)).liquid_states.dtype.names)
-    assert set(EFFECTS) <= names
-    assert all(records_of(pack(scene(POOL)), effect) for effect in EFFECTS)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("refilled", [False, True], ids=["packed", "refilled"])
 @pytest.mark.parametrize("effect", EFFECTS)
@@ -65,35 +59,3 @@ def test_an_effect_left_out_is_neither_read_nor_written(effect, refilled):
         assert np.isfinite(felt_now.force_n).all()
     assert any(sample.any() for sample in (felt_now.force_n, felt_now.velocity_mps))
     assert all(is_poisoned(record) for record in memory)
-
-
-@pytest.mark.parametrize("effect", EFFECTS)
-def test_an_effect_left_out_owns_no_rows(effect):
-    model = pack(scene(without(effect)))
-    assert all(len(getattr(model.rows, name)) == 0 for name in ROWS.get(effect, ()))
-
-
-@pytest.mark.skipif(not COMPILED, reason="the servo exists compiled only")
-@pytest.mark.parametrize("effect", EFFECTS)
-def test_not_even_by_a_servo_that_has_memory_for_it(effect):
-    from study_app.devices.scripted import ScriptedDevice
-    from study_app.haptics.runtime.clocks.clock import VirtualClock
-    from study_app.haptics.runtime.servo import Servo
-
-    device = ScriptedDevice()
-    servo = Servo(device, clock=VirtualClock())
-    reader = servo.telemetry.reader()
-    servo.load(scene(without(effect)))
-    model = servo.loop.slots[1]  # the spare one, which the first tick takes
-    assert model.liquids[0].effects
-    memory = records_of(model, effect)
-    for record in memory:
-        poison(record)
-    device.reach_to(0.03, 0.02, -0.02)
-    assert servo.advance(TICKS) == TICKS
-    samples = reader.read()
-    assert all(is_poisoned(record) for record in memory)
-    servo.stop()
-    assert np.isfinite(samples.device_force_n).all()
-    assert samples.force_n.any()
-    assert (samples.scene == 1).all()

@@ -4,7 +4,7 @@ import pytest
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Box, Cylinder
 from study_app.haptics.runtime.offline import simulate
-from tests.haptics.scenes import WATER_FACTOR, liquid, scene, vectors
+from tests.haptics.scenes import WATER_FACTOR, liquid, scene
 
 CUBE = Box(size_m=(0.2, 0.2, 0.2))
 
@@ -72,30 +72,3 @@ def test_where_liquids_overlap_the_last_listed_counts():
     assert phi[3] == pytest.approx(0.95 + 3 * 0.05)
     assert phi[27] == pytest.approx(3)
     assert phi[-1] == pytest.approx(1)
-
-
-def test_out_of_the_liquid_its_wake_is_forgotten():
-    wake = {"length": 100, "scaling": 100}
-    felt = scene(liquid(wake=wake, region=CUBE))
-    places = walk([0.0] * 60 + [0.5] * 30 + [0.0] * 60)
-    velocity_mps = np.tile([1.0, 0.0, 0.0], (150, 1))
-    table = simulate(felt, Motion(np.arange(150) / 1000, places, velocity_mps))
-    wakes = vectors(table, "wake")[:, 0]
-    assert wakes[59] == pytest.approx(0.59, abs=0.01)
-    assert wakes[78] > wakes[59]  # while it fades it is still felt, and still grows
-    assert not wakes[79:91].any()
-    assert wakes[91:] == pytest.approx(wakes[1:60])
-
-
-def test_every_liquid_has_a_wake_of_its_own():
-    wake = {"length": 100, "scaling": 100}
-    felt = scene(
-        liquid(id="left", wake=wake, region=Box(centre_m=(-1, 0, 0), size_m=(1, 1, 1))),
-        liquid(id="right", wake=wake, region=Box(centre_m=(1, 0, 0), size_m=(1, 1, 1))),
-    )
-    places = walk([-1.0] * 50 + [1.0] * 50)
-    velocity_mps = np.concatenate([np.tile([1.0, 0, 0], (50, 1)), np.tile([0, 0, 2.0], (50, 1))])
-    table = simulate(felt, Motion(np.arange(100) / 1000, places, velocity_mps))
-    assert table.wake_x_mps[49] == pytest.approx(0.49, abs=0.01)
-    assert not table.wake_x_mps[70:].any()
-    assert table.wake_z_mps[99] == pytest.approx(2 * 0.49, abs=0.02)

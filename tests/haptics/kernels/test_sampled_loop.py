@@ -15,7 +15,6 @@ from tests.haptics.scenes import COMPILED, UNBENT, scene
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="too many sub-steps for plain Python")
 STILL = np.zeros(3)
-FRICTION_NSPM = 0.5
 
 
 def coast(handle, k_spm, speed_mps, ticks):
@@ -99,80 +98,3 @@ def test_without_delay_it_is_alpha_over_2_minus_alpha(alpha):
 def test_the_more_delay_the_lower_the_frequency_that_is_least_passive():
     worst_hz = [passivity_multiplier(0.1, delay)[1] for delay in (0, 1, 2, 4, 8)]
     assert worst_hz == pytest.approx([500, 112, 76, 50, 32], abs=1.0)
-
-
-def exact_step(mass_kg, period_s):
-    """Return how (x, v) and a held force become the next (x, v), (2, 3), with b = 0.5 N·s/m."""
-    rate = FRICTION_NSPM / mass_kg
-    kept = np.exp(-rate * period_s)
-    gone_s = (1 - kept) / rate
-    return np.array([[1, gone_s, (period_s - gone_s) / FRICTION_NSPM], [0, kept, gone_s / mass_kg]])
-
-
-def handles_step(mass_kg, period_s):
-    """Return the same as the product's handle integrates it."""
-    columns = []
-    for x, v, force in np.eye(3):
-        handle = new_handle(mass_kg=mass_kg, viscous_nspm=FRICTION_NSPM)
-        handle.held = 0
-        handle.position_m[0], handle.velocity_mps[0], handle.force_n[0] = x, v, force
-        move(handle, STILL, STILL, period_s)
-        columns.append([handle.position_m[0], handle.velocity_mps[0]])
-    return np.array(columns).T
-
-
-def growth(damping_nspm, step, period_s, alpha, delay):
-    """Return the largest |eigenvalue| of (x, v, x before, estimate, forces under way): over 1 it diverges."""
-    weight = 1 - (1 - alpha) ** (period_s / 1e-3)
-    size = 4 + delay
-    estimate = np.zeros(size)  # u = (x - x before) / T, v ← v + α (u - v)
-    estimate[0], estimate[2], estimate[3] = weight / period_s, -weight / period_s, 1 - weight
-    acting = -damping_nspm * estimate if delay == 0 else np.eye(size)[3 + delay]
-    matrix = np.zeros((size, size))
-    matrix[:2, :2] = step[:, :2]
-    matrix[:2] += np.outer(step[:, 2], acting)
-    matrix[2, 0] = 1.0
-    matrix[3] = estimate
-    if delay > 0:
-        matrix[4] = -damping_nspm * estimate
-        matrix[5:, 4:-1] = np.eye(delay - 1)
-    eigenvalues = np.linalg.eigvals(matrix)
-    moving = eigenvalues[abs(eigenvalues - 1.0) > 1e-9]  # without a spring the place itself stays: 1
-    return abs(moving).max()
-
-
-def critical_nspm(step, period_s, alpha, delay):
-    """Return the least damping that makes the loop of this mechanical step (2, 3) diverge."""
-    low, high = 1.0, 2000.0
-    while high - low > 0.01:
-        middle = (low + high) / 2
-        low, high = (middle, high) if growth(middle, step, period_s, alpha, delay) < 1 else (low, middle)
-    return low
-
-
-def test_a_free_handle_of_100_g_with_one_tick_of_delay_bears_71_newton_seconds_a_metre():
-    assert critical_nspm(exact_step(0.1, 1e-3), 1e-3, 0.1, 1) == pytest.approx(71.5, abs=1.0)
-
-
-@pytest.mark.parametrize(
-    ("period_s", "alpha", "mass_kg", "expected"),
-    [
-        (1e-3, 0.1, 0.1, (210, 71.5, 43.7, 25.0)),
-        (1e-3, 0.1, 0.25, (510, 174, 106, 61)),
-        (1e-3, 0.1, 0.5, (1010, 344, 210, 120)),
-        (1e-3, 1.0, 0.1, (201, 83, 54, 32)),
-        (2e-3, 1 - 0.9**0.5, 0.1, (110, 37, 23, 13)),  # these two: a tenth a tick
-        (4e-3, 1 - 0.9**0.25, 0.1, (60, 20, 12.5, 7.2)),
-    ],
-)
-def test_critical_damping_over_delay(period_s, alpha, mass_kg, expected):
-    found = [critical_nspm(exact_step(mass_kg, period_s), period_s, alpha, delay) for delay in (0, 1, 2, 4)]
-    assert found == pytest.approx(expected, rel=0.02)
-
-
-@pytest.mark.parametrize("mass_kg", [0.1, 0.5])
-@pytest.mark.parametrize("delay", [0, 1, 2, 4])
-def test_the_products_handle_has_the_same_boundary(delay, mass_kg):
-    exact, own = (critical_nspm(step(mass_kg, 1e-3), 1e-3, 0.1, delay) for step in (exact_step, handles_step))
-    # Its sub-steps of 50 µs carry a handle half of one too far: undelayed that is 5 % of damping.
-    assert own == pytest.approx(exact, rel=0.055 if delay == 0 else 0.025)

@@ -6,25 +6,12 @@ from numba.core.runtime import _nrt_python, rtsys
 from study_app.errors import StudyError
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.kernels.tick import tick
-from study_app.haptics.model import layout
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Box, Scene
 from study_app.haptics.runtime.offline import simulate
-from study_app.haptics.runtime.pack import elements_needed, pack, pack_into
-from tests.haptics.scenes import (
-    COMPILED,
-    EVERYTHING,
-    HONEY,
-    LIGHT_OIL,
-    THESIS,
-    WATER,
-    Hand,
-    liquid,
-    scene,
-    stroke,
-    vectors,
-)
+from study_app.haptics.runtime.pack import pack, pack_into
+from tests.haptics.scenes import COMPILED, EVERYTHING, LIGHT_OIL, THESIS, WATER, Hand, liquid, scene, stroke, vectors
 
 MANY = scene(
     *WATER.liquids,
@@ -49,20 +36,6 @@ def test_the_servos_tick_and_simulate_are_the_same(felt):
     assert (table.limiters == [sample.limiters for sample in live]).all()
 
 
-def test_rest_is_zero_force_and_the_velocity_is_known():
-    hand = Hand(Scene())
-    moved = hand.sweep(0.2, 100)
-    assert not any(sample.device_force_n.any() or sample.force_n.any() for sample in moved)
-    assert moved[-1].velocity_mps[0] == pytest.approx(2.0, rel=1e-3)
-
-
-def test_an_effect_left_out_owns_no_memory():
-    model = pack(HONEY)
-    assert (len(model.rows.elements), len(model.rows.segments), elements_needed(HONEY)) == (0, 0, 0)
-    assert len(pack(LIGHT_OIL).rows.elements) == elements_needed(LIGHT_OIL) == 125
-    assert len(pack(Scene()).liquids) == 0
-
-
 def test_a_model_is_refilled_in_place_with_a_fresh_state():
     model = pack(WATER, capacity=2000)
     memory = [field.ctypes.data for field in model.arrays]
@@ -84,12 +57,6 @@ def test_models_made_with_a_capacity_have_room_for_any_scene_within_it():
     assert [int(wake.row) for wake in model.liquids.wake[:2]] == [0, 1700]
     with pytest.raises(StudyError, match=r"needs 1701 wake elements.*room for 1700"):
         pack_into(pack(Scene(), capacity=1700), scene(liquid(wake={"length": 1701, "scaling": 1701})))
-
-
-def test_two_models_do_not_share_memory():
-    first, second = Hand(WATER), Hand(WATER)
-    first.sweep(0.2, 50)
-    assert not second.model.state[0].position_m.any()
 
 
 @njit
@@ -120,11 +87,3 @@ def test_hazard_18_no_tick_allocates_so_no_collection_can_pause_it(felt):
         assert allocations(4000) == allocations(0)
     finally:
         _nrt_python.memsys_disable_stats()
-
-
-def test_limiter_names_are_those_of_the_bits():
-    bits = {
-        name: value for name, value in vars(layout).items() if name.startswith("LIMITER_") and name != "LIMITER_NAMES"
-    }
-    assert [f"LIMITER_{name.upper()}" for name in layout.LIMITER_NAMES] == list(bits)
-    assert list(bits.values()) == [1 << k for k in range(len(bits))]

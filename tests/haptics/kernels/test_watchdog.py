@@ -74,16 +74,6 @@ def test_a_late_tick_finds_the_force_fading_as_without_samples(bench, late_ms):
     assert bench.fade == 1.0
 
 
-def test_the_fade_is_the_one_that_silence_of_the_device_gets():
-    silent, late = Bench(), Bench()
-    for bench in (silent, late):
-        felt(bench.servo)
-    silent.probe.state.silent_from_read = silent.probe.state.reads + 1
-    silent.servo.advance(30)
-    late.be_late(29.0)
-    assert late.fade == pytest.approx(silent.fade, abs=0.03)
-
-
 def test_the_slew_limit_does_not_prolong_the_fade_out(bench):
     bench.probe.state.velocity_mps *= 2.0
     felt(bench.servo)

@@ -1,14 +1,12 @@
 """Which effects a scene calls for: the rule, its worked examples, and the bounds by arithmetic."""
 
 import math
-import subprocess
-import sys
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.haptics.model.bounds import Extremes, bounds, lowered_mps, submerged
+from study_app.haptics.model.bounds import Extremes, bounds, lowered_mps
 from study_app.haptics.model.effects.current import Channel, Uniform, Vortex
 from study_app.haptics.model.effects.drag import Drag, cheapest_law, resistance_n
 from study_app.haptics.model.effects.wake import Wake
@@ -99,23 +97,6 @@ def test_a_current_is_bounded_by_the_drag_it_adds_and_its_shear_by_what_it_ticks
     assert bound(channel, "added_mass") == pytest.approx(0.5 * 998.2 * VOLUME_M3 * (6.25 + sheared_mps2))
     assert bound(channel, "history") == pytest.approx(bound(still, "history") + history_n)
     assert all(bound(vortex, effect) == pytest.approx(bound(channel, effect)) for effect in ("current", "history"))
-
-
-def test_a_full_wake_against_the_motion_is_the_most_it_can_do():
-    scene = stirred("water", 0.5, viscosity_pa_s=None, wake=Wake(length=100, scaling=200, exponent=2))
-    drag_n = 0.5 * 998.2 * 0.47 * math.pi * 0.034**2 * 0.25
-    assert bound(scene, "wake") == pytest.approx(drag_n * (1.25**2 - 1))
-
-
-def test_without_a_viscosity_there_is_no_history_and_the_coefficient_is_constant():
-    scene = stirred("water", 1.0, viscosity_pa_s=None)
-    assert "history" not in bounds(scene, scene.liquids[0])
-    assert resolve(scene).liquids[0].drag == Drag(law="constant")
-
-
-@pytest.mark.parametrize(("depth", "share"), [(-0.1, 0.0), (-0.017, 0.15625), (0.0, 0.5), (0.017, 0.84375), (9, 1.0)])
-def test_the_cap_under_the_surface(depth, share):
-    assert submerged(depth, 0.034) == pytest.approx(share)
 
 
 POOL = Box(size_m=(1.0, 0.4, 1.0))
@@ -216,15 +197,6 @@ def test_the_law_is_the_cheapest_within_the_target_at_every_speed(scene):
     assert not any(meets(other) for other in cheaper[law])
 
 
-@pytest.mark.parametrize(
-    ("name", "speed_mps", "law"),
-    [("water", 1.0, "constant"), ("olive_oil", 1.0, "schiller-naumann"), ("tar", 0.1, "schiller-naumann")],
-)
-def test_laws_of_the_real_liquids(name, speed_mps, law):
-    scene = stirred(name, speed_mps)
-    assert cheapest_law(Extremes(scene, scene.liquids[0])) == law
-
-
 def test_effects_that_are_named_stay_as_they_are():
     scene = Scene(liquids=(Liquid(id="honey", density_kg_m3=1400, viscosity_pa_s=10),))
     assert resolve(scene) is scene
@@ -262,13 +234,6 @@ def test_the_cost_has_a_column_where_it_was_measured():
     lines = describe_gate(scene, {("water", "buoyancy"): 3.6})
     assert lines[1].split() == ["effect", "bound", "[N]", "share", "ns", "per", "tick", "why"]
     assert [line.split()[3] for line in lines[2:5]] == ["–", "4", "–"]
-
-
-@pytest.mark.slow
-def test_neither_the_gate_nor_the_laws_load_the_compiler():
-    code = "import sys, study_app.haptics.model.gate; print('numba' in sys.modules, 'numpy' in sys.modules)"
-    printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert printed.split() == ["False", "False"]
 
 
 def later(scene):

@@ -2,18 +2,10 @@
 
 import pytest
 
-from study_app.haptics.model.estimators import ESTIMATORS, NAMED
 from study_app.haptics.model.estimators.device import MOST_LAG_TICKS, DeviceVelocity
 from study_app.haptics.model.force_rules import VERSIONS
 from study_app.haptics.model.scene import Ewma, Foaw, Given, Lead, Line, Raw
 from study_app.haptics.model.slope_limits import damping_limits, handle_limits, table
-
-
-@pytest.mark.parametrize("kind", [it for it in ESTIMATORS if it.of_device], ids=lambda it: it.name)
-def test_every_estimator_has_entries_at_every_measured_parameter(kind):
-    found = [it for it in table() if it.estimator == kind.name]
-    assert {it.parameter for it in found} == (set(kind.measured) or {None})
-    assert len(found) == 16 * max(len(kind.measured), 1)
 
 
 def entry(name, parameter):
@@ -44,12 +36,6 @@ def test_a_smaller_tolerance_also_has_the_limit_of_the_raw_difference():
 def test_a_given_velocity_has_the_limit_of_ewma_and_lead_has_its_own():
     assert limit(Given()) == limit(Ewma()) == 53
     assert limit(Lead()) == entry("lead", None) < limit(Ewma())
-
-
-def test_a_parameter_that_is_measured_is_a_field_of_the_model():
-    for kind in NAMED.values():
-        assert kind.parameter is None or kind.parameter in kind.model.model_fields
-        assert bool(kind.parameter) == bool(kind.measured)
 
 
 def test_velocity_of_a_device_has_the_limits_of_a_line_that_lags_as_much():

@@ -151,8 +151,3 @@ def test_parameters_that_belong_together_are_judged_together():
 def test_an_override_that_fails_says_why(name, value, message):
     with pytest.raises(StudyError, match=message):
         override(WATER, name, value)
-
-
-def test_a_parameter_of_an_effect_left_out_is_unknown():
-    with pytest.raises(StudyError, match=r"no parameter .length.*it has absolute_n, acceleration_mps2, alpha, "):
-        override(HONEY, "length", 5)

@@ -61,11 +61,6 @@ def test_unsteady_drag_reaches_the_predicted_force_once_its_history_is_over(name
     assert (predicted.limit == "slope") == (name == "tar")
 
 
-def test_the_limits_that_the_cases_above_meet():
-    limits = {steady(scene_of(name, 3), hand_mps).limit for name in LIQUIDS for hand_mps in (0.1, 0.6)}
-    assert limits == {None, "slope", "norm"}
-
-
 def test_tar_is_clipped_by_the_slope_limit():
     tar = steady(scene_of("tar", 3))
     assert (tar.force_n, tar.limit) == (pytest.approx(5.3), "slope")

@@ -11,14 +11,7 @@ from study_app.errors import DeviceError
 from study_app.haptics.kernels.loop import FASTER_SAMPLES, SLOWER_SAMPLES
 from study_app.haptics.kernels.safety import begin_scene, new_safety
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
-from study_app.haptics.model.layout import (
-    CONTRACT_VERSION,
-    LIMITER_SATURATED,
-    READING,
-    STATUS_DEVICE_LOST,
-    new_command,
-    new_reading,
-)
+from study_app.haptics.model.layout import LIMITER_SATURATED, STATUS_DEVICE_LOST
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.pack import pack
 from study_app.haptics.runtime.recompute import new_wake_places, recompute_sample
@@ -35,14 +28,6 @@ def felt(probe, ticks=1000):
     servo.advance(ticks)
     servo.stop()
     return reader.read()
-
-
-def test_records_of_the_contract_say_version_and_size():
-    for record in (new_reading(), new_command()):
-        assert (record[0].version, record[0].size_bytes) == (CONTRACT_VERSION, record.itemsize)
-    assert READING.fields["version"][1] == 0
-    assert READING.fields["size_bytes"][1] == 8
-    assert READING.fields["measured"][1] == 56  # where the record of version 1 ended
 
 
 def test_telemetry_and_passivity_observer_take_the_force_that_the_device_sent():

@@ -49,22 +49,6 @@ def test_advancing_in_pieces_is_advancing_at_once():
     assert scripted_session(1, 16, 17, 966).tobytes() == scripted_session(1000).tobytes()
 
 
-def test_a_tick_comes_every_period_of_its_clock(servo):
-    reader = servo.telemetry.reader()
-    servo.advance(50)
-    samples = reader.read()
-    assert (np.diff(samples.time_ns) == 1_000_000).all()
-    assert (samples.lateness_ns == 0).all()
-    assert samples.tick.tolist() == list(range(50))
-
-
-def test_what_is_written_is_what_telemetry_says(servo, probe):
-    reader = servo.telemetry.reader()
-    servo.load(HONEY)
-    servo.advance(700)
-    assert np.array_equal(probe.forces_n[-700:], reader.read().device_force_n)
-
-
 @pytest.fixture
 def counted_allocations():
     _nrt_python.memsys_enable_stats()
@@ -125,16 +109,6 @@ def test_a_change_of_scene_fades_and_never_steps(servo):
     assert not faded[51:].any()
     forces = np.vstack((before.device_force_n[-1:], after.device_force_n))
     assert np.linalg.norm(np.diff(forces, axis=0), axis=1).max() <= 0.5 + 1e-12
-
-
-def test_every_scene_gets_a_serial_of_its_own_and_rest_is_scene_0(servo):
-    assert [servo.load(scene) for scene in (WATER, HONEY, WATER)] == [1, 2, 3]
-    servo.advance(1)
-    assert servo.telemetry.latest().scene == 3
-    servo.rest()
-    servo.advance(1)
-    assert servo.telemetry.latest().scene == 0
-    assert servo.load(HONEY) == 4
 
 
 def test_rest_takes_the_force_to_zero_without_a_step(servo, probe):
@@ -203,16 +177,6 @@ def test_a_gap_is_passed_over_and_not_made_up_for(probe):
     assert servo.overruns == 4
     assert timing(samples, 1000).overruns == 4
     assert (np.diff(samples.time_ns) >= 600_000).all()
-
-
-def test_a_tick_that_is_only_a_little_late_costs_no_deadline(probe):
-    clock = VirtualClock()
-    servo = Servo(probe, clock=clock)
-    reader = servo.telemetry.reader()
-    probe.stall(clock, at_read=10, stall_ns=1_700_000)
-    servo.advance(20)
-    assert reader.read().lateness_ns[10] == 700_000
-    assert servo.overruns == 0
 
 
 def test_a_reader_that_comes_too_late_counts_what_it_missed(servo):

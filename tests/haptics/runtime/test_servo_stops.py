@@ -107,14 +107,6 @@ def test_a_stopped_servo_starts_again_at_rest_and_fades_in(servo, probe):
     assert 0.2 < np.linalg.norm(probe.forces_n[-1]) < 4
 
 
-def test_stopping_twice_writes_nothing_more(servo, probe):
-    felt(servo)
-    servo.stop()
-    written = len(probe.forces_n)
-    servo.stop()
-    assert len(probe.forces_n) == written
-
-
 # faults
 
 

@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 
 import numba
 import numpy as np
@@ -73,15 +72,6 @@ def test_a_handler_that_a_program_has_set_stays():
     assert signal.getsignal(signal.SIGTSTP) is own
     allow_suspension(own)
     assert signal.getsignal(signal.SIGTSTP) is own
-
-
-def test_another_thread_changes_nothing():
-    holder = object()
-    other = threading.Thread(target=refuse_suspension, args=(holder,))
-    other.start()
-    other.join()
-    assert handlers() == {signal.SIG_DFL}
-    allow_suspension(holder)
 
 
 @pytest.mark.variants(2)

@@ -42,23 +42,6 @@ def test_a_reader_gets_what_came_since_it_last_read_in_order():
     assert reader.dropped == 0
 
 
-def test_readers_do_not_take_from_each_other():
-    telemetry = Telemetry(64)
-    first, second = telemetry.reader(), telemetry.reader()
-    push(telemetry, 4)
-    assert first.read().tick.tolist() == second.read().tick.tolist() == [0, 1, 2, 3]
-
-
-def test_what_was_read_is_a_copy():
-    telemetry = Telemetry(4)
-    reader = telemetry.reader()
-    push(telemetry, 2)
-    samples, latest = reader.read(), telemetry.latest()
-    push(telemetry, 4)
-    assert samples.tick.tolist() == [0, 1]
-    assert latest.tick == 1
-
-
 @pytest.mark.slow
 @settings(deadline=None)  # the first example compiles
 @given(st.lists(st.integers(0, 20), max_size=20))
@@ -113,14 +96,6 @@ def test_beside_a_racing_writer_every_sample_read_is_whole():
 # the newest sample, and the place at a moment
 
 
-def test_before_the_first_sample_there_is_none():
-    telemetry = Telemetry(8)
-    assert telemetry.latest() is None
-    position, moment = telemetry.position_at(123)
-    assert position.tolist() == [0, 0, 0]
-    assert moment == 0
-
-
 @pytest.mark.slow
 @settings(deadline=None)  # the first example compiles
 @given(st.integers(40, 99), st.floats(0, 1, exclude_max=True))
@@ -133,14 +108,6 @@ def test_even_motion_is_interpolated_exactly(before, share):
     position, moment = telemetry.position_at(time_ns)
     assert moment == time_ns
     assert position == pytest.approx([time_ns * 1e-9, 0, -2e-9 * time_ns], abs=1e-16, rel=1e-15)
-
-
-def test_uneven_times_are_interpolated_between_their_neighbours():
-    telemetry = Telemetry(8)
-    push(telemetry, 3)
-    telemetry.ring.time_ns[:3] = 0, 10 * MS, 11 * MS
-    assert telemetry.position_at(5 * MS)[0][0] == pytest.approx(0.5e-3)
-    assert telemetry.position_at(10_250_000)[0][0] == pytest.approx(1.25e-3)
 
 
 def test_outside_the_history_the_nearest_sample_is_given_with_its_own_time():
@@ -187,14 +154,6 @@ def ticks(times_ms, lateness_ms=None, first_tick=0):
     samples.time_ns = np.asarray(times_ms) * MS
     samples.lateness_ns = 0 if lateness_ms is None else np.asarray(lateness_ms) * MS
     return samples
-
-
-def test_timing_of_an_even_servo():
-    seen = timing(ticks(np.arange(2001) / 2), 2000)
-    assert (seen.ticks, seen.overruns) == (2001, 0)
-    assert seen.rate_hz == pytest.approx(2000)
-    assert seen.worst_gap_s == pytest.approx(0.0005)
-    assert seen.lateness_p99_s == 0
 
 
 def test_timing_tells_lateness_gap_and_deadlines_passed_over():

@@ -53,9 +53,3 @@ def test_a_liquid_that_does_not_ask_for_it_takes_the_weight_off():
     force = simulate(scene(sea, weightless), Motion(np.arange(50) / 1000, np.column_stack([x_m, 0 * x_m, 0 * x_m])))
     assert force.fy_n[5] == pytest.approx(500 * volume_m3() * G)
     assert force.fy_n[40] == pytest.approx(0.0, abs=1e-12)
-
-
-def test_out_of_every_liquid_nothing_weighs():
-    pond = floating(1500, region=Box(size_m=(1, 1, 1)))
-    out = Motion(np.arange(3) / 1000, np.tile([3.0, 0.0, 0.0], (3, 1)))
-    assert not vectors(simulate(scene(pond), out), "force").any()

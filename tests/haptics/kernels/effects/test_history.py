@@ -7,9 +7,7 @@ from study_app.haptics.kernels.effects.history import TIMES, WEIGHTS
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.effects.history import History
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Box
 from study_app.haptics.runtime.offline import simulate
-from study_app.haptics.runtime.pack import pack
 from tests.haptics.scenes import COMPILED, UNBENT, examples, liquid, moving, scene, vectors
 
 HONEY = {"density_kg_m3": 1420, "viscosity_pa_s": 10}
@@ -98,10 +96,6 @@ def test_within_the_window_and_far_beyond_it_is_the_integral(legs, pace):
     assert abs(felt[1:] - exact).max() <= worst * max(abs(np.array(exact)).max(), 1e-12)
 
 
-def test_even_motion_has_no_history():
-    assert not simulate(tank(**HONEY), moving(np.tile([1.0, 0.5, 0.0], (60, 1)))).fx_n.any()
-
-
 def test_measured_velocities_are_smoothed_first():
     place_m = np.zeros((80, 3))
     place_m[40:, 0] = 38e-6  # one count of an encoder, at scale 1
@@ -110,22 +104,3 @@ def test_measured_velocities_are_smoothed_first():
     raw = one.model_copy(update={"history": History(smoothing_s=0.0)})
     rough, smooth = (abs(simulate(scene(fluid), motion).fx_n).max() for fluid in (raw, one))
     assert smooth < 0.35 * rough
-
-
-def test_it_owns_rows_for_its_window_at_the_rate_of_the_scene():
-    few, many = (pack(tank(**HONEY, rate_hz=rate, history={"window_s": 0.05})) for rate in (500.0, 2000.0))
-    assert (len(few.rows.intervals), len(many.rows.intervals)) == (29, 104)
-    assert len(few.rows.exponentials) == 10
-
-
-def test_after_leaving_the_past_is_forgotten():
-    pool = liquid(**HONEY, effects=("history",), region=Box(size_m=(1, 1, 1)))
-    t_s = np.arange(200) / 1000
-    x_m = np.where(t_s < 0.1, 0.0, np.where(t_s < 0.14, 1.0, 0.0))
-    velocity = np.zeros((200, 3))
-    velocity[50:100, 0] = 1.0
-    motion = moving(velocity)
-    motion.position_m[:, 0] = x_m
-    felt = simulate(scene(pool), motion).fx_n
-    assert abs(felt[99]) > 0.1
-    assert not felt[125:].any()

@@ -9,9 +9,7 @@ from study_app.haptics.model.effects.local_wake import CELLS, LocalWake
 from study_app.haptics.model.force_rules import VERSIONS
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.paths import path
-from study_app.haptics.model.scene import Box
 from study_app.haptics.runtime.offline import simulate
-from study_app.haptics.runtime.pack import pack
 from tests.haptics.scenes import COMPILED, UNBENT, WATER_FACTOR, Hand, examples, liquid, moving, scene, vectors
 
 STEP_S = 1e-3
@@ -187,26 +185,3 @@ def test_the_oldest_cells_are_merged_and_nothing_of_them_is_lost():
     motion = hand.model.rows.cells["velocity_mps"].sum(axis=0)
     assert motion[0] == pytest.approx(hand.model.rows.cells["speed_mps"].sum())
     assert hand.model.rows.cells["count"].sum() == 600
-
-
-def test_out_of_the_liquid_it_is_forgotten():
-    pool = tank().liquids[0].model_copy(update={"region": Box(size_m=(1, 1, 1))})
-    x_m = np.where((np.arange(120) < 50) | (np.arange(120) > 80), 0.0, 3.0)
-    motion = Motion(np.arange(120) * STEP_S, np.column_stack([x_m, 0 * x_m, 0 * x_m]), np.tile([1.0, 0, 0], (120, 1)))
-    wake = simulate(scene(pool, knee=UNBENT), motion).wake_x_mps
-    assert wake[49] == pytest.approx(0.49)
-    assert not wake[75:82].any()
-    assert wake[82] == pytest.approx(0.01)
-
-
-@pytest.mark.parametrize(("axes", "rises"), [("xz", False), ("xyz", True)])
-def test_vertical_motion_enters_only_where_asked(axes, rises):
-    felt = simulate(tank(axes=axes), moving(np.tile([1.0, 1.0, 0.0], (20, 1))))
-    assert felt.wake_x_mps[-1] > 0
-    assert (felt.wake_y_mps[-1] > 0) == rises
-
-
-def test_it_owns_its_cells_and_nothing_else():
-    model = pack(tank())
-    assert (len(model.rows.cells), len(model.rows.elements), len(model.rows.intervals)) == (CELLS, 0, 0)
-    assert len(pack(scene()).rows.cells) == 0

@@ -2,15 +2,13 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from study_app.haptics.kernels.regions import update_volume_fractions
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Box, Cylinder, Given
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack
-from tests.haptics.scenes import UNBENT, WATER_FACTOR, examples, liquid, scene, vectors
+from tests.haptics.scenes import UNBENT, WATER_FACTOR, liquid, scene, vectors
 
 RADIUS_M = 0.034
 TOP_M = 0.3
@@ -55,22 +53,6 @@ def through(y_m, velocity_mps, interval_s=1e-3):
 )
 def test_the_cap_of_a_ball(depth, volume, upright, level, region):
     assert shares(depth, region) == pytest.approx((volume, upright, level), abs=5e-5)
-
-
-@pytest.mark.slow
-@settings(max_examples=examples(100), deadline=None)
-@given(depth=st.floats(-0.1, 1.1))
-def test_shares_are_areas_and_volumes_by_quadrature(depth):
-    h = min(max(depth, 0.0), 1.0) * 2 * RADIUS_M
-    z = (np.arange(4000) + 0.5) / 4000 * h - RADIUS_M
-    chord = np.sqrt(RADIUS_M**2 - z**2)
-    dz = h / 4000
-    expected = (
-        math.pi * (chord**2).sum() * dz / (4 / 3 * math.pi * RADIUS_M**3),
-        1.0 if h > RADIUS_M else (2 * RADIUS_M * h - h * h) / RADIUS_M**2,
-        2 * chord.sum() * dz / (math.pi * RADIUS_M**2),
-    )
-    assert shares(depth) == pytest.approx(expected, abs=1e-5)
 
 
 def test_drag_meets_what_is_under_the_surface():
@@ -126,15 +108,6 @@ def test_entering_through_the_surface_takes_no_time_and_through_a_wall_20_ms():
     entering = simulate(pool("drag"), Motion(np.arange(40) / 1000, places, np.tile([-1.0, 0.0, 0.0], (40, 1)))).fx_n
     assert entering[:10] == pytest.approx(0)
     assert entering[10:30] == pytest.approx(WATER_FACTOR * np.arange(1, 21) / 20)
-
-
-def test_out_of_the_water_the_wake_is_gone():
-    wake = {"length": 50, "scaling": 50}
-    y_m = np.concatenate([np.full(60, 0.0), np.full(5, TOP_M + 0.05), np.full(5, 0.0)])
-    felt = simulate(pool("drag", "wake", wake=wake), through(y_m, (1.0, 0, 0)))
-    assert felt.wake_x_mps[59] == pytest.approx(1.0, rel=1e-2)
-    assert not felt.wake_x_mps[60:66].any()
-    assert felt.wake_x_mps[66] == pytest.approx(0.02)
 
 
 def test_of_two_liquids_on_top_of_each_other_the_ball_is_shared_at_their_surface():

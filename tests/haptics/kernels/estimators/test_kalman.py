@@ -15,12 +15,12 @@ from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Ewma, Kalman, Scene
 from study_app.haptics.model.slope_limits import damping_limits, table
 from study_app.haptics.runtime.offline import simulate
-from study_app.haptics.runtime.pack import built_alike, pack
+from study_app.haptics.runtime.pack import pack
 from study_app.haptics.runtime.recompute import new_wake_places, recompute_sample
 from study_app.validation.stability.damping_boundary import boundary_nspm
 from study_app.validation.stability.trace_measures import fast_part
 from study_app.validation.stability.withheld_force import measure
-from tests.haptics.scenes import COMPILED, HONEY, UNBENT, WATER, Hand, scene, vectors
+from tests.haptics.scenes import COMPILED, HONEY, UNBENT, WATER, Hand, vectors
 
 pytestmark = pytest.mark.slow
 
@@ -178,24 +178,6 @@ def test_a_motion_that_breaks_off_leaves_no_liquid_weak():
         assert found.quick < 0.02
 
 
-def test_it_prefers_no_direction():
-    random = np.random.default_rng(5)
-    p_m = np.cumsum(random.normal(0, 1e-6, (200, 3)).cumsum(axis=0), axis=0)
-    q, _ = np.linalg.qr(random.normal(size=(3, 3)))
-    found, turned = (
-        vectors(simulate(scene(scale=3, velocity=Kalman()), Motion(np.arange(200) / 1000, 3 * p)), "velocity")
-        for p in (p_m, p_m @ q.T)
-    )
-    assert turned == pytest.approx(found @ q.T, abs=1e-9)
-    assert np.abs(found).max() > 1e-3
-
-
-def test_the_first_sample_says_nothing_and_one_count_says_little():
-    v = felt(Kalman(), np.array([0.5, 0.5 + COUNT_M]))[:, 0]
-    assert v[0] == 0.0
-    assert 0 < v[1] < 0.2 * COUNT_M / 1e-3
-
-
 @compiled
 def test_nothing_of_a_motion_is_left_in_denormal_numbers():
     moved = hand()
@@ -214,11 +196,6 @@ def test_a_device_that_measures_no_delay_gets_ewma():
     found, usual = (Hand(WATER.model_copy(update={"velocity": it})) for it in (Kalman(), Ewma()))
     assert found.model.parameters[0].estimator == ewma.CODE
     assert [s.tobytes() for s in found.sweep(0.2, 40)] == [s.tobytes() for s in usual.sweep(0.2, 40)]
-
-
-def test_another_estimator_is_no_change_of_numbers_alone():
-    assert built_alike(WATER.model_copy(update={"velocity": Kalman()}), WATER.model_copy(update={"velocity": Kalman()}))
-    assert not built_alike(WATER, WATER.model_copy(update={"velocity": Kalman()}))
 
 
 def strokes(ticks, hz=2.0):

@@ -19,9 +19,7 @@ MEASURED = [
 ]
 BALL = {"diameter_m": 0.068, "drag_coefficient": 0.47}
 WATER = {"density_kg_m3": 998.2, "viscosity_pa_s": 1.0016e-3, **BALL}
-OLIVE_OIL = {"density_kg_m3": 913, "viscosity_pa_s": 0.084, **BALL}
 HONEY = {"density_kg_m3": 1420, "viscosity_pa_s": 10, **BALL}
-TAR = {"density_kg_m3": 1150, "viscosity_pa_s": 100, **BALL}
 
 
 def coefficient(law, reynolds):
@@ -43,26 +41,6 @@ def test_measured_coefficients_are_met_within_7_percent_on_average_and_16_at_mos
     assert abs(deviation).max() < 0.16
 
 
-def test_the_cheapest_law_is_the_least_true():
-    deviation = {
-        law: np.sqrt(np.mean((np.array([coefficient(law, re) for re in REYNOLDS]) / MEASURED - 1) ** 2)) for law in LAWS
-    }
-    assert max(deviation, key=deviation.get) == next(iter(LAWS)) == "schiller-naumann"
-    assert deviation["schiller-naumann"] < 0.08
-
-
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize(("liquid", "newtons"), [(WATER, 0.2166), (OLIVE_OIL, 0.2652), (HONEY, 4.622)])
-def test_drag_at_half_a_metre_a_second(law, liquid, newtons):
-    assert drag_n(law, 0.5, **liquid) == pytest.approx(newtons, rel=0.08 if law == "schiller-naumann" else 0.07)
-
-
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize(("liquid", "speed"), [(WATER, 3.01), (OLIVE_OIL, 3.51), (HONEY, 0.780), (TAR, 0.121)])
-def test_the_speed_at_which_8_newtons_are_reached(law, liquid, speed):
-    assert drag_n(law, 0.93 * speed, **liquid) < 8 < drag_n(law, 1.07 * speed, **liquid)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 @given(low=st.floats(0, 1e6), high=st.floats(0, 1e6))
@@ -75,11 +53,6 @@ def test_a_constant_coefficient_is_the_thesis_equation():
     assert drag_n("constant", 2.0, density_kg_m3=1000, viscosity_pa_s=None, **BALL) == pytest.approx(
         0.5 * 1000 * 0.47 * math.pi * 0.034**2 * 4
     )
-
-
-def test_in_honey_a_constant_coefficient_is_9_times_too_weak_and_115_times_when_slow():
-    ratio = [drag_n("brown-lawler", v, **HONEY) / drag_n("constant", v, **HONEY) for v in (1.0, 0.05)]
-    assert ratio == pytest.approx([9, 115], rel=0.05)
 
 
 def test_a_law_of_the_reynolds_number_needs_a_viscosity():

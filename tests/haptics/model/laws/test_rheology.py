@@ -111,11 +111,6 @@ def test_a_bad_value_is_one_line(values, said):
     assert "\n" not in str(caught.value)
 
 
-def test_a_thickened_viscosity_below_the_other_is_refused():
-    with pytest.raises(ValidationError, match=r"thickened_viscosity_pa_s = 1 is less than .* = 2"):
-        ShearThickening(zero_shear_viscosity_pa_s=2, thickened_viscosity_pa_s=1, onset_shear_rate_per_s=5)
-
-
 @pytest.mark.parametrize("effects", ["auto", ("non_newtonian",)])
 def test_a_liquid_has_a_viscosity_or_a_flow_curve(effects):
     with pytest.raises(ValidationError, match="remove one of them"):
@@ -128,10 +123,6 @@ def test_the_gate_chooses_it_where_a_liquid_has_a_flow_curve(name):
     assert "non_newtonian" in liquid.effects
     assert not {"drag", "unsteady_drag", "history"} & set(liquid.effects)
     assert "not modelled: thixotropy" in "\n".join(describe_gate(tank(name, effects="auto")))
-
-
-def test_a_newtonian_liquid_is_written_as_before():
-    assert "non_newtonian" not in Liquid(id="a", density_kg_m3=1000).model_dump()
 
 
 @pytest.mark.parametrize("velocity", [Scene().velocity, Kalman()])

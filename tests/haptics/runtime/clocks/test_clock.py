@@ -13,14 +13,12 @@ if numba.config.DISABLE_JIT:
 
 from llvmlite import binding
 
-from study_app.errors import StudyError
 from study_app.haptics.kernels.c_functions import NOW, SLEEP, c_function
 from study_app.haptics.model.layout import records
 from study_app.haptics.runtime.clocks import linux as clock_linux
 from study_app.haptics.runtime.clocks import macos
 from study_app.haptics.runtime.clocks import windows as clock_windows
-from study_app.haptics.runtime.clocks.clock import SystemClock, VirtualClock, raise_priority
-from study_app.haptics.runtime.clocks.grants import Grant
+from study_app.haptics.runtime.clocks.clock import SystemClock, raise_priority
 
 if sys.platform != "win32":
     import resource
@@ -46,12 +44,6 @@ def test_a_sleep_ends_at_its_deadline_or_later_and_says_when():
     assert deadline <= woken <= clock.now_ns()
 
 
-def test_a_deadline_in_the_past_is_not_waited_for():
-    clock = SystemClock()
-    before = clock.now_ns()
-    assert before <= sleep(clock, before - 3_600_000 * MS) <= clock.now_ns()
-
-
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="signals of POSIX")
 def test_a_signal_does_not_shorten_a_sleep():
     clock, rung = SystemClock(), []
@@ -65,17 +57,6 @@ def test_a_signal_does_not_shorten_a_sleep():
         signal.signal(signal.SIGALRM, before)
 
 
-def test_virtual_time_passes_in_sleeps_alone():
-    clock = VirtualClock(start_ns=5)
-    assert clock.now_ns() == clock.now_ns() == 5
-    assert sleep(clock, 70 * MS) == 70 * MS == clock.now_ns()
-
-
-def test_virtual_time_never_goes_back():
-    clock = VirtualClock(start_ns=9 * MS)
-    assert sleep(clock, 2 * MS) == 9 * MS == clock.now_ns()
-
-
 # priority, asked for in threads that end with the test
 
 
@@ -85,18 +66,6 @@ def in_a_thread(function):
     thread.start()
     thread.join()
     return answers[0]
-
-
-def test_what_the_system_grants_is_said_in_words():
-    grant = in_a_thread(raise_priority)
-    assert grant.level in {"real-time", "raised", "normal"}
-    assert str(grant).startswith(grant.level)
-    assert (grant.level == "real-time") == (not grant.advice)
-
-
-def test_an_ordinary_thread_is_left_one():
-    grant = in_a_thread(lambda: raise_priority(((0, 0),), real_time=False))
-    assert str(grant) == "normal (no more was requested)"
 
 
 def refuse(*_):
@@ -148,12 +117,6 @@ def test_linux_takes_the_priority_that_a_limit_allows(linux, monkeypatch):
     monkeypatch.setattr(os, "sched_setscheduler", grant_20)
     assert str(in_a_thread(raise_priority)) == "real-time (SCHED_FIFO 20)"
     assert asked == [60, 20]
-
-
-def test_memory_that_is_not_locked_is_said_with_its_cure():
-    well = Grant("real-time", "SCHED_FIFO 60")
-    assert str(well.with_memory(locked=True, advice="cure")) == "real-time (SCHED_FIFO 60), memory locked"
-    assert str(well.with_memory(locked=False, advice="cure")) == "real-time (SCHED_FIFO 60), memory not locked; cure"
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="a limit of Linux")
@@ -215,12 +178,6 @@ def test_a_spin_takes_over_before_the_deadline_and_is_counted():
     trusting = SystemClock(spin_us=0)
     sleep(trusting, trusting.now_ns() + MS)
     assert trusting.spun_ns == 0
-
-
-@pytest.mark.parametrize("spin_us", [-1.0, 1001.0, float("nan")])
-def test_a_spin_longer_than_a_tick_is_refused(spin_us):
-    with pytest.raises(StudyError, match="a spin lasts 0 to 1000 µs"):
-        SystemClock(spin_us=spin_us)
 
 
 # the other systems' logic, against C functions that stand in for theirs

@@ -121,24 +121,11 @@ def test_the_service_is_asked_for_what_it_grants_at_most(serve, limits):
     assert limits == [(resource.RLIMIT_RTTIME, (200_000, 200_000))]
 
 
-def test_a_refusal_is_an_os_error(serve, limits):
-    _, path = serve(refuses=("MakeThreadRealtime",))
-    with pytest.raises(PermissionError, match="refuses MakeThreadRealtime"):
-        make_real_time(1, path)
-    assert limits
-
-
 def test_a_bus_without_the_service_changes_no_limit(serve, limits):
     _, path = serve(refuses=("Get",))
     with pytest.raises(PermissionError, match="refuses Get"):
         make_real_time(1, path)
     assert limits == []
-
-
-def test_a_bus_that_refuses_the_user_is_an_os_error(serve):
-    _, path = serve(auth=b"REJECTED EXTERNAL\r\n")
-    with pytest.raises(PermissionError, match="refuses this user"):
-        make_real_time(1, path)
 
 
 def test_no_bus_is_an_os_error(tmp_path, monkeypatch):
@@ -154,9 +141,3 @@ def test_a_thread_goes_before_others_as_far_as_the_service_grants_it(serve, limi
     assert (named[3], named[8]) == ("MakeThreadHighPriority", "ti")
     assert struct.unpack("<Qi", body) == (4711, -7)
     assert limits == [], "it may compute as long as it likes: it is not real-time"
-
-
-def test_a_thread_that_may_not_go_before_others_is_an_os_error(serve):
-    _, path = serve(refuses=("MakeThreadHighPriority",))
-    with pytest.raises(PermissionError, match="refuses MakeThreadHighPriority"):
-        make_high_priority(1, -10, path)
