@@ -38,39 +38,9 @@ def test_a_drag_is_one_step() -> None:
     assert edited.undo().redo().a == edited.a
 
 
-def test_a_drag_let_go_where_it_was_is_one_step_and_the_next_edit_another() -> None:
-    edited = bench().change("wake.length", 1600.0, held=True).change("wake.length", 1600.0)
-    assert len(edited.past) == 1
-    assert len(edited.change("wake.length", 1500.0).past) == 2
-
-
-def test_drags_of_two_parameters_are_two_steps() -> None:
-    edited = bench().change("wake.length", 1600.0, held=True).change("wake.exponent", 1.0, held=True)
-    assert len(edited.past) == 2
-    assert edited.undo().a.value("wake.length") == 1600.0
-
-
-def test_what_changes_nothing_is_no_step() -> None:
-    assert bench().change("wake.length", 1700.0) == bench()
-
-
 def test_a_refused_edit_says_why_and_leaves_everything() -> None:
     with pytest.raises(StudyError, match="outrun"):
         bench().change("wake.length", 1701.0)
-
-
-def test_choosing_and_copying_can_be_taken_back() -> None:
-    edited = bench().choose("A", "Honey", SCENES["honey"]).copy_felt_to_other()
-    assert edited.a == edited.b == Setting("Honey", SCENES["honey"], SCENES["honey"])
-    back = edited.undo().undo()
-    assert (back.a, back.b) == (bench().a, bench().b)
-    assert not back.may_undo
-
-
-def test_an_edit_after_undo_forgets_what_could_be_redone() -> None:
-    edited = bench().change("wake.exponent", 1.0).undo().change("wake.exponent", 2.0)
-    assert not edited.may_redo
-    assert edited.redo() == edited
 
 
 edits = st.lists(

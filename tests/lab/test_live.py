@@ -11,10 +11,8 @@ from study_app.devices.mouse import MouseDevice
 from study_app.devices.rig import Rig
 from study_app.errors import ServoFault, StudyError
 from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_FADE, LIMITER_NAMES, LIMITER_SLEW, LIMITER_STOP
-from study_app.haptics.model.scene import Kalman
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
-from study_app.lab.ab_comparison import Setting, Workbench
 from study_app.lab.live import Live, open_live
 from study_app.lab.programmed_paths import REACHED, TITLES, led_to, programme
 from tests.haptics.recording_device import Probe
@@ -251,13 +249,6 @@ def test_programmed_paths_fit_the_workspace_and_the_hand_goes_along_them(name: s
     live.close()
 
 
-def test_an_unknown_path_is_refused() -> None:
-    live = live_with(scripted())
-    with pytest.raises(StudyError, match="unknown path 'square'"):
-        live.play("square")
-    live.close()
-
-
 def test_the_pointer_moves_the_mouse_unless_a_path_does() -> None:
     device = MouseDevice(workspace_m=(0.05, 0.03, 0.03))
     live = Live(Rig(device, Servo(device, clock=VirtualClock(), elements=10_000)))
@@ -306,15 +297,6 @@ def test_a_path_beside_a_hand_that_takes_no_orders_is_computed_alone() -> None:
     live.servo.stop()
 
 
-def test_the_slew_limit_told_is_that_of_the_estimator() -> None:
-    live = live_with(scripted())
-    assert "Slew, 1.5 N per tick" in [it.name for it in live.limiters()]
-    water = SCENES["water"].model_copy(update={"velocity": Kalman()})
-    live.feel(Workbench(Setting("water", water, water), bench().b))
-    assert "Slew, 1.2 N per tick" in [it.name for it in live.limiters()]
-    live.close()
-
-
 @pytest.mark.slow
 def test_limiters_are_counted_as_telemetry_has_them() -> None:
     live = live_with(scripted())
@@ -337,16 +319,6 @@ def test_limiters_are_counted_as_telemetry_has_them() -> None:
     live.fade_in()
     run(live, 11_000)
     assert {it.name: it for it in live.limiters()}["Force stopped"].ticks == 0  # longer ago than 10 s
-    live.close()
-
-
-def test_a_scene_of_another_rate_is_felt_at_the_servos() -> None:
-    live = live_with(scripted())
-    sides = bench()
-    slow = sides.a.scene.model_copy(update={"rate_hz": 500.0})
-    live.feel(sides.choose("A", "slow", slow))
-    run(live, 40)
-    assert live.servo.telemetry.ring.scene[39] == 1
     live.close()
 
 

@@ -31,24 +31,6 @@ def test_every_value_of_a_preset_can_be_set_again(name: str) -> None:
         assert changed(scene, it.name, value) == scene, it.name
 
 
-@pytest.mark.variants(10)
-@pytest.mark.slow
-@pytest.mark.parametrize("name", SCENES)
-def test_both_ends_of_every_range_are_taken(name: str) -> None:
-    scene = SCENES[name]
-    for it in every(scene):
-        ends = [choice for choice, _ in it.choices] if it.choices else [it.least, it.most]
-        for end in ends:
-            try:
-                out = changed(scene, it.name, end)
-            except StudyError as error:
-                allowed = ("outrun", "viscosity", "needs a region", "missing")
-                assert any(word in str(error) for word in allowed), (it.name, end, error)  # noqa: PT017
-            else:
-                if not isinstance(end, str):
-                    assert value_of(out, it.name) == pytest.approx(end)
-
-
 def test_a_number_out_of_range_is_refused_in_the_units_that_are_shown() -> None:
     with pytest.raises(StudyError, match=r"Breaking span must be 0 mm to 500 mm, not 700 mm"):
         changed(SCENES["rek2024/water"], "wake.breaking_span_m", 0.7)
@@ -76,27 +58,6 @@ def test_smoothing_left_open_follows_from_the_estimator() -> None:
         assert value_of(kalman, name) == parameter(kalman, name).default == 0.015
         said = changed(kalman, name, 0.02)
         assert (value_of(said, name), parameter(said, name).default) == (0.02, 0.015)
-
-
-def test_a_liquid_without_viscosity_has_none_and_takes_one() -> None:
-    scene = SCENES["rek2024/water"]
-    assert value_of(scene, "liquid.viscosity_pa_s") is None
-    assert value_of(changed(scene, "liquid.viscosity_pa_s", 1e-3), "liquid.viscosity_pa_s") == 1e-3
-
-
-def test_only_the_tables_of_effects_that_are_called_for_are_shown() -> None:
-    titles = [section.title for section in sections(SCENES["rek2024/honey"])]
-    assert "Wake" not in titles
-    assert "Wake" in [it.title for it in sections(changed(SCENES["rek2024/honey"], "effects.wake", "on"))]
-    assert [it.title for it in sections(SCENES["rek2024/water"])][:4] == ["Liquid", "Wake", "Body", "Filter"]
-
-
-def test_components_are_parameters_of_their_own() -> None:
-    scene = changed(SCENES["rek2024/water"], "effects.current", "on")
-    moved = changed(scene, "current.velocity_mps.z", -1.5)
-    assert moved.liquids[0].current is not None
-    assert moved.liquids[0].current.velocity_mps == (0.5, 0.0, -1.5)  # type: ignore[union-attr]
-    assert value_of(moved, "current.velocity_mps.z") == -1.5
 
 
 def test_another_current_or_region_begins_as_large_as_the_hand_reaches() -> None:

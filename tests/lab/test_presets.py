@@ -51,13 +51,6 @@ def test_a_preset_reads_back_as_it_was_and_check_takes_it(source: str, edit: boo
         assert result.exit_code == 0, result.output
 
 
-def test_a_preset_says_what_was_changed() -> None:
-    origin = load_scene("rek2024", "water")
-    text = preset_text(Setting("Water", origin, changed(origin, "wake.length", 1200.0)))
-    assert text.splitlines()[:2] == ["# Water, as set in the liquid lab.", "# Changed from the preset: wake.length."]
-    assert "Changed" not in preset_text(Setting("Water", origin, origin))
-
-
 def test_a_preset_that_cannot_be_written_says_why(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="cannot be written"):
         save(tmp_path / "nowhere" / "water.toml", "")
@@ -76,13 +69,6 @@ def test_the_shipped_liquids_are_at_hand_with_those_of_a_folder_and_without_brok
     water = next(it for it in at_hand if (it.source, it.liquid) == ("rek2024", "water"))
     assert water.scene.velocity == Ewma()  # as its file says
     assert water.setting().origin == water.scene.model_copy(update={"velocity": Kalman()})
-
-
-def test_a_liquid_goes_on_with_its_own_estimator_if_that_is_not_the_usual_one(tmp_path: Path) -> None:
-    slow = load_scene("rek2024", "honey").model_copy(update={"velocity": Ewma(alpha=0.05)})
-    path = tmp_path / "slow.toml"
-    save(path, preset_text(Setting("Honey", slow, slow)))
-    assert Choice(str(path), "honey", "Honey").setting().scene.velocity == Ewma(alpha=0.05)
 
 
 def test_what_the_lab_saves_names_kalman(tmp_path: Path) -> None:

@@ -76,8 +76,3 @@ def test_a_file_that_takes_no_table_is_refused_and_unchanged(tmp_path: Path, set
         use_in_study(path, setting, None)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_study_that_is_gone_is_said(setting: Setting) -> None:
-    with pytest.raises(StoreError, match="cannot be read"):
-        use_in_study(Path("gone.toml"), setting, None)

@@ -11,7 +11,7 @@ from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.scene import Kalman, Scene
 from study_app.lab.ab_comparison import Setting, Workbench
 from study_app.lab.changes import changed
-from study_app.lab.shadow import SPAN_S, Shadow
+from study_app.lab.shadow import Shadow
 from study_app.lab.wake_tail import MOST_POINTS
 from tests.haptics.scenes import EVERYTHING
 from tests.lab.benches import SCENES, bench, live_with, run, scripted
@@ -52,18 +52,6 @@ def test_so_they_are_with_every_effect(name: str) -> None:
     run(live, 2500)
     assert live.shadow.differing == 0
     live.close()
-
-
-def test_so_they_are_with_the_kalman_filter_on_a_light_handle() -> None:
-    device = scripted()
-    device.state.handle.mass_kg = 0.05
-    live = live_with(device)
-    scene = SCENES["honey"].model_copy(update={"velocity": Kalman()})
-    live.feel(Workbench(Setting("honey", scene, scene), bench().b))
-    live.play("reach")
-    run(live, 2000)
-    assert live.shadow.followed > 1900
-    assert live.shadow.differing == 0
 
 
 def test_the_other_sides_kalman_filter_knows_the_force_that_was_sent() -> None:
@@ -121,20 +109,6 @@ def test_a_side_that_is_not_touched_keeps_its_wake_while_the_other_is_edited() -
     live.close()
 
 
-@pytest.mark.slow
-def test_a_trace_is_the_last_two_and_a_half_seconds() -> None:
-    live = live_with(scripted())
-    assert live.trace() is None
-    live.feel(bench())
-    run(live, 4000)
-    trace = live.trace()
-    assert trace is not None
-    assert trace.t_s[-1] == 0.0
-    assert trace.t_s[0] == pytest.approx(-SPAN_S, abs=2e-3)
-    assert len(trace.t_s) == len(trace.force_a_n) == len(trace.body_mps) == 2500
-    live.close()
-
-
 def test_a_tail_is_the_path_that_was_left_and_breaks_where_it_turns() -> None:
     """A path with a right angle: every point lies on it, and one segment begins at the corner."""
     scene = SCENES["water"]
@@ -178,30 +152,3 @@ def test_a_tail_forgets_what_falls_off_it() -> None:
     assert tail.positions_m[:, 0] == pytest.approx(np.arange(300, 400) * 1e-4)
     assert tail.ages[0] == 1.0
     assert shadow.tail("B") is None  # honey has no wake
-
-
-def test_zero_elements_are_alive_and_not_drawn() -> None:
-    shadow = Shadow(Scene(), 2000, 8.0, alone=True)
-    shadow.expect(1, "A", SCENES["water"], SCENES["water"])
-    samples = records(SAMPLE, 700)
-    samples.time_ns, samples.scene, samples.fresh = np.arange(700) * 1_000_000, 1, 1
-    samples.position_m[:, 0] = np.minimum(np.arange(700), 100) * 1e-4
-    shadow.take(samples)
-    tail = shadow.tail("A")
-    assert tail is not None
-    assert tail.alive == 700
-    assert len(tail.positions_m) < 250
-    assert tail.ages[-1] > 0.2
-
-
-def test_samples_that_were_lost_begin_both_sides_anew() -> None:
-    shadow = Shadow(Scene(), 2000, 8.0)
-    shadow.expect(1, "A", SCENES["water"], SCENES["light_oil"])
-    samples = records(SAMPLE, 300)
-    samples.time_ns, samples.scene, samples.fresh = np.arange(300) * 1_000_000, 1, 1
-    samples.position_m[:, 0] = np.arange(300) * 1e-4
-    shadow.take(samples)
-    shadow.take(samples[-10:], lost=True)
-    tail = shadow.tail("A")
-    assert tail is not None
-    assert tail.alive == 10

@@ -28,14 +28,6 @@ def test_it_prints_values_with_intervals_and_the_computing_time(tmp_path: Path) 
     assert re.search(r"6000 rows, [\d.]+ µs of computing per row", out)
 
 
-def test_without_idle_time_a_long_file_is_read_to_its_end(tmp_path: Path) -> None:
-    rows = measured(planted(drag=0.42, length=1700, scaling=1700), *stirring(2.0))
-    path = begun(tmp_path / "robot.csv")
-    path.write_text(path.read_text("utf-8") + "".join(lines(rows)), "utf-8")
-    assert path.stat().st_size > 3 * 65_536
-    assert "\n2000 rows" in said(*FILE, "--idle", "0", "--measured", str(path))
-
-
 def test_it_ends_with_3_where_the_motion_shows_nothing(tmp_path: Path) -> None:
     t_s, places = stirring(2.0)
     path = begun(tmp_path / "robot.csv")

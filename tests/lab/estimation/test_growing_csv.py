@@ -83,14 +83,3 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
     begun(path)
     with pytest.raises(StudyError, match="became shorter"):
         source.poll()
-
-
-def test_a_device_is_not_read() -> None:
-    """One such as /dev/zero has no end."""
-    with pytest.raises(StudyError, match="it is a device, which may have no end"):
-        GrowingCsv(Path("/dev/null")).poll()
-
-
-def test_a_file_that_the_system_does_not_look_at_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(StudyError, match=r"cannot read .*: File name too long; name a CSV file"):
-        GrowingCsv(tmp_path / f"{'x' * 300}.csv")
