@@ -104,12 +104,6 @@ def test_figure_6_the_wake_stays_limited_unless_the_breaking_angle_exceeds_the_t
     assert size(force(broken))[0] == pytest.approx(INITIAL_N)
 
 
-def test_figure_6_goes_toward_minus_z_and_turns_by_ninety_degrees():
-    motion = figure_6().runs[0].motion
-    assert (motion.velocity_mps[:, 2] < 0).all()
-    assert set(np.sign(motion.velocity_mps[:, 0])) == {-1.0, 1.0}
-
-
 def test_figure_7_a_coarser_resolution_fills_more_slowly():
     runs = thesis_motions.figure_7().runs
     wakes = [run.table.wake_x_mps for run in runs]
@@ -158,18 +152,6 @@ def test_every_figure_is_drawn_whole():
             box = text.get_window_extent()
             assert frame.x0 <= box.x0 < box.x1 <= frame.x1
             assert frame.y0 <= box.y0 < box.y1 <= frame.y1
-
-
-def test_the_force_is_drawn_per_axis_over_time():
-    drawn = thesis_figures.draw(figure_4())
-    plot = drawn.axes[0]
-    lines = {line.get_label()[0]: line for line in plot.lines if not line.get_label().startswith("_")}
-    assert set(lines) == {"x", "y", "z"}
-    table = figure_4().runs[0].table
-    for axis, line in lines.items():
-        assert (line.get_xdata() == table.t_s).all()
-        assert (line.get_ydata() == table[f"f{axis}_n"]).all()
-    assert len({line.get_color() for line in lines.values()}) == 3
 
 
 @pytest.mark.nightly

@@ -8,7 +8,6 @@ from study_app.cli import commands
 from study_app.cli.evidence.accuracy import motion_along
 from study_app.errors import StudyError
 from study_app.haptics.model.motion import Motion
-from study_app.protocol.load import load_scene
 from study_app.validation.accuracy.comparison import accuracy
 from tests.validation.accuracy.scenes import TANK, compiled
 
@@ -54,8 +53,3 @@ def test_the_command_prints_the_table_of_one_liquid(tmp_path):
     assert "central differences" in told.output
     assert "the motion is short: calls, of some µs, count in times of 5 ticks a batch" in told.output
     assert "| drag |" in told.output
-
-
-def test_the_default_subjects_are_at_hand():
-    assert load_scene("rek2024", "water").liquids[0].wake is not None
-    assert load_scene("physical_liquids", "honey").liquids[0].viscosity_pa_s is not None

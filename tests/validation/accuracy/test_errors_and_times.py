@@ -1,19 +1,16 @@
 """Errors of forces, their Pareto front, and times without what other threads take."""
 
 import math
-import threading
-import time
 
 import numpy as np
 import pytest
 
 from study_app.evaluation.force_error import Error, error_of
-from study_app.evaluation.hand_motions import stir
 from study_app.evaluation.reference_solutions import Case, Truth
 from study_app.haptics.model.motion import Motion
 from study_app.validation.accuracy.candidates import TickRung
-from study_app.validation.accuracy.comparison import FINE_S, Row, Time, front, race
-from tests.validation.accuracy.scenes import TANK, first_seconds
+from study_app.validation.accuracy.comparison import Row, Time, front
+from tests.validation.accuracy.scenes import TANK
 
 pytestmark = pytest.mark.slow
 
@@ -56,20 +53,3 @@ def test_the_front_takes_rounding_errors_and_times_within_a_twentieth_as_equal()
     assert [rung.name for rung in front(points)] == ["quick", "sums"]
     alike = dict([row("quick", 100, 0.5), row("truer", 104, 0.1), row("truest", 150, 0.01)])
     assert [rung.name for rung in front(alike)] == ["truer", "truest"]
-
-
-class WaitingRung(TickRung):
-    """A rung that is kept waiting by another thread, and notes for how long [ns]."""
-
-    def take(self, start, stop):
-        other, began = threading.Thread(target=sum, args=(range(1_000_000),)), time.perf_counter_ns()
-        other.start()
-        other.join()
-        self.waited_ns = time.perf_counter_ns() - began
-
-
-@pytest.mark.skipif(time.get_clock_info("thread_time").resolution > FINE_S, reason="no fine clock of a thread")
-def test_what_others_take_is_not_counted():
-    rung = WaitingRung("waiting", "waiting", "tick", TANK)
-    took = race((rung,), first_seconds(stir(10, 1000), 1.5), 1, 1, 1.0)[rung]
-    assert took.median_ns * rung.BATCH < 0.5 * rung.waited_ns

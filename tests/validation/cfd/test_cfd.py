@@ -4,7 +4,6 @@ import csv
 import re
 import shutil
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from importlib import resources
 
 import numpy as np
@@ -16,13 +15,10 @@ from study_app.cli.evidence.cfd import cfd
 from study_app.cli.parallel import executor_for
 from study_app.errors import StudyError
 from study_app.figure_style import PLOT_SETTINGS, file_bytes
-from study_app.protocol.load import load_scene
-from study_app.protocol.source.files import shipped_file
 from study_app.validation.cfd import cases, flow, flow_figure, model_comparison, solver, stored_flows
 from study_app.validation.cfd import fits as fitted
 from study_app.validation.cfd.cases import Case
-from study_app.validation.cfd.profiles import END, PROFILES, RAMP, STOP, STOPPING
-from study_app.validation.cfd.solver_truths import solver_truths
+from study_app.validation.cfd.profiles import PROFILES, RAMP, STOP, STOPPING
 from study_app.workers.executors import Workers
 from tests.haptics.scenes import COMPILED as IS_COMPILED
 from tests.validation.cfd import stand_ins
@@ -74,13 +70,6 @@ def test_acceleration_is_the_slope_of_the_speed_which_begins_at_rest(profile):
     assert 0.98 <= abs(profile.speed(t)).max() <= 1
 
 
-def test_the_stop_is_from_even_speed_to_rest():
-    t = np.linspace(0, END, 4001)
-    speeds = STOPPING.speed(t)
-    assert (speeds[(t >= RAMP) & (t <= STOP)] == 1).all()
-    assert (speeds[t >= STOP + RAMP] == 0).all()
-
-
 @pytest.mark.parametrize("t", [0.05, 0.2, 0.3, 5.0, 10.1, 10.2, 12.0])
 @pytest.mark.parametrize("reynolds", [1.0, 100.0])
 @pytest.mark.parametrize("profile", PROFILES.values(), ids=PROFILES)
@@ -98,25 +87,6 @@ def test_the_exact_linear_force_is_what_plain_quadrature_gives(profile, t, reyno
     expected = 3 * np.pi * viscosity * profile.speed(np.array([t])) + np.pi / 12 * acceleration(t)
     expected += 1.5 * np.sqrt(np.pi * viscosity) * memory
     assert profile.linear_drags(np.array([t]), reynolds) == pytest.approx(expected, rel=1e-6, abs=1e-9)
-
-
-def test_moments_cover_the_motion_in_steps_that_start_and_stop_short():
-    times = STOPPING.moments(0.005)
-    steps = np.diff(times)
-    assert (times[0], times[-1]) == (0.0, END)
-    assert steps.min() == pytest.approx(0.005)
-    assert steps.max() == pytest.approx(0.02)
-    np.testing.assert_allclose(steps[(times[1:] < 0.45) | ((times[1:] > STOP) & (times[1:] < STOP + 0.45))], 0.005)
-    assert STOPPING.near_steps(times).sum() == 2 * (0.4 / 0.005) + 2
-
-
-@pytest.mark.slow
-def test_a_study_of_the_workspace_does_not_change_what_is_solved(tmp_path, monkeypatch):
-    shipped = shipped_file(cases.PROTOCOL).read_text("utf-8")
-    (tmp_path / "protocols").mkdir()
-    (tmp_path / "protocols" / f"{cases.PROTOCOL}.toml").write_text(shipped.replace("density_kg_m3", "density_kg_m33"))
-    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
-    assert (*cases.cases(), *cases.training_cases(), *cases.held_out_cases()) == CASES
 
 
 def test_what_is_not_axisymmetric_is_refused():
@@ -182,20 +152,6 @@ def test_steady_drag_is_what_was_published_and_independent_of_the_grid():
         assert drag[reynolds == at] == pytest.approx(published, rel=0.006)
     assert drag[reynolds == 1] > 24 * (1 + 3 / 16) * 0.9  # Oseen's correction, too large by a little
     assert drag[reynolds == 1] < 24 * (1 + 3 / 16)
-
-
-def test_truths_find_the_tables_of_their_liquid():
-    honey = load_scene("physical_liquids", "honey")
-    found = solver_truths(honey)
-    assert [it.name for it in found] == [
-        "stop at 0.2 m/s",
-        "stop at 0.6 m/s",
-        "stop at 0.104 m/s",
-        "multi-sine at 0.0311 m/s",
-        "oscillation, KC 4 at 0.311 m/s",
-        "reversal at 0.207 m/s",
-    ]
-    assert all(it.computing_s is not None and it.computing_s > 0 for it in found)
 
 
 def test_a_table_that_was_damaged_is_named(tmp_path):
@@ -287,26 +243,6 @@ def test_without_the_library_one_line_says_what_to_install(monkeypatch, tmp_path
     assert CliRunner().invoke(cfd, ["--solve"]).exit_code == 2
 
 
-@pytest.mark.slow
-def test_cases_are_solved_by_an_executor_and_stored_under_their_names(monkeypatch, tmp_path):
-    monkeypatch.setattr(solver, "library", lambda: None)
-    monkeypatch.setattr(
-        solver, "motion_table", lambda case, flow, coarse, step: f"{case.name} {flow} {coarse} {step}".encode()
-    )
-    monkeypatch.setattr(solver, "steady_table", lambda: b"steady")
-    monkeypatch.setattr(solver, "Flow", lambda grid: f"ball {grid.ball}")
-    said = []
-    solver.flow_of.cache_clear()
-    with ThreadPoolExecutor(2) as executor:
-        written = solver.solve(tmp_path / "new", executor, said.append)
-    solver.flow_of.cache_clear()
-    of_cases = {f"{it.name}.csv": f"{it.name} ball 0.1 ball 0.14 {_step(it)}" for it in CASES}
-    assert {path.name: path.read_text("utf-8") for path in written} == {**of_cases, "steady.csv": "steady"}
-    folders = [path.parent.relative_to(tmp_path / "new").as_posix() for path in written]
-    assert folders == ["."] * 4 + ["training"] * 8 + ["held_out"] * len(cases.HELD_OUT) + ["."]
-    assert said[0] == f"{NAMES[0]}.csv, 1 of {len(written)} ..."
-
-
 @pytest.fixture
 def without_solver(monkeypatch):
     monkeypatch.setattr(solver, "library", lambda: None)
@@ -343,10 +279,6 @@ def test_an_interrupted_solution_keeps_its_tables_and_continues(tmp_path, capsys
         assert len(solver.solve(tmp_path, executor, lambda _: None)) == len(CASES) + 1
     assert int(kept) >= 9
     assert f"cases finished by an earlier start: {kept}" in capsys.readouterr().err
-
-
-def _step(case):
-    return 0.005 if case.reynolds <= 50 else 0.0025
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -19,7 +19,6 @@ from study_app.analysis.findings.other_assumptions import FINDING as AGAIN
 from study_app.analysis.findings.pair_comparison import FINDING as PAIRS
 from study_app.analysis.findings.settings_differ import FINDING as OMNIBUS
 from study_app.analysis.power.plan import plan
-from study_app.analysis.statistics.psychometrics.threshold import noticed
 from study_app.cli import commands
 from study_app.protocol.forms.simulated_observer import TrialFeatures
 from study_app.protocol.load import load
@@ -169,18 +168,6 @@ def test_rates_do_not_depend_on_the_executor(
     assert all(rates == found[0] for rates in found)
 
 
-def test_two_studies_in_one_process_have_truths_of_their_own(rek: Simulated, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(studies, "TRUTH", 200)
-    decided = replace(rek.decided, rising=rek.decided.falling, falling=rek.decided.rising)
-    turned = replace(rek, plan=replace(rek.plan, decided=decided))
-    cell = Cell("ordinal probit", "full", 5)
-    first, second = (truth(one, cell) for one in (rek, turned))
-    place = [block.kind for block in rek.blocks].index("delays")
-    clear = np.abs(first[place]) > 1
-    assert clear.any()
-    assert (np.sign(second[place]) == -np.sign(first[place]))[clear].all()
-
-
 @pytest.mark.parametrize(
     ("hits", "code", "last"),
     [
@@ -220,18 +207,6 @@ def test_single_tests_are_counted() -> None:
     assert covered.hits >= 2
 
 
-@pytest.mark.slow
-def test_an_interval_that_is_not_printed_covers_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        single_test_rates, "noticed", lambda *_args, **_named: noticed([[np.nan] * 7], single_test_rates.LEVELS_MS)
-    )
-    printed, covered = single_test_rates.count(("one threshold for all", 12), 1, 0, 4)
-    assert (printed.hits, printed.studies) == (0, 4)
-    assert (covered.hits, covered.studies) == (0, 0)
-    assert covered.holds == "too few studies"
-    assert replace(printed, studies=100).holds == "no"
-
-
 @pytest.fixture
 def continued(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[tuple[int, int]]]:
     """Two cells without any study; the batches that are counted of each."""
@@ -249,19 +224,6 @@ def continued(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[tuple[int, int]
         simulation, "cell_counts", lambda *_: {("clear", 5): counted("clear", 0), ("unclear", 5): counted("unclear", 2)}
     )
     return batches
-
-
-def test_cells_with_an_undecided_rate_are_continued_with_other_studies(
-    rek: Simulated, continued: dict[str, list[tuple[int, int]]]
-) -> None:
-    told: list[str] = []
-    with ThreadPoolExecutor(1) as executor:
-        *_, (done, rates) = validate(rek, 290, executor, progress=told.append)
-    assert continued["clear"] == [(batch, 25) for batch in range(11)] + [(11, 15)]
-    assert [batch for batch, _ in continued["unclear"]] == list(range(24))  # 24 of 290 are undecided, of 580 4.1 % hold
-    assert [(rate.hits, rate.studies, rate.holds) for rate in rates] == [(0, 290, "yes"), (24, 580, "yes")]
-    assert done == 3 * 290
-    assert told == ["continued: unclear, n = 5: what: 24 of 290, 8.3 % (5.6 to 12.0), at most 5 %: too few studies"]
 
 
 def test_a_cell_is_continued_until_it_is_beyond_or_has_four_times_the_studies(

@@ -86,19 +86,3 @@ def test_a_lost_device_begins_another_run():
     counts = audited(made)
     assert broken(counts) == {}
     assert (counts.lost, counts.silent) == (1, 0)
-
-
-def test_missing_ticks_are_counted():
-    made = samples()
-    assert broken(audited(made[[0, 1, 2, 6, 7, 8]])) == {"missing": 3}
-
-
-def test_a_tick_that_takes_long_passes_deadlines_over():
-    made = samples()
-    made.busy_ns[7] = 3_500_000
-    made.time_ns[8:] += 2_000_000
-    made.time_ns[8] += 500_000
-    made.lateness_ns[8] += 500_000
-    counts = audited(made)
-    assert broken(counts) == {"overruns": 2}
-    assert counts.long_ticks == 1

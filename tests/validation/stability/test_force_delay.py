@@ -14,7 +14,6 @@ from study_app.validation.stability.closed_loop import TRACE, follow
 from study_app.validation.stability.device_bench import new_bench
 from study_app.validation.stability.force_delay import DELAYS_MS, ESTIMATORS, HANDS, LIQUIDS, delayed_trace, measure
 from study_app.validation.stability.stability_cases import Case, parse
-from study_app.validation.stability.verdict import judge
 from tests.haptics.scenes import COMPILED
 
 compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
@@ -110,13 +109,6 @@ def test_the_longest_delay_is_the_last_one_before_too_much_is_withheld():
     assert all(longest_ms(it, "kalman") <= longest_ms(it, "kalman", "middle") for it in LIQUIDS)
     with pytest.raises(KeyError):
         longest_ms("oil", "kalman")
-
-
-@compiled
-def test_a_case_with_a_delayed_force_is_a_line():
-    case = parse("liquid=water hand=middle motion=sine speed_mps=0.2 force_delay_ms=20")
-    assert parse(str(case)) == case
-    assert judge(case, safe=True).stable
 
 
 def test_command_writes_the_table_and_prints_it(monkeypatch, tmp_path):

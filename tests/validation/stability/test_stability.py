@@ -2,10 +2,8 @@
 
 import csv
 import dataclasses
-import math
 from concurrent.futures import ThreadPoolExecutor
 
-import numpy as np
 import pytest
 from click import UsageError
 from click.testing import CliRunner
@@ -19,10 +17,8 @@ from study_app.protocol.load import load, shipped
 from study_app.validation.stability import stability_report as stability
 from study_app.validation.stability.case_groups import Group, groups, some, sweep
 from study_app.validation.stability.damping_boundary import measure_limits
-from study_app.validation.stability.device_bench import trace_of
 from study_app.validation.stability.fidelity import LOOPS, fidelities
 from study_app.validation.stability.stability_cases import GRIPS, Case, liquids, parse, scene_of, scenes
-from study_app.validation.stability.trace_measures import fast_part, smooth
 from study_app.validation.stability.verdict import judge
 from study_app.validation.stability.withheld_force import measure
 from study_app.workers.executors import Workers, open_executor
@@ -177,56 +173,6 @@ def test_what_no_handle_bears_is_said_to_be_limited(name):
     assert not found.within
 
 
-@compiled
-def test_the_slow_loop_is_told_to_differ():
-    (found,) = fidelities(["honey"], [(250.0, 1)])
-    assert not found.within
-    assert found.share > 0.5
-
-
-@compiled
-def test_the_hand_that_is_simulated_follows_its_path_and_lets_go():
-    held = trace_of(Case(liquid="water", hand="firm", speed_mps=0.1, motion="circles"))
-    radii = np.linalg.norm(held.position_m[300:1000, [0, 2]], axis=1)
-    assert radii == pytest.approx(0.03, abs=0.003)
-    gone = trace_of(Case(liquid="water", scale=1.0, hand="lets-go", motion="stroke", speed_mps=0.1))
-    speeds = np.linalg.norm(gone.velocity_mps, axis=1)
-    assert np.abs(np.diff(speeds[gone.t_s > 0.7])).max() < 1e-3
-    assert not math.isclose(speeds[-1], speeds[650], rel_tol=0.02)
-
-
-@compiled
-def test_the_fast_part_passes_what_is_above_40_hz_and_nothing_below():
-    t_s = np.arange(4000) / 1000
-    for frequency_hz, passed in ((10, 0.0625), (40, 0.707), (200, 1.0)):
-        wave = np.column_stack([np.sin(2 * np.pi * frequency_hz * t_s), 0 * t_s, 0 * t_s])
-        found = fast_part(wave, 1000.0, 40.0, 1000, 4000, 0.1)
-        assert found * math.sqrt(2) == pytest.approx(passed, abs=0.03)
-
-
-@compiled
-def test_what_happens_once_is_left_aside_and_what_goes_on_is_not():
-    t_s = np.arange(1000) / 1000
-    once, always = (np.zeros((1000, 3)) for _ in range(2))
-    once[500:520, 1] = 1.0
-    always[:, 1] = np.sin(2 * np.pi * 100 * t_s)
-    assert fast_part(once, 1000.0, 40.0, 0, 1000, 0.0) > 0.05
-    assert fast_part(once, 1000.0, 40.0, 0, 1000, 0.1) < 1e-3
-    assert fast_part(always, 1000.0, 40.0, 0, 1000, 0.1) == pytest.approx(math.sqrt(0.5), rel=0.03)
-
-
-@compiled
-def test_smoothing_halves_the_power_of_40_hz():
-    trace = trace_of(Case())
-    for axis in range(3):
-        trace.position_m[:, axis] = np.sin(2 * np.pi * 40 * trace.t_s)
-        trace.sent_n[:, axis] = np.sin(2 * np.pi * 40 * trace.t_s)
-    out_m, out_n = np.zeros((len(trace), 3)), np.zeros((len(trace), 3))
-    smooth(trace, math.sqrt(math.log(2)) / (2 * math.pi * 40), out_m, out_n)
-    for out in (out_m, out_n):
-        assert out[200:-200].std() == pytest.approx(math.sqrt(0.5) * trace.position_m[200:-200].std(), rel=0.02)
-
-
 @pytest.mark.nightly
 @compiled
 def test_the_files_hold_every_case_and_the_lines_that_reproduce_the_failing_ones(swept, tmp_path):
@@ -327,10 +273,6 @@ def test_the_command_judges_only_the_groups_that_are_named():
 def test_what_cannot_be_judged_is_refused(words, said):
     with pytest.raises((StudyError, UsageError), match=said):
         raise command(*words).exception
-
-
-def test_a_line_that_is_none_is_refused():
-    assert isinstance(command("--case", "liquid=mercury").exception, StudyError)
 
 
 @compiled

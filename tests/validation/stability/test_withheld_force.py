@@ -63,15 +63,6 @@ def test_force_withheld_is_the_vector_between_permitted_and_sent_force():
     assert trace.withheld_n.max() > 0.1
 
 
-@compiled
-def test_position_is_imposed_or_held():
-    t_s = np.arange(600) / 1000
-    path_m = np.outer(0.03 * np.cos(2 * np.pi * t_s), [0.8, 0.0, 0.6])
-    assert (played(Case(liquid="honey"), path_m, rigid=1).position_m == path_m).all()
-    held = played(Case(liquid="honey", hand="firm"), path_m, rigid=0)
-    assert 1e-4 < np.abs(held.position_m - path_m).max() < 0.02
-
-
 @pytest.mark.slow
 @compiled
 def test_a_second_after_the_hand_was_shaken_the_whole_force_arrives():

@@ -12,7 +12,6 @@ from study_app.protocol.load import load
 from study_app.protocol.streams import stream
 from study_app.protocol.trials.kinds import default_design
 from study_app.session.simulated.design_observer import OBSERVER, Comparison
-from study_app.validation.thresholds import noticed_figure
 from study_app.validation.thresholds.noticed_delays import (
     CRITERIA_S,
     JND_S,
@@ -81,16 +80,6 @@ def test_the_table_has_a_row_for_each_procedure_and_criterion(found: Compared) -
     assert rows[-1].startswith("| rek2024: rating of “different”, half agree, adapted to 30 ms | 130 ms | ")
     nothing = replace(found.rated[0], found=replace(found.rated[0].found, effect=None, lower=None, upper=None))
     assert "| none | – |" in markdown(replace(found, rated=(nothing,)))
-
-
-def test_the_figure_draws_every_threshold(found: Compared) -> None:
-    sheet = noticed_figure.draw(found, ("DejaVu Sans",))
-    left, right = sheet.figure.axes
-    assert {line.get_gid() for line in left.lines} >= {"correct", "detected", "rated-60", "rated-165"}
-    of = {line.get_gid(): line for line in right.lines}
-    assert set(of) >= {"detected", "thesis", "threshold-60", "threshold-95", "threshold-130", "threshold-165"}
-    assert of["detected"].get_ydata()[0] == found.detected_ms[0]
-    assert of["threshold-95"].get_ydata()[0] == found.rated[1].found.effect
 
 
 @pytest.mark.nightly

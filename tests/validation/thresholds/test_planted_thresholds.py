@@ -12,9 +12,9 @@ from study_app.protocol.load import load, parse
 from study_app.protocol.streams import stream
 from study_app.protocol.trials.kinds import default_design
 from study_app.session.simulated.design_observer import OBSERVER, Comparison, Observer
-from study_app.validation.thresholds.methods_alone import StudyFound, simulate, slopes
+from study_app.validation.thresholds.methods_alone import StudyFound, simulate
 from study_app.validation.thresholds.planted import SHIPPED, Planted, planted
-from study_app.validation.thresholds.verdicts import Verdict, markdown, spread, table, verdicts
+from study_app.validation.thresholds.verdicts import markdown, spread, verdicts
 from study_app.validation.thresholds.whole_pipeline import judged, rehearsed
 from tests.compiled import needs_servo
 from tests.protocol.trials.level_studies import text_of_damper
@@ -114,16 +114,6 @@ def test_a_biased_estimate_and_intervals_that_are_too_narrow_are_found(one: Plan
     assert not narrow["coverage of participants' 95 % intervals"]
 
 
-def test_slopes_tell_a_constant_jnd_from_webers_law() -> None:
-    protocol = parse(SMALL.replace("standards = [8]", "standards = [4, 8, 16]").encode(), "small.toml")
-    three = planted("three", protocol)
-    assert three.exponent == 1
-    rows = tuple((0.24, 0.2, 0.3) for _ in range(3))
-    assert slopes(three, StudyFound(rows, (rows, rows))) == pytest.approx([1, 1])
-    constant = tuple((0.96 / standard, 0.1, 0.3) for standard in (4, 8, 16))
-    assert slopes(three, StudyFound(constant, (constant,))) == pytest.approx([0], abs=1e-12)
-
-
 @pytest.mark.nightly
 @pytest.mark.slow
 @needs_servo
@@ -135,12 +125,3 @@ def test_the_whole_program_recovers_it_and_another_observer_is_found(one: Plante
     other = list(judged(dull, rehearsed(dull, SMALL.encode(), seed=1), 0.05))
     assert other[2].limit.startswith("2 ± 3 SD")
     assert not other[2].holds, "the levels end at 0.6"
-
-
-def test_tables_have_a_row_for_each_value() -> None:
-    rows = [Verdict("a", "error", "+1 %", "within ±5 %", True), Verdict("a", "coverage", "50 %", "95 %", False)]
-    assert markdown(rows).splitlines()[2:] == [
-        "| a | error | +1 % | within ±5 % | yes |",
-        "| a | coverage | 50 % | 95 % | no |",
-    ]
-    assert table(rows).decode().splitlines()[1] == "a,error,+1 %,within ±5 %,true"

@@ -7,15 +7,7 @@ from study_app.haptics.kernels.sample_validation import FASTEST_HAND_MPS
 from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_FADE, LIMITER_NORM, LIMITER_SLEW, LIMITER_SLOPE
 from study_app.protocol.load import load_scene
 from tests.haptics.scenes import COMPILED
-from tests.validation.velocity.recorded_encoders import (
-    COUNTS_M,
-    ESTIMATORS,
-    FORCE_LIMIT_N,
-    errors,
-    excerpt,
-    felt,
-    smoothed_mps,
-)
+from tests.validation.velocity.recorded_encoders import COUNTS_M, ESTIMATORS, FORCE_LIMIT_N, errors, excerpt, felt
 
 pytestmark = [pytest.mark.skipif(not COMPILED, reason="many thousands of ticks"), pytest.mark.slow]
 
@@ -54,11 +46,3 @@ def test_errors_on_real_encoders_rank_the_estimators() -> None:
     assert fine["kalman"] < 0.6 * fine["lead"] < 0.6 * fine["ewma"]
     assert coarse["raw"] == max(coarse.values())
     assert all(coarse[kind] > fine[kind] for kind in kinds)
-
-
-def test_the_acausal_smoother_finds_the_speed_of_a_counted_stroke() -> None:
-    t_s = np.arange(3000) * 1e-3
-    count_m = COUNTS_M["spindle"]
-    found_mps = smoothed_mps(np.round(0.026 * np.sin(2 * np.pi * t_s) / count_m) * count_m)
-    true_mps = (0.052 * np.pi * np.cos(2 * np.pi * t_s))[500:-500]
-    assert np.sqrt(np.mean((found_mps - true_mps) ** 2)) < 0.01 * np.sqrt(np.mean(true_mps**2))

@@ -13,7 +13,7 @@ from study_app.haptics.model.scene import Ewma, Kalman, Raw
 from study_app.validation.stability.stability_cases import GRIPS
 from study_app.validation.velocity import criteria, held_handle, imposed_motions
 from study_app.validation.velocity.criteria import PARTS, Row, report
-from study_app.validation.velocity.imposed_motions import COUNT_M, SMOOTH, Stroke, estimated, noise_mmps
+from study_app.validation.velocity.imposed_motions import COUNT_M, Stroke, noise_mmps
 from tests.haptics.scenes import COMPILED
 
 compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
@@ -43,21 +43,6 @@ def test_noise_of_the_raw_difference_is_that_of_its_counts():
         assert found[speed_mps] == pytest.approx(1e3 * COUNT_M / 1e-3 * math.sqrt(p * (1 - p)), rel=0.05)
 
 
-@pytest.mark.parametrize("stroke", [*SMOOTH, Stroke(0.01, 5.0)], ids=str)
-def test_speeds_of_a_stroke_are_the_derivative_of_its_positions(stroke):
-    t_s = np.linspace(0.01, 0.97, 5000)
-    places_m, speeds_mps = stroke.places_m(t_s), stroke.speeds_mps(t_s)
-    assert np.gradient(places_m, t_s) == pytest.approx(speeds_mps, abs=0.01 * np.abs(speeds_mps).max())
-    assert np.ptp(places_m) == pytest.approx(2 * stroke.amplitude_m, rel=1e-3)
-
-
-def test_estimators_get_positions_in_counts():
-    t_s = np.arange(40) / 1000
-    found = estimated(Raw(), t_s, 0.013 * t_s)
-    assert np.round(found / (COUNT_M / 1e-3)) == pytest.approx(found / (COUNT_M / 1e-3), abs=1e-9)
-    assert len(set(np.round(found, 9))) == 2
-
-
 @compiled
 @pytest.mark.slow
 def test_a_held_handle_has_the_error_of_the_imposed_motion():
@@ -67,15 +52,6 @@ def test_a_held_handle_has_the_error_of_the_imposed_motion():
     passed = ewma_response(0.1, 1e-3, 2 * math.pi * 3)
     assert held == pytest.approx(100 * 2 / math.sqrt(3) * abs(passed - 1), rel=0.1)
     assert held_handle.error(quadratic, Kalman(), GRIPS["firm"], Stroke(0.02, 3.0)) < 0.25 * held
-
-
-def test_whole_forces_are_those_of_physical2_at_scale_3_without_buoyancy():
-    found = held_handle.whole_forces()
-    assert [scene.liquids[0].id for scene in found] == list(held_handle.WHOLE_LIQUIDS) == list(criteria.WHOLE_PERCENT)
-    for scene in found:
-        assert scene.scale == 3
-        assert "buoyancy" not in scene.liquids[0].effects
-        assert scene.liquids[0].effects
 
 
 @pytest.mark.nightly

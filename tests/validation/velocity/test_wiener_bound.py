@@ -8,7 +8,6 @@ from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.scene import Knee, Liquid, Scene
 from study_app.validation.stability.stability_cases import scenes
 from study_app.validation.velocity import wiener_bound as bounds
-from study_app.validation.velocity.criteria import Row, report
 from study_app.validation.velocity.wiener_bound import wiener_bound
 from tests.haptics.scenes import COMPILED
 
@@ -44,10 +43,3 @@ def test_bounds_of_physical2_are_those_of_an_outside_check(liquid: str, percent:
     scene = without_buoyancy(scenes()[f"physical2_{liquid}"])
     found = [100 * wiener_bound(scene, count_m, 1e-3) for count_m in (38e-6, 14e-6, 10e-6)]
     assert found == pytest.approx(percent, rel=0.16)
-
-
-def test_the_bound_is_printed_beside_the_errors() -> None:
-    rows = Row("whole", (12.0, 20.0, 15.0), 14.0, bound=9.3), Row("plain", (1.0, 2.0, 3.0))
-    first, second = report(rows).split("\n")[1:]
-    assert first.endswith("≤ 14: met   least of linear estimators 9.3")
-    assert "least" not in second
