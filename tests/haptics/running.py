@@ -5,6 +5,10 @@ import time
 
 import numpy as np
 
+from study_app.haptics.kernels.safety import begin_scene, new_safety
+from study_app.haptics.model.device_dynamics import UNKNOWN
+from study_app.haptics.runtime.pack import pack
+from study_app.haptics.runtime.recompute import new_wake_places, recompute_sample
 from tests.haptics.scenes import HONEY
 
 
@@ -31,11 +35,17 @@ def is_zero(force):
     return not np.any(force)
 
 
-# the force ends
-
-
 def felt(servo, scene=HONEY):
     """Bring the servo to where a force is felt."""
     servo.load(scene)
     servo.advance(1000)
     assert force_n(servo.telemetry) > 1
+
+
+def recomputed(samples, scene=HONEY, dynamics=UNKNOWN, *, delivered=True):
+    """Return the samples of a scene's first presentation as they are computed again, and the state of safety."""
+    again, safety = samples.copy(), new_safety(8.0)
+    begin_scene(safety[0])
+    trail, places = new_wake_places(10)
+    recompute_sample(pack(scene, dynamics=dynamics), safety[0], again, trail[0], places, delivered)
+    return again, safety[0]

@@ -82,6 +82,17 @@ def pass_time(hand: Hand, places_m: Any, ticks: int, *, after_ns: int = TICK_NS)
     return hand.sample.copy()[0]
 
 
+def all_numbers(model: Any) -> Any:
+    """Return every number that is not whole which a model keeps as its state, (n,)."""
+
+    def flat(record: Any) -> list[Any]:
+        if record.dtype.names:
+            return [value for name in record.dtype.names for value in flat(record[name])]
+        return [record.ravel()] if record.dtype == np.float64 else []
+
+    return np.concatenate([value for rows in model.arrays[2:] for value in flat(np.asarray(rows))])
+
+
 @kernel
 def _pass_time(model: Any, safety: Any, sample: Any, places_m: Any, ticks: int, after_ns: int) -> None:
     for k in range(ticks):

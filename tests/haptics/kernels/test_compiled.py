@@ -77,11 +77,6 @@ def test_where_nothing_can_be_kept_the_program_works_and_says_what_to_do(tmp_pat
     assert "NUMBA_CACHE_DIR" in said
 
 
-@about_user_cache
-def test_nobody_hears_of_a_cache_that_works(tmp_path: Path) -> None:
-    assert said_at_start(tmp_path, {"NUMBA_CACHE_DIR": "", "XDG_CACHE_HOME": str(tmp_path)})[1] == ""
-
-
 PACKAGE = Path(__file__).parents[3] / "study_app"
 ADDS = """
 from study_app.haptics.kernels import compiled, vector

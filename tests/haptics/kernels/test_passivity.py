@@ -12,7 +12,7 @@ from study_app.haptics.model.force_rules import VERSIONS
 from study_app.haptics.model.laws import drag_laws as laws
 from study_app.haptics.model.layout import LIMITER_ENERGY
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Body, Raw
+from study_app.haptics.model.scene import Body
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import COMPILED, HONEY, THESIS, WATER, Hand, examples, liquid, scene
 
@@ -154,21 +154,6 @@ def test_a_hand_that_drifts_with_a_current_does_no_work():
     assert passivity(hand).balance_j <= 0.2e-3
 
 
-def test_without_a_wake_and_a_filter_nothing_is_kept_for_later():
-    hand = Hand(HONEY.model_copy(update={"velocity": Raw()}))
-    hand.sweep(0.3, 500)
-    assert passivity(hand).balance_j == 0.0
-
-
-def test_a_new_scene_owes_nothing_and_is_owed_nothing():
-    hand = Hand(WATER)
-    hand.sweep(0.3, 500)
-    assert passivity(hand).balance_j > 0
-    begin_scene(hand.safety[0])
-    fresh = Hand(WATER)
-    assert passivity(hand).tobytes() == passivity(fresh).tobytes()
-
-
 def pushed():
     """Return a hand at rest after a stroke, 18 cm along, whose wake pushes it on."""
     hand = Hand(WATER)
@@ -278,16 +263,6 @@ def test_a_liquid_that_resists_enough_pays_its_debt_unchanged():
     assert sample.limiters == 0
     hand.tick((0.0604, 0.0, 0.0))
     assert passivity(hand).balance_j > -1e-3
-
-
-def test_in_debt_nothing_pushes_the_hand_on():
-    hand = pushed()
-    for k in range(20):
-        hand.tick((0.18 + 1e-4 * k, 0.0, 0.0))
-    assert hand.sample[0].device_force_n[0] > 0.0
-    passivity(hand).balance_j = -1.5e-3
-    hand.tick((0.18 + 1e-4 * 20, 0.0, 0.0))
-    assert hand.sample[0].device_force_n[0] < 0.0
 
 
 @pytest.mark.compiled

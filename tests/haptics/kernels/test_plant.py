@@ -11,9 +11,7 @@ from hypothesis import strategies as st
 if numba.config.DISABLE_JIT:
     pytest.skip("too many sub-steps for plain Python", allow_module_level=True)
 
-from study_app.errors import StudyError
-from study_app.haptics.kernels.plant import let_go, measure, move, new_handle, push
-from study_app.haptics.kernels.tick_schedule import new_schedule, next_tick
+from study_app.haptics.kernels.plant import move, new_handle, push
 from study_app.haptics.model.layout import MOST_DELAY
 
 STILL = np.zeros(3)
@@ -49,16 +47,6 @@ def test_the_step_response_is_that_of_mass_spring_and_damper(damping_ratio):
         wave = np.cos(root * own * t) + damping_ratio / root * np.sin(root * own * t)
         rest = (np.exp(-damping_ratio * own * t) * wave).real
     assert x == pytest.approx(step * (1 - rest), abs=3e-3 * step)
-
-
-def test_quadratic_drag_lets_it_coast_as_the_exact_solution_says():
-    """With m dv/dt = -c v|v|: v = v_0 / (1 + c v_0 t / m); from 1 m/s, 0.1 kg, 0.85 kg/m: 0.105 263 16 after 1 s."""
-    handle = new_handle(mass_kg=0.1)
-    handle.velocity_mps[0] = 1.0
-    t, x, v = trace(handle, 1.0, force=lambda h: -0.85 * h.velocity_mps[0] * abs(h.velocity_mps[0]))
-    assert v[-1] == pytest.approx(0.10526316, rel=5e-3)
-    assert v == pytest.approx(1 / (1 + 8.5 * t), rel=5e-3)
-    assert x == pytest.approx(np.log1p(8.5 * t) / 8.5, rel=5e-3)
 
 
 def test_coulomb_friction_holds_a_handle_and_then_slides():
@@ -107,17 +95,6 @@ def test_end_stops_hold_it():
     assert abs(handle.position_m[0]) < 0.05
 
 
-@settings(deadline=None)  # the first example compiles
-@given(st.floats(-0.1, 0.1))
-def test_encoders_tell_the_nearest_whole_count(x):
-    handle = new_handle(mass_kg=0.2, quantum_m=38e-6)
-    handle.position_m[0] = x
-    seen = np.zeros(3)
-    measure(handle, seen)
-    assert abs(seen[0] - x) <= 19e-6 * (1 + 1e-9)
-    assert seen[0] / 38e-6 == pytest.approx(round(seen[0] / 38e-6), abs=1e-6)
-
-
 @pytest.mark.parametrize("delay", range(MOST_DELAY + 1))
 def test_a_force_acts_as_many_writes_late_as_the_device_is_delayed(delay):
     handle = new_handle(mass_kg=0.2, delay=delay)
@@ -128,42 +105,9 @@ def test_a_force_acts_as_many_writes_late_as_the_device_is_delayed(delay):
     assert acting == [[max(k - delay, 0) * sign for sign in (1, -1, 2)] for k in range(1, 12)]
 
 
-@pytest.mark.parametrize("delay", [-1, MOST_DELAY + 1])
-def test_a_delay_beyond_its_memory_is_refused(delay):
-    with pytest.raises(StudyError, match="0 to 4 ticks"):
-        new_handle(mass_kg=0.2, delay=delay)
-
-
 def test_motors_saturate_each_on_its_own_and_give_whole_steps():
     handle = new_handle(mass_kg=0.2, motor_limit_n=8.0, motor_step_n=0.25)
     push(handle, 9.0, -100.0, 0.37)
     assert handle.force_n.tolist() == [8.0, -8.0, 0.25]
     push(handle, 0.38, -0.38, 0.124)
     assert handle.force_n.tolist() == [0.5, -0.5, 0.0]
-
-
-def test_letting_go_of_the_force_forgets_what_is_on_its_way():
-    handle = new_handle(mass_kg=0.2, delay=3)
-    for _ in range(4):
-        push(handle, 1.0, 1.0, 1.0)
-    let_go(handle)
-    assert not handle.force_n.any()
-    push(handle, 0.0, 0.0, 0.0)
-    assert not handle.force_n.any()
-
-
-def test_a_tick_is_late_but_its_deadlines_stay():
-    pace = new_schedule(2e-3, jitter_s=0.5e-3)
-    late_s = np.cumsum([next_tick(pace) for _ in range(5000)]) - 2e-3 * np.arange(1, 5001)
-    assert late_s.min() >= -1e-12
-    assert late_s.max() <= 0.5e-3
-    assert late_s.mean() == pytest.approx(0.25e-3, rel=0.05)
-    assert late_s.std() == pytest.approx(0.5e-3 / math.sqrt(12), rel=0.05)
-
-
-def test_a_share_of_the_ticks_does_not_come():
-    pace = new_schedule(1e-3, missed=0.2)
-    ticks = np.array([next_tick(pace) for _ in range(5000)]) / 1e-3
-    assert ticks == pytest.approx(np.rint(ticks))
-    assert ticks.mean() == pytest.approx(1 / 0.8, rel=0.03)
-    assert ticks.max() > 2

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from study_app.haptics.model.layout import STATUS_NON_FINITE
+from study_app.haptics.model.layout import LIMITER_ENERGY, STATUS_NON_FINITE
 from study_app.haptics.model.scene import Ewma, Foaw, Line, Raw
+from study_app.haptics.model.slope_limits import SLEW_N
 from tests.haptics.scenes import EVERYTHING, THESIS, TICK_NS, Hand, examples
 
 pytestmark = pytest.mark.slow
@@ -40,11 +41,18 @@ acts = st.one_of(
 @example(
     todo=[("stride", (0.0, 0.0, 3.0), 14), ("stride", (0.0, 5e-265, 0.0), 1)], estimator="raw", faded_in=True
 )  # the square of the speed underflows
-def test_any_bytes_at_any_time_give_a_finite_force_within_the_limit(name, todo, estimator, faded_in):
+def test_any_bytes_at_any_time_give_a_finite_force_within_the_limit_that_never_jumps(name, todo, estimator, faded_in):
     hand = Hand(ALL[name].model_copy(update={"velocity": ESTIMATORS[estimator]}), faded_in=faded_in)
 
+    before_n = np.zeros(3)
+
     def turn(place, after_ns):
+        nonlocal before_n
         sample = hand.tick(place, after_ns=after_ns)
+        stepped_n = np.linalg.norm(sample.device_force_n - before_n)
+        let_go = sample.limiters & LIMITER_ENERGY or not sample.device_force_n.any()
+        assert stepped_n <= SLEW_N + 1e-9 or let_go
+        before_n = np.array(sample.device_force_n)
         assert np.isfinite(sample.device_force_n).all()
         assert np.linalg.norm(sample.device_force_n) <= 8 * (1 + 1e-12)
         assert sample.status != STATUS_NON_FINITE

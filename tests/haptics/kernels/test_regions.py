@@ -41,10 +41,6 @@ def test_a_region_holds_its_border_and_nothing_beyond(region, inside, outside):
     assert [shares(felt, [place])[0] for place in outside] == [0] * len(outside)
 
 
-def test_a_body_inside_at_the_beginning_feels_the_whole_liquid_at_once():
-    assert shares(scene(liquid(region=CUBE)), walk(np.zeros(3))) == pytest.approx([1, 1, 1])
-
-
 def test_entering_and_leaving_fade_over_20_ms():
     phi = shares(scene(liquid(region=CUBE)), walk([0.5] + [0.0] * 30 + [0.5] * 30))
     assert phi[:32] == pytest.approx([0, *np.minimum(np.arange(1, 31) / 20, 1), 0.95])

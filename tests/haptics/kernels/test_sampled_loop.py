@@ -40,23 +40,6 @@ def test_quadratic_drag_that_is_held_for_a_tick_diverges_from_k_v_2_on():
     assert abs(coast(new_handle(mass_kg=0.1), k_spm, 1.99 / k_spm, 3000)[-1]) * k_spm < 0.05
 
 
-@pytest.mark.parametrize("friction_per_step", [1e-3, 1.0, 2.01, 1e3])
-@pytest.mark.parametrize("stiffness_npm", [0.0, 1e9])
-def test_what_the_handle_itself_integrates_never_diverges(friction_per_step, stiffness_npm):
-    handle = new_handle(mass_kg=0.1, viscous_nspm=0.1 * friction_per_step / 50e-6, stiffness_npm=stiffness_npm)
-    handle.velocity_mps[0] = 1.0
-    speeds = []
-    for _ in range(200):
-        move(handle, STILL, STILL, 50e-6)
-        speeds.append(handle.velocity_mps[0])
-    assert max(abs(np.array(speeds))) < 1.0
-    assert abs(speeds[-1]) < 1.0 / (1 + friction_per_step)
-    if stiffness_npm == 0.0:
-        assert np.array(speeds) == pytest.approx(
-            (1 + friction_per_step) ** -np.arange(1.0, 201.0), rel=1e-9, abs=1e-100
-        )
-
-
 def impulse_response(alpha, ticks=2000):
     """Return the velocities (ticks,) [m/s] that the product's estimator makes of 1 m for one sample."""
     x = np.zeros(ticks + 1)

@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 from study_app.haptics.model.device_dynamics import Dynamics
-from study_app.haptics.model.effects.added_mass import AddedMass
-from study_app.haptics.model.effects.history import History
 from study_app.haptics.model.layout import LIMITER_ENERGY
-from study_app.haptics.model.scene import Ewma, Given, Kalman, Scene
+from study_app.haptics.model.scene import Ewma, Kalman, Scene
 from study_app.haptics.model.slope_limits import handle_limits
 from study_app.haptics.runtime.pack import pack
 from study_app.validation.stability.withheld_force import MOST, QUICK, SHAKEN, measure
@@ -39,14 +37,6 @@ def test_accelerations_are_smoothed_as_suits_the_estimator(velocity, dynamics, a
     found = pack(inert(velocity), dynamics=dynamics).liquids[0]
     assert 1 / found.added_mass.filter_per_s == pytest.approx(added_s)
     assert 1 / found.history.filter_per_s == pytest.approx(history_s)
-
-
-def test_what_a_file_says_counts_and_given_velocities_are_not_smoothed():
-    said = {"added_mass": AddedMass(filter_s=0.04), "history": History(smoothing_s=0.0)}
-    found = pack(inert(**said), dynamics=MEASURED).liquids[0]
-    assert 1 / found.added_mass.filter_per_s == pytest.approx(0.04)
-    assert found.history.filter_per_s == np.inf
-    assert pack(inert(Given(), **said)).liquids[0].added_mass.filter_per_s == np.inf
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@ import pytest
 from numba import njit
 from numba.core.runtime import _nrt_python, rtsys
 
-from study_app.errors import StudyError
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.kernels.tick import tick
 from study_app.haptics.model.layout import SAMPLE, records
@@ -49,14 +48,6 @@ def test_a_model_is_refilled_in_place_with_a_fresh_state():
     again.model = model
     for place in stroke(500):
         assert again.tick(place).tobytes() == fresh.tick(place).tobytes()
-
-
-def test_models_made_with_a_capacity_have_room_for_any_scene_within_it():
-    model = pack(Scene(), capacity=1750)
-    pack_into(model, MANY)
-    assert [int(wake.row) for wake in model.liquids.wake[:2]] == [0, 1700]
-    with pytest.raises(StudyError, match=r"needs 1701 wake elements.*room for 1700"):
-        pack_into(pack(Scene(), capacity=1700), scene(liquid(wake={"length": 1701, "scaling": 1701})))
 
 
 @njit

@@ -7,7 +7,6 @@ from study_app.haptics.model.bounds import bounds
 from study_app.haptics.model.effects.current import Channel, Uniform, Vortex
 from study_app.haptics.model.effects.drag import REFERENCE, Drag
 from study_app.haptics.model.effects.history import History
-from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.gate import calls_for, resolve
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Body, Box, Given, Liquid, MotionBox, Scene
@@ -80,23 +79,6 @@ def felt(scene, motion):
 ALL = ("drag", "current", "buoyancy", "surface", "added_mass", "history")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", LIQUIDS)
-@pytest.mark.parametrize("current", CURRENTS)
-@pytest.mark.parametrize("effect", ALL)
-def test_no_motion_makes_more_of_an_effect_than_its_bound(name, current, effect):
-    reached = 0.0
-    for motion in WANDERINGS:
-        scene = pool(name, motion, current=CURRENTS[current])
-        bound_n = bounds(scene, scene.liquids[0])[effect]
-        others = [it for it in ALL if it != effect and not (effect == "drag" and it == "current")]
-        missing_n = felt(with_effects(scene, [*others, effect]), motion) - felt(with_effects(scene, others), motion)
-        greatest_n = np.linalg.norm(missing_n, axis=1).max()
-        assert greatest_n <= bound_n * 1.001
-        reached = max(reached, greatest_n / bound_n if bound_n > 0 else 0.0)
-    assert reached > 0.1
-
-
 @pytest.mark.parametrize("name", LIQUIDS)
 @pytest.mark.parametrize("current", CURRENTS)
 def test_what_auto_leaves_out_is_never_missed_by_more_than_the_target(name, current):
@@ -124,20 +106,3 @@ def test_the_worst_motion_for_history_all_but_reaches_its_bound():
     scene = scene.model_copy(update={"liquids": (liquid,)})
     force_n = felt(with_effects(scene, ["history"]), motion)
     assert -force_n[-1, 0] == pytest.approx(bounds(scene, liquid)["history"], rel=0.02)
-
-
-@pytest.mark.parametrize("exponent", [0.25, 1.0, 4.0])
-@pytest.mark.parametrize("scaling", [100, 150])
-def test_a_wake_adds_no_more_than_its_bound(exponent, scaling):
-    for motion in WANDERINGS:
-        wake = Wake(length=100, scaling=scaling, exponent=exponent, breaking_span_m=0.0, axes="xyz")
-        scene = Scene(
-            scale=1,
-            velocity=Given(),
-            motion=box_of(motion),
-            liquids=(Liquid(id="liquid", density_kg_m3=1000, wake=wake),),
-        )
-        added_n = felt(with_effects(scene, ["drag", "wake"], "constant"), motion) - felt(
-            with_effects(scene, ["drag"], "constant"), motion
-        )
-        assert np.linalg.norm(added_n, axis=1).max() <= bounds(scene, scene.liquids[0])["wake"] * 1.001

@@ -125,12 +125,6 @@ def test_a_wake_is_never_taken_but_keeps_its_place_in_the_table():
     assert taken(scene) == taken(stirred("water", 1.0))
 
 
-def test_a_current_brings_the_drag_that_carries_it():
-    fast = stirred("water", 0.1, current=Uniform(velocity_mps=(2.0, 0, 0)))
-    assert bound(fast, "drag") < 0.05
-    assert taken(fast)[:2] == ["drag", "current"]
-
-
 liquids = st.builds(
     Liquid,
     id=st.just("liquid"),
@@ -197,14 +191,6 @@ def test_the_law_is_the_cheapest_within_the_target_at_every_speed(scene):
     assert not any(meets(other) for other in cheaper[law])
 
 
-def test_effects_that_are_named_stay_as_they_are():
-    scene = Scene(liquids=(Liquid(id="honey", density_kg_m3=1400, viscosity_pa_s=10),))
-    assert resolve(scene) is scene
-    told = {verdict.effect: (verdict.included, verdict.why) for verdict in calls_for(scene)}
-    assert told["drag"] == (True, "named, law constant")
-    assert told["history"] == (False, "not named")
-
-
 def test_the_knee_lowers_the_fastest_motion_too():
     scene = stirred("water", 9.0, viscosity_pa_s=None)
     assert bound(scene, "drag") == pytest.approx(0.5 * 998.2 * 0.47 * math.pi * 0.034**2 * 49)
@@ -229,13 +215,6 @@ def test_the_table_in_words():
     assert all(line == line.rstrip() for line in lines)
 
 
-def test_the_cost_has_a_column_where_it_was_measured():
-    scene = stirred("water", 0.1)
-    lines = describe_gate(scene, {("water", "buoyancy"): 3.6})
-    assert lines[1].split() == ["effect", "bound", "[N]", "share", "ns", "per", "tick", "why"]
-    assert [line.split()[3] for line in lines[2:5]] == ["–", "4", "–"]
-
-
 def later(scene):
     """Return the scene as of a file of format 2."""
     return scene.model_copy(update={"format": 2})
@@ -253,19 +232,6 @@ def later(scene):
 )
 def test_in_format_2_unsteady_drag_is_taken_up_to_re_1000(name, speed_mps, effects):
     assert taken(later(stirred(name, speed_mps))) == effects
-
-
-def test_the_reynolds_number_is_told_as_the_reason():
-    told = "\n".join(describe_gate(later(stirred("honey", 0.1))))
-    assert "unsteady drag instead: Re is up to 0.966, not over 1000" in told
-    told = "\n".join(describe_gate(later(stirred("water", 1.0))))
-    assert told.count("Re is up to 6.78e+04, over 1000: no solution of the flow confirms it") == 2
-
-
-def test_a_current_is_carried_by_unsteady_drag():
-    river = stirred("honey", 0.1, current=Uniform(velocity_mps=(0.2, 0.0, 0.0)))
-    assert taken(later(river)) == ["current", "buoyancy", "unsteady_drag"]
-    assert taken(river) == ["drag", "current", "buoyancy", "history"]
 
 
 def test_a_damper_and_a_liquid_without_viscosity_keep_drag():

@@ -5,7 +5,7 @@ import pytest
 from pydantic import BaseModel
 
 from study_app.errors import StudyError
-from study_app.haptics.model.effects.current import Channel, Uniform, Vortex
+from study_app.haptics.model.effects.current import Channel, Uniform
 from study_app.haptics.model.overrides import override, override_all
 from study_app.haptics.model.scene import Box, Everywhere, Foaw, Line
 from tests.haptics.scenes import HONEY, LIGHT_OIL, POOL, WATER, scene
@@ -85,20 +85,9 @@ def test_every_parameter_is_reached_by_its_table_and_most_by_their_name_alone(fe
 @pytest.mark.parametrize(
     ("name", "text", "where", "value"),
     [
-        ("law", "square", lambda s: s.knee.law, "square"),
-        ("drag.law", "constant", lambda s: s.liquids[0].drag.law, "constant"),
-        ("local_wake.length", "7", lambda s: s.liquids[0].local_wake.length, 7),
-        ("reach_m", "0.1", lambda s: s.liquids[0].local_wake.reach_m, 0.1),
-        ("current.centre_m", "1,2,3", lambda s: s.liquids[0].current.centre_m, (1, 2, 3)),
         ("centre_m", "1,2,3", lambda s: s.liquids[0].region.centre_m, (1, 2, 3)),
-        ("radius_m", "2", lambda s: s.liquids[0].region.radius_m, 2),
         ("region", '{kind="box", size_m=[1, 2, 3]}', lambda s: s.liquids[0].region, Box(size_m=(1, 2, 3))),
-        ("current", '{kind="uniform", velocity_mps=[1, 0, 0]}', lambda s: s.liquids[0].current, RIVER),
-        ("peak_mps", "-2", lambda s: s.liquids[0].current, Vortex(core_m=0.2, peak_mps=-2)),
-        ("filter_s", "0.1", lambda s: s.liquids[0].added_mass.filter_s, 0.1),
-        ("window_s", "0.1", lambda s: s.liquids[0].history.window_s, 0.1),
         ("depth_m", "-0.1,0.5", lambda s: s.motion.depth_m, (-0.1, 0.5)),
-        ("relative", "0.1", lambda s: s.accuracy.relative, 0.1),
         ("effects", "auto", lambda s: s.liquids[0].effects, "auto"),
         ("velocity.kind", "line", lambda s: s.velocity, Line()),
         ("velocity", '{kind="foaw", samples=9}', lambda s: s.velocity, Foaw(samples=9)),

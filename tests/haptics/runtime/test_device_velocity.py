@@ -7,7 +7,6 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("the servo exists compiled only", allow_module_level=True)
 
-from study_app.haptics.kernels.safety import begin_scene, new_safety
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.layout import (
     LIMITER_GLITCH,
@@ -18,10 +17,9 @@ from study_app.haptics.model.layout import (
 )
 from study_app.haptics.model.scene import Knee
 from study_app.haptics.runtime.clocks.clock import VirtualClock
-from study_app.haptics.runtime.pack import pack
-from study_app.haptics.runtime.recompute import new_wake_places, recompute_sample
 from study_app.haptics.runtime.servo import Servo
 from tests.haptics.recording_device import Probe
+from tests.haptics.running import recomputed
 from tests.haptics.scenes import HONEY
 
 LAG_S = 2e-3
@@ -102,10 +100,6 @@ def test_what_is_not_measured_is_zero_whatever_the_record_holds():
 
 def test_tick_with_a_measured_velocity_is_recomputed_to_the_last_bit():
     samples, _ = samples_of(measuring())
-    model, safety = pack(SCENE, dynamics=MEASURING), new_safety(8.0)
-    begin_scene(safety[0])
-    again = samples.copy()
-    trail, places = new_wake_places(10)
-    recompute_sample(model, safety[0], again, trail[0], places, True)
+    again, _ = recomputed(samples, SCENE, MEASURING)
     for name in ("velocity_mps", "force_n", "command_n", "device_force_n", "limiters"):
         assert np.array_equal(again[name], samples[name]), name

@@ -3,8 +3,7 @@ import pytest
 
 from study_app.haptics.model.layout import LIMITER_SLEW
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.overrides import override_all
-from study_app.haptics.model.paths import circle, reach
+from study_app.haptics.model.paths import circle
 from study_app.haptics.model.slope_limits import SLEW_N
 from study_app.haptics.runtime.offline import COLUMNS, simulate
 from study_app.store.tables.csv_files import write_columns
@@ -43,14 +42,6 @@ def test_every_row_is_a_tick_of_its_own_time_not_of_the_rate():
     assert v[3] == pytest.approx(5 + np.sqrt(1 + 2 * (expected[3] - 5)) - 1)
 
 
-def test_the_first_tick_takes_the_scenes_period():
-    motion = moving([(1.0, 0, 0)] * 2)
-    wake = {"length": 10, "scaling": 10}
-    slow = override_all(WATER.model_copy(update={"rate_hz": 100.0}), {**wake, "decay": 0.5, "exponent": 1})
-    # One element of 1 m/s, stored in a tail of one at 100 Hz.
-    assert simulate(slow, motion).wake_x_mps[1] == pytest.approx(1.0)
-
-
 def test_a_file_is_as_good_as_a_motion(tmp_path):
     motion = circle(1000.0, rest_s=0.1, revolutions=0.1)
     table = simulate(WATER, motion)
@@ -58,8 +49,3 @@ def test_a_file_is_as_good_as_a_motion(tmp_path):
     write_columns(file, table[["t_s", "x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps"]])
     assert (simulate(WATER, file) == table).all()
     assert (simulate(WATER, str(file)) == table).all()
-
-
-def test_simulating_twice_gives_the_same_bits():
-    motion = reach(1000.0, reaches=1)
-    assert simulate(WATER, motion).tobytes() == simulate(WATER, motion).tobytes()

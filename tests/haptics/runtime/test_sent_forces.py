@@ -9,14 +9,12 @@ if numba.config.DISABLE_JIT:
 
 from study_app.errors import DeviceError
 from study_app.haptics.kernels.loop import FASTER_SAMPLES, SLOWER_SAMPLES
-from study_app.haptics.kernels.safety import begin_scene, new_safety
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.layout import LIMITER_SATURATED, STATUS_DEVICE_LOST
 from study_app.haptics.runtime.clocks.clock import VirtualClock
-from study_app.haptics.runtime.pack import pack
-from study_app.haptics.runtime.recompute import new_wake_places, recompute_sample
 from study_app.haptics.runtime.servo import Servo
 from tests.haptics.recording_device import Probe
+from tests.haptics.running import recomputed
 from tests.haptics.scenes import HONEY
 
 
@@ -51,17 +49,10 @@ def test_a_tick_is_recomputed_from_the_delivered_force_to_the_last_bit():
     probe = Probe(velocity_mps=(0.3, 0.0, 0.1))
     probe.state.share_sent = 0.5
     samples = felt(probe)
-    model, safety = pack(HONEY), new_safety(8.0)
-    begin_scene(safety[0])
-    again = samples.copy()
-    trail, places = new_wake_places(10)
-    recompute_sample(model, safety[0], again, trail[0], places, True)
+    again, _ = recomputed(samples)
     for name in ("command_n", "device_force_n", "permitted_n", "withheld_n"):
         assert np.array_equal(again[name], samples[name]), name
-    unaware = samples.copy()
-    safety = new_safety(8.0)
-    begin_scene(safety[0])
-    recompute_sample(pack(HONEY), safety[0], unaware, trail[0], places, False)
+    unaware, _ = recomputed(samples, delivered=False)
     assert np.array_equal(unaware.command_n, unaware.device_force_n)
 
 
@@ -94,12 +85,9 @@ def test_the_observer_takes_the_least_favourable_force_of_saturated_motors_and_a
     samples, left = taken["saturated"][2:]
     assert (samples.limiters & LIMITER_SATURATED != 0).all()
     assert (samples.device_force_n == samples.command_n).all()
-    model, safety, again = pack(HONEY), new_safety(8.0), samples.copy()
-    begin_scene(safety[0])
-    trail, places = new_wake_places(10)
-    recompute_sample(model, safety[0], again, trail[0], places, True)
+    again, safety = recomputed(samples)
     assert (again.limiters == samples.limiters).all()
-    assert safety[0].passivity.late_balance_j == left.passivity.late_balance_j
+    assert safety.passivity.late_balance_j == left.passivity.late_balance_j
 
 
 @pytest.mark.parametrize(("delay_s", "expected"), [(None, 1), (0.0, 0), (0.9e-3, 1), (1e-3, 1), (1.2e-3, 2)])
@@ -150,11 +138,7 @@ def test_the_tick_of_a_lost_device_is_recomputed(lost, reads):
     probe.state[lost] = reads
     samples = felt(probe)
     assert samples.status[-1] == STATUS_DEVICE_LOST
-    again = samples.copy()
-    trail, places = new_wake_places(10)
-    safety = new_safety(8.0)
-    begin_scene(safety[0])
-    recompute_sample(pack(HONEY), safety[0], again, trail[0], places, True)
+    again, _ = recomputed(samples)
     assert np.array_equal(again.device_force_n, samples.device_force_n)
     assert np.array_equal(again.command_n, samples.command_n)
     if lost == "lost_at_read":

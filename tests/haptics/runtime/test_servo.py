@@ -5,18 +5,15 @@ from random import Random
 
 import numpy as np
 import pytest
-from numba.core.runtime import _nrt_python, rtsys
 
 from study_app.devices.scripted import ScriptedDevice
 from study_app.errors import StudyError
-from study_app.haptics.kernels.loop import run
 from study_app.haptics.model.layout import LIMITER_FADE
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.haptics.runtime.telemetry import HISTORY, timing
 from tests.compiled import needs_servo
-from tests.haptics.recording_device import Probe
 from tests.haptics.running import is_zero
 from tests.haptics.scenes import HONEY, WATER
 
@@ -43,37 +40,6 @@ def test_two_runs_on_a_virtual_clock_are_identical_to_the_bit():
     first, second = scripted_session(3000), scripted_session(3000)
     assert np.abs(first.device_force_n).max() > 0.5
     assert first.tobytes() == second.tobytes()
-
-
-def test_advancing_in_pieces_is_advancing_at_once():
-    assert scripted_session(1, 16, 17, 966).tobytes() == scripted_session(1000).tobytes()
-
-
-@pytest.fixture
-def counted_allocations():
-    _nrt_python.memsys_enable_stats()
-    yield
-    _nrt_python.memsys_disable_stats()
-
-
-@pytest.mark.usefixtures("counted_allocations")
-def test_a_thousand_ticks_allocate_nothing(servo):
-    servo.load(WATER)
-    servo.advance(1)
-
-    def allocations(ticks):
-        before = rtsys.get_allocation_stats()
-        servo.advance(ticks)
-        return rtsys.get_allocation_stats().alloc - before.alloc
-
-    assert allocations(1001) == allocations(1)
-
-
-def test_one_compilation_serves_every_device_and_clock(servo):
-    servo.advance(1)
-    before = list(run.signatures)
-    Servo(ScriptedDevice(), clock=VirtualClock()).advance(1)
-    assert run.signatures == before
 
 
 # scenes
@@ -120,25 +86,6 @@ def test_rest_takes_the_force_to_zero_without_a_step(servo, probe):
     assert np.linalg.norm(forces[999]) > 4
     assert is_zero(forces[-1])
     assert np.linalg.norm(np.diff(forces, axis=0), axis=1).max() <= 0.5 + 1e-12
-
-
-def test_a_reloaded_scene_begins_afresh():
-    def first_second(servo, ticks_before):
-        servo.advance(ticks_before)
-        servo.load(WATER)
-        reader = servo.telemetry.reader()
-        servo.advance(1000)
-        return reader.read()
-
-    still = Probe(velocity_mps=(0.0, 0.0, 0.0))
-    servo = Servo(still, clock=VirtualClock())
-    first_second(servo, 600)
-    still.state.velocity_mps = (0.1, 0.0, 0.0)
-    moved = first_second(servo, 1)
-    again = first_second(servo, 1)
-    assert is_zero(again.wake_mps[0])
-    assert np.abs(moved.wake_mps[-1]).max() > 0.1
-    assert again.wake_mps == pytest.approx(moved.wake_mps, abs=1e-6)
 
 
 def test_a_scene_of_another_rate_is_refused_by_name(servo):

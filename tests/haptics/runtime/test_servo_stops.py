@@ -67,12 +67,6 @@ def test_a_force_stop_outlasts_a_change_of_scene(servo, probe):
     assert is_zero(probe.forces_n[-200:])
 
 
-def test_stopping_writes_zero(servo, probe):
-    felt(servo)
-    servo.stop()
-    assert is_zero(probe.forces_n[-1])
-
-
 def test_an_exception_in_the_host_ends_in_zero_force(probe):
     def host():
         with Servo(probe, clock=VirtualClock()) as servo:

@@ -9,7 +9,7 @@ import threading
 import numpy as np
 import pytest
 
-from study_app.errors import DeviceLost, StudyError
+from study_app.errors import StudyError
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from tests.compiled import needs_servo
@@ -44,27 +44,6 @@ def test_scenes_loaded_faster_than_ticks_all_arrive_whole(probe):
         serials = [servo.load(scene) for scene in (WATER, HONEY) * 10]
         wait_until(lambda: scene_of(servo.telemetry) == serials[-1])
         assert set(serials) <= set(reader.read().scene.tolist())
-
-
-def test_a_thread_can_be_stopped_and_started_again(probe):
-    servo = Servo(probe)
-    for _ in range(2):
-        ticks = int(servo.telemetry.written[0])
-        servo.start()
-        servo.load(HONEY)
-        wait_until(lambda ticks=ticks: servo.telemetry.written[0] > ticks + 20)
-        servo.stop()
-        assert is_zero(probe.forces_n[-1])
-    assert servo.fault is None
-
-
-def test_a_lost_device_is_told_to_the_host(probe):
-    probe.state.lost_at_read = 20
-    with Servo(probe) as servo:
-        wait_until(lambda: servo.fault is not None)
-        with pytest.raises(DeviceLost):
-            servo.check()
-    assert is_zero(probe.forces_n[-1])
 
 
 @pytest.mark.slow

@@ -6,7 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.haptics.model.effects.added_mass import AddedMass
-from study_app.haptics.model.effects.current import Uniform
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Box
 from study_app.haptics.runtime.offline import simulate
@@ -64,15 +63,6 @@ def test_one_count_of_an_encoder_is_hardly_felt():
     smooth, rough = (simulate(heavy(added_mass=AddedMass(filter_s=t)), motion).fx_n for t in (0.025, 0.0))
     assert abs(rough).max() == pytest.approx(0.31, abs=0.01)
     assert abs(smooth).max() < 0.02
-
-
-def test_it_goes_by_the_motion_through_the_liquid():
-    current = Uniform(velocity_mps=(0.5, 0.0, 0.0))
-    still = simulate(heavy("drag"), speeding_up((2.0, 0, 0)))
-    flowing = heavy("drag", "current", current=current)
-    motion = speeding_up((2.0, 0, 0))
-    carried = Motion(motion.t_s, motion.position_m, motion.velocity_mps + np.array([0.5, 0, 0]))
-    assert simulate(flowing, carried).fx_n == pytest.approx(still.fx_n, abs=1e-12)
 
 
 def test_entering_a_liquid_is_no_acceleration():

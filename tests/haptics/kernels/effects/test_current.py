@@ -32,16 +32,6 @@ def flow(felt, places_m):
     return np.divide(force, np.sqrt(size * WATER_FACTOR), out=np.zeros_like(force), where=size > 0)
 
 
-@pytest.mark.slow
-@settings(max_examples=examples(50), deadline=None)
-@given(velocity=velocities, current=velocities)
-def test_drag_is_against_the_motion_through_the_moving_liquid(velocity, current):
-    felt = vectors(simulate(river(Uniform(velocity_mps=current)), moving([velocity])), "force")[0]
-    through = np.subtract(velocity, current)
-    still = vectors(simulate(scene(knee=UNBENT), moving([through])), "force")[0]
-    assert felt == pytest.approx(still, rel=1e-12, abs=1e-12)
-
-
 def test_a_hand_that_drifts_with_the_river_feels_nothing_and_leaves_no_wake():
     wake = {"length": 500, "scaling": 500}
     drifting = moving(np.tile([0.7, 0.0, -0.2], (300, 1)))

@@ -11,6 +11,7 @@ import pytest
 from study_app.errors import StudyError
 from study_app.haptics.model.bounds import bounds
 from study_app.haptics.model.effects import NAMED
+from study_app.haptics.model.layout import LIMITER_ENERGY
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack
@@ -125,6 +126,19 @@ def test_both_ends_of_each_range_in_the_lab_are_taken_and_felt_within_the_limits
             table = simulate(given(there), motion)
             assert np.isfinite(vectors(table, "force")).all(), (control.name, end)
             assert (np.linalg.norm(vectors(table, "device"), axis=1) <= 8 * (1 + 1e-12)).all(), (control.name, end)
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of ticks are for compiled code")
+@pytest.mark.parametrize("name", NAMES)
+def test_the_passivity_controller_leaves_strokes_and_stops_alone(name):
+    t_s = np.arange(4000) / 1000
+    swell = np.minimum(t_s, 1) * np.clip(3 - t_s, 0, 1)
+    scene = in_lab(name).model_copy(update={"scale": 3.0, "origin_m": (0.0, -0.3, 0.0)})
+    for hertz, reach_m in ((0.5, 0.03), (1.6, 0.02), (3.0, 0.01)):
+        counts = np.rint(np.outer(reach_m * np.sin(2 * np.pi * hertz * t_s) * swell / 38e-6, [1.0, 0.0, 0.3]))
+        sent = simulate(scene, Motion(t_s, 3 * 38e-6 * counts - [0.0, 0.3, 0.0]))
+        assert sent.device_fx_n.any() or name in FELT_AT_REST | {"surface"}
+        assert not (sent.limiters & LIMITER_ENERGY).any()
 
 
 @pytest.mark.slow

@@ -175,13 +175,3 @@ def test_whatever_the_motion_it_never_outruns_the_body_and_loses_no_element(seed
         rows = (tracks.first + np.arange(tracks.cells)) % CELLS
         assert tracks.held == min(turn, length)
         assert hand.model.rows.cells["count"][rows].sum() == tracks.held
-
-
-def test_the_oldest_cells_are_merged_and_nothing_of_them_is_lost():
-    hand = Hand(tank(length=50_000, scaling=50_000))
-    hand.sweep(2.0, 600)  # 12 m of path: 176 diameters
-    tracks = hand.model.liquid_states[0].local_wake
-    assert tracks.cells == CELLS
-    motion = hand.model.rows.cells["velocity_mps"].sum(axis=0)
-    assert motion[0] == pytest.approx(hand.model.rows.cells["speed_mps"].sum())
-    assert hand.model.rows.cells["count"].sum() == 600

@@ -7,7 +7,6 @@ from study_app.evaluation.reference_solutions import oscillation, start
 from study_app.evaluation.unsteady_law import unsteady_n
 from study_app.haptics.kernels.effects.unsteady_drag import RATES_PER_S, WEIGHTS_RPS
 from study_app.haptics.model.laws.drag_laws import finite_reynolds
-from study_app.haptics.model.layout import LIMITER_ENERGY
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Box, Kalman, MotionBox
 from study_app.haptics.model.steady_state import steady
@@ -76,17 +75,6 @@ def test_it_equals_its_law_by_the_letter(name, interval_s, within):
 @pytest.mark.parametrize("name", FLUIDS)
 def test_no_motion_gains_energy(name):
     assert highest_gain(name, range(12)) <= 1e-3
-
-
-@compiled
-@pytest.mark.parametrize("interval_s", [2e-4, 1e-3, 4e-3, 2e-2])
-def test_long_and_fast_ticks_stay_bounded(interval_s):
-    velocity = np.zeros((400, 3))
-    velocity[::2, 0], velocity[1::2, 1] = 100.0, -100.0
-    velocity[200:] = 0.0
-    felt = force(tank("water"), velocity, np.full(400, interval_s))
-    assert np.isfinite(felt).all()
-    assert abs(felt[300:]).max() <= abs(felt[:200]).max()
 
 
 def test_a_body_that_moves_already_meets_steady_drag_at_once():
@@ -203,17 +191,3 @@ def test_under_a_surface_drag_goes_by_the_area_and_inertia_by_the_volume():
     area, volume = (np.arccos(0.5) - 0.5 * np.sqrt(0.75)) / np.pi, 0.25 * 0.5**2 * 2.5
     inertial_n = -deep[1, 0] - stokes_n
     assert -part[1, 0] == pytest.approx(stokes_n * area + inertial_n * volume, rel=2e-3)
-
-
-@compiled
-@pytest.mark.parametrize("name", ["olive oil", "gear oil", "glycerin", "honey"])
-def test_the_passivity_controller_leaves_strokes_and_stops_alone(name):
-    """What it returns after a stop is within the reserve, read from encoder counts at scale 3."""
-    t_s = np.arange(4000) / 1000
-    swell = np.minimum(t_s, 1) * np.clip(3 - t_s, 0, 1)
-    felt = tank(name).model_copy(update={"scale": 3.0})
-    for hertz, reach_m in ((0.5, 0.03), (1.6, 0.02), (3.0, 0.01)):
-        counts = np.rint(np.outer(reach_m * np.sin(2 * np.pi * hertz * t_s) * swell / 38e-6, [1.0, 0.0, 0.3]))
-        sent = simulate(felt, Motion(t_s, 3 * 38e-6 * counts))
-        assert sent.device_fx_n.any()
-        assert not (sent.limiters & LIMITER_ENERGY).any()

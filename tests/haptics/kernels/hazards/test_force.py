@@ -7,9 +7,8 @@ from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.laws.drag_laws import HIGHEST_REYNOLDS, LAWS, drag_n
 from study_app.haptics.model.layout import LIMITER_NORM
 from study_app.haptics.runtime.offline import simulate
-from tests.haptics.kernels.hazards.test_sample_validation import all_numbers
 from tests.haptics.scenes import COMPILED, THESIS, UNBENT, Hand, liquid, moving, scene, vectors
-from tests.haptics.tails import pass_time
+from tests.haptics.tails import all_numbers, pass_time
 
 BALL = {"diameter_m": 0.068, "drag_coefficient": 0.47}
 TAR = {"density_kg_m3": 1150, "viscosity_pa_s": 100, **BALL}

@@ -1,19 +1,4 @@
-"""Numerical hazards of a wake that is kept as running sums: each was seen to bite without its cure.
-
-======  ===========================================================  =======================
-number  hazard                                                       tested in
-======  ===========================================================  =======================
-1-5     scale, stored sizes, precision, drift, steps of the sums     here
-6-12    directions, angles, chatter, clock, positions at the door    ``test_hazards_door``
-13-16   clamping, denormals, both ends of the Reynolds number        ``test_hazards_force``
-17      energy from the wake                                         here
-18      memory and its collection in a tick                          ``test_tick``
-19, 20  wrap of the ring, order of one tick                          here
-======  ===========================================================  =======================
-
-A wake equals its definition over random walks in ``test_wake``; on any path the passivity controller holds in
-``test_energy``.
-"""
+"""Hazards 1-5, 17, 19, 20 of a wake that is kept as running sums: each was seen without its remedy."""
 
 import math
 
