@@ -10,12 +10,11 @@ if numba.config.DISABLE_JIT:
 from study_app.devices.mouse import MouseDevice
 from study_app.devices.rig import Rig
 from study_app.errors import ServoFault, StudyError
-from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_FADE, LIMITER_NAMES, LIMITER_SLEW, LIMITER_STOP
+from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_FADE
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.lab.live import Live, open_live
 from study_app.lab.programmed_paths import REACHED, TITLES, led_to, programme
-from tests.haptics.recording_device import Probe
 from tests.lab.benches import SCENES, bench, live_with, run, scripted
 
 
@@ -99,30 +98,6 @@ def test_a_number_set_while_another_scene_waits_goes_with_it() -> None:
     live.feel(sides.change("liquid.density_kg_m3", 900.0))  # before a turn took the switch
     run(live, 900)
     assert live.shadow.differing == 0
-    live.close()
-
-
-@pytest.mark.slow
-def test_every_value_of_a_drag_is_presented_within_fifty_ticks_or_a_newer_one_is() -> None:
-    live = live_with(scripted())
-    sides = bench()
-    live.feel(sides)
-    run(live, 300)
-    for k in range(20):  # a value every 8 ms
-        sides = sides.change("wake.length", 1600.0 - k, held=True)
-        live.feel(sides)
-        run(live, 8, batch=2)
-    assert live.due_in_s is not None
-    run(live, 50, batch=2)
-    assert live.due_in_s is None
-    scenes = live.servo.telemetry.ring.scene[300:510]
-    begins = np.flatnonzero(np.diff(scenes))
-    assert np.diff(begins).min() >= 50  # so that a fade ends
-    assert np.diff(begins).max() <= 52
-    assert live.shadow.differing == 0
-    tail = live.tail("A")
-    assert tail is not None
-    assert tail.elements == 1581
     live.close()
 
 
@@ -269,56 +244,6 @@ def test_the_pointer_moves_the_mouse_unless_a_path_does() -> None:
     reading = live.reading()
     assert reading is not None
     assert reading.position_m[0] == pytest.approx(-0.04, abs=2e-3)
-    live.close()
-
-
-@pytest.mark.slow
-def test_a_path_beside_a_hand_that_takes_no_orders_is_computed_alone() -> None:
-    """The device goes on as it is; trace and tails are those of the path."""
-    probe = Probe(velocity_mps=(0.0, 0.0, 0.0))
-    live = Live(Rig(probe, Servo(probe, clock=VirtualClock(), elements=10_000)))  # type: ignore[arg-type]
-    probe.workspace_m = (0.05, 0.03, 0.03)
-    live.feel(bench())
-    run(live, 100)
-    live.play("circle")
-    run(live, 2500)
-    trace, tail = live.trace(), live.tail("A")
-    assert trace is not None
-    assert tail is not None
-    assert np.linalg.norm(trace.force_a_n, axis=1).max() > 0.5
-    assert np.linalg.norm(trace.force_b_n, axis=1).max() > 0.5
-    assert np.linalg.norm(tail.positions_m, axis=1).max() == pytest.approx(0.0255, abs=1e-3)
-    assert sent_n(live, 2500).max() == 0.0
-    live.play(None)
-    run(live, 100)
-    trace = live.trace()
-    assert trace is not None
-    assert np.abs(trace.force_a_n).max() == 0.0
-    live.servo.stop()
-
-
-@pytest.mark.slow
-def test_limiters_are_counted_as_telemetry_has_them() -> None:
-    live = live_with(scripted())
-    live.feel(bench("light_oil", "water"))
-    live.play("reverse")
-    run(live, 6000)
-    ring = live.servo.telemetry.ring[:6000]
-    told = {it.name: it for it in live.limiters()}
-    assert told["Fade"].ticks == np.count_nonzero(ring.limiters & LIMITER_FADE) > 0
-    assert told["Slew, 1.5 N per tick"].ticks == np.count_nonzero(ring.limiters & LIMITER_SLEW)
-    assert len(told) == len(LIMITER_NAMES)
-    assert not told["Force stopped"].acting
-    live.stop_force()
-    run(live, 200)
-    told = {it.name: it for it in live.limiters()}
-    assert (
-        told["Force stopped"].ticks == 200 == np.count_nonzero(live.servo.telemetry.ring[:6200].limiters & LIMITER_STOP)
-    )
-    assert told["Force stopped"].acting
-    live.fade_in()
-    run(live, 11_000)
-    assert {it.name: it for it in live.limiters()}["Force stopped"].ticks == 0  # longer ago than 10 s
     live.close()
 
 

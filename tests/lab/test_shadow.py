@@ -91,24 +91,6 @@ def test_the_other_side_is_what_it_would_be_were_it_felt() -> None:
     beside.close()
 
 
-def test_a_side_that_is_not_touched_keeps_its_wake_while_the_other_is_edited() -> None:
-    live = live_with(scripted())
-    sides = bench("water", "light_oil")
-    live.feel(sides)
-    live.play("circle")
-    run(live, 1000)
-    before = live.tail("B")
-    live.feel(sides.change("wake.length", 1600.0))
-    run(live, 2, batch=2)
-    felt, beside = live.tail("A"), live.tail("B")
-    assert before is not None
-    assert felt is not None
-    assert beside is not None
-    assert beside.alive == before.alive == 125
-    assert felt.alive <= 2
-    live.close()
-
-
 def test_a_tail_is_the_path_that_was_left_and_breaks_where_it_turns() -> None:
     """A path with a right angle: every point lies on it, and one segment begins at the corner."""
     scene = SCENES["water"]

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from study_app.errors import StudyError
 from study_app.haptics.model.laws.rheology import yield_n
 from study_app.haptics.model.scene import Liquid, Scene
 from study_app.haptics.model.steady_state import steady
@@ -41,12 +40,3 @@ def test_non_newtonian_drag_takes_the_place_of_a_viscosity():
     assert np.all(steady_curves(thicker).stress_pa - steady_curves(found).stress_pa == pytest.approx(45.0))
     carreau = changed(found, "non_newtonian.kind", "carreau")
     assert steady_curves(carreau).force_n[0] == 0.0
-
-
-def test_a_viscosity_takes_the_place_of_a_flow_curve_that_is_off():
-    ketchup = load_scene("slime", "ketchup")
-    with pytest.raises(StudyError, match="remove one of them"):
-        changed(ketchup, "liquid.viscosity_pa_s", 2.0)
-    off = changed(ketchup, "effects.non_newtonian", "off")
-    newtonian = changed(changed(off, "liquid.viscosity_pa_s", 2.0), "effects", "auto").liquids[0]
-    assert (newtonian.viscosity_pa_s, newtonian.non_newtonian) == (2.0, None)

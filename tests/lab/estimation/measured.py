@@ -1,5 +1,6 @@
 """Motions of a hand in the scene frame, and what a sensor in a planted liquid measures along them."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from study_app.protocol.load import load_scene
 WATER = load_scene("rek2024", "water")
 NOISE_N = 0.03
 BATCH = 33
+COLUMNS = "t_s,x_m,y_m,z_m,fx_n,fy_n,fz_n"
 
 
 def planted(scene: Scene = WATER, drag: float = 0.42, length: int = 1200, scaling: float = 1500.0) -> Scene:
@@ -55,3 +57,13 @@ def fed(estimator: OnlineEstimator, rows: Rows, batch: int = BATCH) -> Estimate:
     for first in range(0, len(rows), batch):
         estimator.take(rows.part(first, first + batch))
     return estimator.estimate
+
+
+def lines(rows: Rows, *, velocities: bool = True) -> list[str]:
+    columns = [rows.t_s[:, np.newaxis], rows.position_m, rows.force_n, *([rows.velocity_mps] if velocities else [])]
+    return [",".join(f"{it:.17g}" for it in row) + "\n" for row in np.hstack(columns)]
+
+
+def begun(path: Path, text: str = f"# made by a robot\n{COLUMNS},vx_mps,vy_mps,vz_mps\n") -> Path:
+    path.write_text(text, encoding="utf-8")
+    return path

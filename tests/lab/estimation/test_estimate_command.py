@@ -7,8 +7,7 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.errors import StudyError
-from tests.lab.estimation.measured import WATER, measured, planted, stirring
-from tests.lab.estimation.test_growing_csv import begun, lines
+from tests.lab.estimation.measured import WATER, begun, lines, measured, planted, stirring
 
 FILE = ("estimate", "rek2024", "--liquid", "water", "--idle", "0.1")
 

@@ -134,13 +134,6 @@ def test_laws_without_the_coefficient_are_refused() -> None:
         OnlineEstimator(WATER, (DRAG, "decay"))
 
 
-def test_slow_streams_are_refused() -> None:
-    rows = measured(WATER, *stirring(4.0))
-    slow = Rows(*(getattr(rows, it)[::40] for it in Rows.__slots__))
-    with pytest.raises(StudyError, match="rows per second"):
-        fed(OnlineEstimator(WATER), slow)
-
-
 def test_a_search_that_fails_fails_once() -> None:
     class Failing(Executor):
         def submit(self, *_words: object, **_options: object) -> Any:

@@ -8,19 +8,7 @@ import pytest
 from study_app.errors import StudyError
 from study_app.lab.estimation.growing_csv import GrowingCsv
 from study_app.lab.estimation.rows import Rows, joined
-from tests.lab.estimation.measured import WATER, measured, stirring
-
-COLUMNS = "t_s,x_m,y_m,z_m,fx_n,fy_n,fz_n"
-
-
-def lines(rows: Rows, *, velocities: bool = True) -> list[str]:
-    columns = [rows.t_s[:, np.newaxis], rows.position_m, rows.force_n, *([rows.velocity_mps] if velocities else [])]
-    return [",".join(f"{it:.17g}" for it in row) + "\n" for row in np.hstack(columns)]
-
-
-def begun(path: Path, text: str = f"# made by a robot\n{COLUMNS},vx_mps,vy_mps,vz_mps\n") -> Path:
-    path.write_text(text, encoding="utf-8")
-    return path
+from tests.lab.estimation.measured import COLUMNS, WATER, begun, lines, measured, stirring
 
 
 def append(path: Path, text: str) -> None:

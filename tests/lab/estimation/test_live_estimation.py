@@ -13,8 +13,7 @@ from study_app.lab.estimation.live_estimation import Chosen, LiveEstimation, set
 from study_app.lab.live import Live
 from tests.compiled import needs_servo
 from tests.lab.benches import bench, live_with, scripted
-from tests.lab.estimation.measured import WATER, planted
-from tests.lab.estimation.test_growing_csv import begun
+from tests.lab.estimation.measured import WATER, begun, planted
 
 pytestmark = [pytest.mark.slow, needs_servo]
 
@@ -82,23 +81,6 @@ def test_the_force_of_the_device_is_that_of_the_setting_and_is_not_applied(live:
     assert estimation.estimate.identified, estimation.estimate.reason
     assert estimation.estimate.values[DRAG] == pytest.approx(0.47, rel=1e-3)
     assert estimation.applied(at) == at
-
-
-def test_the_wake_is_found_too(live: Live) -> None:
-    estimation, at = LiveEstimation(), pair(planted())
-    estimation.choose(Chosen("other", NAMES))
-    live.play("reverse")
-    run(live, estimation, at, 12.0)
-    found = estimation.estimate
-    assert found.identified, found.reason
-    assert found.values == {
-        DRAG: pytest.approx(0.42, rel=0.03),
-        "length": pytest.approx(1200, rel=0.05),
-        "scaling": pytest.approx(1500, rel=0.05),
-    }
-    wake = estimation.applied(at).in_hand.scene.liquids[0].wake
-    assert wake is not None
-    assert wake.length == found.values["length"]
 
 
 def test_nothing_is_known_of_a_blind_comparison(live: Live) -> None:

@@ -1,10 +1,7 @@
 """An inlet finds a stream by the labels of its channels, on this computer."""
 
-import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -75,30 +72,6 @@ def test_streams_of_other_channels_are_passed_over() -> None:
     assert len(source.poll()) == 0
     source.close()
     del other
-
-
-def test_a_stream_that_does_not_answer_does_not_hold_up_the_window(monkeypatch: pytest.MonkeyPatch) -> None:
-    answered, threads = threading.Event(), []
-
-    class Silent:
-        def uid(self) -> str:
-            return "silent"
-
-    def inlet(*_words: object, **_options: object) -> Any:
-        threads.append(threading.current_thread())
-        answered.wait(WAITS_S)
-        raise TimeoutError
-
-    with ThreadPoolExecutor(1) as executor:
-        source = LslForce(NAME, executor)
-        monkeypatch.setattr(source, "_resolver", SimpleNamespace(results=lambda: [Silent()]))
-        monkeypatch.setattr(source._lsl, "StreamInlet", lambda *_words, **_options: SimpleNamespace(info=inlet))
-        for _ in range(3):
-            assert len(source.poll()) == 0
-        answered.set()
-    assert threads
-    assert threading.current_thread() not in threads
-    assert not source.connected
 
 
 def test_a_stream_that_ends_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
