@@ -7,7 +7,6 @@ import pytest
 from matplotlib.figure import Figure
 
 from study_app.errors import StoreError
-from study_app.haptics.model.effects.wake import Wake
 from study_app.validation import thesis_figures, thesis_motions
 from study_app.validation.thesis_motions import EXPONENTS, FIGURES, LENGTH, figure_3, figure_4, figure_5, figure_6
 from tests.haptics.scenes import COMPILED, WATER_FACTOR, vectors
@@ -36,19 +35,6 @@ def tick_of(shown, word):
     """Return the row of an event."""
     ((time_s, _),) = [event for event in shown.events if event[1] == word]
     return int(np.searchsorted(shown.runs[0].motion.t_s, time_s))
-
-
-def test_all_stay_in_the_horizontal_plane_and_use_the_evaluations_liquid():
-    for make in FIGURES:
-        for run in make().runs:
-            assert not run.table.fy_n.any()
-            (liquid,) = run.scene.liquids
-            assert liquid.density_kg_m3 == 1000
-            assert run.scene.body.diameter_m == 0.068
-            if liquid.wake is not None:
-                free = {"exponent", "resolution_m", "breaking_angle_deg"}
-                standard = Wake(length=5000, scaling=5000, decay=0.999975, breaking_span_m=0)
-                assert liquid.wake.model_dump(exclude=free) == standard.model_dump(exclude=free)
 
 
 def test_figure_3_constant_force_against_the_motion_and_none_from_the_stop_on():

@@ -2,26 +2,14 @@
 
 import csv
 import io
-from dataclasses import replace
 
-import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from study_app.cli import commands
 from study_app.evaluation.hand_motions import stir
-from study_app.evaluation.reference_solutions import Truth
-from study_app.evaluation.unsteady_law import CONSTANTS
-from study_app.haptics.model.scene import Given
-from study_app.protocol.load import load_scene
 from study_app.validation.accuracy import candidate_sets
-from study_app.validation.accuracy.accuracy_figure import draw
 from study_app.validation.accuracy.accuracy_report import COLUMNS, csv_text, markdown, write
-from study_app.validation.accuracy.candidates import UnsteadyRung
-from study_app.validation.accuracy.comparison import Accuracy, accuracy
-from study_app.validation.cfd import stored_flows
-from study_app.validation.cfd.solver_truths import solver_truths
-from tests.validation.accuracy.scenes import HONEY, REAL, TANK, compiled, first_seconds
+from study_app.validation.accuracy.comparison import accuracy
+from tests.validation.accuracy.scenes import REAL, TANK, compiled, first_seconds
 
 pytestmark = [pytest.mark.nightly, pytest.mark.slow]
 
@@ -53,22 +41,6 @@ def test_what_leaves_something_out_errs_the_more_it_leaves_out(found):
     assert rows["O(1) wake, resolution 5 mm"] < rows["O(1) wake, resolution 20 mm"]
     by_velocity = {name: rows[f"O(1) wake, velocity by {name} from encoder counts"] for name in ("ewma", "line", "raw")}
     assert by_velocity["line"] < by_velocity["ewma"] < by_velocity["raw"]
-
-
-@compiled
-def test_a_linear_damper_is_compared_with_its_definition_and_costed_as_any_law(tmp_path):
-    file = tmp_path / "damper.toml"
-    file.write_text('format = 2\n[liquids.damper]\ndrag = { law = "linear", damping_nspm = 8 }\n')
-    damper = load_scene(file, "damper")
-    found = accuracy(damper, None, first_seconds(stir(1, 1000), 3.0), repeats=1, batches=2, allowance_s=0.1)
-    rows = {row.rung.name: row.error.rms for row in found.rows}
-    assert {row.truth for row in found.rows} == {"definition"}
-    assert rows["drag"] < 1e-11
-    assert rows["drag"] < rows["drag, 500 Hz"] < rows["drag, 100 Hz"]
-    done = CliRunner().invoke(commands, ["scene", str(file)])
-    assert done.exit_code == 0, done.output
-    assert "named, law linear" in done.output
-    assert "against the definition of drag" in done.output
 
 
 @compiled
@@ -115,23 +87,6 @@ def test_unsteady_drag_is_within_the_target_of_a_motion_left_out_of_its_fit(foun
 
 
 @compiled
-def test_the_constants_of_a_motion_left_out_are_those_that_are_used():
-    scene = REAL.model_copy(
-        update={"liquids": (HONEY.model_copy(update={"effects": ("unsteady_drag",)}),), "format": 2}
-    )
-    rung = UnsteadyRung("unsteady drag", "unsteady drag", "effects", scene.model_copy(update={"velocity": Given()}))
-    truths = solver_truths(scene)
-    held_out = {it.case.title for it in stored_flows.held_out()}
-    assert {it.name for it in truths if it.left_out is None} == held_out & {it.name for it in truths}
-    own, (truth, *_) = tuple(stored_flows.left_out().values()), truths
-    assert truth.left_out in own
-    (program,), (without,) = (rung.forces_against(replace(truth, left_out=it)) for it in (None, truth.left_out))
-    assert 1e-4 < np.abs(without - program).max() / np.abs(program).max() < 0.05
-    (same,) = rung.forces_against(replace(truth, left_out=CONSTANTS))
-    np.testing.assert_allclose(same, program, atol=1e-3 * np.abs(program).max())
-
-
-@compiled
 def test_the_table_becomes_files(found, tmp_path):
     written = write(found, tmp_path)
     assert [path.name for path in written] == ["accuracy.csv", "accuracy.md", "accuracy.png", "accuracy.svg"]
@@ -146,15 +101,3 @@ def test_the_table_becomes_files(found, tmp_path):
     assert text.count("◎") == 1 + 1 + 9  # the legend, and the choice against each truth
     assert "**stop at 0.6 m/s**: fluid solver: liquid-study cfd --solve." in text
     assert written[2].read_bytes().startswith(b"\x89PNG")
-
-
-@compiled
-def test_a_solvers_time_is_drawn_where_a_table_is_stored(found):
-    solver = Truth("start and stop", "fluid solver", (), computing_s=17.0)
-    figure = draw(Accuracy(found.rows, (*found.truths, solver), (), found.machine, found.motion))
-    (drawn,) = [text.xy[0] for axes in figure.axes for text in axes.texts if text.get_text() == "fluid solver"]
-    (box,) = [it.get_extents() for it in figure.axes[-1].patches]
-    least, greatest = figure.axes[-1].transData.inverted().transform(box)[:, 0]
-    assert greatest == pytest.approx(17e6)
-    assert least == pytest.approx(drawn) == pytest.approx(1e6 * min(it.computing_s or 99 for it in found.truths))
-    assert figure.axes[-1].get_xlim()[1] > 1.7e10 / 1e3

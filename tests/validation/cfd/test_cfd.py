@@ -14,11 +14,12 @@ from scipy.integrate import quad
 from study_app.cli.evidence.cfd import cfd
 from study_app.cli.parallel import executor_for
 from study_app.errors import StudyError
-from study_app.figure_style import PLOT_SETTINGS, file_bytes
-from study_app.validation.cfd import cases, flow, flow_figure, model_comparison, solver, stored_flows
+from study_app.protocol.load import load_scene
+from study_app.validation.cfd import cases, flow, model_comparison, solver, stored_flows
 from study_app.validation.cfd import fits as fitted
 from study_app.validation.cfd.cases import Case
 from study_app.validation.cfd.profiles import PROFILES, RAMP, STOP, STOPPING
+from study_app.validation.cfd.solver_truths import solver_truths
 from study_app.workers.executors import Workers
 from tests.haptics.scenes import COMPILED as IS_COMPILED
 from tests.validation.cfd import stand_ins
@@ -154,6 +155,36 @@ def test_steady_drag_is_what_was_published_and_independent_of_the_grid():
     assert drag[reynolds == 1] < 24 * (1 + 3 / 16)
 
 
+TABLE = """# title: start and stop
+# density_kg_m3: 1420
+# viscosity_pa_s: 10
+# diameter_m: 0.068
+# computing_s_per_s: 1.5
+# command: solve it
+# machine: two cores
+t_s,velocity_mps,force_n
+0,0,0
+0.01,0.1,-1
+0.02,0.1,-0.9
+"""
+
+
+def test_a_stored_table_is_taken_for_its_own_liquid_alone(tmp_path):
+    honey, glycerin = (load_scene("physical_liquids", name) for name in ("honey", "glycerin"))
+    (tmp_path / "start-100mmps.csv").write_text(TABLE, encoding="utf-8")
+    (tmp_path / "steady.csv").write_text("reynolds,drag_coefficient\n1,27\n", encoding="utf-8")
+    (truth,) = solver_truths(honey, tmp_path)
+    (case,) = truth.cases
+    assert (truth.name, truth.computing_s, truth.machine) == ("start and stop", 1.5, "two cores")
+    assert len(case.motion.t_s) == 20
+    assert case.motion.velocity_mps[5, 0] == pytest.approx(0.05)
+    assert case.force_n[5, 0] == pytest.approx(-0.5)
+    assert case.motion.position_m[10, 0] == pytest.approx(0.5e-3)
+    assert solver_truths(glycerin, tmp_path) == ()
+    with pytest.raises(StudyError, match="holds no tables"):
+        solver_truths(honey, tmp_path / "absent")
+
+
 def test_a_table_that_was_damaged_is_named(tmp_path):
     with pytest.raises(StudyError, match="holds no tables"):
         stored_flows.stored(tmp_path)
@@ -198,40 +229,6 @@ def test_drag_alone_never_pushes_and_history_does(fits, name):
     )
 
 
-@COMPILED
-def test_a_model_of_what_was_solved_without_convection_has_no_error(stored):
-    creeping = Case("pitch", 1261.0, 1e4, 0.068, 0.6)
-    times = STOPPING.moments(0.005)
-    velocity_mps = creeping.speed_mps * STOPPING.speed(times)
-    force_n = 0.0 - STOPPING.linear_drags(times, creeping.reynolds) * creeping.unit_n
-    columns = dict(
-        zip(stored_flows.MOTION, (times[::8] * creeping.unit_s, velocity_mps[::8], force_n[::8]), strict=True)
-    )
-    table = stored_flows.Table(stored_flows.notes_of(creeping), columns)
-    (model,) = [it for it in fitted.MODELS if it.name == "... history, added mass"]
-    judged = fitted.judge(model, table, {})
-    assert judged.share < 0.01
-    assert judged.push == pytest.approx(1, abs=0.1)
-
-
-@pytest.mark.nightly
-@pytest.mark.slow
-@COMPILED
-def test_tables_and_figure_tell_what_was_found(stored, fits):
-    said = model_comparison.fits_markdown(fits)
-    assert said.count("\n| ") == len(NAMES) * (1 + len(fitted.MODELS))
-    assert "| drag, constant C_d | drag_coefficient 10* |" in said  # honey at 0.2 m/s; a scene permits no more
-    assert said.count("drag_coefficient 6.81 |") == 1
-    assert "| 100 | 1.08" in model_comparison.steady_markdown(stored_flows.steady())
-    tables = stored_flows.stored()
-    drawing = flow_figure.draw(tables, fits)
-    assert [ax.get_title(loc="left").split(",")[0] for ax in drawing.axes] == ["glycerin", "honey"]
-    assert all(len(ax.lines) == 2 + len(flow_figure.LOOKS) for ax in drawing.axes)
-    assert file_bytes(drawing, "svg", "t", PLOT_SETTINGS) == file_bytes(
-        flow_figure.draw(tables, fits), "svg", "t", PLOT_SETTINGS
-    )
-
-
 # --- The solver ---
 
 
@@ -248,19 +245,6 @@ def without_solver(monkeypatch):
     monkeypatch.setattr(solver, "library", lambda: None)
     monkeypatch.setattr(solver, "_solved", stand_ins.linear_table)
     monkeypatch.setattr(solver, "steady_table", stand_ins.steady)
-
-
-@pytest.mark.nightly
-@pytest.mark.slow
-@pytest.mark.usefixtures("without_solver")
-def test_tables_are_the_same_bytes_with_one_worker_two_and_a_cluster(tmp_path, all_workers):
-    held = []
-    for number, workers in enumerate(all_workers):
-        with executor_for(workers) as executor:
-            written = solver.solve(tmp_path / str(number), executor, lambda _: None)
-        held.append([(path.relative_to(tmp_path / str(number)), path.read_bytes()) for path in written])
-    assert len(held[0]) == len(CASES) + 1
-    assert all(one == held[0] for one in held)
 
 
 @pytest.mark.nightly
@@ -306,8 +290,3 @@ def test_a_solution_that_misses_the_coarse_one_is_not_stored(coarse, monkeypatch
     monkeypatch.setattr(solver, "PERMITTED", 1e-6)
     with pytest.raises(StudyError, match=r"differs from the coarse solution .* nothing is stored"):
         solver.motion_table(cases.cases()[0], coarse, coarse, step=0.025)
-
-
-def test_steps_that_are_too_long_are_said_to_be(coarse):
-    with pytest.raises(StudyError, match="take shorter steps"):
-        coarse.unsteady(200.0, np.linspace(0, 200, 401), lambda t: min(t, 1.0))

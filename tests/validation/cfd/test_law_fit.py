@@ -79,11 +79,6 @@ def test_the_program_meets_motions_that_no_fit_used():
     assert max(shares.values()) <= 0.05
 
 
-def test_one_motion_is_too_few():
-    with pytest.raises(StudyError, match=r"1 solved motion"):
-        law_fit.refit(stored_flows.training()[:1])
-
-
 @pytest.mark.nightly
 @pytest.mark.timeout(900)
 def test_each_motion_left_out_of_the_fit_is_met():

@@ -6,18 +6,9 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.errors import StudyError
-from study_app.haptics.model.laws.rheology import shape_factor
 from study_app.validation.cfd import yield_flow
 from study_app.validation.cfd.flow import Grid
-from study_app.validation.cfd.yield_flow import (
-    BINGHAM,
-    INDICES,
-    PERMITTED,
-    YieldFlow,
-    errors,
-    law_drag,
-    stored_materials,
-)
+from study_app.validation.cfd.yield_flow import BINGHAM, INDICES, PERMITTED, YieldFlow, errors, stored_materials
 
 
 def test_the_law_is_within_4_percent_of_the_solver_at_every_index_and_bingham_number():
@@ -34,30 +25,11 @@ def test_the_solution_depends_little_on_grid_and_smoothing():
         assert np.abs(table[name] / table["drag"] - 1).max() <= most
 
 
-def test_the_law_is_in_the_units_of_the_table():
-    assert law_drag(1.0, 0.0) == pytest.approx(1.0)
-    assert law_drag(0.5, 4.0) == pytest.approx(shape_factor(0.5) + 1.7 * 0.5**1.5 * 2 + 1.157 * 4)
-
-
-def test_the_command_prints_drag_and_error():
-    shown = CliRunner().invoke(commands, ["cfd", "--materials"], catch_exceptions=False)
-    lines = shown.output.splitlines()
-    assert lines[2] == "| Bi | n 0.3 | n 0.5 | n 0.7 | n 1 |"
-    assert len([line for line in lines if line.startswith("| ")]) == 1 + len(BINGHAM)
-    assert f"errs by at most {np.abs(errors(stored_materials())).max():.1%} (permitted: 4%)" in lines[-1]
-
-
 def test_the_command_writes_what_it_prints(tmp_path):
     printed = CliRunner().invoke(commands, ["cfd", "--materials"], catch_exceptions=False).output
     written = CliRunner().invoke(commands, ["cfd", "--materials", "--to", str(tmp_path)], catch_exceptions=False)
     assert (tmp_path / "materials.md").read_text("utf-8") == printed
     assert written.output == f"{tmp_path / 'materials.md'}\n"
-
-
-def test_the_command_refuses_to_refit_materials():
-    refused = CliRunner().invoke(commands, ["cfd", "--materials", "--refit"])
-    assert refused.exit_code == 2
-    assert "--refit and --materials exclude each other" in refused.output
 
 
 def test_a_table_that_is_missing_is_named(tmp_path):

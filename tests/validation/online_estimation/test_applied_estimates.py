@@ -8,27 +8,13 @@ from click.testing import CliRunner
 from study_app.cli import commands
 from study_app.lab.estimation.liquid_model import DRAG
 from study_app.validation.online_estimation import applied_estimates
-from study_app.validation.online_estimation.applied_estimates import (
-    LIQUIDS,
-    AppliedCase,
-    applied_cases,
-    judge_applied,
-    report,
-)
+from study_app.validation.online_estimation.applied_estimates import AppliedCase, judge_applied, report
 from study_app.validation.stability.stability_cases import parse
 from tests.haptics.scenes import COMPILED
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")]
 
 HELD = parse("liquid=dense scale=3 hand=middle speed_mps=0.3 motion=sine")
-
-
-def test_cases_are_of_the_sweep_and_drawn_from_the_seed() -> None:
-    cases = applied_cases(40)
-    assert cases == applied_cases(40)
-    assert cases[:10] == applied_cases(10)
-    assert cases != applied_cases(40, "another")
-    assert {it.case.liquid for it in cases} <= set(LIQUIDS)
 
 
 @pytest.mark.parametrize("planted", [0.4, 2.5])

@@ -2,9 +2,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import fields
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -27,17 +25,14 @@ from study_app.validation.report_rates import simulation, single_test_rates
 from study_app.validation.report_rates.known_effects import (
     EXTENTS,
     GENERATORS,
-    Extent,
     Generator,
     Simulated,
-    alike,
     answers,
     simulated,
 )
 from study_app.validation.report_rates.rates import Limit, Rate, markdown, table
 from study_app.validation.report_rates.simulation import validate
 from study_app.validation.report_rates.study_rates import CLAIMED, LOST, Cell, count, truth
-from study_app.workers.executors import Workers, open_executor
 
 
 @pytest.fixture(scope="module")
@@ -77,22 +72,6 @@ def test_a_rate_holds_as_far_as_its_interval_tells(limit: Limit, hits: int, stud
     assert Rate("cell", 5, "what", limit, hits, studies).holds == holds
 
 
-@pytest.mark.parametrize("generator", GENERATORS)
-@pytest.mark.parametrize("extent", EXTENTS)
-def test_settings_that_are_alike_are_answered_alike_on_average(
-    rek: Simulated, generator: Generator, extent: Extent
-) -> None:
-    for block, given in zip(rek.blocks, answers(rek, generator, extent, 300, 3, 1), strict=True):
-        assert given.shape == (300, len(block.settings), len(block.items))
-        assert set(np.unique(given)) <= set(range(1, 8))
-        means = given.mean(axis=0)
-        like = alike(block, extent)
-        for place, other in like.items():
-            assert means[place] == pytest.approx(means[other], abs=0.45)
-        if extent == "full":
-            assert np.ptp(means, axis=0).max() > 1
-
-
 @pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("participants", [5, 15])
@@ -109,16 +88,6 @@ def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Simulated, partic
                 for verdicts_only in (False, True)
             )
             assert [one.verdict for one in CONTRASTS.of(quick)] == [one.verdict for one in CONTRASTS.of(whole)]
-            assert [one.found.effect for one in CONTRASTS.of(quick)] == [
-                one.found.effect for one in CONTRASTS.of(whole)
-            ]
-            for one, other in zip(CONTRASTS.of(quick), CONTRASTS.of(whole), strict=True):
-                told = {field.name: getattr(one.found, field.name) for field in fields(one.found)}
-                told = {name: value for name, value in told.items() if value not in (None, "") and name != "note"}
-                told.pop("checks_agree", None)
-                assert told == {name: getattr(other.found, name) for name in told}
-            assert CONTRASTS.entries(quick).keys() == CONTRASTS.entries(whole).keys()
-            assert CONTRASTS.entries(quick)["equivalent_up_to"] == CONTRASTS.entries(whole)["equivalent_up_to"]
             assert (OMNIBUS.of(quick), PAIRS.of(quick)) == (OMNIBUS.of(whole), PAIRS.of(whole))
             assert [one.p_adjusted for one in TREND.of(quick)] == [one.p_adjusted for one in TREND.of(whole)]
             assert (LOWEST.of(quick), THRESHOLD.of(quick), AGAIN.of(quick).mixed) == (
@@ -126,12 +95,8 @@ def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Simulated, partic
                 THRESHOLD.of(whole),
                 (),
             )
-            if RECOGNITION.of(whole) is not None and RECOGNITION.of(quick) is not None:
-                assert (RECOGNITION.of(quick).verdict, RECOGNITION.of(quick).found.p) == (
-                    RECOGNITION.of(whole).verdict,
-                    RECOGNITION.of(whole).found.p,
-                )
-            assert (RECOGNITION.of(quick) is None) == (RECOGNITION.of(whole) is None)
+            recognised = RECOGNITION.of(whole), RECOGNITION.of(quick)
+            assert len({None if one is None else (one.verdict, one.found.p) for one in recognised}) == 1
 
 
 @pytest.mark.slow
@@ -149,23 +114,6 @@ def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator, mo
     }
     assert rates == [rate for cell in cells for rate in count(rek, cell, truth(rek, cell), 1, 0, 2)]
     assert len(markdown(rates).splitlines()) == len(table(rates).splitlines()) + 1 == len(rates) + 2
-
-
-@pytest.mark.nightly
-@pytest.mark.slow
-def test_rates_do_not_depend_on_the_executor(
-    rek: Simulated, all_workers: tuple[Workers, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(studies, "TRUTH", 200)
-    monkeypatch.setattr(simulation, "EXTENTS", EXTENTS[:1])
-    monkeypatch.setattr(simulation, "ROUNDS", 1)
-    found = []
-    for workers in all_workers:
-        with open_executor(workers) as executor:
-            *_, (done, rates) = validate(rek, 2, executor, sizes=(5,))
-        assert done > 0
-        found.append(table(rates))
-    assert all(rates == found[0] for rates in found)
 
 
 @pytest.mark.parametrize(

@@ -18,13 +18,15 @@ if numba.config.DISABLE_JIT:
 
 from study_app.cli import main
 from study_app.errors import ServoFault, StudyError
-from study_app.haptics.model.scene import Kalman
+from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_STOP, SAMPLE, records
 from study_app.protocol.load import load_scenes
+from study_app.validation.soak.sample_audit import Audit
 from study_app.validation.soak.soak import Soak, soak
 
 pytestmark = pytest.mark.slow
 
 SHORT_H = 2 / 60
+PERIOD_NS = 1_000_000
 
 
 @pytest.fixture(scope="module")
@@ -121,13 +123,6 @@ def test_no_force_ticks_to_and_fro_where_a_hand_keeps_still(scenes, seed):
     assert np.count_nonzero(turned & felt) < 5
 
 
-def test_the_slew_limit_promised_is_the_greatest_of_the_scenes_estimators(scenes):
-    ewma = scenes["light_oil"]
-    kalman = ewma.model_copy(update={"velocity": Kalman()})
-    for felt, most_n in (({"a": kalman}, 1.2), ({"a": kalman, "b": ewma}, 1.5)):
-        assert Soak(felt, SHORT_H, virtual=True).audit.counts.slew_n == pytest.approx(most_n)
-
-
 @pytest.mark.parametrize("hours", [0.0, -1.0, math.nan, math.inf, 1e5, 1e-9])
 def test_hours_that_make_no_sense_are_refused(scenes, hours):
     with pytest.raises(StudyError, match="a soak lasts"):
@@ -200,13 +195,6 @@ def test_a_force_above_the_limit_is_found(scenes):
     assert any("N was written" in finding for finding in found.findings)
 
 
-def test_samples_read_too_late_are_counted_and_cost_nothing_else(scenes):
-    found = stepped(scenes, lambda run: run.servo.advance(50_000), at=0.6)
-    assert found.dropped > 50_000 - 32_768
-    assert found.counts.missing == found.dropped
-    assert found.findings == ()
-
-
 @pytest.mark.parametrize(
     ("record", "name", "value", "said"),
     [
@@ -236,6 +224,68 @@ def test_every_number_that_may_not_be_is_named(found, record, name, value, said)
 def test_what_is_left_after_a_rest_is_found(found, name, value):
     rests = dataclasses.replace(found.rests, **{name: value})
     assert "after a rest" in dataclasses.replace(found, rests=rests).verdict
+
+
+def samples(count=10):
+    """Return good samples: a steady force, tick after tick."""
+    made = records(SAMPLE, count)
+    made.tick = np.arange(count)
+    made.time_ns = np.arange(count) * PERIOD_NS + 100
+    made.lateness_ns = 100
+    made.device_force_n = (3.0, 0.0, 4.0)
+    made.fresh = 1
+    return made
+
+
+def audited(made):
+    audit = Audit(8.0, 1.5, PERIOD_NS, 0.05)
+    audit.take(made[: len(made) // 2])
+    audit.take(made[len(made) // 2 :])
+    return audit.counts
+
+
+BROKEN = ("excess", "no_number", "steps", "unstopped", "believed", "drift_ns", "missing", "overruns")
+
+
+def broken(counts):
+    return {name: int(counts[name]) for name in BROKEN if counts[name]}
+
+
+def test_good_samples_break_no_promise():
+    counts = audited(samples())
+    assert broken(counts) == {}
+    assert (counts.samples, counts.most_n, counts.first_tick) == (10, 5.0, -1)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "promise"),
+    [
+        ("device_force_n", (3.0, 1.51, 4.0), {"steps": 2}),
+        ("device_force_n", (3.0, 1.5, 4.0), {}),
+        ("device_force_n", (8.01, 0.0, 4.0), {"excess": 1, "steps": 2}),
+        ("device_force_n", (3.0, math.nan, 4.0), {"no_number": 1}),
+        ("device_force_n", (math.inf, 0.0, 0.0), {"no_number": 1, "steps": 1}),
+        ("position_m", (0.0, math.nan, 0.0), {"believed": 1}),
+        ("position_m", (-math.inf, 0.0, 0.0), {"believed": 1}),
+        ("limiters", LIMITER_STOP, {"unstopped": 1}),
+        ("lateness_ns", 99, {"drift_ns": 1}),
+        ("busy_ns", 3_500_000, {"overruns": 2, "drift_ns": 2_000_000}),
+    ],
+)
+def test_a_broken_promise_is_counted(field, value, promise):
+    made = samples()
+    made[field][7] = value
+    assert broken(audited(made)) == promise
+
+
+def test_the_energy_account_and_stops_may_let_go_at_once():
+    for limiters in (LIMITER_ENERGY, LIMITER_STOP):
+        made = samples()
+        made.device_force_n[7:] = 0.0
+        made.limiters[7] = limiters
+        counts = audited(made)
+        assert broken(counts) == {}
+        assert max(counts.let_go_n, counts.paid_n) == 5.0
 
 
 # the command

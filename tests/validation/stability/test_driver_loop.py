@@ -20,32 +20,6 @@ if not COMPILED:
 RELEASE = Case(plant="falcon", liquid="light_oil", hand="lets-go", motion="sine", speed_mps=0.37699, release_s=0.7875)
 
 
-def traces(case):
-    """Return the traces of the Falcon and of a scripted device."""
-    falcon = driver_loop.opened_falcon()
-    falcon.renew()
-    return driver_loop.falcon_trace(case, falcon), driver_loop.scripted_traces(case, falcon.dynamics)[1]
-
-
-@pytest.mark.slow
-def test_falcon_and_scripted_device_are_in_the_same_hand():
-    case = dataclasses.replace(RELEASE, liquid="water", mass_kg=0.25, release_s=0.9)
-    falcon, scripted = traces(case)
-    held = falcon.t_s < case.release_s
-    assert np.ptp(falcon.position_m[held, 0]) == pytest.approx(0.8 * 0.06, rel=0.5)
-    assert np.abs(falcon.position_m - scripted.position_m)[held].max() < 2.5e-3
-    lengths_n = np.linalg.norm(scripted.acting_n, axis=1)
-    assert np.abs(falcon.acting_n - scripted.acting_n)[held].max() < 0.25 * lengths_n.max()
-
-
-def test_case_is_judged_the_same_each_time_and_after_others():
-    first = judge_driven(RELEASE)
-    judge_driven(dataclasses.replace(RELEASE, liquid="honey", hand="firm"))
-    assert judge_driven(RELEASE) == first
-    assert first.stable
-    assert first.safe
-
-
 @pytest.mark.parametrize("phase", range(4))
 def test_driver_gives_out_no_more_than_the_scripted_device(phase):
     case = dataclasses.replace(RELEASE, release_s=0.6 + phase / 8)

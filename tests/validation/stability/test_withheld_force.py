@@ -2,17 +2,12 @@
 
 import itertools
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from study_app import cli
 from study_app.cli.options import EXIT_FOUND
-from study_app.haptics.model.layout import records
 from study_app.validation.stability import withheld_force
-from study_app.validation.stability.closed_loop import TRACE, follow
-from study_app.validation.stability.device_bench import new_bench
-from study_app.validation.stability.stability_cases import Case
 from study_app.validation.stability.withheld_force import (
     MODES,
     MOST_AFTER,
@@ -35,13 +30,6 @@ def row(liquid, quick=0.0, lasting=0.0, mode=MODES[0]):
     return Withheld(liquid, "ewma", mode, (*(0.0,) * (len(STROKES) - 1), quick), after)
 
 
-def played(case, path_m, *, rigid):
-    bench, trace = new_bench(case, safe=True), records(TRACE, len(path_m))
-    bench.loop.rigid = rigid
-    follow(bench.model, bench.safety[0], bench.sample[0], bench.handle, bench.pace, bench.loop, trace, path_m)
-    return trace
-
-
 @pytest.mark.slow
 @compiled
 def test_slow_strokes_lose_nothing_and_shares_lie_between_0_and_1():
@@ -50,17 +38,6 @@ def test_slow_strokes_lose_nothing_and_shares_lie_between_0_and_1():
     for found in shares:
         assert found.strokes[0] == pytest.approx(0.0, abs=1e-3)
         assert all(0.0 <= share <= 1.0 for share in (*found.strokes, *sum(found.after, ())))
-
-
-@compiled
-def test_force_withheld_is_the_vector_between_permitted_and_sent_force():
-    t_s = np.arange(1500) / 1000
-    path_m = np.outer(0.03 * np.cos(2 * np.pi * 4 * t_s), [1.0, 0.0, 0.0])
-    trace = played(Case(liquid="light_oil"), path_m, rigid=1)
-    sizes_n = np.linalg.norm(trace.sent_n, axis=1)
-    assert trace.permitted_n.max() == pytest.approx(8.0)
-    assert (np.abs(trace.permitted_n - sizes_n) <= trace.withheld_n + 1e-3).all()
-    assert trace.withheld_n.max() > 0.1
 
 
 @pytest.mark.slow

@@ -10,11 +10,10 @@ from study_app.validation.thresholds.estimated_exponents import (
     PlantedExponent,
     exponent_verdicts,
     found_of,
-    planted_exponent,
     simulate_estimates,
     spread_of_exponents,
 )
-from study_app.validation.thresholds.many_studies import NAMES, plant
+from study_app.validation.thresholds.many_studies import plant
 from study_app.validation.thresholds.verdicts import markdown
 from study_app.validation.thresholds.whole_pipeline import judged, rehearsed
 from tests.compiled import needs_servo
@@ -30,13 +29,6 @@ def one() -> PlantedExponent:
 @pytest.fixture(scope="module")
 def studies(one: PlantedExponent) -> list[ExponentsFound]:
     return [simulate_estimates(one, number, seed=1) for number in range(12)]
-
-
-def test_the_observers_exponent_follows_from_the_resistance_at_the_pace(one: PlantedExponent) -> None:
-    assert one.resistance_exponent == pytest.approx(0.73, abs=0.01)
-    assert one.observer.estimates is not None
-    assert one.observer.estimates[0] == pytest.approx(0.60, abs=0.01)
-    assert list(one.resistances) == sorted(one.resistances)
 
 
 def test_without_noise_the_planted_exponent_is_found(one: PlantedExponent, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -56,14 +48,6 @@ def test_studies_recover_it_and_a_wrong_exponent_is_found(one: PlantedExponent, 
     narrow = [ExponentsFound(found.own, found.mean, found.mean, found.mean) for found in studies]
     assert not list(exponent_verdicts(one, narrow))[1].holds
     assert spread_of_exponents(studies, 10) < spread_of_exponents(studies, 3) < 0.05
-
-
-def test_studies_without_estimation_at_a_pace_have_no_exponent() -> None:
-    assert "thickness" in NAMES
-    assert planted_exponent("viscosityjnd", load("viscosityjnd")) is None
-    protocol = load("thickness")
-    task = load("delayjnd").tasks["reach"]
-    assert planted_exponent("x", protocol.model_copy(update={"tasks": {"stir": task}})) is None
 
 
 @pytest.mark.nightly

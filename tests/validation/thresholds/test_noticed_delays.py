@@ -3,12 +3,10 @@
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
-from study_app.protocol.load import load
 from study_app.protocol.streams import stream
 from study_app.protocol.trials.kinds import default_design
 from study_app.session.simulated.design_observer import OBSERVER, Comparison
@@ -18,7 +16,6 @@ from study_app.validation.thresholds.noticed_delays import (
     MEAN_CRITERION_S,
     Compared,
     compare,
-    delays_of,
     markdown,
     people_of,
     rated,
@@ -30,15 +27,6 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def found() -> Compared:
     return compare(40, 1)
-
-
-def test_people_differ_in_sensitivity_and_criterion() -> None:
-    people = people_of(200, 1)
-    jnds = np.log([person.observer.delay_jnd_s for person in people])
-    assert np.exp(jnds.mean()) == pytest.approx(JND_S, rel=0.04)
-    assert np.exp(jnds.std()) == pytest.approx(1.2, abs=0.02)
-    assert np.mean([person.rater.threshold_s for person in people]) == pytest.approx(MEAN_CRITERION_S, abs=0.004)
-    assert people_of(3, 1) == people[:3] != people_of(3, 2)
 
 
 def test_the_forced_choice_finds_the_planted_delay_and_the_rating_the_criterion(found: Compared) -> None:
@@ -67,10 +55,6 @@ def test_adaptation_moves_the_rating_and_no_forced_choice(found: Compared) -> No
             attended.choose(design, [0.2 - shift, 0.22 - shift], 0.0, stream(seed, "x").random) for shift in (0.0, 0.03)
         ]
         assert chosen[0] == chosen[1]
-
-
-def test_the_delays_are_those_of_the_studys_own_block() -> None:
-    assert delays_of(load("rek2024")) == (0, 50, 75, 100, 125, 150, 200)
 
 
 def test_the_table_has_a_row_for_each_procedure_and_criterion(found: Compared) -> None:

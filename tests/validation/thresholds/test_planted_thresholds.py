@@ -13,7 +13,7 @@ from study_app.protocol.streams import stream
 from study_app.protocol.trials.kinds import default_design
 from study_app.session.simulated.design_observer import OBSERVER, Comparison, Observer
 from study_app.validation.thresholds.methods_alone import StudyFound, simulate
-from study_app.validation.thresholds.planted import SHIPPED, Planted, planted
+from study_app.validation.thresholds.planted import Planted, planted
 from study_app.validation.thresholds.verdicts import markdown, spread, verdicts
 from study_app.validation.thresholds.whole_pipeline import judged, rehearsed
 from tests.compiled import needs_servo
@@ -59,15 +59,6 @@ def test_an_observer_is_correct_in_75_percent_at_the_planted_threshold(
     n = 20_000
     correct = sum(attended.choose(design, [standard, comparison], 0.0, draw) == "second" for _ in range(n))
     assert correct / n == pytest.approx(0.75, abs=0.01)
-
-
-@pytest.mark.parametrize("name", SHIPPED)
-def test_the_shipped_studies_have_a_planted_threshold_within_their_levels(name: str) -> None:
-    shipped = planted(name, load(name))
-    stimulus = shipped.protocol.stimuli[str(shipped.block.stimulus)]
-    low, high = stimulus.levels
-    assert low < shipped.threshold < high
-    assert (shipped.exponent is None) == (len(shipped.standards) == 1)
 
 
 def test_what_has_no_threshold_is_refused() -> None:

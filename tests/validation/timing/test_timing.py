@@ -16,18 +16,16 @@ if numba.config.DISABLE_JIT:
 
 from study_app.cli import main
 from study_app.errors import StudyError
-from study_app.haptics.kernels.c_functions import SLEEP, c_function, record_at
-from study_app.haptics.runtime.clocks.clock import VIRTUAL, VirtualClock
+from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.pack import elements_needed
 from study_app.haptics.runtime.servo import Servo
 from study_app.validation.timing.lateness import Lane, Timed
-from study_app.validation.timing.loops import LEAD_IN, PERIOD_NS, BareLoop, ServoLoop, granted, taken
+from study_app.validation.timing.loops import LEAD_IN, PERIOD_NS, ServoLoop, granted, taken
 from study_app.validation.timing.measurement import timing
 from study_app.validation.timing.timed_scene import FULL, PlayedHand
-from study_app.validation.timing.timing_report import BEGIN, COLUMNS, END, csv_text, markdown, text, write
+from study_app.validation.timing.timing_report import BEGIN, COLUMNS, END, csv_text, markdown, write
 
-_virtual_at = record_at(VIRTUAL)
 NORMAL, REAL_TIME = Grant("normal", "no more was requested"), Grant("real-time", "SCHED_FIFO 60")
 
 
@@ -74,37 +72,6 @@ def test_a_tick_that_comes_late_is_late_by_all_of_it_and_passes_deadlines_over()
     assert late.lateness_ns.tolist() == [0, 3_400_000, 1_000_000]
     assert late.overruns == 2
     assert late.busy_ns.tolist() == [10_000] * 3
-
-
-def _sleep_late(context, deadline_ns):
-    clock = _virtual_at(context)
-    late_ns = 3_400_000 if (deadline_ns // 1_000_000) % 97 == 0 else 700_000
-    clock.now_ns = max(clock.now_ns, deadline_ns + late_ns)
-    return clock.now_ns
-
-
-@pytest.fixture(scope="module")
-def late_clock():
-    """Return a clock in virtual time whose sleeps are late, now and then by several ticks."""
-    clock = VirtualClock()
-    clock.sleep = c_function(SLEEP, _sleep_late)
-    return clock
-
-
-def test_servo_and_bare_loop_count_alike(late_clock):
-    """On one clock that is late by a rule, both must say the same of the same number of ticks."""
-    bare = BareLoop(NORMAL, real_time=False, clock=late_clock)
-    late_clock.memory[0].now_ns = 0
-    ours = bare.run(500)
-    late_clock.memory[0].now_ns = 0
-    servo = Servo(PlayedHand(), clock=late_clock)
-    reader = servo.telemetry.reader()
-    servo.advance(500 + LEAD_IN)
-    samples = reader.read()
-    assert np.array_equal(samples.lateness_ns[LEAD_IN:], ours.lateness_ns)
-    assert (ours.lateness_ns > 3_000_000).any()
-    passed = np.diff(samples.time_ns - samples.lateness_ns)[LEAD_IN:] // PERIOD_NS - 1
-    assert abs(ours.overruns - int(passed.sum())) <= 2, "the last tick's, and the first one's"
 
 
 # the scene, and what a tick may do
@@ -159,24 +126,6 @@ def test_a_race_times_every_loop_in_every_class_it_is_granted():
     assert lines[-1] == "100 %"
     assert raced.frames_hz is None
     assert not any(thread.name in {"servo", "timed"} for thread in threading.enumerate())
-
-
-@pytest.mark.nightly
-@pytest.mark.slow
-def test_without_qt_its_timer_is_left_out_and_said_so():
-    raced = timing(0.5, "none", None, spin_us=100)
-    assert all(one.kind != "qt" for one in raced.lanes)
-    assert "Qt is not available" in raced.notes[-1]
-    assert raced.spin_us == 100
-    assert raced.spun_share > 0
-    assert "a spin of 100 µs before each deadline took" in text(raced)
-
-
-def test_one_that_is_to_end_ends():
-    ending = threading.Event()
-    ending.set()
-    with pytest.raises(KeyboardInterrupt):
-        timing(1.0, "none", None, ending=ending)
 
 
 @pytest.mark.parametrize("seconds", [0.0, 0.4, 4000.0, float("nan")])

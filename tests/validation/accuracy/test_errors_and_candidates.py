@@ -1,4 +1,4 @@
-"""Errors of forces, their Pareto front, and times without what other threads take."""
+"""Errors of forces, their Pareto front, and the models that a scene is compared with."""
 
 import math
 
@@ -8,9 +8,11 @@ import pytest
 from study_app.evaluation.force_error import Error, error_of
 from study_app.evaluation.reference_solutions import Case, Truth
 from study_app.haptics.model.motion import Motion
-from study_app.validation.accuracy.candidates import TickRung
+from study_app.haptics.model.scene import MotionBox
+from study_app.validation.accuracy import candidate_sets
+from study_app.validation.accuracy.candidates import LinearRung, TickRung
 from study_app.validation.accuracy.comparison import Row, Time, front
-from tests.validation.accuracy.scenes import TANK
+from tests.validation.accuracy.scenes import REAL, TANK
 
 pytestmark = pytest.mark.slow
 
@@ -53,3 +55,12 @@ def test_the_front_takes_rounding_errors_and_times_within_a_twentieth_as_equal()
     assert [rung.name for rung in front(points)] == ["quick", "sums"]
     alike = dict([row("quick", 100, 0.5), row("truer", 104, 0.1), row("truest", 150, 0.01)])
     assert [rung.name for rung in front(alike)] == ["truer", "truest"]
+
+
+@pytest.mark.parametrize(("speed_mps", "expects"), [(1e-3, "no resistance"), (0.6, "+ history")])
+def test_the_ladder_has_the_gates_own_choice(speed_mps, expects):
+    box = MotionBox(speed_mps=speed_mps, acceleration_mps2=10 * speed_mps)
+    rungs, choice = candidate_sets.physical(REAL.model_copy(update={"motion": box}))
+    assert choice in rungs
+    assert expects in choice.name
+    assert isinstance(rungs[0], LinearRung)
