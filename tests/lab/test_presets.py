@@ -69,10 +69,3 @@ def test_the_shipped_liquids_are_at_hand_with_those_of_a_folder_and_without_brok
     water = next(it for it in at_hand if (it.source, it.liquid) == ("rek2024", "water"))
     assert water.scene.velocity == Ewma()  # as its file says
     assert water.setting().origin == water.scene.model_copy(update={"velocity": Kalman()})
-
-
-def test_what_the_lab_saves_names_kalman(tmp_path: Path) -> None:
-    path = tmp_path / "honey.toml"
-    save(path, preset_text(Choice("rek2024", "honey", "Honey").setting()))
-    assert 'kind = "kalman"' in path.read_text()
-    assert load_scene(str(path), "honey").velocity == Kalman()

@@ -12,7 +12,6 @@ from study_app.haptics.model.scene import Kalman, Scene
 from study_app.lab.ab_comparison import Setting, Workbench
 from study_app.lab.changes import changed
 from study_app.lab.shadow import Shadow
-from study_app.lab.wake_tail import MOST_POINTS
 from tests.haptics.scenes import EVERYTHING
 from tests.lab.benches import SCENES, bench, live_with, run, scripted
 
@@ -108,7 +107,6 @@ def test_a_tail_is_the_path_that_was_left_and_breaks_where_it_turns() -> None:
     assert tail is not None
     assert (tail.elements, tail.alive) == (1700, 600)
     assert tail.segments == tail.breaks.sum() == 2
-    assert len(tail.positions_m) <= MOST_POINTS
     corner = tail.positions_m[np.flatnonzero(tail.breaks)[1]]
     assert corner == pytest.approx([0.03, 0.0, 0.0], abs=0.0075)  # a diameter of the ball, and the filter's lag
     on_first = np.abs(tail.positions_m[:, 2]) < 1e-12

@@ -239,12 +239,3 @@ def test_a_damper_and_a_liquid_without_viscosity_keep_drag():
     assert "unsteady_drag" not in bounds(later(damper), damper.liquids[0])
     assert "drag" in taken(later(damper))
     assert "drag" in taken(later(stirred("water", 1.0, viscosity_pa_s=None)))
-
-
-def test_what_is_named_is_counted_once():
-    """Of two models of the same thing one has a share of the force."""
-    for effects in (("drag", "added_mass"), ("unsteady_drag",)):
-        scene = later(stirred("honey", 0.5, effects=effects))
-        counted = {"unsteady_drag"} if "unsteady_drag" in effects else {"drag", "added_mass", "history"}
-        shares = {verdict.effect: verdict.share for verdict in calls_for(scene)}
-        assert sum(shares[name] for name in counted) + shares["buoyancy"] == pytest.approx(1)

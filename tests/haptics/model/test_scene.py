@@ -3,7 +3,7 @@ from pydantic import ValidationError
 
 from study_app.haptics.model.effects import drag
 from study_app.haptics.model.effects.wake import Wake
-from study_app.haptics.model.scene import Body, Box, Everywhere, Given, Liquid, MotionBox, Scene
+from study_app.haptics.model.scene import Body, Liquid, MotionBox, Scene
 from study_app.haptics.runtime.pack import pack
 from tests.haptics.scenes import liquid, scene
 
@@ -80,18 +80,3 @@ def test_liquids_need_ids_of_their_own_and_a_scene_takes_eight():
         scene(liquid(id="a"), liquid(id="a"))
     with pytest.raises(ValidationError, match="at most 8"):
         scene(*(liquid(id=f"a{i}") for i in range(9)))
-
-
-def test_tables_as_read_from_a_file_become_a_scene():
-    read = Scene.model_validate(
-        {
-            "velocity": {"kind": "given"},
-            "liquids": [
-                {"id": "a", "density_kg_m3": 900, "region": {"kind": "box", "size_m": [1, 2, 3]}},
-                {"id": "b", "density_kg_m3": 900},
-            ],
-        }
-    )
-    assert read.velocity == Given()
-    assert read.liquids[0].region == Box(size_m=(1, 2, 3))
-    assert read.liquids[1].region == Everywhere()

@@ -20,10 +20,8 @@ from study_app.haptics.model.paths import path
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import SLEW_N
 from study_app.haptics.runtime.clocks.clock import VirtualClock
-from study_app.haptics.runtime.pack import built_alike
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load_scene
-from tests.haptics.scenes import EVERYTHING
 
 WATER = load_scene("rek2024", "water")
 NUMBERS = {
@@ -100,12 +98,6 @@ def test_what_a_state_was_made_with_cannot_be_adjusted(name: str) -> None:
     assert not servo.may_adjust(WATER)
     servo.stop()
     device.close()
-
-
-@pytest.mark.parametrize("name", sorted(EVERYTHING))
-def test_histories_and_local_wakes_begin_anew(name: str) -> None:
-    effects = {effect for liquid in EVERYTHING[name].liquids for effect in liquid.effects}
-    assert built_alike(EVERYTHING[name], EVERYTHING[name]) is not bool(effects & {"history", "local_wake"})
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""The command of the accuracy table: what it prints and refuses."""
+"""The command of the accuracy table, what it prints and refuses, and its survey of liquids."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,9 @@ from study_app.cli import commands
 from study_app.cli.evidence.accuracy import motion_along
 from study_app.errors import StudyError
 from study_app.haptics.model.motion import Motion
+from study_app.protocol.load import load_scenes
 from study_app.validation.accuracy.comparison import accuracy
+from study_app.validation.accuracy.liquid_survey import FILE, PUBLISHED, survey, survey_markdown, write_survey
 from tests.validation.accuracy.scenes import TANK, compiled
 
 pytestmark = pytest.mark.slow
@@ -20,6 +22,9 @@ def test_what_the_command_cannot_do_is_said_in_a_line():
         (["--liquid", "watr"], "or give FILE, which has it"),
         (["rek2024"], "rek2024: say which --liquid of"),
         (["--liquid", "water", "--path", "circl"], "did you mean 'circle'"),
+        (["--liquids", "--liquid", "honey"], "--liquids and --liquid exclude each other"),
+        (["--liquids", "--path", "circle"], "--liquids and --path exclude each other"),
+        (["rek2024", "--liquids"], "no liquid has a viscosity"),
     ):
         refused = CliRunner().invoke(commands, ["accuracy", *words])
         assert refused.exit_code != 0
@@ -53,3 +58,53 @@ def test_the_command_prints_the_table_of_one_liquid(tmp_path):
     assert "central differences" in told.output
     assert "the motion is short: calls, of some µs, count in times of 5 ticks a batch" in told.output
     assert "| drag |" in told.output
+
+
+CHOSEN = ("water", "honey", "olive_oil")
+
+
+@pytest.fixture(scope="module")
+def found():
+    scenes = load_scenes("physical2")
+    return {it.liquid: it for it in survey({name: scenes[name] for name in CHOSEN})}
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_a_published_law_is_stokes_drag_at_rest_and_a_spheres_at_its_end(name):
+    """The bounds are those of the spheres' standard drag curve: C_d 1.09 at Re 100, 0.38 to 0.5 from Re 3000 on."""
+    law = PUBLISHED[name]
+    assert law(1e-9) == pytest.approx(1, abs=1e-5)
+    assert law(100.0) * 24 / 100 == pytest.approx(1.09, rel=0.025)
+    for reynolds in (3e3, 1e4, 1e5):
+        assert 0.38 <= law(reynolds) * 24 / reynolds <= 0.5
+
+
+@compiled
+def test_each_liquid_is_compared_with_what_is_known_of_it(found):
+    assert list(found) == ["honey", "olive_oil", "water"]
+    honey, oil, water = found.values()
+    assert (honey.model, oil.model, water.model) == ("unsteady drag", "unsteady drag", "constant C_d + added mass")
+    assert max(honey.creeping, oil.creeping) < 0.01
+    assert 0 < honey.solver < 0.04
+    assert 0 < honey.steady < 0.05
+    assert honey.solver_reynolds[0] == pytest.approx(0.3, rel=0.05)
+    assert honey.solver_reynolds[1] == pytest.approx(honey.reynolds, rel=1e-3)
+    assert (oil.solver, water.solver, water.creeping) == (None, None, None)
+    assert water.reynolds == pytest.approx(998.2 * 0.6 * 0.068 / 1.0016e-3, rel=1e-3)
+    for it in found.values():
+        assert it.expected.causes.law < 0.08
+        assert 0.04 < it.expected.error_share < 0.16 + it.expected.causes.limits
+        assert it.expected.cost_ns > 0
+
+
+@compiled
+def test_the_survey_says_up_to_which_speed_the_force_was_solved(found, tmp_path):
+    file = write_survey(tuple(found.values()), tmp_path)
+    text = file.read_text("utf-8")
+    assert (file.name, text) == (FILE, f"{survey_markdown(tuple(found.values()))}\n")
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines() if line.startswith("|")]
+    by_name = {row[0]: row for row in rows}
+    assert [by_name[name][6] for name in CHOSEN] == ["–", "0.6 m/s", "0.14 m/s"]
+    assert by_name["water"][1] == "40,700 (0.6 m/s)"
+    assert len(by_name["100,000"]) == len(PUBLISHED) + 4
+    assert "Above Re 1000 there is no reference for unsteady motion" in text

@@ -43,28 +43,25 @@ def test_driver_that_lets_go_slowly_gives_out_too_much(monkeypatch):
     assert judge_driven(case).reasons == ("energy",)
 
 
-def test_force_that_trembles_is_unstable(monkeypatch):
+def trembling(trace):
+    trace.sent_n[:, 1] += 0.2 * np.sin(2 * np.pi * 100 * trace.t_s)
+
+
+def lost(trace):
+    trace.position_m[100] = math.nan
+
+
+@pytest.mark.parametrize(("spoil", "reason"), [(trembling, "force"), (lost, "not finite")])
+def test_force_that_trembles_and_position_that_is_no_number_are_unstable(monkeypatch, spoil, reason):
     follow = driver_loop.falcon_trace
 
-    def trembling(case, falcon):
+    def spoilt(case, falcon):
         trace = follow(case, falcon)
-        trace.sent_n[:, 1] += 0.2 * np.sin(2 * np.pi * 100 * trace.t_s)
+        spoil(trace)
         return trace
 
-    monkeypatch.setattr(driver_loop, "falcon_trace", trembling)
-    assert judge_driven(RELEASE).reasons == ("force",)
-
-
-def test_position_that_is_no_number_is_unstable(monkeypatch):
-    follow = driver_loop.falcon_trace
-
-    def lost(case, falcon):
-        trace = follow(case, falcon)
-        trace.position_m[100] = math.nan
-        return trace
-
-    monkeypatch.setattr(driver_loop, "falcon_trace", lost)
-    assert judge_driven(RELEASE).reasons == ("not finite",)
+    monkeypatch.setattr(driver_loop, "falcon_trace", spoilt)
+    assert judge_driven(RELEASE).reasons == (reason,)
 
 
 def test_command_judges_a_case_through_the_driver():

@@ -3,6 +3,7 @@
 import csv
 import dataclasses
 from concurrent.futures import ThreadPoolExecutor
+from importlib import resources
 
 import pytest
 from click import UsageError
@@ -12,6 +13,7 @@ from study_app import cli
 from study_app.cli.options import EXIT_FOUND
 from study_app.errors import StoreError, StudyError
 from study_app.haptics.model.layout import LIMITER_NAMES
+from study_app.haptics.model.slope_limits import table
 from study_app.validation.stability import stability_report as stability
 from study_app.validation.stability.case_groups import Group, groups, some, sweep
 from study_app.validation.stability.fidelity import LOOPS, fidelities
@@ -152,10 +154,9 @@ def test_the_files_hold_every_case_and_the_lines_that_reproduce_the_failing_ones
     assert b"Friction b" in written["map.svg"].read_bytes()
     failing = dataclasses.replace(swept.off[0], reasons=("force",), case=Case(plant="arm"))
     more = dataclasses.replace(few, others=(stability.Judged("second plant", (failing,)),))
-    lines = next(
-        path for path in stability.write(tmp_path / "more", more, found) if path.name == "unstable-safety-on.txt"
-    )
-    assert [parse(line) for line in lines.read_text("utf-8").splitlines()] == [failing.case]
+    stability.write(tmp_path / "more", more, found)
+    lines = (tmp_path / "more" / "unstable-safety-on.txt").read_text("utf-8").splitlines()
+    assert [parse(line) for line in lines] == [failing.case]
     (tmp_path / "file").write_text("")
     with pytest.raises(StoreError, match="choose another with --to"):
         stability.write(tmp_path / "file" / "below", few, found)
@@ -236,12 +237,8 @@ def test_what_cannot_be_judged_is_refused(words, said):
 
 @compiled
 def test_the_table_of_limits_is_written_as_it_ships(monkeypatch, tmp_path):
-    from study_app.haptics.model.slope_limits import table
-
     monkeypatch.setattr(stability, "measure_limits", lambda **_: iter(table()))
     ran = command("--table", str(tmp_path / "limits.csv"))
     assert ran.exception is None
-    from importlib import resources
-
     whole = (resources.files("study_app.haptics.model") / "slope_limits.csv").read_bytes()
     assert (tmp_path / "limits.csv").read_bytes() == whole

@@ -5,6 +5,7 @@ import io
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.validation.timing.delay_report import COLUMNS, csv_text, write
@@ -77,13 +78,6 @@ def test_files_are_written_and_the_figure_is_the_same_each_time(tmp_path):
     assert b"1 frame" in files[-1].read_bytes()
 
 
-def test_delays_have_no_loops_to_spin(cli_runner):
-    finished = cli_runner.invoke(commands, ["timing", "--delays", "--spin", "100"])
+def test_delays_have_no_loops_to_spin():
+    finished = CliRunner().invoke(commands, ["timing", "--delays", "--spin", "100"])
     assert "omit it with --delays" in str(finished.exception)
-
-
-@pytest.fixture
-def cli_runner():
-    from click.testing import CliRunner
-
-    return CliRunner()

@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from study_app.haptics.model.effects.added_mass import AddedMass
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Box
 from study_app.haptics.runtime.offline import simulate
@@ -32,7 +31,7 @@ def speeding_up(acceleration, ticks=50, interval_s=1e-3):
     interval_s=st.sampled_from([0.0002, 0.001, 0.01]),
 )
 def test_half_the_displaced_mass_is_accelerated_with_the_ball(density, coefficient, ax, az, interval_s):
-    felt = heavy(density=density, added_mass=AddedMass(coefficient=coefficient))
+    felt = heavy(density=density, added_mass={"coefficient": coefficient})
     force = vectors(simulate(felt, speeding_up((ax, 0.0, az), 20, interval_s)), "force")
     assert not force[0].any()
     expected = -coefficient * density * VOLUME_M3 * np.array([ax, 0, az])
@@ -48,7 +47,7 @@ def test_in_water_it_is_82_grams():
 def test_measured_acceleration_is_smoothed_over_its_time_at_any_rate(interval_s):
     t_s = np.arange(round(0.4 / interval_s)) * interval_s
     motion = Motion(t_s, np.column_stack([0.5 * t_s**2, 0 * t_s, 0 * t_s]))
-    felt = heavy(added_mass=AddedMass(filter_s=0.05)).model_copy(update={"rate_hz": 1 / interval_s})
+    felt = heavy(added_mass={"filter_s": 0.05}).model_copy(update={"rate_hz": 1 / interval_s})
     full = -0.5 * 1000 * VOLUME_M3
     force = simulate(felt, motion).fx_n
     assert force[-1] == pytest.approx(full, rel=0.001)
@@ -60,7 +59,7 @@ def test_one_count_of_an_encoder_is_hardly_felt():
     place_m = np.zeros((80, 3))
     place_m[40:, 0] = 38e-6
     motion = Motion(np.arange(80) / 1000, place_m)
-    smooth, rough = (simulate(heavy(added_mass=AddedMass(filter_s=t)), motion).fx_n for t in (0.025, 0.0))
+    smooth, rough = (simulate(heavy(added_mass={"filter_s": t}), motion).fx_n for t in (0.025, 0.0))
     assert abs(rough).max() == pytest.approx(0.31, abs=0.01)
     assert abs(smooth).max() < 0.02
 

@@ -1,4 +1,4 @@
-"""The estimators that look back: line and foaw, and the plain difference."""
+"""The estimators that look back, line and foaw, the plain difference, and EWMA with lead."""
 
 import numpy as np
 import pytest
@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.errors import StudyError
+from study_app.haptics.model.estimators.lead import ALPHA, LEAD_S, SMOOTHING_S
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Ewma, Foaw, Line, Raw
+from study_app.haptics.model.scene import Ewma, Foaw, Lead, Line, Raw
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack, pack_into
 from tests.haptics.scenes import COMPILED, UNBENT, examples, scene, vectors
@@ -108,3 +109,23 @@ def test_foaw_is_its_definition_in_space(seed):
 def test_a_window_that_is_too_small_is_refused():
     with pytest.raises(StudyError, match=r'"line" looks at 15 samples.*room for 5'):
         pack_into(pack(scene(velocity=Line(samples=5))), scene(velocity=Line()))
+
+
+def test_with_lead_a_parabola_lags_by_the_lag_of_ewma_less_the_lead():
+    t_s = np.arange(600) / 1000
+    lag_s = (2.0 * t_s - felt(Lead(), t_s**2)[:, 0])[-100:] / 2.0
+    assert lag_s == pytest.approx(0.5e-3 + (1 - ALPHA) / ALPHA * 1e-3 - LEAD_S, abs=1e-8)
+    usual_s = (2.0 * t_s - felt(Ewma(alpha=ALPHA), t_s**2)[:, 0])[-100:] / 2.0
+    assert usual_s == pytest.approx(4.5e-3, abs=1e-8)
+
+
+def test_lead_is_its_definition():
+    random = np.random.default_rng(2)
+    x_m = np.cumsum(random.normal(0, 1e-4, 300))
+    e = a = 0.0
+    expected = [0.0]
+    for u in np.diff(x_m) / 1e-3:
+        before, e = e, e + ALPHA * (u - e)
+        a += -np.expm1(-1e-3 / SMOOTHING_S) * ((e - before) / 1e-3 - a)
+        expected.append(e + LEAD_S * a)
+    assert felt(Lead(), x_m)[:, 0] == pytest.approx(np.array(expected), rel=1e-6, abs=1e-9)

@@ -8,7 +8,7 @@ import pytest
 from study_app.haptics.kernels.estimators import kalman
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.model.device_dynamics import Dynamics
-from study_app.haptics.model.estimators import ewma
+from study_app.haptics.model.estimators import NAMED
 from study_app.haptics.model.force_rules import CURRENT, VERSIONS
 from study_app.haptics.model.layout import LIMITER_ESTIMATOR, records
 from study_app.haptics.model.motion import Motion
@@ -188,7 +188,7 @@ def test_nothing_of_a_motion_is_left_in_denormal_numbers():
 
 def test_a_device_that_measures_no_delay_gets_ewma():
     found, usual = (Hand(WATER.model_copy(update={"velocity": it})) for it in (Kalman(), Ewma()))
-    assert found.model.parameters[0].estimator == ewma.CODE
+    assert found.model.parameters[0].estimator == NAMED["ewma"].code
     assert [s.tobytes() for s in found.sweep(0.2, 40)] == [s.tobytes() for s in usual.sweep(0.2, 40)]
 
 
