@@ -144,3 +144,14 @@ def test_a_search_that_fails_fails_once() -> None:
     with pytest.raises(MemoryError):
         fed(estimator, rows)
     assert not estimator.estimate.identified
+
+
+def test_a_measurement_that_is_short_slow_or_interrupted_is_said() -> None:
+    rows = measured(WATER, *stirring(4.0))
+    assert fed(OnlineEstimator(WATER), rows.part(0, 300)).reason.startswith("0.3 s measured, ")
+    slow, gaps = (Rows(*(getattr(rows, it)[::step] for it in Rows.__slots__)) for step in (40, 100))
+    with pytest.raises(StudyError, match="rows per second"):
+        fed(OnlineEstimator(WATER), slow)
+    interrupted = fed(OnlineEstimator(WATER), gaps)
+    assert interrupted.reason.startswith("no force was measured for 0.1 s, at most 0.05 s are permitted")
+    assert interrupted.values == {}

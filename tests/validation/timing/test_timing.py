@@ -20,7 +20,7 @@ from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.pack import elements_needed
 from study_app.haptics.runtime.servo import Servo
 from study_app.validation.timing.lateness import Lane, Timed
-from study_app.validation.timing.loops import LEAD_IN, PERIOD_NS, ServoLoop, granted, taken
+from study_app.validation.timing.loops import LEAD_IN, PERIOD_NS, granted, taken
 from study_app.validation.timing.measurement import timing
 from study_app.validation.timing.timed_scene import FULL, PlayedHand
 from study_app.validation.timing.timing_report import BEGIN, COLUMNS, END, csv_text, markdown
@@ -125,14 +125,6 @@ def test_a_race_times_every_loop_in_every_class_it_is_granted():
     assert lines[-1] == "100 %"
     assert raced.frames_hz is None
     assert not any(thread.name in {"servo", "timed"} for thread in threading.enumerate())
-
-
-def test_the_servo_that_is_timed_lets_go_after_each_tick():
-    loop = ServoLoop(NORMAL, real_time=False, spin_us=None)
-    for _ in range(2):
-        assert len(loop.run(20).lateness_ns) == 20
-    assert loop.servo.grant.level == "normal"
-    assert not loop.servo.loop.live
 
 
 # what it comes to

@@ -91,15 +91,6 @@ def test_nothing_steps_at_the_surface(effects, velocity):
     assert abs(np.diff(force, axis=0)).max() < 0.01 * abs(force).max()
 
 
-@pytest.mark.compiled
-def test_buoyancy_does_not_even_bend_there():
-    y_m = np.linspace(TOP_M + 0.05, TOP_M - 0.05, 2001)
-    force = simulate(pool("buoyancy"), through(y_m, (0, 0, 0))).fy_n
-    slope = np.gradient(force, y_m)
-    assert abs(np.diff(slope)).max() < 0.01 * abs(slope).max()
-    assert slope.min() == pytest.approx(-1000 * 9.80665 * math.pi * RADIUS_M**2, rel=1e-4)  # hydrostatic spring
-
-
 def test_entering_through_the_surface_takes_no_time_and_through_a_wall_20_ms():
     falling = simulate(pool("drag"), through([TOP_M + 0.05, TOP_M - 0.05], (0, -1.0, 0))).fy_n
     assert falling == pytest.approx([0.0, WATER_FACTOR])

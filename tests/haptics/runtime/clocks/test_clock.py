@@ -19,6 +19,7 @@ from study_app.haptics.runtime.clocks import linux as clock_linux
 from study_app.haptics.runtime.clocks import macos
 from study_app.haptics.runtime.clocks import windows as clock_windows
 from study_app.haptics.runtime.clocks.clock import SystemClock, raise_priority
+from study_app.haptics.runtime.clocks.grants import Grant
 
 if sys.platform != "win32":
     import resource
@@ -117,6 +118,12 @@ def test_linux_takes_the_priority_that_a_limit_allows(linux, monkeypatch):
     monkeypatch.setattr(os, "sched_setscheduler", grant_20)
     assert str(in_a_thread(raise_priority)) == "real-time (SCHED_FIFO 20)"
     assert asked == [60, 20]
+
+
+def test_memory_that_is_not_locked_is_said_with_its_cure():
+    well = Grant("real-time", "SCHED_FIFO 60")
+    assert str(well.with_memory(locked=True, advice="cure")) == "real-time (SCHED_FIFO 60), memory locked"
+    assert str(well.with_memory(locked=False, advice="cure")) == "real-time (SCHED_FIFO 60), memory not locked; cure"
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="a limit of Linux")
