@@ -68,6 +68,11 @@ def test_a_rate_holds_as_far_as_its_interval_tells(limit: Limit, hits: int, stud
     assert Rate("cell", 5, "what", limit, hits, studies).holds == holds
 
 
+def test_each_generator_answers_in_its_own_way(rek: Simulated) -> None:
+    one, other = (answers(rek, generator, "full", 20, 3, 1) for generator in GENERATORS)
+    assert all((first != second).any() for first, second in zip(one, other, strict=True))
+
+
 @pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("participants", [5, 15])
@@ -105,6 +110,7 @@ def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator, mo
     assert {rate.cell for rate in rates} == {f"{generator}, {extent}" for extent in EXTENTS}
     assert [rate.hits for rate in rates if rate.what == LOST[0]] == [0, 0, 0]
     assert sum(rate.what == CLAIMED for rate in rates) == 2
+    assert not [rate for rate in rates if rate.limit == "at most 5 %" and rate.hits == 2]
     assert {"detection threshold printed (delays)", "equal liquids distinguished (liquids)"} <= {
         one.what for one in rates
     }
