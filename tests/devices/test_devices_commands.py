@@ -94,6 +94,21 @@ class TestDoctor:
         refused = liquid_study("doctor", "--device", "scripted")
         assert "'scripted' is none" in str(refused.exception)
 
+    @pytest.mark.parametrize(
+        ("fault", "words"),
+        [
+            ("dropp=0.1", "choose one of: drop, truncate"),
+            ("drop=1.5", "must be 0 to 1, not 1.5"),
+            ("drop", "not known; choose of: drop=CHANCE"),
+            ("never", "never-homes, "),
+            ("frozen=1", "does not come by chance"),
+            ("", "not known"),
+        ],
+    )
+    def test_a_fault_that_is_none_is_refused(self, fault, words):
+        refused = liquid_study("doctor", "--device", "falcon-emulated", "--fault", fault)
+        assert words in str(refused.exception)
+
 
 @pytest.mark.skipif(os.name == "nt", reason="no Unix sockets")
 class TestDoctorOverASocket:
