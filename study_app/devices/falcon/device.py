@@ -10,7 +10,14 @@ import numpy as np
 from study_app.devices.base import Device
 from study_app.devices.call_gate import FINISHED, RUNS, check_left, let_go
 from study_app.devices.falcon import boot
-from study_app.devices.falcon.exchange import BRIDGE_LOST, COUNTERS, LEAST_MASS_KG, exchange_functions, new_exchange
+from study_app.devices.falcon.exchange import (
+    BRIDGE_LOST,
+    COUNTERS,
+    FORCE_LIMIT_N,
+    LEAST_MASS_KG,
+    exchange_functions,
+    new_exchange,
+)
 from study_app.devices.falcon.facts import OPEN, Facts
 from study_app.devices.falcon.failure_modes import BY_ID, sentence
 from study_app.devices.falcon.failures import ProgramMissing, usb_failure
@@ -26,8 +33,6 @@ from study_app.devices.guard import DIED, Guard
 from study_app.errors import DeviceError, DeviceLost
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import new_command, new_reading
-
-FORCE_LIMIT_N: Final = 8.0
 
 ENDS_TORQUE: Final = f"{end_torque.__module__}:{end_torque.__name__}"
 _SILENT_TICKS: Final = 40  # after 50 ms without a new position the servo ends the force
@@ -85,7 +90,7 @@ class FalconDevice(Device):
         mechanism = new_mechanism(self._geometry, calibration.UNCALIBRATED_UNITS_PER_NM)
         self._count_m = count_at(mechanism, self._geometry.centre_m)
         self._check_reach(mechanism)
-        self.memory = new_exchange(_CLOSED, mechanism, self._geometry)
+        self.memory = new_exchange(_CLOSED, mechanism, self._geometry, force_limit_n)
         self.falcon = self.memory[0]
         self.falcon.ended = FINISHED
         self.context = int(self.memory.ctypes.data)
@@ -261,7 +266,7 @@ class FalconDevice(Device):
 
     def _home(self, transport: Transport) -> None:
         mechanism = self.falcon.mechanism.copy()
-        self.memory[:] = new_exchange(transport.calls(), mechanism, self._geometry)
+        self.memory[:] = new_exchange(transport.calls(), mechanism, self._geometry, self.force_limit_n)
         self.falcon.unguarded = int(self._guard_died)
         home(self.falcon, self._tick, transport.now_s, self._progress, patience_s=self._patience_s)
         self._begin_anew()

@@ -9,9 +9,10 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from study_app.devices.falcon.device import FORCE_LIMIT_N, FalconDevice
+from study_app.devices.falcon.device import FalconDevice
 from study_app.devices.falcon.emulator.emulator import Emulator
 from study_app.devices.falcon.emulator.usb_backend import EmulatedBackend
+from study_app.devices.falcon.exchange import FORCE_LIMIT_N
 from study_app.devices.falcon.mechanics.geometry import WORKSPACE_M
 from study_app.devices.falcon.transport.transport import Transport
 from study_app.devices.falcon.transport.usb import PyUsbTransport

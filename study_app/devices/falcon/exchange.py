@@ -42,11 +42,12 @@ from study_app.haptics.kernels.c_functions import (
     record_at,
 )
 from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.vector import clear, copy
+from study_app.haptics.kernels.vector import clear, copy, square
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import COMMAND, READING, records
 from study_app.haptics.model.slope_limits import SLEW_S, slew_limit_n
 
+FORCE_LIMIT_N: Final = 8.0
 LEAST_MASS_KG: Final = 0.1
 """The least effective mass at the grip in any direction [kg], about that of arms and platform of this size. Nobody
 published a measured value; the limits of the loop are held for 30 to 250 g."""
@@ -59,6 +60,7 @@ LONGEST_GAP_NS: Final = 20_000_000
 _BEYOND = 2  # positions in a row that show an out-stroke: a single one may be from a corrupted packet
 _READS = 2  # most reads of the bridge per tick: an answer may contain only status bytes
 _TIMEOUT_MS = 1
+_NORM_SLACK = 1.001
 _DATA = 4 * USB_PACKET
 
 FALCON = np.dtype(
@@ -85,6 +87,7 @@ FALCON = np.dtype(
         ("previous_m", np.float64, (3,)),  # the pose before
         ("velocity_mps", np.float64, (3,)),
         ("tick_s", np.float64),  # how long the last one was
+        ("force_limit_n", np.float64),
         ("slew_n_per_s", np.float64),  # growth rate of a force that does not brake the grip
         ("force_n", np.float64, (3,)),  # as it passed the gate
         ("held_n", np.float64, (3,)),  # force of the motors by the command before
@@ -166,7 +169,7 @@ _READING_BYTES = READING.itemsize
 _DATA_AT, _PACKET_AT, _TRANSFERRED_AT = _offset("data"), _offset("packet"), _offset("transferred")
 
 
-def new_exchange(calls: BulkCalls, mechanism: Any, geometry: Geometry) -> Any:
+def new_exchange(calls: BulkCalls, mechanism: Any, geometry: Geometry, force_limit_n: float = FORCE_LIMIT_N) -> Any:
     """Return the memory of an exchange over an open bridge, shape (1,): its address is the device's ``context``."""
     memory = records(FALCON, 1)
     falcon = memory[0]
@@ -175,6 +178,7 @@ def new_exchange(calls: BulkCalls, mechanism: Any, geometry: Geometry) -> Any:
     falcon.centre_m = geometry.centre_m
     falcon.position_m = START_M
     falcon.delay = 1
+    falcon.force_limit_n = force_limit_n
     falcon.slew_n_per_s = slew_limit_n(SLEW_S, Dynamics(mass_kg=LEAST_MASS_KG)) / SLEW_S
     return memory
 
@@ -254,7 +258,11 @@ def _take_reply(falcon: Any, context: int, now_ns: int, out: Any) -> int:
 
 @kernel
 def _send_force(falcon: Any, context: int, force_n: Any) -> int:
-    copy(force_n, falcon.force_n)
+    most_n = _NORM_SLACK * falcon.force_limit_n
+    if square(force_n) <= most_n * most_n:
+        copy(force_n, falcon.force_n)
+    else:  # nor NaN: the servo sends neither
+        clear(falcon.force_n)
     _send_packet(falcon, context)
     return READ_LOST if falcon.ended != RUNS else 0
 

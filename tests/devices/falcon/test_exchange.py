@@ -266,9 +266,12 @@ class TestTheGate:
         assert given / np.linalg.norm(given) == pytest.approx(PUSH_N / np.linalg.norm(PUSH_N), abs=2e-3)
         assert ticks.falcon.shortened > 50
 
-    @pytest.mark.parametrize("bad", [np.nan, np.inf])
-    def test_a_force_that_is_no_number_is_none(self, ticks, bad):
+    @pytest.mark.parametrize("bad", [np.nan, np.inf, 8.1])
+    def test_a_force_that_is_no_number_or_beyond_the_limit_is_none(self, ticks, bad):
+        ticks.falcon.force_limit_n = 8.0
         ticks.open_gate()
+        ticks.tick(reply(), force_n=(1.0, 2.0, 0.0))
+        assert ticks.torques != [0, 0, 0]
         ticks.tick(reply(), force_n=(1.0, bad, 0.0))
         assert ticks.torques == [0, 0, 0]
 

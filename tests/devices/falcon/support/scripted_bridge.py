@@ -1,6 +1,7 @@
 """A bridge that answers as a test tells it to, called by the compiled exchange through a C function of Python's."""
 
 import ctypes
+import math
 from collections import deque
 
 import numpy as np
@@ -95,7 +96,7 @@ class Ticks:
 
     def __init__(self):
         self.bridge = FakeBridge()
-        self.memory = new_exchange(self.bridge.calls, new_mechanism(GEOMETRY, UNITS_PER_NM), GEOMETRY)
+        self.memory = new_exchange(self.bridge.calls, new_mechanism(GEOMETRY, UNITS_PER_NM), GEOMETRY, math.inf)
         self.falcon = self.memory[0]
         self.read, self.write = exchange_functions()
         self.reading, self.command = new_reading(), new_command()
