@@ -1,172 +1,104 @@
-import json
+"""Opening devices by name, alone and together with a servo; simulated devices and their hand."""
+
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
-import numba
 import pytest
 
-if numba.config.DISABLE_JIT:
-    pytest.skip("devices are C functions", allow_module_level=True)
-
-from study_app.devices import registry
-from study_app.devices.registry import descriptor_of, list_devices, open_device
+from study_app.devices import registry, rig
+from study_app.devices.registry import descriptor_of, open_device
 from study_app.errors import DeviceError, DeviceNotFound
-from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
-from study_app.haptics.model.layout import new_reading
-from tests.devices.contract import write
+from study_app.haptics.kernels.c_functions import READ_NEW, READ_NOTHING_NEW
+from study_app.protocol.streams import stream
+from tests.compiled import needs_servo
+from tests.devices.subjects import MS, Ticks, write
 
-MS = 1_000_000
-
-
-class Readings:
-    """Reads a device as the servo would."""
-
-    def __init__(self, device, start_ns=10 * MS):
-        self.device, self.now_ns = device, start_ns
-        self.reading = new_reading()
-
-    def at(self, now_ns):
-        self.now_ns = now_ns
-        return self.device.read.ctypes(self.device.context, now_ns, self.reading.ctypes.data)
-
-    def after(self, ticks):
-        """Return answer after ``ticks`` of 1 ms; the last reading is in ``reading``."""
-        for _ in range(ticks):
-            answer = self.at(self.now_ns + MS)
-        return answer
-
-    @property
-    def position_m(self):
-        return self.reading[0].position_m.copy()
+SETTINGS = rig.RigSettings(workspace_m=(0.1, 0.06, 0.06), force_limit_n=8.0, elements=100, random=stream(1, "tremor"))
 
 
-def test_the_mouse_is_the_default():
-    assert list_devices()[0] == "mouse"
-
-
-def test_a_device_without_failure_is_closed_and_named(monkeypatch):
+def test_a_device_without_failure_is_closed_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
     class Bare:
         closed = False
 
-        def close(self):
+        def close(self) -> None:
             self.closed = True
 
-    bare = Bare()
+    bare: Any = Bare()
     monkeypatch.setattr(registry, "descriptor_of", lambda _: replace(descriptor_of("mouse"), open=lambda _: bare))
     with pytest.raises(DeviceError, match="device 'mouse' has no 'failure': let Bare inherit"):
         open_device("mouse")
     assert bare.closed
 
 
-@pytest.mark.parametrize("name", ["mouse", "scripted"])
-class TestEverySimulatedDevice:
-    def test_is_what_its_name_opens(self, name):
-        with open_device(name) as device:
-            assert device.name == name
-            assert device.describe()["name"] == name
-
-    def test_can_be_described_in_a_receipt(self, name):
-        described = open_device(name).describe()
-        assert json.loads(json.dumps(described)) == described
-        assert described["force_limit_n"] > 0
-
-    def test_takes_its_workspace_and_force_limit_as_options(self, name):
-        device = open_device(name, workspace_m=(0.04, 0.03, 0.02), force_limit_n=3.0)
-        assert device.workspace_m == (0.04, 0.03, 0.02)
-        assert device.force_limit_n == 3.0
-
-    def test_has_a_new_sample_whenever_time_has_passed(self, name):
-        readings = Readings(open_device(name))
-        assert readings.at(10 * MS) == READ_NEW
-        assert readings.at(10 * MS) == READ_NOTHING_NEW
-        assert readings.at(11 * MS) == READ_NEW
-        assert readings.at(5 * MS) == READ_NOTHING_NEW
-
-    def test_is_pushed_by_the_force_written_to_it(self, name):
-        device = open_device(name)
-        readings = Readings(device)
-        readings.after(1)
-        assert write(device, (4.0, 0.0, -4.0))[0] == 0
-        readings.after(300)
-        assert readings.position_m[0] > 0.005
-        assert readings.position_m[2] < -0.005
-        assert abs(readings.position_m[1]) < 0.001
-
-    def test_closing_takes_the_force_away(self, name):
-        device = open_device(name)
-        readings = Readings(device)
-        readings.after(1)
-        write(device, (4.0, 0.0, 0.0))
-        device.close()
-        readings.after(300)
-        assert abs(readings.position_m[0]) < 0.001
-
-    def test_unplugged_it_answers_no_more_until_it_is_opened_again(self, name):
-        device = open_device(name)
-        readings = Readings(device)
-        device.unplug()
-        assert readings.after(1) == READ_LOST
-        assert write(device)[0] == READ_LOST
-        device.open()
-        assert readings.after(1) == READ_NEW
-
-    def test_has_buttons(self, name):
-        device = open_device(name)
-        readings = Readings(device)
-        device.press(0b1001)
-        readings.after(1)
-        assert readings.reading[0].buttons == 0b1001
-        device.release()
-        readings.after(1)
-        assert readings.reading[0].buttons == 0
-
-    def test_holds_a_place_within_its_workspace(self, name):
-        device = open_device(name)
-        readings = Readings(device)
-        device.hold(0.02, -0.3, 0.0)
-        readings.after(1000)
-        assert readings.position_m == pytest.approx([0.02, -0.05, 0.0], abs=3e-4)
-        assert device.aim_m == (0.02, -0.05, 0.0)
-        assert not device.moving
-
-
-def test_an_unknown_device_is_refused_with_those_there_are():
-    with pytest.raises(DeviceNotFound, match="'falcn' is not known; choose one of: mouse, falcon, "):
-        open_device("falcn")
-
-
-@pytest.mark.parametrize("name", ["mouse:2", "falcon-emulated:x", "falcon-sockets:x", ":"])
-def test_a_device_of_a_kind_that_has_but_one_is_not_known(name):
-    with pytest.raises(DeviceNotFound, match="is not known"):
-        descriptor_of(name)
-
-
-def test_a_socket_needs_its_path():
+def test_a_socket_needs_its_path() -> None:
     with pytest.raises(DeviceNotFound, match="falcon-socket:PATH"):
         open_device("falcon-socket")
-    assert descriptor_of("falcon-socket:/run/falcon:1").name == "falcon-socket"
-
-
-@pytest.mark.parametrize(
-    ("name", "firmware", "by_itself", "simulated"),
-    [
-        ("mouse", False, False, False),
-        ("falcon", True, False, False),
-        ("falcon:FT1", True, False, False),
-        ("spacemouse", False, False, False),
-        ("scripted", False, True, True),
-        ("falcon-emulated", True, True, True),
-        ("falcon-socket:/x", True, False, True),
-    ],
-)
-def test_who_holds_a_device_follows_from_its_name(name, firmware, by_itself, simulated):
-    device = descriptor_of(name)
-    assert [option.name for option in device.options] == ["firmware"] * firmware
-    assert (device.doctor is not None, device.moves_by_itself, device.simulated) == (firmware, by_itself, simulated)
 
 
 @pytest.mark.slow
-def test_naming_the_devices_loads_no_compiler():
+def test_naming_the_devices_loads_no_compiler() -> None:
     program = "import sys, study_app.devices.registry as d; d.list_devices(); sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
+
+
+def is_cancelled(opened: list[Any]) -> Callable[[], bool]:
+    return lambda: bool(opened)
+
+
+def fails(_opened: list[Any]) -> Callable[[], bool]:
+    def fail() -> bool:
+        raise RuntimeError("the window is gone")
+
+    return fail
+
+
+@needs_servo
+@pytest.mark.parametrize(
+    ("ask", "error", "words"),
+    [(is_cancelled, DeviceError, "'scripted' was cancelled"), (fails, RuntimeError, "the window is gone")],
+)
+def test_a_device_cancelled_while_it_opens_is_closed_and_gets_no_servo(
+    ask: Any, error: type[Exception], words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[Any] = []
+    closed: list[str] = []
+    open_before = rig.open_device
+
+    def open_and_watch(*words: Any, **named: Any) -> Any:
+        device = open_before(*words, **named)
+        opened.append(device)
+        monkeypatch.setattr(device, "close", lambda: closed.append(device.name))
+        return device
+
+    monkeypatch.setattr(rig, "open_device", open_and_watch)
+    with pytest.raises(error, match=words):
+        rig.open_rig("scripted", SETTINGS, cancelled=ask(opened))
+    assert closed == ["scripted"]
+
+
+@needs_servo
+@pytest.mark.parametrize("name", ["mouse", "scripted"])
+def test_the_hand_of_a_simulated_device_is_pushed_holds_a_place_and_lets_go(name: str) -> None:
+    device: Any = open_device(name)
+    ticks = Ticks(device)
+    assert [ticks.read(pause_ns) for pause_ns in (0, 0, MS, -6 * MS)] == [
+        READ_NEW, READ_NOTHING_NEW, READ_NEW, READ_NOTHING_NEW,
+    ]  # fmt: skip
+    write(device, (4.0, 0.0, -4.0))
+    for _ in range(300):
+        ticks.read()
+    assert ticks.position_m[0] > 0.005
+    assert ticks.position_m[2] < -0.005
+    assert abs(ticks.position_m[1]) < 0.001
+    device.close()
+    for _ in range(300):
+        ticks.read()
+    assert abs(ticks.position_m[0]) < 0.001
+    device.hold(0.02, -0.3, 0.0)
+    ticks.after(1000)
+    assert ticks.position_m == pytest.approx([0.02, -0.05, 0.0], abs=3e-4)
+    assert device.aim_m == (0.02, -0.05, 0.0)
+    assert not device.moving

@@ -28,11 +28,6 @@ def liquid_study(*words, **options):
     return CliRunner().invoke(commands, ["devices", *words], **options)
 
 
-@pytest.fixture(autouse=True)
-def own_settings(tmp_path, monkeypatch):
-    monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path / "settings"))
-
-
 @pytest.mark.parametrize("words", [(), ("list",)])
 def test_the_list_names_every_device_with_what_it_can_do(words):
     listed = liquid_study(*words)

@@ -19,6 +19,7 @@ from study_app.protocol.orders.schedule import build_schedule
 from study_app.viewmodels.devices.list_view import devices_shown
 from study_app.viewmodels.home import study_facts
 from tests.compiled import needs_servo
+from tests.devices.packages import install_metadata
 
 pytestmark = pytest.mark.slow
 
@@ -74,14 +75,9 @@ DRIVER = """
 
 def install(site: Path, package: str, entry_points: dict[str, str], **modules: str) -> None:
     """Write an installed package: its modules and its metadata."""
-    site.mkdir(exist_ok=True)
     for name, source in modules.items():
         (site / f"{name}.py").write_text(dedent(source))
-    metadata = site / f"{package}-1.0.dist-info"
-    metadata.mkdir()
-    (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
-    points = "".join(f"{name} = {value}\n" for name, value in entry_points.items())
-    (metadata / "entry_points.txt").write_text(f"[liquid_study.devices]\n{points}")
+    install_metadata(site, package, "1.0", entry_points)
 
 
 @pytest.fixture
@@ -89,7 +85,6 @@ def site(tmp_path, monkeypatch):
     """Return a folder that packages can be installed into."""
     folder = tmp_path / "site"
     folder.mkdir()
-    monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path / "settings"))
     monkeypatch.syspath_prepend(folder)
     before = set(sys.modules)
     yield folder

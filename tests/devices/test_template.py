@@ -1,29 +1,25 @@
 """The published contract: the C header describes the servo's records; the template package runs by entry point."""
 
 import ctypes
-import importlib.util
 import json
 import shutil
 import subprocess
 import sys
-import time
-import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from study_app.devices.backends import backends
-from study_app.devices.registry import discover, open_device
+from study_app.devices.registry import open_device
 from study_app.errors import DeviceLost
 from study_app.haptics.model import layout
 from tests.compiled import needs_servo
+from tests.devices.packages import TEMPLATE
+from tests.devices.subjects import until, write
 
-TEMPLATE = Path(__file__).parents[2] / "docs" / "examples" / "liquid_study_device"
 SOURCES = Path("src", "liquid_study_example")
 COMPILER = shutil.which("cc")
-PATIENCE_S = 10.0
 
 pytestmark = [
     pytest.mark.slow,
@@ -83,55 +79,11 @@ def test_header_and_numpy_records_have_the_same_offsets_sizes_and_constants(tmp_
     assert found["constants"] == constants
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of the built template's modules, with the metadata of an installed package."""
-    if importlib.util.find_spec("setuptools") is None:
-        pytest.skip("setuptools, which builds the template, is not installed")
-    folder = tmp_path_factory.mktemp("template") / "package"
-    shutil.copytree(TEMPLATE, folder)
-    build = [sys.executable, "-W", "ignore", "setup.py", "-q", "build_ext", "--inplace"]
-    subprocess.run(build, cwd=folder, check=True, capture_output=True)
-    project = tomllib.loads((folder / "pyproject.toml").read_text())["project"]
-    metadata = folder / "src" / f"liquid_study_example-{project['version']}.dist-info"
-    metadata.mkdir()
-    (metadata / "METADATA").write_text(
-        f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
-    )
-    points = project["entry-points"]["liquid_study.devices"]
-    lines = "".join(f"{name} = {value}\n" for name, value in points.items())
-    (metadata / "entry_points.txt").write_text(f"[liquid_study.devices]\n{lines}")
-    return folder / "src"
-
-
-@pytest.fixture
-def installed(built: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.syspath_prepend(built)
-    discover.cache_clear()
-    yield
-    discover.cache_clear()
-
-
 def maker_force_n(loaded: ctypes.CDLL) -> list[float]:
     """Return what the motors give."""
     force = (ctypes.c_double * 3)()
     loaded.maker_force_now(force)
     return list(force)
-
-
-def write_force(device, context: int | None = None, asked_n=(1.0, 0.0, 0.0)) -> tuple[int, list[float]]:
-    """Return what WRITE answers, and the force that it says it sent."""
-    command = layout.new_command()
-    command[0].force_n = command[0].sent_n = asked_n
-    write = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_ssize_t, ctypes.c_ssize_t)(device.write.address)
-    return write(device.context if context is None else context, command.ctypes.data), command[0].sent_n.tolist()
-
-
-def until(reached, what: str) -> None:
-    began = time.monotonic()
-    while not reached():
-        assert time.monotonic() - began < PATIENCE_S, what
-        time.sleep(0.005)
 
 
 def run_in_servo(name: str):
@@ -156,7 +108,7 @@ def run_in_servo(name: str):
         return samples, fault, force_n
 
 
-@pytest.mark.usefixtures("installed")
+@pytest.mark.usefixtures("template")
 class TestTemplate:
     def test_is_found_by_its_entry_points(self):
         found = {one.name: one for one in backends()}
@@ -199,28 +151,12 @@ class TestTemplate:
             servo.stop()
         assert maker_force_n(library()) == [0.0, 0.0, 0.0]
 
-    @pytest.mark.parametrize("name", ["example-direct", "example-mailbox"])
-    @pytest.mark.parametrize(
-        ("asked_n", "sent_n"),
-        [((3.0, 0.0, 4.0), (1.2, 0.0, 1.6)), ((np.nan, 0.0, 1.0), (0.0, 0.0, 0.0)), ((0.5, 1.0, 0.0), (0.5, 1.0, 0.0))],
-    )
-    def test_force_is_limited_mapped_and_reported(self, name: str, asked_n, sent_n):
-        with open_device(name, force_limit_n=2.0) as device:
-            from liquid_study_example.driver import library
-
-            answer, said_n = write_force(device, asked_n=asked_n)
-            assert answer == 0
-            assert said_n == pytest.approx(sent_n)
-            x_n, y_n, z_n = sent_n
-            if any(sent_n):
-                until(lambda: maker_force_n(library()) == pytest.approx([z_n, x_n, y_n]), "the force is not sent")
-
     def test_force_ends_where_the_servo_is_silent(self):
         """The library's own thread goes on without the servo: a hang of ours must not hold a force."""
         with open_device("example-mailbox") as device:
             from liquid_study_example.driver import library
 
-            write_force(device)
+            write(device, (1.0, 0.0, 0.0))
             until(lambda: any(maker_force_n(library())), "the force is not sent")
             until(lambda: not any(maker_force_n(library())), "the force goes on")
 
@@ -228,16 +164,7 @@ class TestTemplate:
         with open_device("example-mailbox") as device:
             from liquid_study_example.driver import library
 
-            write_force(device)
+            write(device, (1.0, 0.0, 0.0))
             until(lambda: any(maker_force_n(library())), "the force is not sent")
             library().maker_pull_cable()
             until(lambda: not any(maker_force_n(library())), "the force goes on")
-
-    @pytest.mark.parametrize("name", ["example-direct", "example-mailbox"])
-    def test_servo_that_goes_on_after_close_sends_no_force(self, name: str):
-        with open_device(name) as device:
-            from liquid_study_example.driver import library
-
-            context = device.context
-        write_force(device, context)
-        assert maker_force_n(library()) == [0.0, 0.0, 0.0]

@@ -23,7 +23,7 @@ from study_app.devices.falcon.failures import FalconLost, FalconNotFound, UsbFai
 from study_app.devices.falcon.transport.usb import PyUsbTransport
 from study_app.devices.falcon.wire import constants
 from study_app.errors import DeviceError
-from tests.devices.falcon.test_firmware import stream
+from tests.devices.falcon.support.firmware_stream import stream
 
 
 class Wrong(PyUsbTransport):

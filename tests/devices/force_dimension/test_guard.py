@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,17 +14,16 @@ from study_app.devices.registry import open_device
 from study_app.errors import DeviceError
 from study_app.haptics.kernels.c_functions import READ_LOST
 from tests.compiled import needs_servo
-from tests.devices.contract import write
-from tests.devices.force_dimension.standin import StandIn, build, needs_standin
+from tests.devices.force_dimension.standin import StandIn, needs_standin
+from tests.devices.subjects import until, write
 
 pytestmark = [needs_servo, *needs_standin, pytest.mark.slow]
 
 MOMENTS = 50
-PATIENCE_S = 20.0
 PROGRAM = """
 import sys
 from study_app.devices.registry import open_device
-from tests.devices.contract import write
+from tests.devices.subjects import write
 print("opens", flush=True)
 device = open_device("force-dimension", options={"dhd-library": sys.argv[1]})
 while True:
@@ -33,33 +31,7 @@ while True:
 """
 
 
-@pytest.fixture(scope="module")
-def standin(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StandIn]:
-    folder = tmp_path_factory.mktemp("shared")
-    state = folder / "device"
-    state.touch()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("STANDIN_FILE", str(state))
-        yield StandIn(build(folder))
-
-
-@pytest.fixture
-def unwatched(standin: StandIn) -> StandIn:
-    standin.loaded.standin_reset()
-    standin.fault("unwatched")
-    return standin
-
-
-def until(condition: Any) -> bool:
-    patience = time.monotonic() + PATIENCE_S
-    while not condition():
-        if time.monotonic() > patience:
-            return False
-        time.sleep(0.002)
-    return True
-
-
-@pytest.mark.variants(3)
+@pytest.mark.variants(2)
 @pytest.mark.parametrize("moment", range(MOMENTS))
 def test_a_program_that_is_killed_leaves_no_force(unwatched: StandIn, moment: int) -> None:
     """Half of the moments are within half a second of the opening's begin, half while it pushes."""
@@ -71,12 +43,12 @@ def test_a_program_that_is_killed_leaves_no_force(unwatched: StandIn, moment: in
         assert running.stdout is not None
         assert running.stdout.readline() == b"opens\n"
         if moment % 2:
-            assert until(lambda: unwatched.state["force_n"] == [-3.0, 1.0, 2.0])
+            until(lambda: unwatched.state["force_n"] == [-3.0, 1.0, 2.0], "it does not push", 20.0)
         time.sleep(wait_s)
         running.send_signal(signal.SIGKILL)
         assert running.wait() == -signal.SIGKILL
     if unwatched.state["force_n"] != [0.0, 0.0, 0.0]:
-        assert until(lambda: unwatched.state["closed"] == 1.0)
+        until(lambda: unwatched.state["closed"] == 1.0, "it is not closed", 20.0)
         assert (unwatched.state["stopped"], unwatched.state["force_on"]) == (1.0, 0.0)
     assert moment % 2 == 0 or unwatched.state["closed"] == 1.0
     assert unwatched.state["force_n"] == [0.0, 0.0, 0.0]
@@ -108,7 +80,7 @@ def test_a_device_that_takes_no_end_of_force_is_left_to_its_guard(unwatched: Sta
     device.close()
     assert unwatched.state["force_n"] == [0.0, 1.0, 0.0]
     unwatched.fault("unwatched")
-    assert until(lambda: unwatched.state["force_n"] == [0.0, 0.0, 0.0])
+    until(lambda: unwatched.state["force_n"] == [0.0, 0.0, 0.0], "the force goes on", 20.0)
 
 
 def test_a_program_that_cannot_start_a_guard_is_refused(unwatched: StandIn, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,9 +1,6 @@
 """The real driver with a stand-in library of our own, built by the C compiler: opening, ticks, faults, ends."""
 
 import math
-import threading
-import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,51 +9,20 @@ import pytest
 
 from study_app.devices.descriptor import NONE, NOT_AVAILABLE
 from study_app.devices.failure_table import DeviceFailure
-from study_app.devices.force_dimension.failures import FAILURES, VARIABLE
+from study_app.devices.force_dimension.failures import VARIABLE
 from study_app.devices.force_dimension.library import LONGEST_WATCHDOG, SIGNATURES, Library, probe
-from study_app.devices.registry import open_device
-from study_app.errors import DeviceError, DeviceLost, DeviceNotFound, ServoFault
+from study_app.devices.registry import doctor_of, open_device
+from study_app.errors import DeviceError, DeviceNotFound, ServoFault
 from study_app.haptics.model.device_dynamics import UNKNOWN
 from study_app.haptics.model.layout import LIMITER_SATURATED
 from study_app.store import workstation
 from study_app.store.workstation import DeviceBench
 from study_app.user_folder import FOLDER_VARIABLE
 from tests.compiled import needs_servo
-from tests.devices.force_dimension.standin import FAULTS, StandIn, build, needs_standin
-
-STROKE_TICKS = 1000
+from tests.devices.force_dimension.standin import StandIn, build, needs_standin
+from tests.devices.subjects import until, write
 
 pytestmark = [needs_servo, *needs_standin]
-
-OPENING = {
-    "no-device": "no-device",
-    "uncalibrated": "uncalibrated",
-    "no-threshold": "safety",
-    "weak": "max-force",
-    "stays-off": "force-off",
-}
-STREAM = {
-    "error": "error",
-    "nan": "not-finite",
-    "turns-off": "force-off",
-    "write-error": "error",
-    "status-error": "error",
-}
-REFUSED_WRITES = {"write-error"}
-"""The stand-in takes no force then, not the last zero either: `dhdStop` is what ends it."""
-
-
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return build(tmp_path_factory.mktemp("standin"))
-
-
-@pytest.fixture
-def standin(built: Path) -> Iterator[StandIn]:
-    one = StandIn(built)
-    one.loaded.standin_reset()
-    yield one
-    one.loaded.standin_reset()
 
 
 def opened(standin: StandIn, name: str = "force-dimension", **limits: Any) -> Any:
@@ -71,14 +37,8 @@ def ticking(device: Any) -> Any:
 
     servo = Servo(device, clock=VirtualClock())
     servo.load(load("rek2024").scene_for("honey"))
-    servo.advance(STROKE_TICKS)
+    servo.advance(1000)
     return servo
-
-
-def ended(standin: StandIn) -> bool:
-    """Whether no force acts: zero was sent, or the motors were turned off."""
-    state = standin.state
-    return state["stopped"] == 1.0 and state["force_on"] == 0.0
 
 
 class TestLibrary:
@@ -121,8 +81,8 @@ class TestOpening:
         assert found["velocity_threshold"] == 40
         assert found["watchdog_s"] == pytest.approx(0.031875)
         assert (found["sdk"], found["system"], found["serial"]) == ("3.17.5.0", "stand-in omega.7", "10233")
-        assert ended(standin)
-        assert standin.state["closed"] == 1.0
+        state = standin.state
+        assert (state["stopped"], state["force_on"], state["closed"]) == (1.0, 0.0, 1.0)
 
     def test_delay_count_and_mass_are_measured_and_read(self, standin: StandIn) -> None:
         with opened(standin) as device:
@@ -160,23 +120,6 @@ class TestOpening:
             opened(standin, "force-dimension:10234")
         with pytest.raises(DeviceError, match="'left' is not a serial number"):
             opened(standin, "force-dimension:left")
-
-    @pytest.mark.parametrize("fault", OPENING)
-    def test_a_fault_of_opening_is_refused_with_cause_and_cure_and_without_force(
-        self, standin: StandIn, fault: str
-    ) -> None:
-        standin.fault(fault)
-        with pytest.raises(DeviceFailure) as refused:
-            opened(standin)
-        mode = FAILURES.mode(OPENING[fault])
-        assert refused.value.mode == mode.id
-        message = str(refused.value)
-        assert "\n" not in message
-        assert mode.cause in message
-        assert message.endswith(mode.cure)
-        assert standin.state["force_n"] == [0.0, 0.0, 0.0]
-        assert standin.state["open"] == 0.0
-        assert fault == "no-device" or ended(standin)
 
 
 class TestTicks:
@@ -226,8 +169,6 @@ class TestTicks:
         assert abs(found @ expected) == pytest.approx(1.0, abs=1e-12)
 
     def test_force_is_sent_in_the_makers_axes_and_motors_of_the_wrist_get_none(self, standin: StandIn) -> None:
-        from tests.devices.contract import write
-
         with opened(standin, force_limit_n=4.0) as device:
             assert write(device, (1.0, 2.0, -3.0))[1].tolist() == [1.0, 2.0, -3.0]
             state = standin.state
@@ -242,7 +183,7 @@ class TestTicks:
         with opened(standin) as device:
             servo = ticking(device)
             servo.check()
-            assert device.counters["guarded"] == pytest.approx(STROKE_TICKS / 2, abs=1)
+            assert device.counters["guarded"] == pytest.approx(500, abs=1)
             assert device.counters["fresh"] + device.counters["guarded"] == device.counters["ticks"]
 
     def test_forces_that_saturate_the_motors_are_counted_and_their_ticks_marked(self, standin: StandIn) -> None:
@@ -250,7 +191,7 @@ class TestTicks:
         with opened(standin) as device:
             servo = ticking(device)
             servo.check()
-            assert device.counters["saturated"] >= STROKE_TICKS
+            assert device.counters["saturated"] >= 1000
             reader = servo.telemetry.reader()
             standin.fault("none")
             servo.advance(10)
@@ -260,97 +201,26 @@ class TestTicks:
             assert marked[-20:].tolist() == [False] * 10 + [True] * 10
 
 
-class TestFaults:
-    def test_the_tables_have_every_fault(self) -> None:
-        assert {
-            "none",
-            "slow",
-            "hangs",
-            "guarded",
-            "saturated",
-            "unwatched",
-            "deaf",
-            "unmodelled",
-            *OPENING,
-            *STREAM,
-        } == set(FAULTS)
-
-    @pytest.mark.parametrize("fault", STREAM)
-    def test_a_fault_in_a_stroke_ends_in_its_message_and_zero_force(self, standin: StandIn, fault: str) -> None:
-        device = opened(standin)
-        servo = ticking(device)
-        assert np.linalg.norm(standin.state["force_n"]) > 0.5
-        standin.fault(fault)
-        assert servo.advance(100) < 60
-        assert device.failure_mode == STREAM[fault]
-        with pytest.raises((DeviceLost, ServoFault)) as stopped:
-            servo.check()
-        mode, message = FAILURES.mode(STREAM[fault]), str(stopped.value)
-        assert message.startswith("the device 'force-dimension' stopped: ")
-        assert mode.symptom in message
-        assert mode.cure in message
-        assert message.endswith("; the force is zero")
-        assert fault != "turns-off" or "(velocity threshold)" in message
-        assert ended(standin)  # before anything is closed
-        assert fault in REFUSED_WRITES or standin.state["force_n"] == [0.0, 0.0, 0.0]
-        servo.stop()
-        device.close()
-        assert standin.state["closed"] == 1.0
-
-    def test_a_call_that_lasts_ends_the_servo_and_the_force_once_it_returns(self, standin: StandIn) -> None:
-        from study_app.haptics.runtime.servo import Servo
-
-        device = opened(standin)
-        servo = Servo(device)
-        servo.start()
-        standin.fault("slow")
-        patience = time.monotonic() + 10.0
-        while servo.fault is None:
-            assert time.monotonic() < patience
-            time.sleep(0.005)
-        with pytest.raises(ServoFault, match="force-dimension"):
-            servo.check()
-        servo.stop()
-        device.close()
-        assert ended(standin)
-        assert standin.state["force_n"] == [0.0, 0.0, 0.0]
-
-    def test_a_call_that_outlasts_closing_ends_the_force_once_it_returns(self, standin: StandIn) -> None:
-        from study_app.haptics.model.layout import new_reading
-        from tests.devices.contract import write
-
-        device = opened(standin)
-        write(device, (1.0, 0.0, 0.0))
-        standin.fault("hangs")
-        reading = new_reading()
-        call = threading.Thread(target=device.read.ctypes, args=(device.context, 1_000_000, reading.ctypes.data))
-        call.start()
-        while not device.exchange.inside:
-            time.sleep(0.001)
-        device.close()
-        assert standin.state["closed"] == 0.0
-        with pytest.raises(DeviceFailure, match="a call of the library does not return"):
-            device.open()
-        call.join()
-        assert ended(standin)
-        assert standin.state["force_n"] == [0.0, 0.0, 0.0]
-        device.close()
-        assert standin.state["closed"] == 1.0
+def test_a_device_in_order_has_no_finding(standin: StandIn) -> None:
+    report = doctor_of("force-dimension").examine(
+        "force-dimension", options={"dhd-library": standin.path}, progress=str
+    )
+    assert report.failure is None
+    assert not [one.id for one in report.found if one.id != "rate"]  # a loaded machine may be late
+    assert standin.state["stopped"] == 1.0
 
 
-class TestDoctor:
-    def test_a_device_in_order_has_no_finding(self, standin: StandIn) -> None:
-        from study_app.devices.force_dimension.doctor import examine
+def test_a_call_that_lasts_ends_the_servo_and_the_force_once_it_returns(standin: StandIn) -> None:
+    from study_app.haptics.runtime.servo import Servo
 
-        report = examine("force-dimension", options={"dhd-library": standin.path}, progress=str, seconds=0.5)
-        assert report.failure is None
-        assert not [one.id for one in report.found if one.id != "rate"]  # a loaded machine may be late
-        assert ended(standin)
-
-    @pytest.mark.parametrize("fault", OPENING)
-    def test_a_fault_of_opening_is_the_finding(self, standin: StandIn, fault: str) -> None:
-        from study_app.devices.force_dimension.doctor import examine
-
-        standin.fault(fault)
-        report = examine("force-dimension", options={"dhd-library": standin.path}, progress=str)
-        assert [one.id for one in report.found] == [OPENING[fault]]
+    device = opened(standin)
+    servo = Servo(device)
+    servo.start()
+    standin.fault("slow")
+    until(lambda: servo.fault is not None, "the servo goes on")
+    with pytest.raises(ServoFault, match="force-dimension"):
+        servo.check()
+    servo.stop()
+    device.close()
+    state = standin.state
+    assert (state["stopped"], state["force_on"], state["force_n"]) == (1.0, 0.0, [0.0, 0.0, 0.0])

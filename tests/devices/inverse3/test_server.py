@@ -1,10 +1,7 @@
 """The driver over a real TCP connection to the emulated service, in real time."""
 
 import json
-import os
 import socket
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -80,32 +77,6 @@ def test_a_service_that_is_killed_in_a_stroke_ends_in_its_message(service: Servi
         with pytest.raises(DeviceLost, match=r"closed the connection.*start Haply Hub.*the force is zero"):
             servo.check()
         assert until(lambda: service.force_n == (0.0, 0.0, 0.0))
-
-
-def test_a_program_that_is_killed_in_a_stroke_leaves_an_idle_device(service: Service, server: ServiceServer) -> None:
-    program = f"""
-import time
-from study_app.devices.inverse3.device import Inverse3Device
-from study_app.haptics.runtime.servo import Servo
-from study_app.protocol.load import load
-device = Inverse3Device("127.0.0.1:{server.port}")
-device.open()
-servo = Servo(device)
-servo.start()
-servo.load(load("rek2024").scene_for("honey"))
-print("pushes", flush=True)
-time.sleep(600)
-"""
-    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, env=os.environ.copy()) as child:
-        assert child.stdout is not None
-        assert child.stdout.readline() == b"pushes\n"
-        try:
-            assert until(lambda: moved_by(service))
-        finally:
-            child.kill()
-    assert until(lambda: service.force_n == (0.0, 0.0, 0.0))
-    commands = int(service.state.commands)
-    assert not until(lambda: service.state.commands > commands, 0.2)
 
 
 def test_closing_a_connection_with_unread_replies_does_not_reset_it() -> None:

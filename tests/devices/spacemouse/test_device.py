@@ -1,5 +1,3 @@
-import threading
-
 import numba
 import numpy as np
 import pytest
@@ -9,85 +7,25 @@ from hypothesis import strategies as st
 if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
-from study_app.devices.registry import descriptor_of, list_devices
 from study_app.devices.spacemouse import hid as spacemouse_hid
 from study_app.devices.spacemouse.device import SpaceMouseDevice
 from study_app.devices.spacemouse.hid import find_space_mice
 from study_app.devices.spacemouse.reports import (
     FULL_SPEED_MPS,
-    MODELS,
     Buttons,
     Displacement,
     parse,
     program_buttons,
     velocity_mps,
 )
-from study_app.errors import DeviceError, DeviceLost, DeviceNotFound
+from study_app.errors import DeviceError, DeviceNotFound
 from study_app.haptics.model.layout import BUTTON_STOP
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
+from tests.devices.spacemouse.fake_hid import HELD_S, MODEL, FakeHid, interface
 
-MODEL = {model.name: model for model in MODELS}
 RIGHT = bytes([1, 0x5E, 0x01, 0, 0, 0, 0])  # 350 to the right
 REST = bytes([1, 0, 0, 0, 0, 0, 0])
-HELD_S = 0.008
-
-
-class FakeHid:
-    """hidapi with these devices connected; one that is opened reports what it is given, 8 ms apart."""
-
-    def __init__(self, *reports, listed=None, opens=True):
-        self.reports = list(reports)
-        self.listed = [interface()] if listed is None else listed
-        self.opens = opens
-        self.now = 0.0
-        self.written = []
-        self.path = None
-        self.open_count = 0
-        self.idle = threading.Event()
-        self.gone = threading.Event()
-
-    def now_s(self):
-        return self.now
-
-    def enumerate(self):
-        return self.listed
-
-    def device(self):
-        return self
-
-    def open_path(self, path):
-        if not self.opens:
-            raise OSError("open failed")
-        self.path = path
-        self.open_count += 1
-
-    def read(self, size, timeout_ms):
-        assert size >= 13
-        if self.gone.is_set():
-            raise OSError("read error")
-        if not self.reports:
-            self.idle.set()
-            self.gone.wait(timeout_ms / 1000)
-            return []
-        report = self.reports.pop(0)
-        self.now += HELD_S
-        if isinstance(report, Exception):
-            raise report
-        return list(report)
-
-    def write(self, data):
-        self.written.append(bytes(data))
-        return len(data)
-
-    def close(self):
-        self.open_count -= 1
-
-
-def interface(model="SpaceNavigator", path=b"first", usage=(1, 8)):
-    known = MODEL[model]
-    told = {} if usage is None else {"usage_page": usage[0], "usage": usage[1]}
-    return {"vendor_id": known.vendor, "product_id": known.product, "path": path, **told}
 
 
 def opened(*reports, **options):
@@ -195,24 +133,6 @@ class TestMoving:
 
 
 class TestComingAndGoing:
-    def test_one_that_is_pulled_out_is_lost_and_can_be_opened_again(self):
-        device, hid = opened(RIGHT)
-        with Servo(device, clock=VirtualClock()) as servo:
-            servo.advance(10)
-            hid.gone.set()
-            device.thread.join(10)
-            servo.advance(10)
-            with pytest.raises(DeviceLost, match="spacemouse"):
-                servo.check()
-        device.close()
-        hid.gone.clear()
-        device.open()
-        with Servo(device, clock=VirtualClock()) as servo:
-            servo.advance(10)
-            servo.check()
-        device.close()
-        assert hid.open_count == 0
-
     def test_none_connected_is_told_with_those_there_are(self):
         other = {"vendor_id": 0x046D, "product_id": 0xC52B, "path": b"a mouse", "usage_page": 1, "usage": 2}
         hid = FakeHid(listed=[other])
@@ -260,12 +180,6 @@ class TestComingAndGoing:
 
     def test_hidapi_itself_can_be_asked(self):
         assert isinstance(find_space_mice(spacemouse_hid.load_hid()), list)
-
-
-def test_a_participant_holds_it():
-    assert "spacemouse" in list_devices()
-    assert not descriptor_of("spacemouse").simulated
-    assert not descriptor_of("spacemouse").moves_by_itself
 
 
 def test_the_receipt_says_which_it_was():

@@ -1,9 +1,6 @@
-"""The whole driver in front of an emulated Falcon in another process, in real time, and its guard."""
+"""The whole driver in front of an emulated Falcon in another process."""
 
 import json
-import signal
-import subprocess
-import sys
 
 import numba
 import pytest
@@ -19,22 +16,6 @@ from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 
 pytestmark = pytest.mark.slow
-
-PUSHES_AND_DIES = """
-import os, signal, sys, time
-from study_app.devices.registry import open_device
-from study_app.haptics.model.layout import new_command, new_reading
-device, reading, command = open_device(sys.argv[1]), new_reading(), new_command()
-command[0].force_n = (0.0, 0.0, 2.0)
-ticks = 0
-while abs(device.held[1]).max() < 100 and ticks < 20_000:
-    ticks += 1
-    device.read.ctypes(device.context, time.monotonic_ns(), reading.ctypes.data)
-    device.write.ctypes(device.context, command.ctypes.data)
-    device.transport.pause(0.001)
-print(device.guard.watching, flush=True)
-os.kill(os.getpid(), getattr(signal, sys.argv[2]))
-"""
 
 
 @pytest.fixture
@@ -58,14 +39,3 @@ def test_the_servo_ticks_on_it_and_its_end_is_without_torque(server):
     assert str(server.path) not in json.dumps(described)
     assert server.emulator.torques == (0, 0, 0)
     assert server.emulator.lights == 0
-
-
-@pytest.mark.parametrize("how", ["SIGKILL", "SIGSEGV"])
-def test_a_program_that_dies_pushing_is_quietened_by_its_guard(server, how):
-    command = [sys.executable, "-c", PUSHES_AND_DIES, f"falcon-socket:{server.path}", how]
-    ended = subprocess.run(command, capture_output=True, text=True, check=False)  # until its guard has gone, too
-    assert ended.returncode == -getattr(signal, how), ended.stderr
-    assert ended.stdout == "True\n"
-    assert server.emulator.highest_torque >= 100
-    assert server.emulator.torques == (0, 0, 0)
-    assert server.emulator.homed == 0b111

@@ -231,7 +231,7 @@ def test_an_emulated_falcon_is_booted_and_answers_through_its_socket(path):
     from study_app.devices.falcon.boot import boot, configure, is_running, measure_round_trip, set_event_character
     from study_app.devices.falcon.emulator.emulator import Emulator
     from study_app.devices.falcon.emulator.socket_server import EmulatorServer
-    from tests.devices.falcon.test_firmware import stream
+    from tests.devices.falcon.support.firmware_stream import stream
 
     emulator = warm(Emulator(tremor_m=0.0, serial="S17"))
     with EmulatorServer(emulator, path):
