@@ -3,7 +3,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -16,7 +15,7 @@ from study_app.devices.falcon.transport.transport import PACKETS, open_transport
 from study_app.devices.falcon.wire.constants import FLAG_HOMING, quiet_packet
 from study_app.devices.guard import PATIENCE_S, watch
 from study_app.errors import DeviceError
-from tests.devices.falcon.support.bridges import Server, compiled, warm
+from tests.devices.falcon.support.bridges import Server
 
 pytestmark = pytest.mark.slow
 
@@ -64,10 +63,6 @@ def ended(running):
 
 def guard_for(bridge):
     return guarding.Guard("falcon", ENDS_TORQUE, bridge)
-
-
-def guard_of(guard):
-    return guard.child
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGABRT])
@@ -158,7 +153,7 @@ def test_a_guard_that_was_left_behind_is_recalled_when_the_falcon_is_opened_agai
 def test_what_ends_a_program_does_not_end_its_guard(server):
     guard = guard_for(server.bridge)
     guard.start()
-    child = guard_of(guard)
+    child = guard.child
     assert os.getsid(child.pid) != os.getsid(0)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         child.send_signal(number)
@@ -170,9 +165,9 @@ def test_what_ends_a_program_does_not_end_its_guard(server):
 def test_a_guard_stands_down_at_a_good_end(server):
     with guard_for(server.bridge) as guard:
         assert guard.watching
-        child = guard_of(guard)
+        child = guard.child
         guard.start()
-        assert guard_of(guard) is child
+        assert guard.child is child
     assert not guard.watching
     assert child.returncode == 0
     guard.stand_down()
@@ -196,7 +191,7 @@ def test_a_guard_acts_at_a_bad_end(server):
 def test_a_guard_that_died_is_not_watching_and_ends_all_the_same(server):
     guard = guard_for(server.bridge)
     guard.start()
-    child = guard_of(guard)
+    child = guard.child
     child.kill()
     child.wait()
     assert not guard.watching
@@ -220,19 +215,6 @@ def test_a_falcon_that_has_gone_is_told_of(tmp_path, monkeypatch, capsys):
     assert said.out == "ready\n"
     assert said.err.startswith("the device 'falcon' may still push: ")
     assert said.err.endswith("; turn it off\n")
-
-
-def test_patience_ends(monkeypatch, tmp_path, capsys):
-    seconds = iter(range(100))
-    naps = []
-    monkeypatch.setattr(time, "monotonic", lambda: float(next(seconds)))
-    monkeypatch.setattr(time, "sleep", naps.append)
-    monkeypatch.setattr(guarding.signal, "signal", lambda *_: None)
-    with (tmp_path / "ended").open("w+") as ended_at_once:
-        monkeypatch.setattr(guarding.sys, "stdin", ended_at_once)
-        assert watch("falcon", ENDS_TORQUE, f"falcon-socket:{tmp_path / 'none'}") == 2
-    assert len(naps) == guarding.PATIENCE_S
-    capsys.readouterr()
 
 
 def test_a_packet_that_does_not_go_out_does_not_keep_the_others_back():
@@ -267,30 +249,3 @@ def test_a_guard_loads_nothing_from_the_folder_it_is_started_in(tmp_path, monkey
     monkeypatch.chdir(tmp_path)
     with guard_for("falcon") as guard:
         assert guard.watching
-
-
-@compiled
-def test_an_emulated_falcon_pushes_on_when_its_program_is_killed_and_not_when_it_was_guarded(tmp_path):
-    from study_app.devices.falcon.boot import configure
-    from study_app.devices.falcon.emulator.emulator import Emulator
-    from study_app.devices.falcon.emulator.socket_server import EmulatorServer
-
-    emulator = warm(Emulator(tremor_m=0.0, running=True))
-    with EmulatorServer(emulator, tmp_path / "falcon") as server:
-        bridge = f"falcon-socket:{tmp_path / 'falcon'}"
-        transport = open_transport(bridge)
-        configure(transport)
-        transport.close()
-        for guarded in (False, True):
-            assert server.until(lambda: server.clients == 0, 30)
-            running = program(bridge, guarded=guarded)
-            assert server.until(lambda: emulator.torques == (4095, 4095, 4095), 30)
-            running.kill()
-            ended(running)
-            if guarded:
-                assert server.until(lambda: emulator.torques == (0, 0, 0), 30)
-            else:
-                assert server.until(lambda: server.clients == 0, 30)
-                assert emulator.torques == (4095, 4095, 4095)
-        assert server.until(lambda: emulator.packets == 2 + PACKETS, 30)
-        assert emulator.refused == 0

@@ -10,8 +10,8 @@ import numba
 import numpy as np
 import pytest
 import usb.core
-from usb.backend import IBackend
 
+from study_app.devices.falcon.emulator.usb_backend import EmulatedBackend
 from study_app.devices.falcon.failures import usb_failure
 from study_app.devices.falcon.transport.socket_frames import (
     ANSWER,
@@ -25,12 +25,11 @@ from study_app.devices.falcon.transport.socket_frames import (
 from study_app.devices.falcon.wire import constants
 
 
-class Backend(IBackend):
+class Backend(EmulatedBackend):
     """A bus with Falcons on it: ``serials`` names them; ``fails`` maps a method's name to the error it raises."""
 
     def __init__(self, *serials, fails=None, configured=True, kernel_driver=None):
-        super().__init__()
-        self.serials = list(serials)
+        super().__init__(*(SimpleNamespace(serial=serial, number=at) for at, serial in enumerate(serials)))
         self.fails = dict(fails or {})
         self.configured = configured
         self.kernel_driver = kernel_driver
@@ -40,90 +39,67 @@ class Backend(IBackend):
 
     def _called(self, name, *arguments):
         self.calls.append((name, *arguments))
-        error = self.fails.get(name)
-        if error is not None:
-            raise error
+        if name in self.fails:
+            raise self.fails[name]
 
     def enumerate_devices(self):
         self._called("enumerate_devices")
-        return range(len(self.serials))
+        return iter(self.emulators)
 
-    def get_device_descriptor(self, device):
-        fields = {"bLength": 18, "bDescriptorType": 1, "bcdUSB": 0x0200, "bDeviceClass": 0, "bDeviceSubClass": 0}
-        fields |= {"bDeviceProtocol": 0, "bMaxPacketSize0": 8, "idVendor": constants.VENDOR_ID, "bcdDevice": 0x0600}
-        fields |= {"idProduct": constants.PRODUCT_ID, "iManufacturer": 0, "iProduct": 0, "bNumConfigurations": 1}
-        fields |= {"iSerialNumber": 3 if self.serials[device] else 0, "address": device + 1, "bus": 1}
-        return SimpleNamespace(**fields, port_number=1, port_numbers=(1,), speed=2)
+    def get_device_descriptor(self, dev):
+        described = super().get_device_descriptor(dev)
+        described.iSerialNumber = 3 if dev.serial else 0
+        return described
 
-    def get_configuration_descriptor(self, device, config):
-        if config > 0:
-            raise IndexError(config)
-        fields = {"bLength": 9, "bDescriptorType": 2, "wTotalLength": 32, "bNumInterfaces": 1, "bmAttributes": 0x80}
-        fields |= {"bConfigurationValue": 1, "iConfiguration": 0, "bMaxPower": 45, "extra_descriptors": []}
-        return SimpleNamespace(**fields)
+    def open_device(self, dev):
+        self._called("open_device", dev.number)
+        return dev
 
-    def get_interface_descriptor(self, device, interface, alternate, config):
-        if interface > 0 or alternate > 0:
-            raise IndexError(interface)
-        fields = {"bLength": 9, "bDescriptorType": 4, "bInterfaceNumber": 0, "bAlternateSetting": 0, "iInterface": 0}
-        fields |= {"bNumEndpoints": 2, "bInterfaceClass": 0xFF, "bInterfaceSubClass": 0xFF, "bInterfaceProtocol": 0xFF}
-        return SimpleNamespace(**fields, extra_descriptors=[])
+    def close_device(self, dev_handle):
+        self._called("close_device", dev_handle.number)
 
-    def get_endpoint_descriptor(self, device, endpoint, interface, alternate, config):
-        address = (constants.ENDPOINT_IN, constants.ENDPOINT_OUT)[endpoint]
-        fields = {"bLength": 7, "bDescriptorType": 5, "bEndpointAddress": address, "bmAttributes": 2, "bInterval": 0}
-        fields |= {"wMaxPacketSize": constants.USB_PACKET, "bRefresh": 0, "bSynchAddress": 0, "extra_descriptors": []}
-        return SimpleNamespace(**fields)
-
-    def open_device(self, device):
-        self._called("open_device", device)
-        return SimpleNamespace(device=device)
-
-    def close_device(self, handle):
-        self._called("close_device", handle.device)
-
-    def get_configuration(self, handle):
+    def get_configuration(self, dev_handle):
         self._called("get_configuration")
-        return 1 if self.configured else 0
+        return int(self.configured)
 
-    def set_configuration(self, handle, value):
-        self._called("set_configuration", value)
+    def set_configuration(self, dev_handle, config_value):
+        self._called("set_configuration", config_value)
         self.configured = True
 
-    def claim_interface(self, handle, interface):
-        self._called("claim_interface", handle.device)
+    def claim_interface(self, dev_handle, intf):
+        self._called("claim_interface", dev_handle.number)
 
-    def release_interface(self, handle, interface):
-        self._called("release_interface", handle.device)
+    def release_interface(self, dev_handle, intf):
+        self._called("release_interface", dev_handle.number)
 
-    def is_kernel_driver_active(self, handle, interface):
+    def is_kernel_driver_active(self, dev_handle, intf):
         if self.kernel_driver is None:
             raise NotImplementedError
         return self.kernel_driver
 
-    def detach_kernel_driver(self, handle, interface):
+    def detach_kernel_driver(self, dev_handle, intf):
         self._called("detach_kernel_driver")
         self.kernel_driver = False
 
-    def ctrl_transfer(self, handle, kind, request, value, index, data, timeout):
-        if kind == 0x80:  # a string: languages first
-            text = b"\x09\x04" if value & 0xFF == 0 else self.serials[handle.device].encode("utf-16-le")
+    def ctrl_transfer(self, dev_handle, bmRequestType, bRequest, wValue, wIndex, data, timeout):  # noqa: N803
+        if bmRequestType == 0x80:  # a string: languages first
+            text = b"\x09\x04" if wValue & 0xFF == 0 else dev_handle.serial.encode("utf-16-le")
             answer = bytes([len(text) + 2, 3]) + text
             data[: len(answer)] = type(data)("B", answer)
             return len(answer)
-        self._called("ctrl_transfer", kind, request, value, index)
+        self._called("ctrl_transfer", bmRequestType, bRequest, wValue, wIndex)
         return 0
 
-    def bulk_write(self, handle, endpoint, interface, data, timeout):
-        self._called("bulk_write", endpoint, bytes(data), timeout)
+    def bulk_write(self, dev_handle, ep, intf, data, timeout):
+        self._called("bulk_write", ep, bytes(data), timeout)
         return min(len(data), self.most_written)
 
-    def bulk_read(self, handle, endpoint, interface, buffer, timeout):
-        self._called("bulk_read", endpoint, len(buffer), timeout)
+    def bulk_read(self, dev_handle, ep, intf, buff, timeout):
+        self._called("bulk_read", ep, len(buff), timeout)
         if not self.incoming:
             raise usb.core.USBTimeoutError("timed out", constants.ERROR_TIMEOUT, 110)
-        data = self.incoming.pop(0)[: len(buffer)]
-        buffer[: len(data)] = type(buffer)("B", data)
+        data = self.incoming.pop(0)[: len(buff)]
+        buff[: len(data)] = type(buff)("B", data)
         return len(data)
 
 
@@ -131,12 +107,12 @@ class Server(threading.Thread):
     """A server of the socket's framing, for one client after another.
 
     ``answers`` maps a kind of request to its answer, (code, bytes); bulk in takes from ``incoming``. Every request is
-    kept in ``requests`` as (kind, at, value, length, timeout_ms, data).
+    kept in ``requests`` as (kind, at, value, length, timeout_ms, data), and its bytes in ``heard``.
     """
 
     def __init__(self, path, *, serial="FALC0001", product=constants.PRODUCT_ID):
         super().__init__(daemon=True)
-        self.requests = []
+        self.requests, self.heard = [], []
         self.news = threading.Condition()
         self.answers = {DESCRIPTOR: (0, IDENTITY.pack(constants.VENDOR_ID, product) + serial.encode())}
         self.incoming = []
@@ -174,6 +150,7 @@ class Server(threading.Thread):
             data = stream.read(length) if kind == BULK_OUT else b""
             with self.news:
                 self.requests.append((kind, at, value, length, timeout_ms, data))
+                self.heard.append(head + data)
                 self.news.notify_all()
             answer = self.answer(kind)
             if kind == self.hang_up_at:
