@@ -134,20 +134,24 @@ def test_of_an_address_scheme_and_host_alone_are_shown(source: str, shown: str) 
     assert without_login(source) == shown
 
 
-def test_check_notes_that_this_machine_has_no_camera(camera_study: Path) -> None:
+@pytest.mark.parametrize(
+    ("installed", "words"),
+    [
+        (True, "Note: the camera tcp://127.0.0.1:9 cannot be used: Connection refused. Sessions of this"),
+        (False, "pip install 'liquid-study[video]'"),
+    ],
+)
+def test_check_notes_what_keeps_this_machine_from_showing_the_camera(
+    camera_study: Path, installed: bool, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+
     workstation.save(MachineSettings(camera="tcp://127.0.0.1:9"))
+    if not installed:
+        monkeypatch.setattr(sources, "installed", lambda: False)
     checked = CliRunner().invoke(check, [str(camera_study)])
     assert checked.exit_code == 0, checked.output
     assert "Statements" in checked.output
-    note = checked.output.splitlines()[-1]
-    assert note.startswith("Note: the camera tcp://127.0.0.1:9 cannot be used: Connection refused. Sessions of this")
-
-
-def test_check_notes_that_the_extra_is_not_installed(camera_study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sources, "installed", lambda: False)
-    checked = CliRunner().invoke(check, [str(camera_study)])
-    assert checked.exit_code == 0, checked.output
-    assert "pip install 'liquid-study[video]'" in checked.output.splitlines()[-1]
+    assert words in checked.output.splitlines()[-1]
 
 
 def test_a_video_that_failed_is_opened_again_without_its_name(study: Protocol, camera: type[FakeCamera]) -> None:

@@ -13,7 +13,6 @@ import pytest
 from study_app.cli import main
 from study_app.errors import StudyError, WorkerError
 from study_app.workers import cluster as clusters
-from study_app.workers.cluster import ADDRESS
 from study_app.workers.environment import environment
 from study_app.workers.executors import Workers, open_executor
 from tests.workers.local_cluster import INSTALLED, MISSING, local_cluster
@@ -25,15 +24,10 @@ posix = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
 
 @needs_distributed
-def test_results_are_those_of_the_seeds_in_their_order(dask_cluster: str) -> None:
+def test_results_are_those_of_the_seeds_in_their_order_and_an_error_is_that_of_its_case(dask_cluster: str) -> None:
     with open_executor(Workers(cluster=dask_cluster)) as executor:
         assert executor.workers == 2
         assert list(executor.map(draw, range(50))) == [draw(seed) for seed in range(50)]
-
-
-@needs_distributed
-def test_an_error_of_a_case_is_raised_where_its_result_is_asked_for(dask_cluster: str) -> None:
-    with open_executor(Workers(cluster=dask_cluster)) as executor:
         futures = [executor.submit(refuse, case) for case in range(6)]
         with pytest.raises(StudyError, match="case 3"):
             futures[3].result()
@@ -86,11 +80,6 @@ def test_a_worker_with_another_library_or_program_refuses_its_cases() -> None:
     assert "\n" not in str(raised.value)
     with pytest.raises(WorkerError, match=r"liquid-study \S+ \(\w{16}\) instead of 0\.1\.0 \(another\)"):
         compute({**environment(), "liquid-study": "0.1.0 (another)"}, draw, (3,), {})
-
-
-@pytest.mark.parametrize("address", ["tcp://lab1:8786", "tls://10.0.0.2:8786", "tcp://[::1]:8786"])
-def test_an_address_has_a_scheme_a_host_and_a_port(address: str) -> None:
-    assert ADDRESS.fullmatch(address)
 
 
 @pytest.fixture
