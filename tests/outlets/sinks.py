@@ -1,5 +1,8 @@
-"""Sinks that fail or hang when a test wants it."""
+"""Sinks that fail or hang when a test wants it, and a recorder of streams in another process."""
 
+import json
+import subprocess
+import sys
 import threading
 from collections.abc import Mapping
 from typing import Any
@@ -40,3 +43,34 @@ class Sink:
 
     def close(self) -> None:
         self.closed.set()
+
+
+RECORDER = """
+import json, sys, pylsl
+name, count = sys.argv[1], int(sys.argv[2])
+found = pylsl.resolve_byprop("name", name, 1, 30)
+inlet = pylsl.StreamInlet(found[0])
+info = inlet.info(10)
+inlet.open_stream(10)
+print("ready", flush=True)
+samples = [inlet.pull_sample(20) for _ in range(count)]
+print(json.dumps({"xml": info.as_xml(), "rate": info.nominal_srate(), "samples": samples}))
+"""
+
+
+class Recorder:
+    """A recording program that knows nothing of this one: it takes so many samples of a stream by its name."""
+
+    def __init__(self, name: str, count: int) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", RECORDER, name, str(count)], stdout=subprocess.PIPE, text=True
+        )
+        assert self._process.stdout is not None
+        assert self._process.stdout.readline() == "ready\n"
+
+    def kill(self) -> None:
+        self._process.kill()
+        self._process.communicate(timeout=60)
+
+    def found(self) -> dict[str, Any]:
+        return json.loads(self._process.communicate(timeout=60)[0])

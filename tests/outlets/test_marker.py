@@ -53,11 +53,8 @@ def test_codes_are_bytes_of_events_of_the_journal_and_differ() -> None:
     assert set(CODES) <= EVENT_NAMES
     assert len(set(CODES.values())) == len(CODES)
     assert all(1 <= code <= 255 for code in CODES.values())
-
-
-def test_what_concerns_the_results_folder_alone_is_no_marker() -> None:
-    assert marker_of("recorded", 1.0, 0, {"trial": 1}) is None
-    assert marker_of("preflight", 1.0, 0, {"checks": []}) is None
+    for event, fields in (("recorded", {"trial": 1}), ("preflight", {"checks": []})):
+        assert marker_of(event, 1.0, 0, fields) is None  # it concerns the results folder alone
 
 
 def test_markers_are_sent_in_order_and_the_rest_at_the_end() -> None:
@@ -84,14 +81,11 @@ def test_a_failure_is_kept_and_later_markers_are_dropped() -> None:
     assert thread.lost == "test:port failed: it was unplugged"
     assert sink.sent == [marker(1)]
     thread.close(5)
-
-
-def test_another_exception_ends_the_sink_alone() -> None:
-    sink = Sink()
-    sink.send = lambda _marker: 1 / 0  # type: ignore[method-assign]
-    thread = SinkThread(sink)
+    mistaken = Sink()
+    mistaken.send = lambda _marker: 1 / 0  # type: ignore[method-assign]
+    thread = SinkThread(mistaken)
     thread.mark(marker())
-    assert sink.closed.wait(5)
+    assert mistaken.closed.wait(5)
     assert thread.lost == "ZeroDivisionError: division by zero"
 
 
@@ -211,15 +205,6 @@ def test_readings_that_take_long_on_one_side_do_not_bias_beyond_the_bound() -> N
     assert abs(mapping.offset_s) <= mapping.uncertainty_s
 
 
-def test_a_drift_is_followed() -> None:
-    clocks = Clocks(2.0, lambda: 1_000)
-    mapping = ClockMapping(clocks.now_ns, clocks.other_s)
-    clocks.offset_s = 2.001
-    mapping.measure()
-    assert mapping.offset_s == pytest.approx(2.001, abs=mapping.uncertainty_s)
-    assert mapping.uncertainty_s < 2e-6
-
-
 def test_it_is_measured_again_when_it_is_due(monkeypatch: pytest.MonkeyPatch) -> None:
     clocks = Clocks(2.0, lambda: 1_000)
     mapping = ClockMapping(clocks.now_ns, clocks.other_s)
@@ -228,4 +213,5 @@ def test_it_is_measured_again_when_it_is_due(monkeypatch: pytest.MonkeyPatch) ->
     assert mapping.offset_s == pytest.approx(2.0, abs=1e-5)
     monkeypatch.setattr("study_app.outlets.clock_mapping.time.monotonic", lambda: float("inf"))
     mapping.measure_if_due()
-    assert mapping.offset_s == pytest.approx(3.0, abs=1e-5)
+    assert mapping.offset_s == pytest.approx(3.0, abs=mapping.uncertainty_s)
+    assert mapping.uncertainty_s < 2e-6
