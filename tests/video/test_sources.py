@@ -20,6 +20,7 @@ from study_app.video import sources
 from study_app.video.camera import NOT_SHOWN, without_login
 from study_app.video.frames import VideoFrame, stopped
 from study_app.video.sources import Videos
+from study_app.video.statistics import VideoStatistics
 from tests.video.clips import write_clip
 
 
@@ -92,6 +93,8 @@ def test_the_receipt_has_neither_name_nor_password_of_a_camera(study: Protocol, 
     every = videos(study, "rtsp://operator:se@cret@192.168.0.7:554/live?key=secret")
     assert every.open().fault == ""
     assert every.describe()["camera"]["source"] == "rtsp://192.168.0.7:554"
+    every.close()
+    assert camera.made[0].closed
 
 
 @pytest.mark.parametrize(
@@ -184,6 +187,24 @@ def test_footage_that_was_replaced_is_refused(tmp_path: Path) -> None:
     again = Videos(parse(source_bytes(file), str(file)), tmp_path, "", lambda: 0)
     write_clip(clip, frames=4, size=(64, 48))
     assert again.open().fault == f"{clip} is not the file that the study began with: restore it"
+
+
+def test_the_row_of_a_trial_counts_frames_that_were_late_or_lost_and_says_their_age() -> None:
+    def frame(number: int, age_ms: float | None) -> VideoFrame:
+        age_ns = None if age_ms is None else round(1e6 * age_ms)
+        return VideoFrame(number, 2, 2, 8, bytes(16), 30_000_000 * number, age_ns, 30_000_000)
+
+    statistics = VideoStatistics()
+    assert set(statistics.columns().values()) == {None}
+    for number, painted_ms, age_ms in ((0, 10.0, 80.0), (0, 99.0, 80.0), (1, 41.5, 90.0), (5, 191.0, None)):
+        statistics.frame(round(1e6 * painted_ms), frame(number, age_ms), 0.01)
+    assert statistics.columns() == {
+        "video_frames": 3,
+        "video_frames_late": 1,
+        "video_frames_lost": 3,
+        "video_delay_error_max_ms": pytest.approx(31.0),
+        "video_age_mean_ms": pytest.approx(85.0),
+    }
 
 
 def test_a_video_that_stops_can_be_reconnected() -> None:

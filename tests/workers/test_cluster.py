@@ -13,6 +13,7 @@ import pytest
 from study_app.cli import main
 from study_app.errors import StudyError, WorkerError
 from study_app.workers import cluster as clusters
+from study_app.workers import environment as environments
 from study_app.workers.environment import environment
 from study_app.workers.executors import Workers, open_executor
 from tests.workers.local_cluster import INSTALLED, MISSING, local_cluster
@@ -80,6 +81,21 @@ def test_a_worker_with_another_library_or_program_refuses_its_cases() -> None:
     assert "\n" not in str(raised.value)
     with pytest.raises(WorkerError, match=r"liquid-study \S+ \(\w{16}\) instead of 0\.1\.0 \(another\)"):
         compute({**environment(), "liquid-study": "0.1.0 (another)"}, draw, (3,), {})
+
+
+def test_the_digest_of_a_program_is_of_names_and_contents_of_its_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "protocols").mkdir()
+    monkeypatch.setattr(environments, "_PACKAGE", tmp_path)
+    found = []
+    for name, content in (("a.py", "1"), ("b.py", "1"), ("b.py", "2"), ("b.txt", "2"), ("c.txt", "3")):
+        file = tmp_path / name
+        file.write_text(content)
+        found.append(environment.__wrapped__()["liquid-study"])
+        file.unlink()
+    assert len(set(found)) == 4
+    assert found[3] == found[4]  # what is no part of the program
 
 
 @pytest.fixture
