@@ -14,6 +14,7 @@ from study_app.devices.bench import measurements, procedure
 from study_app.devices.bench.kept import dynamics_of
 from study_app.devices.bench.measurements import gain_of
 from study_app.devices.bench.report import as_json, as_markdown, kept
+from study_app.devices.registry import descriptor_of, open_device
 from study_app.errors import DeviceError, DeviceLost
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.store import workstation
@@ -22,12 +23,6 @@ from tests.compiled import needs_servo
 QUICK = procedure.Durations(rest_s=1.0, come_s=3.0, wave_s=12.0, push_s=3.0, damping_s=8.0)
 
 pytestmark = [needs_servo, pytest.mark.slow]
-
-
-def opened(name):
-    from study_app.devices.registry import open_device
-
-    return open_device(name)
 
 
 def bench(device, ask=None, durations=QUICK):
@@ -54,7 +49,7 @@ def found_of():
 
     def measured(name):
         if name not in found:
-            with opened(name) as device:
+            with open_device(name) as device:
                 found[name] = bench(device)
                 assert not commanded(device).any()
         return found[name]
@@ -132,7 +127,7 @@ def test_interrupt_ends_in_zero_force(name, at):
 
         return ask
 
-    with opened(name) as device:
+    with open_device(name) as device:
         with pytest.raises(KeyboardInterrupt):
             bench(device, interrupting)
         assert forces[-1].any()
@@ -146,7 +141,7 @@ def test_key_ends_the_damper_and_no_scale_is_left_out():
 
         return ask
 
-    with opened("scripted") as device:
+    with open_device("scripted") as device:
         found = bench(device, keys)
         assert {one.ended for one in found.damping} == {"operator"}
         assert all(one.damping_nspm < 1.0 for one in found.damping)
@@ -155,55 +150,47 @@ def test_key_ends_the_damper_and_no_scale_is_left_out():
 
 
 @pytest.mark.parametrize(
-    ("happens", "error", "words"),
+    ("at", "happens", "error", "words"),
     [
-        (lambda device: device.unplug(), DeviceLost, "stopped responding"),
-        (lambda device: device.press(8), DeviceError, "the stop button was pressed"),
+        ("damping", lambda device: device.unplug(), DeviceLost, "stopped responding"),
+        ("damping", lambda device: device.press(8), DeviceError, "the stop button was pressed"),
+        ("scale", lambda device: setattr(device, "held", False), DeviceError, "the handle moved too far"),
     ],
-    ids=["unplugged", "stop button"],
+    ids=["unplugged", "stop button", "slips off the scale"],
 )
-def test_what_happens_to_the_device_ends_the_bench(happens, error, words):
+def test_what_happens_to_the_device_ends_the_bench_without_force(at, happens, error, words):
     def watched(hand):
         def ask(kind, text):
-            if kind == "damping":
+            answer = hand(kind, text)
+            if kind == at:
                 happens(device)
-            return hand(kind, text)
+            return answer
 
         return ask
 
-    with opened("scripted") as device:
+    with open_device("scripted") as device:
         with pytest.raises(error, match=words):
             bench(device, watched)
         assert device.force_n == (0.0, 0.0, 0.0)
 
 
-def test_handle_that_slips_off_the_scale_gets_no_force():
-    def slipping(hand):
-        def ask(kind, words):
-            answer = hand(kind, words)
-            if kind == "scale":
-                device.held = False
-            return answer
-
-        return ask
-
-    with opened("scripted") as device:
-        with pytest.raises(DeviceError, match="the handle moved too far"):
-            bench(device, slipping)
-        assert device.force_n == (0.0, 0.0, 0.0)
-
-
-def test_silent_host_ends_the_force():
-    """A program that hangs keeps no force on the handle."""
+def excited(device, limit_n, alive_ns=10**12, **excitation):
+    """Return a servo that drives a device for a bench."""
     from study_app.devices.bench.excitation import BenchDriver, Excitation
     from study_app.haptics.runtime.clocks.clock import VirtualClock
     from study_app.haptics.runtime.servo import Servo
 
-    with opened("scripted") as device:
-        driver = BenchDriver(device, 4.0)
-        servo = Servo(driver, clock=VirtualClock(), elements=1)
-        driver.state.alive_ns = 500_000_000
-        driver.excite(Excitation(push_n=(0.0, -1.0, 0.0)))
+    driver = BenchDriver(device, limit_n)
+    servo = Servo(driver, clock=VirtualClock(), elements=1)
+    driver.state.alive_ns = alive_ns
+    driver.excite(Excitation(**excitation))
+    return servo
+
+
+def test_silent_host_ends_the_force():
+    """A program that hangs keeps no force on the handle."""
+    with open_device("scripted") as device:
+        servo = excited(device, 4.0, alive_ns=500_000_000, push_n=(0.0, -1.0, 0.0))
         servo.advance(499)
         assert device.force_n[1] < -0.9
         servo.advance(3)
@@ -212,17 +199,11 @@ def test_silent_host_ends_the_force():
 
 
 def test_position_that_is_not_finite_is_passed_over():
-    from study_app.devices.bench.excitation import BenchDriver, Excitation
-    from study_app.haptics.runtime.clocks.clock import VirtualClock
-    from study_app.haptics.runtime.servo import Servo
     from tests.haptics.recording_device import Probe
 
     probe = Probe(velocity_mps=(0.0, 0.0, 0.0))
     probe.state.bad_at_read = 300
-    driver = BenchDriver(probe, 4.0)
-    servo = Servo(driver, clock=VirtualClock(), elements=1)
-    driver.state.alive_ns = 10**12
-    driver.excite(Excitation(stiffness_npm=100.0, damping_nspm=6.0, push_n=(1.0, 0.0, 0.0)))
+    servo = excited(probe, 4.0, stiffness_npm=100.0, damping_nspm=6.0, push_n=(1.0, 0.0, 0.0))
     servo.advance(1000)
     assert probe.forces_n[-1] == pytest.approx([1.0, 0.0, 0.0])
     assert np.diff(probe.forces_n[:, 0]).min() >= 0.0
@@ -232,12 +213,8 @@ def test_position_that_is_not_finite_is_passed_over():
 
 @pytest.mark.nightly
 def test_fault_during_a_bench_has_the_message_of_the_driver():
-    from study_app.devices.bench.excitation import BenchDriver
-    from study_app.haptics.runtime.clocks.clock import VirtualClock
-    from study_app.haptics.runtime.servo import Servo
-
-    with opened("inverse3-emulated") as device:
-        servo = Servo(BenchDriver(device, 4.0), clock=VirtualClock(), elements=1)
+    with open_device("inverse3-emulated") as device:
+        servo = excited(device, 4.0)
         servo.advance(10)
         device.hand.take("closes")
         servo.advance(100)
@@ -246,16 +223,9 @@ def test_fault_during_a_bench_has_the_message_of_the_driver():
 
 
 def test_force_of_an_excitation_never_exceeds_its_limit():
-    from study_app.devices.bench.excitation import BenchDriver, Excitation
-    from study_app.haptics.runtime.clocks.clock import VirtualClock
-    from study_app.haptics.runtime.servo import Servo
-
-    with opened("scripted") as device:
-        driver = BenchDriver(device, 2.0)
-        servo = Servo(driver, clock=VirtualClock(), elements=1)
+    with open_device("scripted") as device:
+        servo = excited(device, 2.0, stiffness_npm=5000.0, centre_m=(0.04, 0.04, 0.0), push_n=(0.0, -9.0, 0.0))
         reader = servo.telemetry.reader()
-        driver.state.alive_ns = 10**12
-        driver.excite(Excitation(stiffness_npm=5000.0, centre_m=(0.04, 0.04, 0.0), push_n=(0.0, -9.0, 0.0)))
         servo.advance(3000)
         sizes = np.linalg.norm(reader.read().device_force_n, axis=1)
         assert sizes.max() == pytest.approx(2.0, abs=1e-3)
@@ -266,14 +236,12 @@ def test_force_of_an_excitation_never_exceeds_its_limit():
 def test_handle_that_is_held_is_reported_and_not_kept(tmp_path, monkeypatch):
     from study_app.cli.devices import bench as command
     from study_app.devices.bench import simulated_operator
-    from study_app.devices.registry import descriptor_of
 
     def never_lets_go(device, _tell):
         device.hold(0.0, 0.0, 0.0)
         device.follow(np.arange(0, 600, 0.1), 0.006 * np.random.default_rng(1).standard_normal((6000, 3)))
         return lambda kind, _words: lambda: {"damping": None, "scale": "no"}.get(kind, "")
 
-    monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path / "settings"))
     monkeypatch.setattr(procedure, "Durations", lambda: QUICK)
     monkeypatch.setattr(simulated_operator, "asks_hand", never_lets_go)
     real = replace(descriptor_of("scripted"), kind="felt")
@@ -283,21 +251,6 @@ def test_handle_that_is_held_is_reported_and_not_kept(tmp_path, monkeypatch):
     assert "the handle was touched" in (tmp_path / "report" / "bench.md").read_text()
     assert "Nothing was kept" in done.output
     assert workstation.load().benches == ()
-
-
-def test_bench_of_a_real_device_is_kept_with_the_path_of_its_report(tmp_path, monkeypatch):
-    from study_app.devices.registry import descriptor_of
-
-    monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path / "settings"))
-    monkeypatch.setattr(procedure, "Durations", lambda: QUICK)
-    real = replace(descriptor_of("scripted"), kind="felt")
-    monkeypatch.setattr("study_app.devices.registry.descriptor_of", lambda _name: real)
-    monkeypatch.chdir(tmp_path)
-    done = liquid_study("devices", "bench", "scripted")
-    assert done.exit_code == 0, done.output
-    (own,) = workstation.load().benches
-    assert own.report == str(tmp_path / "bench-scripted" / "bench.md")
-    assert Path(own.report).is_file()
 
 
 def test_refused_position_does_not_enter_the_noise():
@@ -323,14 +276,21 @@ def liquid_study(*words):
     return CliRunner().invoke(commands, words)
 
 
-def test_command_writes_its_report_and_keeps_nothing_of_a_simulated_device(tmp_path, monkeypatch):
-    monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path / "settings"))
+def test_command_writes_its_report_and_keeps_what_it_found_of_a_real_device_alone(tmp_path, monkeypatch):
     monkeypatch.setattr(procedure, "Durations", lambda: QUICK)
     done = liquid_study("devices", "bench", "scripted", "--to", str(tmp_path / "report"))
     assert done.exit_code == 0, done.output
     assert {path.name for path in (tmp_path / "report").iterdir()} == {"bench.md", "bench.json"}
     assert "its measurements are not kept" in done.output
     assert workstation.load().benches == ()
+    real = replace(descriptor_of("scripted"), kind="felt")
+    monkeypatch.setattr("study_app.devices.registry.descriptor_of", lambda _name: real)
+    monkeypatch.chdir(tmp_path)
+    done = liquid_study("devices", "bench", "scripted")
+    assert done.exit_code == 0, done.output
+    (own,) = workstation.load().benches
+    assert own.report == str(tmp_path / "bench-scripted" / "bench.md")
+    assert Path(own.report).is_file()
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from contextlib import nullcontext
 
 import click
 import numba
@@ -15,7 +16,6 @@ if numba.config.DISABLE_JIT:
 
 from study_app.cli import commands
 from study_app.cli.devices import Terminal
-from study_app.devices.falcon.doctor.examine import examine
 from study_app.devices.falcon.emulator.emulator import Emulator
 from study_app.devices.falcon.failure_modes import MODES, UDEV_RULE
 from study_app.devices.falcon.mechanics.calibration import calibration_file, load
@@ -106,32 +106,21 @@ class TestDoctor:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no Unix sockets")
-class TestDoctorOverASocket:
-    def serving(self, tmp_path, *faults):
-        from study_app.devices.falcon.emulator.socket_server import EmulatorServer
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [("busy", "cause: another program uses it"), ("gone", "cause: none is connected"), (None, "seen: opened")],
+)
+def test_a_falcon_behind_a_socket_is_examined(tmp_path, fault, words):
+    from study_app.devices.falcon.emulator.socket_server import EmulatorServer
 
-        emulator = Emulator(running=True)
-        for fault in faults:
-            emulator.take(fault)
-        return EmulatorServer(emulator, tmp_path / "falcon")
-
-    def test_one_that_is_refused(self, tmp_path):
-        with self.serving(tmp_path, "busy"):
-            told = liquid_study("doctor", "--device", f"falcon-socket:{tmp_path / 'falcon'}")
-        assert told.exit_code == 3
-        assert "cause: another program uses it" in told.output
-
-    def test_nobody_there(self, tmp_path):
-        told = liquid_study("doctor", "--device", f"falcon-socket:{tmp_path / 'falcon'}")
-        assert told.exit_code == 3
-        assert "cause: none is connected" in told.output
-
-    def test_one_that_answers_is_homed_and_turned(self, tmp_path):
-        with self.serving(tmp_path):
-            examined = examine(f"falcon-socket:{tmp_path / 'falcon'}", progress=str, seconds=0.25)
-        assert examined.facts.program == "running"
-        assert examined.facts.homed == 0b111
-        assert examined.facts.replies  # how fast they come is this machine's affair
+    emulator, path = Emulator(running=True), tmp_path / "falcon"
+    if fault == "busy":
+        emulator.take(fault)
+    with EmulatorServer(emulator, path) if fault != "gone" else nullcontext():
+        told = liquid_study("doctor", "--device", f"falcon-socket:{path}")
+    assert words in told.output
+    assert fault is None or told.exit_code == 3
+    assert fault is not None or emulator.homed == 0b111  # how fast replies come is this machine's affair
 
 
 class TestTheTerminal:

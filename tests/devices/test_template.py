@@ -12,7 +12,6 @@ import pytest
 
 from study_app.devices.backends import backends
 from study_app.devices.registry import open_device
-from study_app.errors import DeviceLost
 from study_app.haptics.model import layout
 from tests.compiled import needs_servo
 from tests.devices.packages import TEMPLATE
@@ -132,24 +131,6 @@ class TestTemplate:
         assert np.percentile(np.abs(moved_mps - velocity_mps[:, 0])[1:-1], 90) < 0.01  # less certain at gaps
         power_w = (own.device_force_n * velocity_mps).sum(axis=1)
         assert power_w.mean() < 0.0
-
-    @needs_servo
-    @pytest.mark.parametrize("name", ["example-direct", "example-mailbox"])
-    def test_pulled_cable_ends_the_servo(self, name: str):
-        from study_app.haptics.runtime.servo import Servo
-
-        with open_device(name) as device:
-            from liquid_study_example.driver import library
-
-            servo = Servo(device)
-            servo.start()
-            until(lambda: servo.telemetry.written[0] >= 20, "the servo does not tick")
-            library().maker_pull_cable()
-            until(lambda: servo.fault is not None, "the servo goes on without its device")
-            with pytest.raises(DeviceLost, match="stopped responding"):
-                servo.check()
-            servo.stop()
-        assert maker_force_n(library()) == [0.0, 0.0, 0.0]
 
     def test_force_ends_where_the_servo_is_silent(self):
         """The library's own thread goes on without the servo: a hang of ours must not hold a force."""

@@ -253,16 +253,7 @@ def test_a_program_that_says_nothing_did_not_start():
     assert "check that the file is a Falcon's firmware" in str(failure)
 
 
-def test_a_bridge_that_takes_no_bytes_is_a_failed_attempt():
-    _, transport = falcon()
-    transport.fails = usb_failure(constants.ERROR_TIMEOUT, "sending")
-    failure, _ = failing(transport, attempts=2)
-    assert (failure.step, failure.reason) == ("ping", "the bridge does not accept the bytes")
-    configure(transport)
-    assert not is_running(transport)
-
-
-def test_a_falcon_that_is_unplugged_is_not_waited_for():
+def test_a_falcon_that_goes_is_not_waited_for_and_one_that_takes_no_bytes_is_tried_again():
     emulator, transport = falcon()
     transport.fails = usb_failure(constants.ERROR_NO_DEVICE, "sending")
     with pytest.raises(FalconLost):
@@ -270,20 +261,12 @@ def test_a_falcon_that_is_unplugged_is_not_waited_for():
     with pytest.raises(FalconLost):
         is_running(transport)
     transport.fails = usb_failure(constants.ERROR_TIMEOUT, "sending")
-
-    def unplug(_line):
-        emulator.faults.on("unplugged")
-
-    with pytest.raises(FalconNotFound):
-        boot(transport, stream(), progress=unplug)
-
-
-def test_a_falcon_that_somebody_takes_between_attempts_is_busy():
-    emulator, transport = falcon()
-    emulator.power(False)
-    with pytest.raises(UsbFailure) as caught:
-        boot(transport, stream(), progress=lambda _: emulator.faults.on("busy"))
-    assert caught.value.kind == "busy"
+    failure, _ = failing(transport, attempts=2)
+    assert (failure.step, failure.reason) == ("ping", "the bridge does not accept the bytes")
+    assert not is_running(transport)
+    for fault, error in (("busy", UsbFailure), ("unplugged", FalconNotFound)):  # between attempts
+        with pytest.raises(error):
+            boot(transport, stream(), progress=lambda _line, fault=fault: emulator.faults.on(fault))
 
 
 def test_the_event_character_and_the_timer_are_the_round_trip():

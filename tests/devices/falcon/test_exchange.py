@@ -45,37 +45,24 @@ class TestAPosition:
         assert ticks.tick(reply(SOMEWHERE_M))[0] == READ_NEW
         assert ticks.position_m == pytest.approx(SOMEWHERE_M, abs=60e-6)  # whole counts of the encoders
 
-    def test_a_tick_without_a_reply_gives_nothing_new(self, ticks):
+    @pytest.mark.parametrize(
+        ("came", "answers", "counted"),
+        [
+            ([[reply(SOMEWHERE_M)], []], [READ_NEW, READ_NOTHING_NEW], {"missing": 2, "fresh": 1}),
+            ([[MODEM_STATUS + reply(CENTRE_M) + reply(SOMEWHERE_M)]], [READ_NEW], {"replies": 2, "surplus": 1}),
+            ([[reply(SOMEWHERE_M)[:9], reply(SOMEWHERE_M)[9:]]], [READ_NEW], {"cut_short": 1}),
+            ([[reply()[:14]], [reply(SOMEWHERE_M)]], [READ_NOTHING_NEW, READ_NEW], {"replies": 1}),
+            ([[b"", reply(SOMEWHERE_M)]], [READ_NEW], {"replies": 1}),
+        ],
+        ids=["none", "two", "in two parts", "of 14 bytes", "after status bytes alone"],
+    )
+    def test_replies_are_new_positions_however_they_come(self, ticks, came, answers, counted):
         ticks.tick()
-        ticks.tick(reply(SOMEWHERE_M))
-        assert ticks.tick()[0] == READ_NOTHING_NEW
-        assert (ticks.falcon.missing, ticks.falcon.fresh) == (2, 1)
-
-    def test_of_several_replies_the_newest_counts(self, ticks):
-        ticks.tick()
-        assert ticks.tick(reply(CENTRE_M), reply(SOMEWHERE_M))[0] == READ_NEW
+        for parts, answer in zip(came, answers, strict=True):
+            ticks.bridge.queue.extend(part if part[:2] == MODEM_STATUS else MODEM_STATUS + part for part in parts)
+            assert ticks.tick()[0] == answer
         assert ticks.position_m == pytest.approx(SOMEWHERE_M, abs=60e-6)
-        assert (ticks.falcon.replies, ticks.falcon.surplus) == (2, 1)
-
-    def test_a_reply_that_comes_in_two_parts_is_one(self, ticks):
-        ticks.tick()
-        whole = reply(SOMEWHERE_M)
-        ticks.bridge.queue.append(MODEM_STATUS + whole[:9])
-        assert ticks.tick(whole[9:])[0] == READ_NEW
-        assert ticks.position_m == pytest.approx(SOMEWHERE_M, abs=60e-6)
-        assert ticks.falcon.cut_short == 1
-
-    def test_a_reply_of_14_bytes_is_no_reply(self, ticks):
-        ticks.tick()
-        assert ticks.tick(reply(SOMEWHERE_M)[:14])[0] == READ_NOTHING_NEW
-        assert ticks.tick(reply(SOMEWHERE_M))[0] == READ_NEW
-        assert ticks.falcon.parser.skipped == 14
-        assert ticks.falcon.replies == 1
-
-    def test_status_bytes_alone_are_asked_after_once_more(self, ticks):
-        ticks.tick()
-        ticks.bridge.queue.append(MODEM_STATUS)
-        assert ticks.tick(reply(SOMEWHERE_M))[0] == READ_NEW
+        assert {name: ticks.falcon[name] for name in counted} == counted
 
     def test_a_reply_from_before_a_pause_is_not_given(self, ticks):
         ticks.tick()
