@@ -267,6 +267,8 @@ def test_a_falcon_that_goes_is_not_waited_for_and_one_that_takes_no_bytes_is_tri
     for fault, error in (("busy", UsbFailure), ("unplugged", FalconNotFound)):  # between attempts
         with pytest.raises(error):
             boot(transport, stream(), progress=lambda _line, fault=fault: emulator.faults.on(fault))
+        emulator.faults.off(fault)
+        transport.reopen()
 
 
 def test_the_event_character_and_the_timer_are_the_round_trip():
