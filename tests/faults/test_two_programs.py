@@ -4,9 +4,11 @@ import contextlib
 import io
 import json
 import multiprocessing
-import os
+import re
 import shutil
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +18,10 @@ from study_app.cli import main
 from study_app.errors import StoreError
 from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.verification.verify_study import verify
+from tests.faults.support.racers import race
 from tests.platforms import needs_fork
 from tests.session import small
 from tests.studies import once, rehearsed
@@ -95,53 +99,31 @@ def test_two_programs_leave_a_sound_study(
                 assert words[2] in kept or any(other[0] == "withdraw" for other in effects)
 
 
-TIMES = 100
+def test_of_two_programs_exactly_one_gets_each_id_and_both_have_the_same_key(tmp_path: Path) -> None:
+    """Every round in a new study: the key is raced for, too; then both take free ids and compare keys."""
 
-
-def race(folder: Path, start: Any, won: Any) -> None:
-    """Try to begin each session when the other does."""
-    taken = []
-    for number in range(1, TIMES + 1):
-        start.wait(60)
+    @contextmanager
+    def begun(program: int, number: int) -> Iterator[str]:
+        participant = f"P00{program + 2 if number % 2 else 1}"
+        who = {"seed": 1, "operator": "AB", "language": "en", "device": {"name": "memory"}, "screens": {}}
+        start = SessionStart(participant, simulated=False, **who)  # type: ignore[arg-type]
         try:
-            store = begin(
-                folder,
-                small.protocol(),
-                b"small",
-                SessionStart(
-                    f"P{number:03d}",
-                    seed=1,
-                    operator=str(os.getpid()),
-                    language="en",
-                    device={"name": "memory"},
-                    screens={},
-                    simulated=False,
-                ),
-            )
+            store = begin(tmp_path / str(number // 2), small.protocol(), b"small", start)
         except StoreError as error:
-            taken.append((number, str(error)))
+            yield f"refused: {error}"
         else:
+            yield store.key.hash
             store.close()
-            taken.append((number, ""))
-    won.put(taken)
 
-
-def test_of_two_programs_exactly_one_gets_each_id(tmp_path: Path) -> None:
-    forking = multiprocessing.get_context("fork")
-    start, won = forking.Barrier(2), forking.Queue()
-    programs = [forking.Process(target=race, args=(tmp_path / "study", start, won)) for _ in range(2)]
-    for program in programs:
-        program.start()
-    one, other = won.get(timeout=120), won.get(timeout=120)
-    for program in programs:
-        program.join(30)
-        assert program.exitcode == 0
-    for (number, first), (_, second) in zip(one, other, strict=True):
-        refused = first or second
-        assert not (first and second), number
-        assert first or second, number
-        assert "already has session 1" in refused, refused
-        assert "nothing was changed" in refused
-    study = StudyFolder(tmp_path / "study")
-    assert len(study.sessions()) == TIMES
-    assert verify(study.path).errors == ()
+    answers = race(begun, 40)
+    for number, (raced, free) in enumerate(zip(answers[::2], answers[1::2], strict=True)):
+        won, lost = sorted(raced, key=lambda answer: answer.startswith("refused"))
+        assert re.match(r"refused: participant P001 already has session 1.*nothing was changed", lost), raced
+        assert free == [won, won]
+        study = StudyFolder(tmp_path / str(number))
+        (line,) = journal.read(study.session("P001", 1).journal)
+        assert line["event"] == "session_started"
+        table = study.participants("small").read_text(encoding="utf-8").splitlines()
+        assert [row.split(",")[1] for row in table[1:]] == ["P001", "P002", "P003"]
+        assert not list(study.path.rglob("*.tmp"))
+        assert verify(study.path).errors == ()

@@ -21,6 +21,11 @@ SEVEN = ("Completely disagree", "Mostly", "Somewhat", "Neutral", "Somewhat agree
 
 SOURCE = b"[study]\nname = 'brackish'\n"
 
+
+Start = Callable[..., SessionStore]
+Attend = Callable[[SessionStore], None]
+Make = Callable[..., np.ndarray[Any, Any]]
+Tables = Callable[..., dict[str, Any]]
 FullDisk = Callable[[int], AbstractContextManager[None]]
 
 
@@ -81,7 +86,7 @@ def _no_plug_is_pulled(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def tables_of_study() -> Callable[..., dict[str, Any]]:
+def tables_of_study() -> Tables:
     return study_tables
 
 
@@ -99,7 +104,7 @@ def clock() -> SessionClock:
 
 
 @pytest.fixture
-def start(tmp_path: Path, protocol: Protocol, clock: SessionClock) -> Callable[..., SessionStore]:
+def start(tmp_path: Path, protocol: Protocol, clock: SessionClock) -> Start:
     """Begin a session of P007 in tmp_path/study; any value of its ``SessionStart`` can be given, and of ``begin``."""
 
     def begun(
@@ -179,7 +184,7 @@ def summary() -> dict[str, Any]:
 
 
 @pytest.fixture
-def attend(protocol: Protocol) -> Callable[[SessionStore], None]:
+def attend(protocol: Protocol) -> Attend:
     """Walk a session through its schedule as the session's machine journals it, up to the end."""
 
     def attended(store: SessionStore) -> None:
@@ -209,6 +214,19 @@ def attend(protocol: Protocol) -> Callable[[SessionStore], None]:
     return attended
 
 
+@pytest.fixture
+def finished(start: Start, attend: Attend) -> Start:
+    """Begin a session, answer everything and complete it; any argument of ``start`` can be given."""
+
+    def completed(participant: str = "P007", **given: Any) -> SessionStore:
+        store = start(participant, **given)
+        attend(store)
+        store.finish("completed")
+        return store
+
+    return completed
+
+
 def made_samples(count: int, *, first_tick: int = 0, scene: int = 1, seed: int = 5) -> np.ndarray[Any, Any]:
     """A hand that wanders, with a servo that is late by different amounts; numbers as full of digits as they can be."""
     generator = np.random.default_rng(seed)
@@ -235,5 +253,5 @@ def made_samples(count: int, *, first_tick: int = 0, scene: int = 1, seed: int =
 
 
 @pytest.fixture
-def samples_of() -> Callable[..., np.ndarray[Any, Any]]:
+def samples_of() -> Make:
     return made_samples

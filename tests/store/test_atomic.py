@@ -1,7 +1,5 @@
 import os
 import time
-from collections.abc import Callable
-from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
@@ -19,8 +17,7 @@ from study_app.store.atomic import (
     temporary_path,
     write_file,
 )
-
-FullDisk = Callable[[int], AbstractContextManager[None]]
+from tests.store.conftest import FullDisk
 
 
 def names_in(folder: Path) -> list[str]:

@@ -2,8 +2,6 @@ import codecs
 import csv
 import io
 import json
-from collections.abc import Callable
-from contextlib import AbstractContextManager
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any
@@ -15,23 +13,20 @@ from study_app.store.blinded.catch_trials import RULE
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import Exclusion, exclude, exclusions, include, reversals
 from study_app.store.sessions.folder_lock import is_open
-from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.verify_study import verify
+from tests.store.conftest import FullDisk, Start
 
 pytestmark = pytest.mark.slow
 
-FullDisk = Callable[[int], AbstractContextManager[None]]
 
 NOW = datetime(2026, 3, 2, 9, 30, tzinfo=timezone(timedelta(hours=1)))
 AWKWARD = 'comma, "quote"\nnew line\ttab 🌊 =SUM(A1) ' + "é" * 10_000
 
 
 @pytest.fixture
-def folder(tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]) -> Path:
+def folder(tmp_path: Path, start: Start, finished: Start) -> Path:
     """P007 with five trials, P008 with none."""
-    store = start()
-    attend(store)
-    store.finish("completed")
+    finished()
     start("P008").finish("withdrawn")
     return tmp_path / "study"
 
@@ -105,7 +100,7 @@ def test_what_is_left_out_already_is_refused(folder: Path) -> None:
     assert len(exclusions(folder)) == 2
 
 
-def test_many_participants_are_not_all_listed(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
+def test_many_participants_are_not_all_listed(tmp_path: Path, start: Start) -> None:
     for number in range(1, 9):
         start(f"P{number:03d}").finish("completed")
     with pytest.raises(StoreError, match=r"participants: P001, P002, P003, P004, P005, P006 … P008$"):

@@ -1,6 +1,6 @@
 import itertools
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +16,8 @@ from study_app.store.blinded.blinding import open_or_draw_key, read_key
 from study_app.store.blinded.whole_protocol import whole_protocol
 from study_app.store.progress import Given, Progress, progress, progress_of
 from study_app.store.receipt import read, versions, without_conditions, write
-from study_app.store.sessions.open_session import SessionStore
 from tests.protocol.trials.level_studies import text_of
+from tests.store.conftest import Attend, Start
 
 
 def lines_of(*events: dict[str, Any]) -> list[dict[str, Any]]:
@@ -126,7 +126,7 @@ def test_the_latest_moment_counts_however_lines_are_ordered() -> None:
 
 
 def test_wherever_a_session_stops_it_stands_where_its_schedule_was(
-    protocol: Protocol, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
+    protocol: Protocol, start: Start, attend: Attend
 ) -> None:
     """Cut after every line of a whole session: steps are left one by one, in the schedule's order."""
     store = start()
@@ -148,7 +148,7 @@ def test_wherever_a_session_stops_it_stands_where_its_schedule_was(
     assert (stands[0].step, stands[-1].step) == (0, len(steps))
 
 
-def test_a_torn_line_counts_as_never_written(start: Callable[..., SessionStore]) -> None:
+def test_a_torn_line_counts_as_never_written(start: Start) -> None:
     with start() as store:
         store.append("page_shown", page="consent")
     with store.folder.journal.open("ab") as file:
@@ -156,7 +156,7 @@ def test_a_torn_line_counts_as_never_written(start: Callable[..., SessionStore])
     assert (progress(store.folder.path).step, progress(store.folder.path).page) == (0, "consent")
 
 
-def test_what_is_no_session_is_named(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
+def test_what_is_no_session_is_named(tmp_path: Path, start: Start) -> None:
     with pytest.raises(StoreError, match="is not a session folder: name one such as"):
         progress(tmp_path)
     with pytest.raises(StoreError, match="does not begin with session_started"):

@@ -2,8 +2,7 @@ import errno
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +13,10 @@ from study_app.store import recording_writer
 from study_app.store.recorder import Lost, Recorded, Recorder, recording_files
 from study_app.store.recording_files import Written, read_facts, read_frames, read_samples
 from study_app.store.recording_writer import SamplesFile
+from tests.store.conftest import FullDisk, Make
 
 pytestmark = pytest.mark.slow
 
-Make = Callable[..., np.ndarray[Any, Any]]
-FullDisk = Callable[[int], AbstractContextManager[None]]
 
 FACTS = {"participant": "P007", "session": 1}
 

@@ -1,8 +1,6 @@
 import json
 import struct
 import zlib
-from collections.abc import Callable
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +17,7 @@ from study_app.store import recording_writer
 from study_app.store.recording_files import Written, read_checks, read_facts, read_frames, read_samples
 from study_app.store.recording_writer import SamplesFile, write_frames
 from study_app.store.tables.recorded_columns import FRAMES, SAMPLES
-
-Make = Callable[..., np.ndarray[Any, Any]]
-FullDisk = Callable[[int], AbstractContextManager[None]]
+from tests.store.conftest import FullDisk, Make
 
 EXACT = ("tick", "time_ns", "lateness_ns", "fresh", "buttons", "limiters", "scene", "status", "position_m")
 FACTS = {"participant": "P007", "trial": 3}

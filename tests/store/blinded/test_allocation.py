@@ -4,6 +4,8 @@ import json
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -25,6 +27,8 @@ from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.reopen import reopen
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
+from tests.faults.support.racers import race
+from tests.platforms import needs_fork
 from tests.protocol.groups.grouped import GROUPS, STUDY, grouped
 
 SOURCE = (STUDY + GROUPS).encode()
@@ -97,39 +101,18 @@ def test_no_file_names_a_group_of_a_participant(tmp_path: Path) -> None:
     assert len({len(sealed) for sealed in readable.values()}) == 1, "the length tells nothing"
 
 
-RACER = """
-import sys
-from pathlib import Path
-from study_app.store.blinded.allocation import allocate
-from study_app.store.blinded.blinding import read_key
-from study_app.store.folders import StudyFolder
-study = StudyFolder(Path(sys.argv[1]))
-key = read_key(study.path)
-print("ready", flush=True)
-sys.stdin.readline()
-for number in range(40):
-    print(allocate(study, key, f"{sys.argv[2]}{number}", waits=False).entry, flush=True)
-"""
-
-
 @pytest.mark.slow
+@needs_fork
 def test_two_programs_at_once_never_share_an_entry(tmp_path: Path) -> None:
-    open_or_draw_key(tmp_path, grouped())
-    racers = [
-        subprocess.Popen(
-            [sys.executable, "-c", RACER, str(tmp_path), name], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-        for name in ("A", "B")
-    ]
-    assert [racer.stdout.readline() for racer in racers if racer.stdout] == ["ready\n"] * 2
-    for racer in racers:
-        assert racer.stdin
-        racer.stdin.write("go\n")
-        racer.stdin.flush()
-    entries = [int(line) for racer in racers for line in racer.communicate(timeout=60)[0].splitlines()]
-    assert sorted(entries) == list(range(1, 81))
-    key = open_or_draw_key(tmp_path, grouped())
-    study = StudyFolder(tmp_path)
+    key, study = open_or_draw_key(tmp_path, grouped()), StudyFolder(tmp_path)
+
+    @contextmanager
+    def entered(program: int, number: int) -> Iterator[int]:
+        found = allocate(study, key, f"{'AB'[program]}{number}", waits=False)
+        assert found is not None
+        yield found.entry
+
+    assert sorted(entry for answers in race(entered, 40) for entry in answers) == list(range(1, 81))
     counts = Counter(allocated(study, key, claim.participant).group for claim in claims(study))  # type: ignore[union-attr]
     assert counts == dict.fromkeys(GROUP_NAMES, 40)
 

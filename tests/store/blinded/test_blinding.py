@@ -5,7 +5,6 @@ import os
 import random
 import stat
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +23,8 @@ from study_app.store.blinded.blinding import (
     unreadable_reveals,
 )
 from study_app.store.blinded.unblinding import unblind
-from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.verify_study import verify
+from tests.store.conftest import Start, Tables
 
 
 def names_in(folder: Path) -> list[str]:
@@ -62,9 +61,7 @@ def test_the_key_gives_every_code_its_condition(tmp_path: Path, protocol: Protoc
     assert key.liquids("delays", tardy) == ("quagmire",)
 
 
-def test_several_liquids_of_a_condition_are_named_in_order(
-    tmp_path: Path, tables_of_study: Callable[..., dict[str, Any]]
-) -> None:
+def test_several_liquids_of_a_condition_are_named_in_order(tmp_path: Path, tables_of_study: Tables) -> None:
     tables = tables_of_study()
     tables["conditions"]["learn"] = {"liquids": ["spare", "mildew"]}
     key = open_or_draw_key(tmp_path, Protocol.model_validate(tables))
@@ -160,7 +157,7 @@ def test_rehearsals_and_real_sessions_do_not_mix(tmp_path: Path, protocol: Proto
 
 @pytest.mark.parametrize("what", ["a liquid", "a delay", "the list of a block", "a block's letter"])
 def test_a_protocol_with_other_conditions_is_refused_without_naming_them(
-    tmp_path: Path, protocol: Protocol, tables_of_study: Callable[..., dict[str, Any]], what: str
+    tmp_path: Path, protocol: Protocol, tables_of_study: Tables, what: str
 ) -> None:
     open_or_draw_key(tmp_path, protocol)
     tables = tables_of_study()
@@ -181,9 +178,7 @@ def test_a_protocol_with_other_conditions_is_refused_without_naming_them(
     assert not any(word in message for word in ("mildew", "tardy", "139", "1200"))
 
 
-def test_a_protocol_with_other_texts_keeps_its_key(
-    tmp_path: Path, protocol: Protocol, tables_of_study: Callable[..., dict[str, Any]]
-) -> None:
+def test_a_protocol_with_other_texts_keeps_its_key(tmp_path: Path, protocol: Protocol, tables_of_study: Tables) -> None:
     key = open_or_draw_key(tmp_path, protocol)
     tables = tables_of_study()
     tables["pages"]["consent"]["body"] = "Other words."
@@ -205,7 +200,7 @@ def test_a_key_of_a_later_format_is_refused(tmp_path: Path, protocol: Protocol) 
         open_or_draw_key(tmp_path, protocol)
 
 
-def test_a_tampered_key_is_found_by_the_receipts(start: Callable[..., SessionStore], tmp_path: Path) -> None:
+def test_a_tampered_key_is_found_by_the_receipts(start: Start, tmp_path: Path) -> None:
     start("P001").finish("completed")
     folder = tmp_path / "study"
     content = content_of(folder)
@@ -220,9 +215,7 @@ def test_a_tampered_key_is_found_by_the_receipts(start: Callable[..., SessionSto
 
 
 @pytest.mark.parametrize("content", [b"", b"{}", b'{"key_hash', b"\xff\xfe", None])
-def test_a_damaged_receipt_stops_no_session_but_its_own(
-    start: Callable[..., SessionStore], tmp_path: Path, content: bytes | None
-) -> None:
+def test_a_damaged_receipt_stops_no_session_but_its_own(start: Start, tmp_path: Path, content: bytes | None) -> None:
     with start("P001"):
         pass
     with start("P002") as store:
@@ -237,7 +230,7 @@ def test_a_damaged_receipt_stops_no_session_but_its_own(
 
 
 def test_a_tampered_key_is_found_by_the_journal_of_a_session_whose_receipt_is_damaged(
-    start: Callable[..., SessionStore], tmp_path: Path
+    start: Start, tmp_path: Path
 ) -> None:
     with start() as store:
         store.folder.receipt.write_bytes(b"?")
@@ -247,7 +240,7 @@ def test_a_tampered_key_is_found_by_the_journal_of_a_session_whose_receipt_is_da
         start("P008")
 
 
-def test_a_lost_key_is_not_drawn_anew(start: Callable[..., SessionStore], tmp_path: Path) -> None:
+def test_a_lost_key_is_not_drawn_anew(start: Start, tmp_path: Path) -> None:
     start("P001").finish("completed")
     sealed(tmp_path / "study").unlink()
     with pytest.raises(StoreError, match=r"key\.sealed is missing, though 1 sessions ran under it"):
@@ -255,7 +248,7 @@ def test_a_lost_key_is_not_drawn_anew(start: Callable[..., SessionStore], tmp_pa
     assert not sealed(tmp_path / "study").exists()
 
 
-def test_a_reveal_is_recorded_before_it_tells(start: Callable[..., SessionStore], tmp_path: Path) -> None:
+def test_a_reveal_is_recorded_before_it_tells(start: Start, tmp_path: Path) -> None:
     store = start("P001")
     store.finish("completed")
     folder = tmp_path / "study"
@@ -271,16 +264,14 @@ def test_a_reveal_is_recorded_before_it_tells(start: Callable[..., SessionStore]
 
 
 @pytest.mark.parametrize(("by", "reason", "named"), [("", "done", "--by"), ("AB", " \n", "--reason")])
-def test_a_reveal_needs_a_name_and_a_reason(
-    start: Callable[..., SessionStore], tmp_path: Path, by: str, reason: str, named: str
-) -> None:
+def test_a_reveal_needs_a_name_and_a_reason(start: Start, tmp_path: Path, by: str, reason: str, named: str) -> None:
     start("P001").finish("completed")
     with pytest.raises(StoreError, match=f"{named} is empty"):
         reveal(tmp_path / "study", by, reason)
     assert not (tmp_path / "study" / "blinding" / "reveals.jsonl").exists()
 
 
-def test_a_reveal_that_cannot_be_recorded_tells_nothing(start: Callable[..., SessionStore], tmp_path: Path) -> None:
+def test_a_reveal_that_cannot_be_recorded_tells_nothing(start: Start, tmp_path: Path) -> None:
     start("P001").finish("completed")
     (tmp_path / "study" / "blinding" / "reveals.jsonl").mkdir()
     with pytest.raises(StoreError, match=r"reveals\.jsonl cannot be"):
@@ -288,9 +279,7 @@ def test_a_reveal_that_cannot_be_recorded_tells_nothing(start: Callable[..., Ses
 
 
 @pytest.mark.parametrize("line", [b"5", b"null", b'"by AB"', b"[1]", b"xat: 2026"])
-def test_a_line_that_is_no_reveal_is_told_and_the_others_count(
-    start: Callable[..., SessionStore], tmp_path: Path, line: bytes
-) -> None:
+def test_a_line_that_is_no_reveal_is_told_and_the_others_count(start: Start, tmp_path: Path, line: bytes) -> None:
     start("P001").finish("completed")
     folder = tmp_path / "study"
     path = folder / "blinding" / "reveals.jsonl"

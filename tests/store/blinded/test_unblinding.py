@@ -1,7 +1,6 @@
 """Before unblinding no table tells a condition; after it every table is what an open study's would have been."""
 
 import csv
-from collections.abc import Callable
 from datetime import datetime, timedelta, timezone
 from itertools import count
 from pathlib import Path
@@ -26,11 +25,8 @@ from study_app.store.tables.columns import SEALED, TRIALS
 from study_app.store.tables.csv_files import csv_bytes, read_table
 from study_app.store.tables.study_description import description_bytes
 from study_app.store.verification.verify_study import verify
-from tests.store.conftest import SOURCE
+from tests.store.conftest import SOURCE, Attend, Start
 from tests.store.forging import Lines, cover_up, forge
-
-Start = Callable[..., SessionStore]
-Attend = Callable[[SessionStore], None]
 
 
 def ticking() -> journal.SessionClock:
@@ -54,10 +50,8 @@ def sound(folder: Path) -> bool:
     return findings.sound
 
 
-def test_a_sealed_study_holds_no_column_that_tells_a_condition(tmp_path: Path, start: Start, attend: Attend) -> None:
-    store = start()
-    attend(store)
-    store.finish("completed")
+def test_a_sealed_study_holds_no_column_that_tells_a_condition(tmp_path: Path, finished: Start) -> None:
+    store = finished()
     folder = tmp_path / "study"
     assert names(store.folder.table("brackish", "trials")) == set(header(unsealed(TRIALS)))
     for path in folder.rglob("*.*"):
@@ -102,13 +96,11 @@ def test_unblinding_gives_what_an_open_study_would_have_held(
 
 @pytest.mark.slow
 def test_opening_again_changes_no_table_and_finishes_what_was_broken_off(
-    tmp_path: Path, start: Start, attend: Attend, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, finished: Start
 ) -> None:
     """Ended between a session's table and its checksum."""
     for name in ("P007", "P008"):
-        store = start(name)
-        attend(store)
-        store.finish("completed")
+        finished(name)
     folder = tmp_path / "study"
 
     def killed(*_: object) -> None:
@@ -159,10 +151,8 @@ def test_what_is_not_the_journals_is_left_and_named(tmp_path: Path, start: Start
     assert sound(folder)
 
 
-def test_the_command_names_the_codes_and_what_it_left(start: Start, attend: Attend) -> None:
-    store = start()
-    attend(store)
-    store.finish("completed")
+def test_the_command_names_the_codes_and_what_it_left(finished: Start) -> None:
+    store = finished()
     table = store.folder.table("brackish", "trials")
     table.unlink()
     asked = ["unblind", str(store.place.study_folder.path), "--by", "AB", "--reason", "done"]
@@ -191,11 +181,9 @@ def test_a_session_goes_on_as_it_began(tmp_path: Path, protocol: Protocol, start
     assert sound(tmp_path / "study")
 
 
-def test_a_sealed_text_that_was_changed_is_found(tmp_path: Path, start: Start, attend: Attend) -> None:
+def test_a_sealed_text_that_was_changed_is_found(tmp_path: Path, finished: Start) -> None:
     """Before unblinding too, though nothing is shown."""
-    store = start()
-    attend(store)
-    store.finish("completed")
+    store = finished()
 
     def change(lines: Lines) -> None:
         line = next(line for line in lines if "sealed" in line)
@@ -225,19 +213,15 @@ def in_clear(store: SessionStore, study: StudyHead) -> None:
 
 @pytest.mark.slow
 def test_a_study_of_an_earlier_version_stays_sound_sealed_and_opened(
-    tmp_path: Path, protocol: Protocol, start: Start, attend: Attend
+    tmp_path: Path, protocol: Protocol, finished: Start
 ) -> None:
-    store = start()
-    attend(store)
-    store.finish("completed")
+    store = finished()
     in_clear(store, protocol.study)
     folder = tmp_path / "study"
     assert names(store.folder.table("brackish", "trials")) == set(header(TRIALS))
     assert sound(folder)
     assert rebuild(store.folder.path).rewritten == ()
-    later = start("P008")
-    attend(later)
-    later.finish("completed")
+    later = finished("P008")
     assert not SEALED & names(later.folder.table("brackish", "trials"))
     assert sound(folder)
     held = store.folder.table("brackish", "trials").read_bytes()
@@ -247,12 +231,8 @@ def test_a_study_of_an_earlier_version_stays_sound_sealed_and_opened(
     assert sound(folder)
 
 
-def test_a_table_of_an_earlier_version_is_opened_without_the_column_that_it_did_not_know(
-    start: Start, attend: Attend
-) -> None:
-    store = start()
-    attend(store)
-    store.finish("completed")
+def test_a_table_of_an_earlier_version_is_opened_without_the_column_that_it_did_not_know(finished: Start) -> None:
+    store = finished()
     folder, path = store.place.study_folder.path, store.folder.table(store.place.study, "trials")
     earlier = tuple(column for column in unsealed(TRIALS) if column.name != "recording_lost")
     sealed = path.read_bytes()

@@ -3,7 +3,6 @@
 import hashlib
 import json
 import re
-from collections.abc import Callable
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from study_app.store.clock import SessionClock
 from study_app.store.journals.journal import plain, read, scan
 from study_app.store.journals.journal_events import problem, unknown_events
 from study_app.store.journals.journal_writer import Journal
-from study_app.store.sessions.open_session import SessionStore
+from tests.store.conftest import Start
 from tests.store.journals.awkward_text import AWKWARD
 
 
@@ -247,12 +246,8 @@ def line(event: str, **fields: Any) -> dict[str, Any]:
     return {**OF_ALL, "event": event, **fields}
 
 
-def test_whatever_the_store_writes_is_in_the_dictionary(
-    start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
-) -> None:
-    store = start(recordings=True)
-    attend(store)
-    store.finish("completed")
+def test_whatever_the_store_writes_is_in_the_dictionary(finished: Start) -> None:
+    store = finished(recordings=True)
     assert list(unknown_events(store.lines)) == []
     assert [problem(each) for each in store.lines if problem(each)] == []
 

@@ -5,8 +5,6 @@ import json
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -19,22 +17,17 @@ from study_app.protocol.model import Protocol
 from study_app.store import receipt
 from study_app.store.journals.journal import read, scan
 from study_app.store.journals.journal_writer import Journal
-from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.sessions.reopen import check_can_go_on
 from study_app.store.verification.verify_study import verify
-from tests.store.conftest import SOURCE
+from tests.store.conftest import SOURCE, FullDisk, Start
 from tests.store.forging import Lines, forge
 from tests.store.journals.awkward_text import AWKWARD
 
 
 @pytest.mark.parametrize("mended", [True, False], ids=["taken back at once", "taken back before the next line"])
 def test_after_a_full_disk_it_goes_on_where_it_was(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    files_up_to: Callable[[int], AbstractContextManager[None]],
-    *,
-    mended: bool,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, files_up_to: FullDisk, *, mended: bool
 ) -> None:
     path = tmp_path / "journal.jsonl"
     journal = Journal.create(path)
@@ -237,15 +230,10 @@ def test_what_was_acknowledged_survives_a_kill_at_any_moment(tmp_path: Path) -> 
     assert len(values) <= len(acknowledged) + 1
 
 
-Attend = Callable[[SessionStore], None]
-
-
 @pytest.fixture
-def folder(start: Callable[..., SessionStore], attend: Attend) -> Path:
+def folder(finished: Start) -> Path:
     """Return the folder of a session with 12 answers that ended."""
-    store = start()
-    attend(store)
-    store.finish("completed")
+    store = finished()
     return store.folder.path
 
 

@@ -1,7 +1,6 @@
 """Sessions that are opened again, and the state of a folder."""
 
 import itertools
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +9,9 @@ import pytest
 from study_app.protocol.model import Protocol
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.reopen import reopen
-from tests.store.conftest import SOURCE
+from tests.store.conftest import SOURCE, Start
 
-Again = Callable[..., SessionStore]
+Again = Start
 
 
 @pytest.fixture

@@ -1,13 +1,12 @@
 """An open session: journal, tables, recordings, a disk that refuses, and the end."""
 
 import csv
-import errno
 import hashlib
 import io
 import os
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import pytest
 
@@ -16,52 +15,24 @@ from study_app.store import receipt
 from study_app.store.checksums import read_checksums
 from study_app.store.journals import journal
 from study_app.store.recording_files import read_facts
-from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import SessionStore
-from tests.store.conftest import FullDisk
+from tests.store.conftest import Make, Start
 
 
-def test_a_table_that_is_held_stops_nothing_and_is_caught_up(
-    start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
-) -> None:
-    store = start()
-    path = store.folder.table("brackish", "responses")
-    path.unlink()
-    path.mkdir()
-    (path / "held").touch()
-    attend(store)
-    assert "responses_data.csv cannot be written (Is a directory)" in str(store.behind)
-    (path / "held").unlink()
-    path.rmdir()
-    store.append("note", kind="note", text="closed the spreadsheet")
-    store.write_tables()
-    assert store.behind is None
-    assert path.read_bytes().count(b"\n") == 13
-    store.close()
+def test_a_table_or_receipt_that_cannot_be_written_at_the_end_is_reported_and_the_rest_written(start: Start) -> None:
+    for participant, of, status in (("P007", "trials", "completed"), ("P008", None, "unfinished")):
+        store = start(participant)
+        path = store.folder.table("brackish", of) if of else store.folder.receipt
+        path.unlink()
+        path.mkdir()
+        with pytest.raises(StoreError, match=rf"{path.name} cannot be written"):
+            store.finish("completed")
+        assert journal.read(store.folder.journal)[-1]["event"] == "session_ended"
+        assert of is None or receipt.read(store.folder.receipt)["status"] == status
+        assert b"completed" in store.place.study_folder.participants("brackish").read_bytes()
 
 
-def test_a_table_held_to_the_end_is_reported_and_the_rest_written(start: Callable[..., SessionStore]) -> None:
-    store = start()
-    path = store.folder.table("brackish", "trials")
-    path.unlink()
-    path.mkdir()
-    store.append("trial_started", trial=1, attempt=1, block="b", phase="main", part=1, index=1, of=1, code="L1")
-    with pytest.raises(StoreError, match=r"trials_data\.csv cannot be written"):
-        store.finish("completed")
-    assert receipt.read(store.folder.receipt)["status"] == "completed"
-    assert b"completed" in store.place.study_folder.participants("brackish").read_bytes()
-
-
-def test_a_receipt_that_cannot_be_written_at_the_end_is_reported(start: Callable[..., SessionStore]) -> None:
-    store = start()
-    store.folder.receipt.unlink()
-    store.folder.receipt.mkdir()
-    with pytest.raises(StoreError, match=r"receipt\.json cannot be written"):
-        store.finish("completed")
-    assert journal.read(store.folder.journal)[-1]["event"] == "session_ended"
-
-
-def test_after_its_end_a_session_takes_nothing(start: Callable[..., SessionStore]) -> None:
+def test_after_its_end_a_session_takes_nothing(start: Start) -> None:
     store = start()
     store.finish("completed")
     for late in (lambda: store.append("note", kind="note", text="late"), lambda: store.finish("aborted")):
@@ -82,7 +53,7 @@ def rows_of(store: SessionStore, table: str) -> list[dict[str, str]]:
 
 @pytest.mark.slow
 def test_recordings_are_kept_beside_the_journal_and_linked_from_the_trials_row(
-    start: Callable[..., SessionStore], samples_of: Callable[..., Any], summary: dict[str, Any]
+    start: Start, samples_of: Make, summary: dict[str, Any]
 ) -> None:
     store = start(recordings=True)
     recorder = store.recorder
@@ -111,9 +82,7 @@ def test_recordings_are_kept_beside_the_journal_and_linked_from_the_trials_row(
     assert (facts["participant"], facts["origin_ns"]) == ("P007", 5_000_000_000)
 
 
-def test_a_recording_that_is_lost_is_said_to_be(
-    start: Callable[..., SessionStore], samples_of: Callable[..., Any]
-) -> None:
+def test_a_recording_that_is_lost_is_said_to_be(start: Start, samples_of: Make) -> None:
     store = start(recordings=True)
     store.folder.recordings.write_text("in the way")
     store.append("trial_started", **trial_of(1))
@@ -126,23 +95,8 @@ def test_a_recording_that_is_lost_is_said_to_be(
     assert rows_of(store, "trials")[0]["recording"] == "n/a"
 
 
-def test_a_session_that_is_left_has_its_recordings_linked_too(
-    start: Callable[..., SessionStore], samples_of: Callable[..., Any]
-) -> None:
-    with start(recordings=True) as store:
-        assert store.recorder is not None
-        store.append("trial_started", **trial_of(1))
-        store.recorder.start(1, 1, 1000.0)
-        store.recorder.append(samples_of(10))
-    assert [line["event"] for line in journal.read(store.folder.journal)][-1] == "recorded"
-
-
-def test_checksums_of_a_finished_session_are_those_of_its_files(
-    start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
-) -> None:
-    store = start()
-    attend(store)
-    store.finish("completed")
+def test_checksums_of_a_finished_session_are_those_of_its_files(finished: Start) -> None:
+    store = finished()
     listed = read_checksums(store.folder)
     assert sorted(listed) == sorted(
         path.name for path in store.folder.path.iterdir() if path.name != "checksums.sha256"
@@ -151,110 +105,12 @@ def test_checksums_of_a_finished_session_are_those_of_its_files(
         assert hashlib.sha256((store.folder.path / name).read_bytes()).hexdigest() == digest
 
 
-def test_a_session_is_open_in_one_program_until_its_end(start: Callable[..., SessionStore]) -> None:
-    store = start()
-    assert is_open(store.folder.path)
-    store.finish("completed")
-    assert not is_open(store.folder.path)
-    left = start("P008")
-    left.close()
-    assert not is_open(left.folder.path)
-
-
-def test_a_disk_that_fills_during_a_session_costs_nothing_that_was_acknowledged(
-    start: Callable[..., SessionStore],
-    attend: Callable[[SessionStore], None],
-    files_up_to: FullDisk,
-    summary: dict[str, Any],
-) -> None:
-    """What does not fit is told with the reason, and the session goes on where it was when space returns."""
-    store = start()
-    attend(store)
-    tables = {table: store.folder.table("brackish", table).read_bytes() for table in ("responses", "trials")}
-    store.append("trial_started", **trial_of(6))
-    acknowledged = store.folder.journal.read_bytes()
-    with files_up_to(len(acknowledged) + 20):
-        with pytest.raises(StoreError, match=r"journal\.jsonl cannot be written \(File too large\): free disk space"):
-            store.append("trial_ended", trial=6, attempt=1, outcome="complete", **summary)
-        with pytest.raises(StoreError, match="File too large"):
-            store.finish("aborted")
-    with files_up_to(100):
-        store.write_tables()
-    assert "_data.csv cannot be written (File too large)" in str(store.behind)
-    assert {table: store.folder.table("brackish", table).read_bytes() for table in tables} == tables
-    assert store.folder.journal.read_bytes() == acknowledged
-    assert is_open(store.folder.path)
-
-    store.append("trial_ended", trial=6, attempt=1, outcome="complete", **summary)
-    store.write_tables()
-    assert store.behind is None
-    store.finish("completed")
-    lines = journal.read(store.folder.journal)
-    assert [line["event"] for line in lines][-3:] == ["trial_started", "trial_ended", "session_ended"]
-    assert [line["n"] for line in lines] == list(range(1, len(lines) + 1))
-    assert rows_of(store, "trials")[-1]["outcome"] == "complete"
-
-
-class Refusing:
-    """A journal's file on a disk that refuses at a step, after so many bytes of the line."""
-
-    def __init__(self, file: Any, step: str, kept: int) -> None:
-        self._file, self._step, self._kept = file, step, kept
-        self.refuses = True
-
-    def write(self, content: Any) -> int:
-        if not (self.refuses and self._step in ("write", "truncate")):
-            return self._file.write(content)
-        if self._kept:
-            written = self._file.write(bytes(content[: self._kept]))
-            self._kept = 0
-            return written
-        raise OSError(errno.EROFS, "Read-only file system")
-
-    def truncate(self, size: int) -> int:
-        if self.refuses and self._step == "truncate":
-            raise OSError(errno.EROFS, "Read-only file system")
-        return self._file.truncate(size)
-
-    def fileno(self) -> int:
-        if self.refuses and self._step == "fsync":
-            raise OSError(errno.EIO, "Input/output error")
-        return self._file.fileno()
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._file, name)
-
-
-@pytest.mark.parametrize("kept", [0, 1, 40])
-@pytest.mark.parametrize("step", ["write", "truncate", "fsync"])
-def test_a_disk_that_becomes_read_only_leaves_whole_lines_and_is_tried_again(
-    start: Callable[..., SessionStore], step: str, kept: int
-) -> None:
-    store = start()
-    store.append("note", kind="note", text="before")
-    before = journal.read(store.folder.journal)
-    disk = Refusing(store.journal.file, step, kept)
-    store.journal.file = disk  # type: ignore[assignment]
-    for _ in range(2):
-        with pytest.raises(StoreError, match=r"journal\.jsonl cannot be written"):
-            store.append("note", kind="note", text="never acknowledged")
-        assert journal.read(store.folder.journal) == before
-    disk.refuses = False
-    store.append("note", kind="note", text="after")
-    store.finish("completed")
-    texts = [line.get("text") for line in journal.read(store.folder.journal)]
-    assert texts == [None, "before", "after", None]
-
-
 def test_an_end_that_was_half_written_is_finished_by_another_call(
-    start: Callable[..., SessionStore], monkeypatch: pytest.MonkeyPatch
+    start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store = start()
-
-    def full(*_: object) -> None:
-        raise StoreError("no space left")
-
     with monkeypatch.context() as patched:
+        full = mock.Mock(side_effect=StoreError("no space left"))
         patched.setattr("study_app.store.sessions.open_session.write_participants", full)
         with pytest.raises(StoreError, match="no space"):
             store.finish("completed")
@@ -264,7 +120,7 @@ def test_an_end_that_was_half_written_is_finished_by_another_call(
 
 
 def test_while_it_runs_only_the_journal_is_waited_for_and_at_its_end_every_table(
-    start: Callable[..., SessionStore], monkeypatch: pytest.MonkeyPatch
+    start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store = start()
     flushed: list[Path] = []

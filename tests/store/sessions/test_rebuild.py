@@ -1,5 +1,4 @@
 import hashlib
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -8,19 +7,17 @@ from study_app.errors import StoreError
 from study_app.store import receipt
 from study_app.store.journals import journal
 from study_app.store.sessions.folder_lock import is_open
-from study_app.store.sessions.open_session import Place, SessionStore, table_files
-from study_app.store.sessions.rebuild import rebuild
+from study_app.store.sessions.open_session import SessionStore, table_files
+from study_app.store.sessions.rebuild import Rebuilt, rebuild
 from study_app.store.verification.integrity import doubts
 from study_app.store.verification.verify_study import verify
+from tests.store.conftest import Attend, Start
 from tests.store.forging import forge
-
-
-def every_byte(folder: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+from tests.store.sessions.conftest import every_byte
 
 
 @pytest.fixture
-def ended(start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]) -> SessionStore:
+def ended(start: Start, attend: Attend) -> SessionStore:
     store = start()
     attend(store)
     store.append("note", kind="note", text='comma, "quote"\nnew line, =SUM(A1) 🌊')
@@ -28,18 +25,13 @@ def ended(start: Callable[..., SessionStore], attend: Callable[[SessionStore], N
     return store
 
 
-def test_what_is_right_is_left_alone(tmp_path: Path, ended: SessionStore) -> None:
-    before = {path: path.stat().st_mtime_ns for path in ended.folder.path.iterdir()}
-    done = rebuild(ended.folder.path)
-    assert (done.rewritten, done.swept, done.torn_bytes) == ((), (), 0)
-    assert {path: path.stat().st_mtime_ns for path in ended.folder.path.iterdir()} == before
-
-
 @pytest.mark.parametrize(
     "spoilt", [None, b"", b"study,participant\n", b"\xff\0"], ids=["gone", "empty", "cut", "noise"]
 )
 def test_everything_comes_back_to_the_byte(tmp_path: Path, ended: SessionStore, spoilt: bytes | None) -> None:
     before = every_byte(tmp_path)
+    assert rebuild(ended.folder.path) == Rebuilt(rewritten=(), swept=(), torn_bytes=0)
+    assert every_byte(tmp_path) == before
     derived = [
         ended.folder.table("brackish", "responses"),
         ended.folder.table("brackish", "trials"),
@@ -93,16 +85,6 @@ def test_a_session_without_a_fingerprint_gets_it_with_a_note(tmp_path: Path, end
     assert rebuild(ended.folder.path).rewritten == ()
 
 
-@pytest.mark.parametrize("name", ["responses", "trials"])
-def test_a_folder_under_a_tables_name_is_a_doubt(ended: SessionStore, name: str) -> None:
-    path = ended.folder.table("brackish", name)
-    path.unlink()
-    path.mkdir()
-    (doubt,) = doubts(ended.place)
-    assert doubt.path == path
-    assert "cannot be read" in str(doubt)
-
-
 @pytest.mark.parametrize("name", ["journal.jsonl", "receipt.json", "mood.txt"])
 def test_a_changed_or_added_file_is_never_vouched_for(tmp_path: Path, ended: SessionStore, name: str) -> None:
     """Making tables again must not hide that something else has changed since the session ended."""
@@ -140,9 +122,7 @@ def three_answers(store: SessionStore) -> None:
 
 @pytest.mark.nightly
 @pytest.mark.slow
-def test_of_a_journal_cut_at_any_byte_everything_whole_is_rebuilt_and_the_journal_left_alone(
-    start: Callable[..., SessionStore],
-) -> None:
+def test_of_a_journal_cut_at_any_byte_everything_whole_is_rebuilt_and_the_journal_left_alone(start: Start) -> None:
     """The tables are those of the whole lines; the torn tail is counted; without a whole line there is nothing."""
     with start() as store:
         three_answers(store)
@@ -179,7 +159,7 @@ def test_an_end_that_the_receipt_never_heard_of_is_brought_into_it(tmp_path: Pat
     assert verify(tmp_path / "study").sound
 
 
-def test_a_session_that_is_open_is_left_alone(start: Callable[..., SessionStore]) -> None:
+def test_a_session_that_is_open_is_left_alone(start: Start) -> None:
     with start() as store:
         before = every_byte(store.folder.path)
         with pytest.raises(StoreError, match="is open in another program"):
@@ -195,16 +175,3 @@ def test_a_damaged_journal_is_refused_untouched(tmp_path: Path, ended: SessionSt
         rebuild(ended.folder.path)
     assert every_byte(tmp_path) == before
     assert not is_open(ended.folder.path)
-
-
-def test_what_is_no_session_is_named(tmp_path: Path, ended: SessionStore) -> None:
-    for path in (tmp_path, tmp_path / "study", ended.folder.path.parent, tmp_path / "none"):
-        with pytest.raises(StoreError, match="is not a session folder: name one such as"):
-            rebuild(path)
-
-
-def test_a_relative_name_will_do(ended: SessionStore, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(ended.folder.path)
-    ended.folder.table("brackish", "trials").unlink()
-    assert rebuild(Path()).rewritten == (Path.cwd() / ended.folder.table("brackish", "trials").name,)
-    assert isinstance(ended.place, Place)

@@ -5,6 +5,7 @@ import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import pytest
 
@@ -14,16 +15,14 @@ from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal_writer
 from study_app.store.sessions import begin, open_session
 from study_app.store.sessions.folder_lock import markers, open_alone
-from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.participant_ids import check_unused, used_ids
 from study_app.store.sessions.reopen import reopen
 from study_app.store.sessions.unstarted_sessions import abandoned, never_begun
 from study_app.store.verification.verify_study import verify
-from tests.store.conftest import SOURCE
+from tests.store.conftest import SOURCE, Start
 
 pytestmark = pytest.mark.slow
 
-Start = Callable[..., SessionStore]
 
 KILLED_BEFORE = {
     "the receipt": (begin.receipt, "write"),
@@ -56,6 +55,8 @@ def killed(start: Start, participant: str, place: Any, name: str, instead: Calla
 @pytest.fixture
 def study(tmp_path: Path, start: Start) -> StudyFolder:
     """A study in which P003 was."""
+    if not hasattr(os, "fork"):
+        pytest.skip("needs processes that fork")
     with start("P003") as store:
         store.finish("completed")
     return StudyFolder(tmp_path / "study")
@@ -64,8 +65,6 @@ def study(tmp_path: Path, start: Start) -> StudyFolder:
 @pytest.fixture(params=[*KILLED_BEFORE, "the end of the first line", "anything was in the folder"])
 def left(request: pytest.FixtureRequest, study: StudyFolder, start: Start) -> StudyFolder:
     """The study after a program that claimed P004 was killed before the named step."""
-    if not hasattr(os, "fork"):
-        pytest.skip("needs processes that fork")
     if request.param in KILLED_BEFORE:
         killed(start, "P004", *KILLED_BEFORE[request.param])
     elif request.param == "the end of the first line":
@@ -76,7 +75,21 @@ def left(request: pytest.FixtureRequest, study: StudyFolder, start: Start) -> St
     return study
 
 
-def test_its_id_is_suggested_again_and_can_be_begun(left: StudyFolder, start: Start, attend: Any) -> None:
+def test_it_cannot_be_resumed_but_begun_where_no_program_takes_it_over(
+    left: StudyFolder, start: Start, protocol: Any
+) -> None:
+    place = left.session("P004", 1)
+    for go_on in (
+        lambda: reopen(place.path, protocol, SOURCE, operator="", device={}, screens={}),
+        lambda: app.resume(place.path),
+    ):
+        with pytest.raises(StoreError, match=r"it cannot be resumed: begin a new session of participant P004"):
+            go_on()
+    with open_alone(place.path):
+        before = sorted(place.path.iterdir())
+        with pytest.raises(StoreError, match="P004 already has session 1"):
+            start("P004")
+        assert sorted(place.path.iterdir()) == before
     assert used_ids(left).suggested() == "P004"
     check_unused(left, "P004", 1)
     with start("P004") as store:
@@ -87,37 +100,13 @@ def test_its_id_is_suggested_again_and_can_be_begun(left: StudyFolder, start: St
         start("P004")
     found = verify(left.path)
     assert (found.errors, found.warnings) == ((), ())
-    assert (left.session("P004", 1).path / "journal.jsonl").read_text().startswith('{"n":1,"event":"session_started"')
-
-
-def test_going_on_with_it_says_that_it_is_to_be_begun(left: StudyFolder, protocol: Any) -> None:
-    place = left.session("P004", 1)
-    for go_on in (
-        lambda: reopen(place.path, protocol, SOURCE, operator="", device={}, screens={}),
-        lambda: app.resume(place.path),
-    ):
-        with pytest.raises(StoreError, match=r"it cannot be resumed: begin a new session of participant P004"):
-            go_on()
-
-
-def test_while_another_program_takes_it_over_it_is_used(left: StudyFolder, start: Start) -> None:
-    place = left.session("P004", 1)
-    other = open_alone(place.path)
-    before = sorted(place.path.iterdir())
-    with pytest.raises(StoreError, match="P004 already has session 1"):
-        start("P004")
-    assert sorted(place.path.iterdir()) == before
-    other.release()
-    start("P004").close()
+    assert (place.path / "journal.jsonl").read_text().startswith('{"n":1,"event":"session_started"')
 
 
 def test_who_fails_after_taking_it_over_leaves_no_folder(
     left: StudyFolder, start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def full(*_given: Any, **_named: Any) -> None:
-        raise StoreError("no space")
-
-    monkeypatch.setattr(begin.receipt, "write", full)
+    monkeypatch.setattr(begin.receipt, "write", mock.Mock(side_effect=StoreError("no space")))
     with pytest.raises(StoreError, match="no space"):
         start("P004")
     assert not left.session("P004", 1).path.parent.exists()
@@ -126,8 +115,6 @@ def test_who_fails_after_taking_it_over_leaves_no_folder(
 def test_what_a_program_killed_while_claiming_left_is_swept_with_the_next_claim(
     study: StudyFolder, start: Start
 ) -> None:
-    if not hasattr(os, "fork"):
-        pytest.skip("needs processes that fork")
     place = study.session("P004", 1).path.parent
     killed(start, "P004", Path, "rename")  # what makes the folder the session's
     (half,) = place.iterdir()
@@ -156,19 +143,11 @@ def test_a_claim_whose_program_lives_or_is_not_known_stays(study: StudyFolder, s
 def test_a_session_that_began_is_never_taken_over(study: StudyFolder, start: Start) -> None:
     start("P005").close()
     folder = study.session("P005", 1)
+    whole = folder.journal.read_bytes()
+    folder.journal.write_bytes(b"#" + whole + whole)
     assert not never_begun(folder.path)
     for missing in (folder.receipt, folder.journal):
         missing.unlink()
         assert not abandoned(folder.path), "its tables are there"
         with pytest.raises(StoreError, match="P005 already has session 1"):
             start("P005")
-
-
-def test_a_damaged_journal_is_no_missing_one(study: StudyFolder, start: Start) -> None:
-    start("P005").close()
-    folder = study.session("P005", 1)
-    for path in folder.path.iterdir():
-        if path.suffix == ".csv":
-            path.unlink()
-    folder.journal.write_bytes(b"#" + folder.journal.read_bytes() + folder.journal.read_bytes())
-    assert not never_begun(folder.path)

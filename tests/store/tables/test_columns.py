@@ -1,6 +1,5 @@
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,13 +11,13 @@ from study_app.protocol.model import Protocol
 from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.exclusions import exclude
 from study_app.store.folders import StudyFolder
-from study_app.store.sessions.open_session import SessionStore
 from study_app.store.tables.cells import cell_pattern, variable
 from study_app.store.tables.column import Column
 from study_app.store.tables.column_dictionary import SECTIONS, dictionary_markdown
 from study_app.store.tables.formulas import guarded, unguarded
 from study_app.store.tables.study_description import check_study, described_study, description_bytes, write_description
 from study_app.store.verification.psychds import validate
+from tests.store.conftest import Attend, Start
 
 
 def test_a_variable_is_a_property_value_with_unit_range_and_levels() -> None:
@@ -92,7 +91,7 @@ def psych_ds_errors(folder: Path) -> list[str]:
 
 
 def test_a_study_folder_keeps_the_rules_of_psych_ds_from_the_first_moment(
-    tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
+    tmp_path: Path, start: Start, attend: Attend
 ) -> None:
     folder = tmp_path / "study"
     store = start("P001")
@@ -106,19 +105,13 @@ def test_a_study_folder_keeps_the_rules_of_psych_ds_from_the_first_moment(
     assert psych_ds_errors(folder) == []
 
 
-def test_what_else_lies_there_is_known_to_be_no_table(
-    tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
-) -> None:
-    store = start("P001", recordings=True)
-    attend(store)
-    store.finish("completed")
+def test_what_else_lies_there_is_known_to_be_no_table(tmp_path: Path, finished: Start) -> None:
+    finished("P001", recordings=True)
     exclude(tmp_path / "study", "P001", 1, by="AB", reason="tired")
     assert not [issue for issue in validate(tmp_path / "study").warnings if issue.code == "FILE_NOT_CHECKED"]
 
 
-def test_the_description_is_the_same_for_every_participant(
-    tmp_path: Path, protocol: Protocol, start: Callable[..., SessionStore]
-) -> None:
+def test_the_description_is_the_same_for_every_participant(tmp_path: Path, protocol: Protocol, start: Start) -> None:
     path = tmp_path / "study" / "dataset_description.json"
     start("P001").finish("completed")
     written = path.stat().st_ino

@@ -1,7 +1,6 @@
 """Tables of a running session: each page writes the rows that changed, and a kill leaves the beginning of a table."""
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from typing import Any, BinaryIO
 
 import pytest
@@ -12,8 +11,8 @@ from study_app.store.journals.cut_journal import refuse_if_cut
 from study_app.store.sessions.open_session import SessionStore, table_files
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.verification.verify_study import verify
+from tests.store.conftest import FullDisk, Start
 
-Start = Callable[..., SessionStore]
 PAGES = 5_000
 NOTES = ("first, of two lines\nand a comma", "=1+2", '"quoted"')
 
@@ -145,7 +144,7 @@ def test_killed_between_any_two_bytes_a_table_is_accepted_and_completed(
 
 
 def test_on_a_disk_that_fills_a_table_keeps_its_rows(
-    start: Start, summary: dict[str, Any], files_up_to: Callable[[int], AbstractContextManager[None]]
+    start: Start, summary: dict[str, Any], files_up_to: FullDisk
 ) -> None:
     with start() as store:
         start_trial(store, 1)

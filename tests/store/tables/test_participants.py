@@ -12,11 +12,11 @@ import pytest
 from study_app.errors import StoreError
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.tables import participants
 from study_app.store.verification.verify_study import verify
 from study_app.viewmodels.sessions import sessions
+from tests.store.conftest import Start
 
 pytestmark = pytest.mark.slow
 
@@ -26,12 +26,8 @@ def table(folder: Path) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8"), newline="")))
 
 
-def test_every_session_has_its_row_and_its_status(
-    tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
-) -> None:
-    store = start("P002")
-    attend(store)
-    store.finish("completed")
+def test_every_session_has_its_row_and_its_status(tmp_path: Path, start: Start, finished: Start) -> None:
+    finished("P002")
     start("P001").finish("withdrawn", "tired")
     start("P001", session=2).close()
     rows = table(tmp_path / "study")
@@ -45,17 +41,13 @@ def test_every_session_has_its_row_and_its_status(
     assert rows[1]["session_ended_at"] == "n/a"
 
 
-def test_no_name_or_initials_are_in_it(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
+def test_no_name_or_initials_are_in_it(tmp_path: Path, start: Start) -> None:
     start("P001", operator="ZQX").finish("completed")
     assert "ZQX" not in StudyFolder(tmp_path / "study").participants("brackish").read_text(encoding="utf-8")
 
 
-def test_a_damaged_journal_stops_nobody_and_is_marked(
-    tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
-) -> None:
-    store = start("P001")
-    attend(store)
-    store.finish("completed")
+def test_a_damaged_journal_stops_nobody_and_is_marked(tmp_path: Path, start: Start, finished: Start) -> None:
+    store = finished("P001")
     lines = store.folder.journal.read_bytes().split(b"\n")
     lines[5] = b"\0" * 30
     store.folder.journal.write_bytes(b"\n".join(lines))
@@ -79,14 +71,9 @@ def about_a_trial_that_never_started(lines: list[dict[str, Any]]) -> None:
     "damage", [without_field("pilot"), without_field("participant"), beginning_late, about_a_trial_that_never_started]
 )
 def test_a_journal_that_gives_no_row_stops_no_other_session_and_is_marked(
-    tmp_path: Path,
-    start: Callable[..., SessionStore],
-    attend: Callable[[SessionStore], None],
-    damage: Callable[[list[dict[str, Any]]], None],
+    tmp_path: Path, start: Start, damage: Callable[[list[dict[str, Any]]], None], finished: Start
 ) -> None:
-    store = start("P001")
-    attend(store)
-    store.finish("completed")
+    store = finished("P001")
     lines = journal.read(store.folder.journal)
     damage(lines)
     store.folder.journal.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
@@ -99,7 +86,7 @@ def test_a_journal_that_gives_no_row_stops_no_other_session_and_is_marked(
         rebuild(store.folder.path)
 
 
-def test_a_claimed_folder_without_a_journal_has_no_row(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
+def test_a_claimed_folder_without_a_journal_has_no_row(tmp_path: Path, start: Start) -> None:
     (tmp_path / "study" / "data" / "sub-P001" / "ses-01").mkdir(parents=True)
     begun = tmp_path / "study" / "data" / "sub-P003" / "ses-01"
     begun.mkdir(parents=True)
@@ -109,7 +96,7 @@ def test_a_claimed_folder_without_a_journal_has_no_row(tmp_path: Path, start: Ca
 
 
 def test_of_two_programs_the_last_to_write_has_seen_both(
-    tmp_path: Path, start: Callable[..., SessionStore], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """While P001's program is between reading the journals and writing the table, P002's session ends and writes."""
     write, other = participants.write_file, start("P002")
@@ -142,15 +129,9 @@ def into_a_link_out_of_the_study(path: Path) -> None:
 @pytest.mark.parametrize("name", ["journal.jsonl", "checksums.sha256", "receipt.json"])
 @pytest.mark.parametrize("turn", [into_a_folder, into_a_link_to_itself, into_a_link_out_of_the_study])
 def test_a_file_that_cannot_be_read_hides_no_session_and_stops_none(
-    tmp_path: Path,
-    start: Callable[..., SessionStore],
-    attend: Callable[[SessionStore], None],
-    turn: Callable[[Path], None],
-    name: str,
+    tmp_path: Path, start: Start, turn: Callable[[Path], None], name: str, finished: Start
 ) -> None:
-    store = start("P001")
-    attend(store)
-    store.finish("completed")
+    store = finished("P001")
     turn(store.folder.path / name)
     start("P002").finish("completed")
     there = "damaged" if name == "journal.jsonl" else "completed"
@@ -171,15 +152,10 @@ def age(study: Path, by_s: float) -> None:
 
 
 def test_a_list_reads_no_journal_that_is_older_than_the_table(
-    tmp_path: Path,
-    start: Callable[..., SessionStore],
-    attend: Callable[[SessionStore], None],
-    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch, finished: Start
 ) -> None:
     for name in ("P001", "P002", "P003", "P004"):
-        store = start(name)
-        attend(store)
-        store.finish("completed")
+        finished(name)
     study = StudyFolder(tmp_path / "study")
     age(study.path, 3600.0)
     rows = participants.participants(study)
@@ -203,7 +179,7 @@ class Killed(BaseException):
 
 
 def test_a_program_killed_after_it_overwrote_a_newer_row_leaves_a_table_that_heals(
-    tmp_path: Path, start: Callable[..., SessionStore], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write, other = participants.write_file, start("P002")
     store = start("P001")
@@ -227,15 +203,10 @@ def test_a_program_killed_after_it_overwrote_a_newer_row_leaves_a_table_that_hea
 
 
 def test_only_journals_that_changed_since_the_table_was_made_are_read(
-    tmp_path: Path,
-    start: Callable[..., SessionStore],
-    attend: Callable[[SessionStore], None],
-    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch, finished: Start
 ) -> None:
     for name in ("P001", "P002", "P003", "P004", "P005"):
-        store = start(name)
-        attend(store)
-        store.finish("completed")
+        finished(name)
     study = StudyFolder(tmp_path / "study")
     path = study.participants("brackish")
     age(study.path, 3600.0)
@@ -261,14 +232,9 @@ def test_only_journals_that_changed_since_the_table_was_made_are_read(
 
 
 def test_opening_the_key_makes_no_row_of_the_table_count(
-    tmp_path: Path,
-    start: Callable[..., SessionStore],
-    attend: Callable[[SessionStore], None],
-    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, finished: Start
 ) -> None:
-    store = start("P001")
-    attend(store)
-    store.finish("completed")
+    store = finished("P001")
     study = StudyFolder(tmp_path / "study")
     age(study.path, 3600.0)
     scan, read = journal.scan, []
@@ -281,9 +247,7 @@ def test_opening_the_key_makes_no_row_of_the_table_count(
 
 
 @pytest.mark.parametrize("content", [b"", b"study\nx\n", b"\xff\xfe", b'"', None])
-def test_a_table_that_is_none_hides_no_session(
-    tmp_path: Path, start: Callable[..., SessionStore], content: bytes | None
-) -> None:
+def test_a_table_that_is_none_hides_no_session(tmp_path: Path, start: Start, content: bytes | None) -> None:
     start("P001").finish("completed")
     study = StudyFolder(tmp_path / "study")
     path = study.participants("brackish")

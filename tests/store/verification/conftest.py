@@ -1,6 +1,5 @@
 """A study of two finished sessions."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -8,18 +7,12 @@ import pytest
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.store.sessions.open_session import SessionStore
-from tests.store.conftest import choose
+from tests.store.conftest import Attend, Make, Start, choose
 
 
 @pytest.fixture
 def study(
-    tmp_path: Path,
-    protocol: Protocol,
-    start: Callable[..., SessionStore],
-    samples_of: Callable[..., Any],
-    summary: dict[str, Any],
-    attend: Callable[[SessionStore], None],
+    tmp_path: Path, protocol: Protocol, start: Start, samples_of: Make, summary: dict[str, Any], attend: Attend
 ) -> Path:
     """Two finished sessions: P007 with recordings, one trial of it presented twice; P008 withdrawn."""
     store = start(recordings=True)

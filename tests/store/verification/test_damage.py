@@ -14,14 +14,13 @@ from study_app.protocol.model import Protocol
 from study_app.store.blinded import blinding
 from study_app.store.exclusions import exclude
 from study_app.store.journals.journal import scan
-from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.sessions.reopen import check_can_go_on
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from study_app.viewmodels.sessions import sessions
 from tests.damage import with_a_bit_flipped, with_an_odd_value, with_deep_nesting
-from tests.store.conftest import SOURCE
+from tests.store.conftest import SOURCE, Attend, Start
 
 pytestmark = pytest.mark.slow
 
@@ -46,11 +45,9 @@ FILES = (
 
 
 @pytest.fixture
-def study(tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]) -> Path:
+def study(tmp_path: Path, start: Start, attend: Attend, finished: Start) -> Path:
     """P007's session is finished, P008's is not; the key was opened and a trial excluded."""
-    finished = start()
-    attend(finished)
-    finished.finish("completed")
+    finished = finished()
     with start("P008") as left:
         attend(left)
     exclude(tmp_path / "study", "P007", 1, trial=2, by="AB", reason="the phone rang")

@@ -3,7 +3,7 @@
 import contextlib
 import os
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +11,8 @@ import pytest
 
 from study_app.errors import StudyError
 from study_app.store import recording_files
-from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.verify_study import verify
+from tests.store.conftest import Make, Start
 
 pytestmark = pytest.mark.slow
 
@@ -22,7 +22,7 @@ TOLD = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "
 
 
 @pytest.fixture
-def session(start: Callable[..., SessionStore], samples_of: Callable[..., Any], summary: dict[str, Any]) -> Path:
+def session(start: Start, samples_of: Make, summary: dict[str, Any]) -> Path:
     """Return the folder of a session with one recorded trial, which ended."""
     store = start(recordings=True)
     assert store.recorder is not None

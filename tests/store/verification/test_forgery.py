@@ -18,13 +18,12 @@ from study_app.store import receipt
 from study_app.store.blinded import blinding
 from study_app.store.blinded.sealing import opened, sealed
 from study_app.store.folders import StudyFolder
-from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.sessions.reopen import check_can_go_on
 from study_app.store.verification.fingerprints import listed
 from study_app.store.verification.verify_study import verify
 from study_app.store.withdrawals.tombstones import Tombstone, bury, describe_session
-from tests.store.conftest import SOURCE
+from tests.store.conftest import SOURCE, Attend, Start
 from tests.store.forging import Lines, cover_up, forge
 
 pytestmark = pytest.mark.slow
@@ -33,12 +32,10 @@ P007 = "data/sub-P007/ses-01"
 
 
 @pytest.fixture
-def study(tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]) -> Path:
+def study(tmp_path: Path, finished: Start) -> Path:
     """Two rehearsed sessions that ended; their fingerprints are kept in tmp_path/kept.txt."""
     for person in ("P007", "P008"):
-        store = start(person, simulated=True)
-        attend(store)
-        store.finish("completed")
+        finished(person, simulated=True)
     shutil.copy(tmp_path / "study" / "fingerprints.txt", tmp_path / "kept.txt")
     return tmp_path / "study"
 
@@ -282,7 +279,7 @@ def test_a_torn_reveal_is_a_warning_and_opens_no_key(study: Path) -> None:
 
 
 def test_an_unfinished_session_with_a_changed_line_does_not_go_on(
-    tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None], protocol: Protocol
+    tmp_path: Path, start: Start, attend: Attend, protocol: Protocol
 ) -> None:
     with start() as store:
         attend(store)

@@ -1,9 +1,7 @@
 """What the conditions are is written nowhere but in the sealed key: no id, no parameter, no delay."""
 
 import re
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -11,9 +9,9 @@ from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
 from study_app.store.blinded import blinding
-from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.leaks import Telltales, certain_telltales, find_leaks, presented_numbers, telltales
 from tests.protocol.trials.level_studies import study as levels_study
+from tests.store.conftest import Attend, Make, Start, Tables
 
 
 def found(folder: Path, protocol: Protocol) -> list[tuple[str, str]]:
@@ -51,7 +49,7 @@ def test_a_word_tells_where_it_stands_by_itself(protocol: Protocol, text: str, t
     assert telltales(protocol).in_text(text) == told
 
 
-def test_a_leak_is_found_wherever_it_is(tmp_path: Path, protocol: Protocol, start: Callable[..., SessionStore]) -> None:
+def test_a_leak_is_found_wherever_it_is(tmp_path: Path, protocol: Protocol, start: Start) -> None:
     store = start(device={"name": "scripted", "rate_hz": 1013.7})
     store.append("note", kind="note", text="this must be mildew, 137 ms")
     store.append("trial_started", trial=1, attempt=1, block="b", phase="main", part=1, index=1, of=1, code="see_tardy")
@@ -70,9 +68,7 @@ def test_a_leak_is_found_wherever_it_is(tmp_path: Path, protocol: Protocol, star
     ]
 
 
-def test_the_moment_of_an_event_may_be_any_number(
-    tmp_path: Path, protocol: Protocol, start: Callable[..., SessionStore]
-) -> None:
+def test_the_moment_of_an_event_may_be_any_number(tmp_path: Path, protocol: Protocol, start: Start) -> None:
     store = start()
     store.append("note", t_s=0.137, kind="mark", text="")
     store.close()
@@ -84,9 +80,7 @@ def test_a_leak_does_not_show_its_word_by_itself(tmp_path: Path, protocol: Proto
     assert "mildew" not in repr(find_leaks(tmp_path, telltales(protocol)))
 
 
-def test_statements_may_name_what_they_ask(
-    tmp_path: Path, tables_of_study: Callable[..., dict[str, Any]], start: Callable[..., SessionStore]
-) -> None:
+def test_statements_may_name_what_they_ask(tmp_path: Path, tables_of_study: Tables, start: Start) -> None:
     """A statement asks whether it feels like mildew, and has that name; elsewhere the word tells."""
     tables = tables_of_study()
     item = {"id": "mildew", "text": "I think it is mildew.", "short": "mildew"}
@@ -107,13 +101,7 @@ def test_statements_may_name_what_they_ask(
 
 @pytest.mark.parametrize("simulated", [False, True], ids=["real", "rehearsed"])
 def test_a_finished_session_tells_nothing(
-    tmp_path: Path,
-    protocol: Protocol,
-    start: Callable[..., SessionStore],
-    attend: Callable[[SessionStore], None],
-    samples_of: Callable[..., Any],
-    *,
-    simulated: bool,
+    tmp_path: Path, protocol: Protocol, start: Start, attend: Attend, samples_of: Make, *, simulated: bool
 ) -> None:
     store = start(simulated=simulated, recordings=True)
     assert store.recorder is not None
@@ -136,9 +124,7 @@ def test_what_stands_somewhere_by_chance_or_is_published_tells_nothing_for_certa
     assert not {"honey", "practice", "1", "50", "0.068", "1000"} & words
 
 
-def test_the_sealed_key_gives_the_words_too(
-    tmp_path: Path, protocol: Protocol, start: Callable[..., SessionStore]
-) -> None:
+def test_the_sealed_key_gives_the_words_too(tmp_path: Path, protocol: Protocol, start: Start) -> None:
     start().finish("completed")
     key = blinding.read_key(tmp_path / "study")
     words = certain_telltales(key.tables, receipt.without_conditions(protocol)).words

@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -17,15 +16,14 @@ from study_app.store.journals import journal
 from study_app.store.output_files import write_files
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.verify_study import verify
+from tests.store.conftest import Start
 
 OWN = ("journal.jsonl", "receipt.json", "key.sealed")
 
 
 @pytest.fixture
-def finished(start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]) -> SessionStore:
-    store = start()
-    attend(store)
-    store.finish("completed")
+def finished(finished: Start) -> SessionStore:
+    store = finished()
     return store
 
 

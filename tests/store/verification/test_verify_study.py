@@ -20,7 +20,6 @@ from study_app.store.exclusions import exclude
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.begin import SessionStart, begin
-from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.sessions.unstarted_sessions import never_begun
 from study_app.store.tables.columns import TABLES
@@ -29,7 +28,7 @@ from study_app.store.tables.participants import write_participants
 from study_app.store.verification.verify_study import verify
 from tests.faults.support import short
 from tests.platforms import needs_fork
-from tests.store.conftest import SOURCE, choose, study_tables, summary_of_trial
+from tests.store.conftest import SOURCE, Attend, Start, choose, study_tables, summary_of_trial
 from tests.store.earlier import TRIALS_HEADER
 from tests.store.forging import forge
 from tests.store.verification.findings import (
@@ -195,9 +194,7 @@ def test_exclusions_are_checked_against_the_sessions(study: Path) -> None:
     assert told(verify(study)).startswith("exclusions.csv: row 2: 'P007,1,x,AB,the phone rang")
 
 
-def test_a_condition_that_is_told_is_found_but_not_repeated(
-    study: Path, tmp_path: Path, start: Callable[..., SessionStore]
-) -> None:
+def test_a_condition_that_is_told_is_found_but_not_repeated(study: Path, tmp_path: Path, start: Start) -> None:
     store = start("P009")
     store.append("note", kind="note", text="this must be mildew")
     store.append("note", kind="note", text="density 1013.7, I think")
@@ -267,7 +264,7 @@ def test_a_description_of_an_earlier_version_is_a_warning_and_a_column_it_never_
         assert "differs from what this version writes" in told(verify(study))
 
 
-def test_damaged_lines_at_the_end_are_an_error(study: Path, start: Callable[..., SessionStore]) -> None:
+def test_damaged_lines_at_the_end_are_an_error(study: Path, start: Start) -> None:
     with start("P009") as store:
         for text in ("one", "two"):
             store.append("note", kind="note", text=text)
@@ -332,7 +329,7 @@ def test_a_receipt_of_a_session_resumed_more_often_than_the_journal_tells_is_an_
 
 
 def test_a_session_killed_between_its_last_line_and_its_checksums_is_finished_by_rebuild(
-    study: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
+    study: Path, start: Start, attend: Attend
 ) -> None:
     store = start("P009")
     attend(store)
@@ -419,7 +416,7 @@ def test_a_rehearsal_with_recordings_beside_it_is_never_called_unsound(tmp_path:
     assert verify(tmp_path / "study").sound
 
 
-def test_a_damaged_line_of_a_running_session_is_an_error(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
+def test_a_damaged_line_of_a_running_session_is_an_error(tmp_path: Path, start: Start) -> None:
     with start() as store:
         store.append("note", kind="note", text="one")
         store.append("note", kind="note", text="two")

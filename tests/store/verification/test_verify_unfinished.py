@@ -1,19 +1,18 @@
 """Sessions that run, stopped or crashed: what is a warning, and what an error all the same."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from study_app.store.journals import journal
-from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.verify_study import verify
+from tests.store.conftest import Start
 from tests.store.forging import forge
 from tests.store.verification.findings import PARTICIPANTS, SESSION, replace, told, warned
 
 
-def test_what_should_be_known_is_a_warning(study: Path, start: Callable[..., SessionStore]) -> None:
+def test_what_should_be_known_is_a_warning(study: Path, start: Start) -> None:
     with start("P009", recordings=True) as store:
         told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
         for trial in (1, 2):
@@ -60,9 +59,7 @@ def test_the_trace_of_a_crash_is_told_and_an_empty_one_is_not(study: Path) -> No
 
 
 @pytest.mark.slow
-def test_what_a_running_session_is_just_recording_is_not_said_to_be_left(
-    study: Path, start: Callable[..., SessionStore]
-) -> None:
+def test_what_a_running_session_is_just_recording_is_not_said_to_be_left(study: Path, start: Start) -> None:
     told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
     store = start("P009", recordings=True)
     store.folder.recordings.mkdir()
@@ -84,7 +81,7 @@ def test_what_a_running_session_is_just_recording_is_not_said_to_be_left(
 
 @pytest.mark.slow
 def test_tables_of_a_session_that_has_not_ended_may_be_behind_its_journal(
-    study: Path, start: Callable[..., SessionStore], summary: dict[str, Any]
+    study: Path, start: Start, summary: dict[str, Any]
 ) -> None:
     """Its program was killed before it wrote them; those of the others may not."""
     told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
@@ -110,7 +107,7 @@ def test_tables_of_a_session_that_has_not_ended_may_be_behind_its_journal(
     ],
 )
 def test_a_table_of_a_session_that_has_not_ended_tells_nothing_else_than_its_journal(
-    study: Path, start: Callable[..., SessionStore], summary: dict[str, Any], name: str, old: str, new: str
+    study: Path, start: Start, summary: dict[str, Any], name: str, old: str, new: str
 ) -> None:
     """Nor does a table that is no CSV end in a traceback."""
     told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
@@ -125,7 +122,7 @@ def test_a_table_of_a_session_that_has_not_ended_tells_nothing_else_than_its_jou
 
 
 @pytest.mark.slow
-def test_a_trial_without_its_recording_is_known_at_the_end(study: Path, start: Callable[..., SessionStore]) -> None:
+def test_a_trial_without_its_recording_is_known_at_the_end(study: Path, start: Start) -> None:
     store = start("P009", recordings=True)
     told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
     store.append("trial_started", trial=1, attempt=1, **told_of)
