@@ -19,6 +19,8 @@ from study_app.store.sessions.open_session import SessionStore
 
 SEVEN = ("Completely disagree", "Mostly", "Somewhat", "Neutral", "Somewhat agree", "Mostly agree", "Completely agree")
 
+AWKWARD = 'comma, "quote",\nnew line\r\n\ttab 🌊 \u2028\x85 =SUM(A1)' + "é" * 10_000
+
 SOURCE = b"[study]\nname = 'brackish'\n"
 
 
@@ -95,12 +97,16 @@ def protocol() -> Protocol:
     return Protocol.model_validate(study_tables())
 
 
-@pytest.fixture
-def clock() -> SessionClock:
-    """A clock that moves a millisecond with each look at it."""
+def ticking_clock() -> SessionClock:
+    """Return a clock that moves a millisecond with each look at it."""
     ticks = itertools.count(5_000_000_000, 1_000_000)
     origin = datetime(2026, 3, 1, 10, 0, tzinfo=timezone(timedelta(hours=1)))
     return SessionClock(lambda: next(ticks), origin)
+
+
+@pytest.fixture
+def clock() -> SessionClock:
+    return ticking_clock()
 
 
 @pytest.fixture

@@ -1,47 +1,14 @@
-import os
-import time
 from pathlib import Path
 
 import pytest
 
 from study_app.errors import StoreError
-from study_app.store.atomic import (
-    OLD_S,
-    append_line,
-    create_folder,
-    is_there,
-    probe,
-    sweep,
-    sweep_old,
-    temporaries,
-    temporary_path,
-    write_file,
-)
+from study_app.store.atomic import append_line, create_folder, probe, sweep, temporaries, temporary_path, write_file
 from tests.store.conftest import FullDisk
 
 
 def names_in(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
-
-
-def test_only_old_halves_are_swept_where_others_may_write(tmp_path: Path) -> None:
-    old, new, other = (tmp_path / name for name in (".x.csv.0123abcd.tmp", ".y.csv.0123abcd.tmp", ".z.csv"))
-    for path in (old, new, other):
-        path.touch()
-    for path in (old, other):
-        os.utime(path, (0, time.time() - OLD_S - 1))
-    sweep_old(tmp_path)
-    assert not old.exists()
-    assert new.exists()
-    assert other.exists()
-
-
-def test_a_file_is_written_and_replaced_whole(tmp_path: Path) -> None:
-    path = tmp_path / "table.csv"
-    write_file(path, b"old\n")
-    write_file(path, b"new\n" * 100_000)
-    assert path.read_bytes() == b"new\n" * 100_000
-    assert names_in(tmp_path) == ["table.csv"]
 
 
 def test_a_write_that_fails_in_the_middle_leaves_the_old_file_and_nothing_beside(
@@ -53,31 +20,6 @@ def test_a_write_that_fails_in_the_middle_leaves_the_old_file_and_nothing_beside
         write_file(path, b"new\n" * 100_000)
     assert path.read_bytes() == b"old\n"
     assert names_in(tmp_path) == ["table.csv"]
-
-
-def test_a_rename_that_fails_leaves_nothing_beside(tmp_path: Path) -> None:
-    path = tmp_path / "table.csv"
-    (path / "held").mkdir(parents=True)
-    with pytest.raises(StoreError, match="Is a directory"):
-        write_file(path, b"new\n")
-    assert names_in(tmp_path) == ["table.csv"]
-
-
-def test_only_what_may_be_looked_for_is_there_or_not(tmp_path: Path) -> None:
-    (tmp_path / "file").touch()
-    assert is_there(tmp_path / "file")
-    assert not is_there(tmp_path / "none")
-    assert not is_there(tmp_path / "file" / "below")
-    with pytest.raises(StoreError, match=r"cannot be read \(File name too long\)"):
-        is_there(tmp_path / ("x" * 5000))
-
-
-def test_a_folder_is_created_once_with_all_its_files(tmp_path: Path) -> None:
-    path = tmp_path / "blinding"
-    assert create_folder(path, {"key": b"first", "other": b"too"})
-    assert not create_folder(path, {"key": b"second", "other": b"too"})
-    assert (path / "key").read_bytes() == b"first"
-    assert names_in(tmp_path) == ["blinding"]
 
 
 def test_a_folder_that_cannot_be_filled_is_not_created(tmp_path: Path, files_up_to: FullDisk) -> None:
@@ -127,12 +69,6 @@ def test_what_is_half_written_is_known_by_its_name_and_swept(tmp_path: Path) -> 
     assert names_in(tmp_path) == sorted([*kept, "below"])
     assert below.exists()
     assert sweep(tmp_path) == sweep(tmp_path / "none") == ()
-
-
-def test_where_one_can_write_free_space_is_told_and_nothing_left(tmp_path: Path) -> None:
-    assert probe(tmp_path) > 0
-    assert probe(tmp_path / "results" / "not" / "yet") > 0
-    assert names_in(tmp_path) == []
 
 
 def test_where_one_cannot_write_is_told_before_anything_is_begun(tmp_path: Path, files_up_to: FullDisk) -> None:

@@ -1,6 +1,4 @@
 import codecs
-import csv
-import io
 import json
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
@@ -14,13 +12,12 @@ from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import Exclusion, exclude, exclusions, include, reversals
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.verification.verify_study import verify
-from tests.store.conftest import FullDisk, Start
+from tests.store.conftest import AWKWARD, FullDisk, Start
 
 pytestmark = pytest.mark.slow
 
 
 NOW = datetime(2026, 3, 2, 9, 30, tzinfo=timezone(timedelta(hours=1)))
-AWKWARD = 'comma, "quote"\nnew line\ttab 🌊 =SUM(A1) ' + "é" * 10_000
 
 
 @pytest.fixture
@@ -34,37 +31,15 @@ def folder(tmp_path: Path, start: Start, finished: Start) -> Path:
 def test_a_session_and_a_trial_are_left_out_with_their_reasons(folder: Path) -> None:
     assert exclusions(folder) == ()
     first = exclude(folder, "P008", 1, by="rule 3", reason="withdrew", now=NOW)
-    second = exclude(folder, "P007", 1, trial=2, by=" AB ", reason=" the phone rang ", now=NOW)
+    second = exclude(folder, "P007", 1, trial=2, by=" AB ", reason=" =1+1, it rang ", now=NOW)
     assert first == Exclusion("P008", 1, None, "rule 3", "withdrew", "2026-03-02T09:30:00.000+01:00")
-    assert second == Exclusion("P007", 1, 2, "AB", "the phone rang", "2026-03-02T09:30:00.000+01:00")
+    assert second == Exclusion("P007", 1, 2, "AB", "=1+1, it rang", "2026-03-02T09:30:00.000+01:00")
     assert exclusions(folder) == (first, second)
     assert (folder / "exclusions.csv").read_text(encoding="utf-8") == (
         "participant,session,trial,rule_or_person,reason,excluded_at\n"
         "P008,1,n/a,rule 3,withdrew,2026-03-02T09:30:00.000+01:00\n"
-        "P007,1,2,AB,the phone rang,2026-03-02T09:30:00.000+01:00\n"
+        'P007,1,2,AB,"\'=1+1, it rang",2026-03-02T09:30:00.000+01:00\n'
     )
-
-
-def test_a_reason_is_no_formula_in_a_spreadsheet_and_comes_back(folder: Path) -> None:
-    exclude(folder, "P007", 1, by="@AB", reason="=1+1", now=NOW)
-    assert "P007,1,n/a,'@AB,'=1+1," in (folder / "exclusions.csv").read_text(encoding="utf-8")
-    (row,) = exclusions(folder)
-    assert (row.rule_or_person, row.reason) == ("@AB", "=1+1")
-
-
-def test_no_data_are_touched(folder: Path) -> None:
-    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    exclude(folder, "P007", 1, by="AB", reason="tired")
-    after = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    assert {path for path in after if after[path] != before.get(path)} == {folder / "exclusions.csv"}
-
-
-def test_any_reason_comes_back(folder: Path) -> None:
-    exclude(folder, "P007", 1, by="AB", reason=AWKWARD)
-    exclude(folder, "P008", 1, by="AB", reason="after it")
-    assert [row.reason for row in exclusions(folder)] == [AWKWARD.strip(), "after it"]
-    text = (folder / "exclusions.csv").read_bytes().decode()
-    assert [row["reason"] for row in csv.DictReader(io.StringIO(text, newline=""))] == [AWKWARD.strip(), "after it"]
 
 
 @pytest.mark.parametrize(
@@ -98,13 +73,6 @@ def test_what_is_left_out_already_is_refused(folder: Path) -> None:
     with pytest.raises(StoreError, match=r"trial 3 is already excluded.*\(all of it\)"):
         exclude(folder, "P007", 1, trial=3, by="CD", reason="again")
     assert len(exclusions(folder)) == 2
-
-
-def test_many_participants_are_not_all_listed(tmp_path: Path, start: Start) -> None:
-    for number in range(1, 9):
-        start(f"P{number:03d}").finish("completed")
-    with pytest.raises(StoreError, match=r"participants: P001, P002, P003, P004, P005, P006 … P008$"):
-        exclude(tmp_path / "study", "P099", 1, by="AB", reason="tired")
 
 
 def test_a_full_disk_leaves_the_list_as_it_was(folder: Path, files_up_to: FullDisk) -> None:

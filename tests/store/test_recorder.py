@@ -1,5 +1,3 @@
-import errno
-import os
 import threading
 import time
 from collections.abc import Iterator
@@ -10,8 +8,8 @@ import numpy as np
 import pytest
 
 from study_app.store import recording_writer
-from study_app.store.recorder import Lost, Recorded, Recorder, recording_files
-from study_app.store.recording_files import Written, read_facts, read_frames, read_samples
+from study_app.store.recorder import Lost, Recorded, Recorder
+from study_app.store.recording_files import read_facts, read_frames, read_samples
 from study_app.store.recording_writer import SamplesFile
 from tests.store.conftest import FullDisk, Make
 
@@ -92,19 +90,6 @@ def test_the_same_samples_give_the_same_file_however_they_came(tmp_path: Path, s
     assert len(sums) == 1
 
 
-def test_trials_and_attempts_have_files_of_their_own(tmp_path: Path, recorder: Recorder, samples_of: Make) -> None:
-    for trial, attempt in ((1, 1), (2, 1), (2, 2), (120, 1)):
-        record(recorder, samples_of(100 * trial + attempt), trial=trial, attempt=attempt)
-    recorder.close()
-    found = [(kept.trial, kept.attempt) for kept in recorder.kept()]
-    assert found == [(1, 1), (2, 1), (2, 2), (120, 1)]
-    assert recording_files(tmp_path, 2, 2) == (
-        tmp_path / "trial-002_attempt-2.parquet",
-        tmp_path / "trial-002_attempt-2_frames.parquet",
-    )
-    assert len(read_samples(recording_files(tmp_path / "recordings", 120, 1)[0])) == 12_001
-
-
 def test_beginning_the_next_trial_ends_the_one_before(recorder: Recorder, samples_of: Make) -> None:
     recorder.start(1, 1, 1000.0)
     recorder.append(samples_of(10))
@@ -112,16 +97,9 @@ def test_beginning_the_next_trial_ends_the_one_before(recorder: Recorder, sample
     recorder.append(samples_of(20))
     recorder.close()
     assert [kept.samples.rows for kept in recorder.kept() if isinstance(kept, Recorded)] == [10, 20]
-
-
-def test_between_trials_nothing_is_kept(recorder: Recorder, samples_of: Make) -> None:
-    recorder.append(samples_of(10))
-    recorder.frame(1, 0)
-    recorder.stop()
-    record(recorder, samples_of(5))
-    recorder.append(samples_of(10))
+    record(recorder, samples_of(10))  # after its end
     recorder.close()
-    assert [kept.samples.rows for kept in recorder.kept() if isinstance(kept, Recorded)] == [5]
+    assert recorder.kept() == ()
 
 
 def test_a_disk_that_stands_still_holds_nobody_up_and_drops_are_counted(
@@ -188,51 +166,6 @@ def test_the_folder_is_on_the_disk_before_its_first_file(
     assert flushed == [(tmp_path, [])]
 
 
-def test_what_cannot_even_be_taken_away_loses_one_recording_and_not_the_next(
-    recorder: Recorder, samples_of: Make, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    class Stuck(SamplesFile):
-        def finish(self, dropped: int = 0) -> Written:
-            raise OSError(errno.EROFS, os.strerror(errno.EROFS))
-
-        def abandon(self) -> None:
-            super().abandon()
-            raise OSError(errno.EROFS, os.strerror(errno.EROFS))
-
-    with monkeypatch.context() as patched:
-        patched.setattr(recording_writer, "SamplesFile", Stuck)
-        record(recorder, samples_of(200), trial=1)
-        with recorder.changed:
-            assert recorder.changed.wait_for(lambda: recorder.lost, 20)
-    record(recorder, samples_of(200), trial=2)
-    recorder.close()
-    lost, kept = recorder.kept()
-    assert lost == Lost(1, 1, os.strerror(errno.EROFS))
-    assert isinstance(kept, Recorded)
-
-
-def test_any_failure_loses_one_recording_and_tells_it_at_once(
-    recorder: Recorder, samples_of: Make, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    class Broken(SamplesFile):
-        def write(self, samples: Any) -> None:
-            raise ValueError("a column of another length")
-
-    with monkeypatch.context() as patched:
-        patched.setattr(recording_writer, "SamplesFile", Broken)
-        record(recorder, samples_of(200), trial=1)
-        with recorder.changed:
-            assert recorder.changed.wait_for(lambda: recorder.lost, 20)
-    lost = Lost(1, 1, "ValueError: a column of another length")
-    assert recorder.lost == (lost,)
-    record(recorder, samples_of(200), trial=2)
-    recorder.close()
-    told, kept = recorder.kept()
-    assert told == lost
-    assert isinstance(kept, Recorded)
-    assert recorder.lost == (lost,)
-
-
 def test_the_end_of_a_session_does_not_wait_for_ever(tmp_path: Path, samples_of: Make, disk: Disk) -> None:
     recorder = Recorder(tmp_path / "recordings", FACTS)
     record(recorder, samples_of(40_000), chunk=5_000)
@@ -245,21 +178,6 @@ def test_the_end_of_a_session_does_not_wait_for_ever(tmp_path: Path, samples_of:
     assert recorder.thread is not None
     recorder.thread.join(20)
     assert list((tmp_path / "recordings").iterdir()) == [], "it was said to be lost"
-
-
-def test_whether_all_is_on_the_disk_is_told_without_waiting(tmp_path: Path, samples_of: Make, disk: Disk) -> None:
-    recorder = Recorder(tmp_path / "recordings", FACTS)
-    record(recorder, samples_of(40_000), chunk=5_000)
-    assert disk.asked.wait(20)
-    before = time.perf_counter()
-    assert not recorder.settled()
-    assert time.perf_counter() - before < 1.0  # and not the half minute that a disk is given
-    disk.works.set()
-    while not recorder.settled():
-        time.sleep(0.01)
-    recorder.close()
-    (kept,) = recorder.kept()
-    assert isinstance(kept, Recorded)
 
 
 def test_a_disk_that_never_comes_back_is_given_up_without_waiting(
@@ -277,13 +195,6 @@ def test_a_disk_that_never_comes_back_is_given_up_without_waiting(
     disk.works.set()
     assert recorder.thread is not None
     recorder.thread.join(20)
-
-
-def test_after_its_end_it_keeps_nothing(recorder: Recorder, samples_of: Make) -> None:
-    recorder.close()
-    record(recorder, samples_of(10))
-    recorder.close()
-    assert recorder.kept() == ()
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")

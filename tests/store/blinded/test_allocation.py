@@ -1,8 +1,8 @@
 """Participants come into groups: one entry each, whoever begins at the same time or is killed, and sealed."""
 
 import json
-import subprocess
-import sys
+import re
+import signal
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,6 +27,7 @@ from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.reopen import reopen
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
+from tests.faults.support.killer import die, forked
 from tests.faults.support.racers import race
 from tests.platforms import needs_fork
 from tests.protocol.groups.grouped import GROUPS, STUDY, grouped
@@ -53,13 +54,18 @@ def events(store: SessionStore) -> list[str]:
     return [line["event"] for line in store.lines]
 
 
-def test_participants_have_entries_in_the_order_of_their_first_sessions(tmp_path: Path) -> None:
+def test_participants_have_entries_in_the_order_of_their_first_sessions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[Path] = []
+    monkeypatch.setattr(allocation, "sync_folder", synced.append)
     for number, participant in enumerate(("P009", "P001", "X"), start=1):
         with begun(tmp_path / "s", participant) as store:
             assert store.lines[0]["entry"] == number
             assert events(store) == ["session_started", "allocated"]
             assert allocate(StudyFolder(tmp_path / "s"), store.key, participant).entry == number  # type: ignore[union-attr]
     assert [claim.participant for claim in claims(StudyFolder(tmp_path / "s"))] == ["P009", "P001", "X"]
+    assert synced == [StudyFolder(tmp_path / "s").allocated] * 3, "before they count"
     assert not verify(tmp_path / "s").errors
 
 
@@ -117,25 +123,16 @@ def test_two_programs_at_once_never_share_an_entry(tmp_path: Path) -> None:
     assert counts == dict.fromkeys(GROUP_NAMES, 40)
 
 
-KILLED = """
-import os, signal, sys
-from pathlib import Path
-from study_app.store.sessions import begin as module
-from tests.store.blinded.test_allocation import begun
-module.first_words = lambda *_, **__: os.kill(os.getpid(), signal.SIGKILL)
-begun(Path(sys.argv[1]), "P001")
-"""
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is a signal of POSIX systems")
+@needs_fork
 @pytest.mark.slow
-def test_a_program_killed_between_claim_and_first_line_leaves_a_consistent_folder(tmp_path: Path) -> None:
+def test_a_program_killed_between_claim_and_first_line_leaves_a_consistent_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     study = StudyFolder(tmp_path / "s")
-    with begun(study.path, "P000"):
-        pass
-    root = Path(__file__).parents[3]
-    killed = subprocess.run([sys.executable, "-c", KILLED, str(study.path)], cwd=root, timeout=60, check=False)
-    assert killed.returncode == -9
+    begun(study.path, "P000").close()
+    with monkeypatch.context() as patched:
+        patched.setattr("study_app.store.sessions.begin.first_words", die)
+        assert forked(lambda: begun(study.path, "P001")) == -signal.SIGKILL
     assert [claim.participant for claim in claims(study)] == ["P000", "P001"]
     found = verify(study.path)
     assert not found.errors
@@ -143,18 +140,6 @@ def test_a_program_killed_between_claim_and_first_line_leaves_a_consistent_folde
     with begun(study.path, "P002") as other, begun(study.path, "P001") as store:
         assert (store.lines[0]["entry"], other.lines[0]["entry"]) == (2, 3)
         assert "allocated" in events(store)
-
-
-def test_an_entry_left_empty_stays_unused(tmp_path: Path) -> None:
-    study = StudyFolder(tmp_path / "s")
-    with begun(study.path, "P001"):
-        pass
-    (study.allocated / "002.json").touch()
-    with begun(study.path, "P002") as store:
-        assert store.lines[0]["entry"] == 3
-    found = verify(study.path)
-    assert not found.errors
-    assert any("it stays unused" in str(warning) for warning in found.warnings)
 
 
 def test_a_session_resumed_before_its_allocation_was_journalled_journals_it(
@@ -195,55 +180,18 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
     with pytest.raises(StoreError, match="restore it from a copy"):
         begun(study.path, "P003", 2)
     third.write_text(held[2])
+    first.write_text(re.sub(r'(..)"}', '00"}', held[0]))
+    with pytest.raises(StoreError, match="was changed: restore it from a copy"):
+        begun(study.path, "P001", 2)
+    first.write_text(held[0])
     key = open_or_draw_key(study.path, grouped())
     extra = allocate(study, key, "P009")
     assert extra is not None
-    (study.allocated / "004.json").unlink()
+    (study.allocated / "004.json").write_bytes(b"")  # of a program that ended before it wrote it
     with begun(study.path, "P005") as store:
-        assert store.lines[0]["entry"] == 4
+        assert store.lines[0]["entry"] == 5
     assert errors() == ""
-
-
-def test_a_changed_entry_is_refused_and_not_allocated_anew(tmp_path: Path) -> None:
-    study = StudyFolder(tmp_path / "s")
-    with begun(study.path, "P001") as store:
-        key = store.key
-    path = study.allocation(1)
-    held = json.loads(path.read_text())
-    path.write_text(json.dumps(held | {"sealed": held["sealed"][:-2] + "00"}))
-    for what in (allocate, allocated):
-        with pytest.raises(StoreError, match="was changed: restore it from a copy"):
-            what(study, key, "P001")
-
-
-def test_a_claimed_entry_is_on_the_disk_before_it_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with begun(tmp_path / "s", "P001") as store:
-        key = store.key
-    synced: list[Path] = []
-    monkeypatch.setattr(allocation, "sync_folder", synced.append)
-    study = StudyFolder(tmp_path / "s")
-    allocate(study, key, "P002", waits=False)
-    assert synced == []
-    allocate(study, key, "P003")
-    assert synced == [study.allocated]
-
-
-def test_an_entry_of_a_session_is_never_assigned_again(tmp_path: Path) -> None:
-    study = StudyFolder(tmp_path / "s")
-    with begun(study.path, "P001"):
-        pass
-    (study.allocated / "001.json").unlink()
-    with begun(study.path, "P002") as store:
-        assert store.lines[0]["entry"] == 2
-
-
-def test_other_groups_need_another_folder(tmp_path: Path) -> None:
-    with begun(tmp_path / "s", "P001"):
-        pass
-    with pytest.raises(StoreError, match="other conditions"):
-        open_or_draw_key(
-            tmp_path / "s", grouped(groups=GROUPS.replace("[groups.first_thin]", "[groups.first_thin]\nshare = 2"))
-        )
+    assert "it stays unused" in "\n".join(map(str, verify(study.path).warnings))
 
 
 def test_a_session_that_the_group_does_not_have_is_refused_before_anything_is_claimed(tmp_path: Path) -> None:

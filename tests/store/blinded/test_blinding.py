@@ -27,10 +27,6 @@ from study_app.store.verification.verify_study import verify
 from tests.store.conftest import Start, Tables
 
 
-def names_in(folder: Path) -> list[str]:
-    return sorted(path.name for path in folder.iterdir())
-
-
 def sealed(folder: Path) -> Path:
     return folder / "blinding" / "key.sealed"
 
@@ -41,9 +37,8 @@ def content_of(folder: Path) -> dict[str, Any]:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="elsewhere files have no such modes")
-@pytest.mark.parametrize("mask", [0o000, 0o022])
-def test_only_its_owner_may_read_the_key(tmp_path: Path, protocol: Protocol, mask: int) -> None:
-    before = os.umask(mask)
+def test_only_its_owner_may_read_the_key(tmp_path: Path, protocol: Protocol) -> None:
+    before = os.umask(0o000)
     try:
         open_or_draw_key(tmp_path, protocol)
     finally:
@@ -51,26 +46,18 @@ def test_only_its_owner_may_read_the_key(tmp_path: Path, protocol: Protocol, mas
     assert stat.S_IMODE(sealed(tmp_path).stat().st_mode) == 0o600
 
 
-def test_the_key_gives_every_code_its_condition(tmp_path: Path, protocol: Protocol) -> None:
-    key = open_or_draw_key(tmp_path, protocol)
-    assert {key.condition("liquids", code) for code in ("L1", "L2")} == {"feel_quagmire", "feel_mildew"}
-    assert {key.condition("delays", code) for code in ("D1", "D2")} == {"see_prompt", "see_tardy"}
-    assert key.condition("practice", "practice") == "learn"
-    tardy = next(code for code in ("D1", "D2") if key.condition("delays", code) == "see_tardy")
-    assert key.delay_ms("delays", tardy) == 137
-    assert key.liquids("delays", tardy) == ("quagmire",)
-
-
-def test_several_liquids_of_a_condition_are_named_in_order(tmp_path: Path, tables_of_study: Tables) -> None:
+def test_the_key_gives_every_code_its_condition(tmp_path: Path, tables_of_study: Tables) -> None:
     tables = tables_of_study()
     tables["conditions"]["learn"] = {"liquids": ["spare", "mildew"]}
     key = open_or_draw_key(tmp_path, Protocol.model_validate(tables))
+    assert {key.condition("liquids", code) for code in ("L1", "L2")} == {"feel_quagmire", "feel_mildew"}
+    assert {key.condition("delays", code) for code in ("D1", "D2")} == {"see_prompt", "see_tardy"}
+    assert key.condition("practice", "practice") == "learn"
     assert key.liquids("practice", "practice") == ("spare", "mildew")
-
-
-def test_a_code_that_is_not_in_the_key_is_refused(tmp_path: Path, protocol: Protocol) -> None:
+    tardy = next(code for code in ("D1", "D2") if key.condition("delays", code) == "see_tardy")
+    assert (key.delay_ms("delays", tardy), key.liquids("delays", tardy)) == (137, ("quagmire",))
     with pytest.raises(StoreError, match="has no code 'L9' of block 'liquids'"):
-        open_or_draw_key(tmp_path, protocol).condition("liquids", "L9")
+        key.condition("liquids", "L9")
 
 
 def test_the_file_is_encoded_and_its_sha256_is_the_keys_hash(tmp_path: Path, protocol: Protocol) -> None:
@@ -132,43 +119,42 @@ def test_real_keys_give_each_condition_to_each_code_equally_often(tmp_path: Path
     assert min(given.values()) > 60  # 1 in 100 million by chance
 
 
-def test_a_rehearsals_key_follows_from_its_seed(tmp_path: Path, protocol: Protocol) -> None:
-    for name in ("one", "two", "three"):
-        (tmp_path / name).mkdir()
-    one = open_or_draw_key(tmp_path / "one", protocol, stream(1, "blinding").random)
-    two = open_or_draw_key(tmp_path / "two", protocol, stream(1, "blinding").random)
-    three = open_or_draw_key(tmp_path / "three", protocol, stream(2, "blinding").random)
-    assert one == two
-    assert one.hash != three.hash
-    assert one.drawn == "seed"
-
-
-def test_rehearsals_and_real_sessions_do_not_mix(tmp_path: Path, protocol: Protocol) -> None:
-    real, rehearsed = tmp_path / "real", tmp_path / "rehearsed"
-    real.mkdir()
-    rehearsed.mkdir()
-    open_or_draw_key(real, protocol)
-    open_or_draw_key(rehearsed, protocol, stream(1, "blinding").random)
-    with pytest.raises(StoreError, match="rehearsed holds a rehearsal: they must not be mixed with real sessions"):
-        open_or_draw_key(rehearsed, protocol)
-    with pytest.raises(StoreError, match="real holds real sessions: they must not be mixed with a rehearsal"):
-        open_or_draw_key(real, protocol, stream(1, "blinding").random)
-
-
-@pytest.mark.parametrize("what", ["a liquid", "a delay", "the list of a block", "a block's letter"])
-def test_a_protocol_with_other_conditions_is_refused_without_naming_them(
-    tmp_path: Path, protocol: Protocol, tables_of_study: Tables, what: str
+def test_a_rehearsals_key_follows_from_its_seed_and_does_not_mix_with_a_real_one(
+    tmp_path: Path, protocol: Protocol
 ) -> None:
-    open_or_draw_key(tmp_path, protocol)
+    for name in ("one", "two", "three", "real"):
+        (tmp_path / name).mkdir()
+    open_or_draw_key(tmp_path / "real", protocol)
+    one, two, three = (
+        open_or_draw_key(tmp_path / name, protocol, stream(seed, "blinding").random)
+        for name, seed in (("one", 1), ("two", 1), ("three", 2))
+    )
+    assert one == two
+    assert (one.hash != three.hash, one.drawn) == (True, "seed")
+    with pytest.raises(StoreError, match="one holds a rehearsal: they must not be mixed with real sessions"):
+        open_or_draw_key(tmp_path / "one", protocol)
+    with pytest.raises(StoreError, match="real holds real sessions: they must not be mixed with a rehearsal"):
+        open_or_draw_key(tmp_path / "real", protocol, stream(1, "blinding").random)
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        ("liquids.mildew.density_kg_m3", 1200),
+        ("conditions.see_tardy.delay_ms", 139),
+        ("blocks.liquids.conditions", ["feel_mildew", "feel_quagmire"]),
+        ("blocks.liquids.code_prefix", "Q"),
+    ],
+)
+def test_a_protocol_with_other_conditions_is_refused_without_naming_them(
+    tmp_path: Path, protocol: Protocol, tables_of_study: Tables, place: str, value: Any
+) -> None:
+    key = open_or_draw_key(tmp_path, protocol)
     tables = tables_of_study()
-    if what == "a liquid":
-        tables["liquids"]["mildew"]["density_kg_m3"] = 1200
-    elif what == "a delay":
-        tables["conditions"]["see_tardy"]["delay_ms"] = 139
-    elif what == "the list of a block":
-        tables["blocks"]["liquids"]["conditions"].reverse()
-    else:
-        tables["blocks"]["liquids"]["code_prefix"] = "Q"
+    tables["pages"]["consent"]["body"] = "Other words."
+    assert open_or_draw_key(tmp_path, Protocol.model_validate(tables)) == key
+    of, name, last = place.split(".")
+    tables[of][name][last] = value
     with pytest.raises(StoreError, match="was sealed for other conditions than those of this protocol") as refusal:
         open_or_draw_key(tmp_path, Protocol.model_validate(tables))
     with pytest.raises(StoreError, match="undo that change") as early:
@@ -178,74 +164,54 @@ def test_a_protocol_with_other_conditions_is_refused_without_naming_them(
     assert not any(word in message for word in ("mildew", "tardy", "139", "1200"))
 
 
-def test_a_protocol_with_other_texts_keeps_its_key(tmp_path: Path, protocol: Protocol, tables_of_study: Tables) -> None:
-    key = open_or_draw_key(tmp_path, protocol)
-    tables = tables_of_study()
-    tables["pages"]["consent"]["body"] = "Other words."
-    assert open_or_draw_key(tmp_path, Protocol.model_validate(tables)) == key
-
-
-@pytest.mark.parametrize("content", [b"", b"not base64 \xff", b"aGVsbG8=\n", b"W10=\n", b"e30=\n"])
-def test_an_unreadable_key_is_an_error_that_names_it(tmp_path: Path, protocol: Protocol, content: bytes) -> None:
+def test_an_unreadable_key_and_one_of_a_later_format_are_errors(tmp_path: Path, protocol: Protocol) -> None:
     open_or_draw_key(tmp_path, protocol)
-    sealed(tmp_path).write_bytes(content)
-    with pytest.raises(StoreError, match=r"key\.sealed is no longer a sealed key"):
-        open_or_draw_key(tmp_path, protocol)
+    later = base64.encodebytes(json.dumps(content_of(tmp_path) | {"format": 3}).encode())
+    no_key = r"key\.sealed is no longer a sealed key"
+    contents = dict.fromkeys((b"", b"not base64 \xff", b"aGVsbG8=\n", b"W10=\n", b"e30=\n"), no_key)
+    for content, sentence in (contents | {later: "has format 3, this version reads 1 and 2"}).items():
+        sealed(tmp_path).write_bytes(content)
+        with pytest.raises(StoreError, match=sentence):
+            open_or_draw_key(tmp_path, protocol)
 
 
-def test_a_key_of_a_later_format_is_refused(tmp_path: Path, protocol: Protocol) -> None:
-    open_or_draw_key(tmp_path, protocol)
-    sealed(tmp_path).write_bytes(base64.encodebytes(json.dumps(content_of(tmp_path) | {"format": 3}).encode()))
-    with pytest.raises(StoreError, match="has format 3, this version reads 1 and 2"):
-        open_or_draw_key(tmp_path, protocol)
-
-
-def test_a_tampered_key_is_found_by_the_receipts(start: Start, tmp_path: Path) -> None:
-    start("P001").finish("completed")
+def test_a_tampered_key_is_found_by_receipts_and_journals_and_a_lost_one_is_not_drawn_anew(
+    start: Start, tmp_path: Path
+) -> None:
+    with start("P001") as store:
+        store.finish("completed")
     folder = tmp_path / "study"
     content = content_of(folder)
     codes = content["codes"]["liquids"]
     codes["L1"], codes["L2"] = codes["L2"], codes["L1"]
     sealed(folder).write_bytes(base64.encodebytes(json.dumps(content).encode()))
-    for attempt in (lambda: start("P002"), lambda: reveal(folder, "AB", "analysis")):
-        with pytest.raises(StoreError, match=r"is not the key that .*sub-P001.* ran under"):
-            attempt()
+    for _ in range(2):
+        for attempt in (lambda: start("P002"), lambda: reveal(folder, "AB", "analysis")):
+            with pytest.raises(StoreError, match=r"is not the key that .*sub-P001.* ran under"):
+                attempt()
+        store.folder.receipt.write_bytes(b"?")  # then the journal tells
+    sealed(folder).unlink()
+    with pytest.raises(StoreError, match=r"key\.sealed is missing, though 1 sessions ran under it"):
+        start("P002")
+    assert not sealed(folder).exists()
     assert not (folder / "data" / "sub-P002").exists()
     assert reveals(folder) == ()
 
 
-@pytest.mark.parametrize("content", [b"", b"{}", b'{"key_hash', b"\xff\xfe", None])
-def test_a_damaged_receipt_stops_no_session_but_its_own(start: Start, tmp_path: Path, content: bytes | None) -> None:
-    with start("P001"):
-        pass
-    with start("P002") as store:
-        damaged = store.folder.receipt
-    if content is None:
-        damaged.unlink()
-    else:
-        damaged.write_bytes(content)
-    start("P003").finish("completed")
+def test_a_damaged_receipt_stops_no_session_but_its_own(start: Start, tmp_path: Path) -> None:
+    contents = (b"", b"{}", b'{"key_hash', b"\xff\xfe", None)
+    for number, content in enumerate(contents, start=1):
+        with start(f"P{number:03d}") as store:
+            pass
+        if content is None:
+            store.folder.receipt.unlink()
+        else:
+            store.folder.receipt.write_bytes(content)
+    start("P009").finish("completed")
     assert set(unblind(tmp_path / "study", by="AK", reason="done").codes) == {"practice", "liquids", "delays"}
-    assert [error.place for error in verify(tmp_path / "study").errors] == ["data/sub-P002/ses-01/receipt.json"]
-
-
-def test_a_tampered_key_is_found_by_the_journal_of_a_session_whose_receipt_is_damaged(
-    start: Start, tmp_path: Path
-) -> None:
-    with start() as store:
-        store.folder.receipt.write_bytes(b"?")
-    content = content_of(tmp_path / "study") | {"nonce": "0" * 64}
-    sealed(tmp_path / "study").write_bytes(base64.encodebytes(json.dumps(content).encode()))
-    with pytest.raises(StoreError, match=r"is not the key that .*ses-01 ran under"):
-        start("P008")
-
-
-def test_a_lost_key_is_not_drawn_anew(start: Start, tmp_path: Path) -> None:
-    start("P001").finish("completed")
-    sealed(tmp_path / "study").unlink()
-    with pytest.raises(StoreError, match=r"key\.sealed is missing, though 1 sessions ran under it"):
-        start("P002")
-    assert not sealed(tmp_path / "study").exists()
+    assert [error.place for error in verify(tmp_path / "study").errors] == [
+        f"data/sub-P{number:03d}/ses-01/receipt.json" for number in range(1, 6)
+    ]
 
 
 def test_a_reveal_is_recorded_before_it_tells(start: Start, tmp_path: Path) -> None:
@@ -263,37 +229,30 @@ def test_a_reveal_is_recorded_before_it_tells(start: Start, tmp_path: Path) -> N
     assert (folder / "blinding" / "reveals.jsonl").read_bytes().count(b"\n") == 2
 
 
-@pytest.mark.parametrize(("by", "reason", "named"), [("", "done", "--by"), ("AB", " \n", "--reason")])
-def test_a_reveal_needs_a_name_and_a_reason(start: Start, tmp_path: Path, by: str, reason: str, named: str) -> None:
-    start("P001").finish("completed")
-    with pytest.raises(StoreError, match=f"{named} is empty"):
-        reveal(tmp_path / "study", by, reason)
-    assert not (tmp_path / "study" / "blinding" / "reveals.jsonl").exists()
-
-
-def test_a_reveal_that_cannot_be_recorded_tells_nothing(start: Start, tmp_path: Path) -> None:
-    start("P001").finish("completed")
-    (tmp_path / "study" / "blinding" / "reveals.jsonl").mkdir()
-    with pytest.raises(StoreError, match=r"reveals\.jsonl cannot be"):
-        reveal(tmp_path / "study", "AB", "analysis")
-
-
-@pytest.mark.parametrize("line", [b"5", b"null", b'"by AB"', b"[1]", b"xat: 2026"])
-def test_a_line_that_is_no_reveal_is_told_and_the_others_count(start: Start, tmp_path: Path, line: bytes) -> None:
+def test_a_reveal_needs_a_name_a_reason_and_its_record(start: Start, tmp_path: Path) -> None:
     start("P001").finish("completed")
     folder = tmp_path / "study"
     path = folder / "blinding" / "reveals.jsonl"
-    path.write_bytes(line + b"\n")
-    assert revealed_key(folder) is None
-    unblind(folder, "AB", "done")
-    assert unreadable_reveals(folder) == ((1, False),)
-    assert [one["by"] for one in reveals(folder)] == ["AB"]
-    assert [str(one) for one in verify(folder).errors] == [
-        "blinding/reveals.jsonl: line 1 is not a reveal: it was changed; restore it from a copy"
-    ]
-
-
-def test_a_folder_without_a_key_is_named(tmp_path: Path) -> None:
+    for by, reason, named in (("", "done", "--by"), ("AB", " \n", "--reason")):
+        with pytest.raises(StoreError, match=f"{named} is empty"):
+            reveal(folder, by, reason)
+    assert not path.exists()
+    path.mkdir()
+    with pytest.raises(StoreError, match=r"reveals\.jsonl cannot be"):
+        reveal(folder, "AB", "analysis")
     with pytest.raises(StoreError, match=r"is not a study folder \(it has no key\.sealed\): name one"):
         reveal(tmp_path, "AB", "analysis")
-    assert names_in(tmp_path) == []
+
+
+def test_a_line_that_is_no_reveal_is_told_and_the_others_count(start: Start, tmp_path: Path) -> None:
+    start("P001").finish("completed")
+    folder, wrong = tmp_path / "study", (b"5", b"null", b'"by AB"', b"[1]", b"xat: 2026")
+    (folder / "blinding" / "reveals.jsonl").write_bytes(b"\n".join(wrong) + b"\n")
+    assert revealed_key(folder) is None
+    unblind(folder, "AB", "done")
+    assert unreadable_reveals(folder) == tuple((number, False) for number in range(1, 6))
+    assert [one["by"] for one in reveals(folder)] == ["AB"]
+    assert [str(one) for one in verify(folder).errors] == [
+        f"blinding/reveals.jsonl: line {number} is not a reveal: it was changed; restore it from a copy"
+        for number in range(1, 6)
+    ]

@@ -150,9 +150,3 @@ def test_sessions_of_versions_without_catch_trials_are_reproduced_and_unblinded(
         writer.writerows(rows)
     write_checksums(session, {})
     assert verify(study).errors == ()
-
-
-def test_a_share_that_is_permitted_excludes_nobody(tmp_path: Path) -> None:
-    study = rehearsed(tmp_path, UNNOTICED, ("wrong_most = 0.2", "wrong_most = 1"))
-    assert unblind(study, "AB", "to analyse").excluded == ()
-    assert exclusions(study) == ()

@@ -1,14 +1,10 @@
 """Before unblinding no table tells a condition; after it every table is what an open study's would have been."""
 
 import csv
-from datetime import datetime, timedelta, timezone
-from itertools import count
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
-from study_app.cli import commands
 from study_app.protocol.model import Protocol, StudyHead
 from study_app.store.blinded import unblinding as module
 from study_app.store.blinded.blinding import open_or_draw_key, reveal
@@ -25,14 +21,8 @@ from study_app.store.tables.columns import SEALED, TRIALS
 from study_app.store.tables.csv_files import csv_bytes, read_table
 from study_app.store.tables.study_description import description_bytes
 from study_app.store.verification.verify_study import verify
-from tests.store.conftest import SOURCE, Attend, Start
+from tests.store.conftest import SOURCE, Attend, Start, ticking_clock
 from tests.store.forging import Lines, cover_up, forge
-
-
-def ticking() -> journal.SessionClock:
-    ticks = count(5_000_000_000, 1_000_000)
-    origin = datetime(2026, 3, 1, 10, 0, tzinfo=timezone(timedelta(hours=1)))
-    return journal.SessionClock(lambda: next(ticks), origin)
 
 
 def names(path: Path) -> set[str]:
@@ -73,7 +63,7 @@ def test_unblinding_gives_what_an_open_study_would_have_held(
     reveal(folders[0], "AB", "no blinding")
     for folder in folders:
         for name in ("P007", "P008"):
-            store = start(name, results=folder, clock=ticking(), simulated=True)
+            store = start(name, results=folder, clock=ticking_clock(), simulated=True)
             attend(store)
             store.append("trial_started", trial=6, attempt=1, block="b", phase="main", part=2, index=9, of=9, code="D1")
             store.append("trial_ended", trial=6, attempt=1, outcome="complete", withheld_share=0.9)
@@ -149,21 +139,6 @@ def test_what_is_not_the_journals_is_left_and_named(tmp_path: Path, start: Start
     for name in ("P001", "P003"):
         rebuild(stores[name].folder.path)
     assert sound(folder)
-
-
-def test_the_command_names_the_codes_and_what_it_left(finished: Start) -> None:
-    store = finished()
-    table = store.folder.table("brackish", "trials")
-    table.unlink()
-    asked = ["unblind", str(store.place.study_folder.path), "--by", "AB", "--reason", "done"]
-    done = CliRunner().invoke(commands, asked)
-    assert done.exit_code == 0
-    codes = {line.split()[1] for line in done.stdout.splitlines()}
-    assert codes == {"practice", "L1", "L2", "D1", "D2"}
-    assert done.stderr.splitlines() == [
-        f"warning: {table} differs from the journal, so it was not changed: "
-        f"rebuild it with liquid-study rebuild {store.folder.path}"
-    ]
 
 
 def test_a_session_goes_on_as_it_began(tmp_path: Path, protocol: Protocol, start: Start, attend: Attend) -> None:

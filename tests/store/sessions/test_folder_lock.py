@@ -13,7 +13,7 @@ import psutil
 import pytest
 
 from study_app.errors import StoreError
-from study_app.store.folders import StudyFolder, locate
+from study_app.store.folders import StudyFolder, locate, study_folder
 from study_app.store.sessions.folder_lock import is_open, markers, open_alone, process_began
 from study_app.store.sessions.participant_ids import check_participant, check_unused, used_ids
 from tests.faults.support.racers import race
@@ -182,6 +182,7 @@ def test_a_sessions_folder_is_known_from_its_path(tmp_path: Path) -> None:
     assert locate(session.path) == (study, session)
     (tmp_path / "link").symlink_to(session.path)
     assert locate(tmp_path / "link") == (study, session)
+    assert study_folder(Path("results"), "rek2024", pilot=True).path == Path("results/rek2024-pilot")
 
 
 @pytest.mark.parametrize(

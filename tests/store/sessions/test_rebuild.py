@@ -175,3 +175,12 @@ def test_a_damaged_journal_is_refused_untouched(tmp_path: Path, ended: SessionSt
         rebuild(ended.folder.path)
     assert every_byte(tmp_path) == before
     assert not is_open(ended.folder.path)
+
+
+def test_a_folder_under_a_tables_name_is_a_doubt(ended: SessionStore) -> None:
+    path = ended.folder.table("brackish", "trials")
+    path.unlink()
+    path.mkdir()
+    (doubt,) = doubts(ended.place)
+    assert doubt.path == path
+    assert "cannot be read" in str(doubt)

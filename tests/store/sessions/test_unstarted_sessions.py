@@ -19,9 +19,11 @@ from study_app.store.sessions.participant_ids import check_unused, used_ids
 from study_app.store.sessions.reopen import reopen
 from study_app.store.sessions.unstarted_sessions import abandoned, never_begun
 from study_app.store.verification.verify_study import verify
+from tests.faults.support.killer import die, forked
+from tests.platforms import needs_fork
 from tests.store.conftest import SOURCE, Start
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, needs_fork]
 
 
 KILLED_BEFORE = {
@@ -31,10 +33,6 @@ KILLED_BEFORE = {
 }
 
 
-def die(*_given: Any, **_named: Any) -> None:
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
 def half_a_line(file: Any, content: bytes) -> None:
     file.write(content[: len(content) // 2])
     die()
@@ -42,21 +40,14 @@ def half_a_line(file: Any, content: bytes) -> None:
 
 def killed(start: Start, participant: str, place: Any, name: str, instead: Callable[..., None] = die) -> None:
     """Begin a session in a program that dies where it calls ``place.name``."""
-    child = os.fork()
-    if child == 0:
-        setattr(place, name, instead)
-        try:
-            start(participant)
-        finally:
-            os._exit(1)
-    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -signal.SIGKILL
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(place, name, instead)
+        assert forked(lambda: start(participant)) == -signal.SIGKILL
 
 
 @pytest.fixture
 def study(tmp_path: Path, start: Start) -> StudyFolder:
     """A study in which P003 was."""
-    if not hasattr(os, "fork"):
-        pytest.skip("needs processes that fork")
     with start("P003") as store:
         store.finish("completed")
     return StudyFolder(tmp_path / "study")

@@ -3,10 +3,10 @@
 import json
 import shutil
 import signal
-import subprocess
-import sys
+from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
@@ -18,6 +18,7 @@ from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.store.sessions.rebuild import rebuild
+from study_app.store.sites import merge as merging
 from study_app.store.sites.merge import merge
 from study_app.store.sites.merged import all_exclusions, own_place, read_merged
 from study_app.store.sites.merged_rows import participants_of
@@ -27,31 +28,10 @@ from study_app.store.tables.study_description import check_study
 from study_app.store.verification.verify_study import verify
 from study_app.store.withdrawals.output_log import write_output
 from study_app.store.withdrawals.withdraw import withdraw
+from tests.faults.support.killer import die, forked
+from tests.platforms import needs_fork
 
 pytestmark = pytest.mark.slow
-
-KILLED = """
-import os, shutil, signal, sys
-from pathlib import Path
-from study_app.store import atomic
-from study_app.store.sites import merge as merging
-
-left = int(sys.argv[3])
-
-def stop(*words, **options):
-    global left
-    left -= 1
-    if left < 0:
-        os.kill(os.getpid(), signal.SIGKILL)
-
-for module, name in ((merging, "_copy_file"), (merging, "write_file"), (merging, "sync_folder"), (Path, "rename")):
-    def watched(*words, whole=getattr(module, name), **options):
-        stop()
-        return whole(*words, **options)
-    setattr(module, name, watched)
-merging.merge({"C": Path(sys.argv[1])}, Path(sys.argv[2]))
-print(left)
-"""
 
 
 def run(*words: object) -> Result:
@@ -155,20 +135,19 @@ def test_a_folder_that_changes_while_it_is_copied_is_refused(
     assert list(results.iterdir()) == []
 
 
-def test_a_session_that_begins_before_the_copy_is_refused(
-    labs: dict[str, Path], results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    lab = Path(shutil.copytree(labs["A"], tmp_path / "lab"))
+def merge_until(count: int, lab: Path, to: Path) -> None:
+    """Merge site C; die after so many steps that write."""
+    left = iter(range(count))
 
-    def begin_a_session(*_sources: object) -> None:
-        shutil.copytree(lab / "data/sub-P001", lab / "data/sub-P009")
+    def watched(whole: Callable[..., Any]) -> Callable[..., Any]:
+        return lambda *words, **options: die() if next(left, None) is None else whole(*words, **options)
 
-    monkeypatch.setattr("study_app.store.sites.merge._check_sessions", begin_a_session)
-    with pytest.raises(StoreError, match="was changed while it was copied"):
-        merge({"A": lab}, results / "pooled")
-    assert list(results.iterdir()) == []
+    for module, name in ((merging, "_copy_file"), (merging, "write_file"), (merging, "sync_folder"), (Path, "rename")):
+        setattr(module, name, watched(getattr(module, name)))
+    merge({"C": lab}, to)
 
 
+@needs_fork
 @pytest.mark.parametrize("exists", [pytest.param(False, marks=pytest.mark.nightly), True])
 def test_a_killed_merge_leaves_the_old_state_or_the_new_one(exists: bool, labs: dict[str, Path], results: Path) -> None:
     to, old, states = results / "killed", dict[str, bytes](), []
@@ -177,21 +156,20 @@ def test_a_killed_merge_leaves_the_old_state_or_the_new_one(exists: bool, labs: 
         if exists:
             merge({"A": labs["A"]}, to)
             old = contents(to)
-        words = [sys.executable, "-c", KILLED, str(labs["C"]), str(to), str(kill_at)]
-        done = subprocess.run(words, check=False, capture_output=True, text=True)
+        code = forked(lambda count=kill_at: merge_until(count, labs["C"], to))
         merged = read_merged(to)
         listed = () if merged is None else merged.names
         states.append(listed)
         if merged is not None:
             assert verify_folder(to).sound
         if "C" not in listed:
-            assert done.returncode == -signal.SIGKILL
+            assert code == -signal.SIGKILL
             held = {} if merged is None else contents(to)
             assert {name: held.get(name) for name in old} == old
             assert merge({"C": labs["C"]}, to).names[-1] == "C"
         assert contents(to / "sites/C") == contents(labs["C"])
         assert [path.name for path in (to / "sites").iterdir() if path.name not in ("A", "C")] == []
-        if done.returncode == 0:
+        if code == 0:
             break
     assert {"C" in listed for listed in states} == {False, True}
 
@@ -255,24 +233,6 @@ def test_a_participant_of_a_merged_study_withdraws_from_copy_and_site(
     assert run("withdraw", pooled, "--participant", "P002", "--by", "AK", "--reason", "asked").exit_code != 0
 
 
-def test_studies_and_sessions_list_a_merged_study(pooled: Path) -> None:
-    listed = (pooled / "sites.json").read_bytes()
-    assert "  pooled  4 sessions, sites A, B" in run("studies").output
-    names = [line.split()[0] for line in run("sessions", "pooled").output.splitlines()]
-    assert names == ["pooled/A-P001/1", "pooled/A-P002/1", "pooled/B-P001/1", "pooled/B-P002/1"]
-    (pooled / "sites.json").write_text("{")
-    assert "pooled  cannot be used: " in run("studies").output
-    (pooled / "sites.json").write_bytes(listed)
-    for name in names:
-        assert "reproduced" in run("reproduce", name).output
-
-
-def test_what_is_no_listed_site_does_not_count_and_is_named(labs: dict[str, Path], pooled: Path) -> None:
-    shutil.copytree(labs["C"], pooled / "sites/C")
-    assert len(participants_of(pooled)) == 4
-    assert "sites/C: is not a site that sites.json lists" in "\n".join(map(str, verify_folder(pooled).warnings))
-
-
 def test_verify_finds_what_was_changed_after_merging(labs: dict[str, Path], pooled: Path) -> None:
     response = next((pooled / "sites/B").glob("data/sub-P001/ses-01/*responses*"))
     response.write_bytes(response.read_bytes() + b"x")
@@ -290,13 +250,18 @@ def test_verify_finds_what_was_changed_after_merging(labs: dict[str, Path], pool
     assert "is not the key that site B was merged with" in "\n".join(map(str, verify_folder(pooled).errors))
 
 
-def test_a_damaged_list_of_sites_is_refused(pooled: Path) -> None:
+def test_a_damaged_list_of_sites_is_refused_and_a_changed_one_is_an_error(pooled: Path) -> None:
+    path = pooled / "sites.json"
+    held = json.loads(path.read_text())
+    path.write_text(json.dumps(held | {"study": "another"}))
+    found = list(map(str, verify_folder(pooled).errors))
+    assert found == [f"sites/{name}: is of study demo, but sites.json lists sites of another" for name in "AB"]
     for text in ("{", "[]", '{"format": 1}', '{"format": 1, "study": "demo", "protocol_hash": "", "sites": [{}]}'):
-        (pooled / "sites.json").write_text(text)
+        path.write_text(text)
         with pytest.raises(StoreError, match="does not list the sites"):
             read_merged(pooled)
-    (pooled / "sites.json").write_text('{"format": 2}')
-    with pytest.raises(StoreError, match="format 2"):
+    path.write_text(json.dumps(held | {"format": "x" * 5000}))
+    with pytest.raises(StoreError, match=r"has format 'x{199}…, this version reads 1"):
         read_merged(pooled)
 
 
@@ -310,25 +275,6 @@ def test_a_site_elsewhere_is_not_read(pooled: Path, tmp_path: Path) -> None:
         read_merged(pooled)
 
 
-def test_a_site_that_is_a_loop_of_links_is_missing(pooled: Path) -> None:
-    shutil.rmtree(pooled / "sites/B")
-    (pooled / "sites/B").symlink_to("B")
-    assert "sites/B: is missing, but sites.json lists site B" in "\n".join(map(str, verify_folder(pooled).errors))
-    with pytest.raises(StoreError, match="is the copy of a site in the merged study"):
-        check_study(StudyFolder(pooled / "sites/B"), "demo")
-
-
-def test_a_list_of_sites_that_was_changed_is_an_error(pooled: Path) -> None:
-    path = pooled / "sites.json"
-    held = json.loads(path.read_text())
-    path.write_text(json.dumps(held | {"study": "another"}))
-    found = list(map(str, verify_folder(pooled).errors))
-    assert found == [f"sites/{name}: is of study demo, but sites.json lists sites of another" for name in "AB"]
-    path.write_text(json.dumps(held | {"format": "x" * 5000}))
-    with pytest.raises(StoreError, match=r"has format 'x{199}…, this version reads 1"):
-        read_merged(pooled)
-
-
 def test_an_unfinished_session_that_was_deleted_at_a_site_is_missed(labs: dict[str, Path], results: Path) -> None:
     lab = Path(shutil.copytree(labs["A"], results / "lab"))
     session = lab / "data/sub-P002/ses-01"
@@ -338,20 +284,6 @@ def test_an_unfinished_session_that_was_deleted_at_a_site_is_missed(labs: dict[s
     assert verify_folder(pooled).sound
     shutil.rmtree(pooled / "sites/A/data/sub-P002")
     said = "sites/A: has 1 of the 2 sessions that sites.json lists: restore the others from a copy"
-    assert said in list(map(str, verify_folder(pooled).errors))
-
-
-def test_a_withdrawal_before_merging_excuses_no_session_that_was_deleted_later(
-    labs: dict[str, Path], results: Path
-) -> None:
-    lab = Path(shutil.copytree(labs["A"], results / "lab"))
-    before = datetime.now().astimezone() - timedelta(hours=1)
-    withdraw(lab, "P001", by="AK", reason="asked", now=before)
-    unfinished(lab / "data/sub-P002/ses-01")
-    pooled = merge({"A": lab, "B": labs["B"]}, results / "pooled").path
-    assert verify_folder(pooled).sound
-    shutil.rmtree(pooled / "sites/A/data/sub-P002")
-    said = "sites/A: has 0 of the 1 sessions that sites.json lists: restore the others from a copy"
     assert said in list(map(str, verify_folder(pooled).errors))
 
 
@@ -378,3 +310,15 @@ def unfinished(session: Path) -> None:
     kept = [line for line in fingerprints.read_text().splitlines(keepends=True) if session.parent.name not in line]
     fingerprints.write_text("".join(kept))
     rebuild(session)
+
+
+def test_studies_and_sessions_list_a_merged_study(pooled: Path) -> None:
+    listed = (pooled / "sites.json").read_bytes()
+    assert "  pooled  4 sessions, sites A, B" in run("studies").output
+    names = [line.split()[0] for line in run("sessions", "pooled").output.splitlines()]
+    assert names == ["pooled/A-P001/1", "pooled/A-P002/1", "pooled/B-P001/1", "pooled/B-P002/1"]
+    (pooled / "sites.json").write_text("{")
+    assert "pooled  cannot be used: " in run("studies").output
+    (pooled / "sites.json").write_bytes(listed)
+    for name in names:
+        assert "reproduced" in run("reproduce", name).output

@@ -11,27 +11,11 @@ from study_app.protocol.model import Protocol
 from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.exclusions import exclude
 from study_app.store.folders import StudyFolder
-from study_app.store.tables.cells import cell_pattern, variable
-from study_app.store.tables.column import Column
 from study_app.store.tables.column_dictionary import SECTIONS, dictionary_markdown
 from study_app.store.tables.formulas import guarded, unguarded
-from study_app.store.tables.study_description import check_study, described_study, description_bytes, write_description
+from study_app.store.tables.study_description import check_study, write_description
 from study_app.store.verification.psychds import validate
-from tests.store.conftest import Attend, Start
-
-
-def test_a_variable_is_a_property_value_with_unit_range_and_levels() -> None:
-    duration = Column("duration_s", "number", "How long.", "s", minimum=0, may_miss=True)
-    assert variable(duration) == {
-        "@type": "PropertyValue",
-        "name": "duration_s",
-        "description": "How long.",
-        "unitText": "s",
-        "minValue": 0,
-    }
-    phase = Column("phase", "text", "What for.", levels=(("main", "analysed"), ("practice", "learning")))
-    assert variable(phase)["description"] == "What for. Levels: main: analysed; practice: learning."
-    assert cell_pattern(phase) == "(main|practice)"
+from tests.store.conftest import Start
 
 
 @pytest.mark.parametrize(
@@ -64,12 +48,6 @@ def test_every_table_is_one_that_renders() -> None:
     assert len(re.findall(headed, text, re.MULTILINE)) == len(tables)
 
 
-def test_levels_are_explained() -> None:
-    (line,) = [line for line in dictionary_markdown().splitlines() if line.startswith("| `validity` ")]
-    assert "| `valid`, `invalid`, or n/a |" in line
-    assert line.endswith("`valid`: all did; `invalid`: at least one did not. |")
-
-
 @given(st.text(alphabet="'=+-@\t\r a1＝", max_size=6) | st.text())
 @pytest.mark.slow
 def test_every_text_reads_back_unchanged(text: str) -> None:
@@ -81,43 +59,10 @@ def test_a_formula_has_an_apostrophe_before_it(text: str) -> None:
     assert guarded(text) == "'" + text
 
 
-@pytest.mark.parametrize("text", ["", "tired", "a = b", "'quoted'", "3-4", "n/a"])
-def test_other_texts_stay(text: str) -> None:
-    assert guarded(text) == unguarded(text) == text
-
-
-def psych_ds_errors(folder: Path) -> list[str]:
-    return [str(issue) for issue in validate(folder).errors]
-
-
-def test_a_study_folder_keeps_the_rules_of_psych_ds_from_the_first_moment(
-    tmp_path: Path, start: Start, attend: Attend
-) -> None:
-    folder = tmp_path / "study"
-    store = start("P001")
-    assert psych_ds_errors(folder) == []
-    attend(store)
-    store.append("note", kind="note", text='comma, "quote"\nnew line')
-    store.write_tables()
-    assert psych_ds_errors(folder) == []
-    store.finish("completed")
-    start("P002").finish("withdrawn")
-    assert psych_ds_errors(folder) == []
-
-
 def test_what_else_lies_there_is_known_to_be_no_table(tmp_path: Path, finished: Start) -> None:
     finished("P001", recordings=True)
     exclude(tmp_path / "study", "P001", 1, by="AB", reason="tired")
     assert not [issue for issue in validate(tmp_path / "study").warnings if issue.code == "FILE_NOT_CHECKED"]
-
-
-def test_the_description_is_the_same_for_every_participant(tmp_path: Path, protocol: Protocol, start: Start) -> None:
-    path = tmp_path / "study" / "dataset_description.json"
-    start("P001").finish("completed")
-    written = path.stat().st_ino
-    start("P002").finish("completed")
-    assert path.read_bytes() == description_bytes(protocol.study, sealed=True)
-    assert path.stat().st_ino == written
 
 
 def test_a_new_version_of_the_study_renews_it(tmp_path: Path, protocol: Protocol) -> None:
@@ -127,32 +72,6 @@ def test_a_new_version_of_the_study_renews_it(tmp_path: Path, protocol: Protocol
     write_description(folder, newer)
     content = json.loads(folder.description.read_text(encoding="utf-8"))
     assert (content["version"], content["description"]) == ("1.1", "What liquids feel like.")
-
-
-def test_the_folder_of_another_study_is_refused(tmp_path: Path, protocol: Protocol) -> None:
-    folder = StudyFolder(tmp_path)
-    check_study(folder, "brackish")
-    assert described_study(folder) is None
-    write_description(folder, protocol.study)
-    check_study(folder, "brackish")
-    with pytest.raises(StoreError, match="holds the study 'brackish', not 'rek2024': use another results folder"):
-        check_study(folder, "rek2024")
-
-
-@pytest.mark.parametrize("content", [b"", b"[]", b"{}", b"\xff"])
-def test_a_description_that_is_none_is_named(tmp_path: Path, content: bytes) -> None:
-    folder = StudyFolder(tmp_path)
-    folder.description.write_bytes(content)
-    with pytest.raises(StoreError, match=r"dataset_description\.json does not describe a study"):
-        check_study(folder, "brackish")
-
-
-def test_a_description_that_cannot_be_read_is_named(tmp_path: Path, protocol: Protocol) -> None:
-    folder = StudyFolder(tmp_path)
-    folder.description.mkdir()
-    for attempt in (lambda: check_study(folder, "brackish"), lambda: write_description(folder, protocol.study)):
-        with pytest.raises(StoreError, match=r"dataset_description\.json cannot be read \(it is not a file\)"):
-            attempt()
 
 
 def test_no_study_is_begun_around_or_within_others(tmp_path: Path, protocol: Protocol) -> None:

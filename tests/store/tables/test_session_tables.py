@@ -13,7 +13,7 @@ from study_app.store.tables.column import MISSING, Column, header
 from study_app.store.tables.columns import RESPONSES, TABLES, TRIALS
 from study_app.store.tables.csv_files import csv_bytes, in_columns_of, read_table
 from study_app.store.tables.formulas import guarded
-from study_app.store.tables.session_tables import latest, participant, responses, trials
+from study_app.store.tables.session_tables import participant, responses, trials
 
 TEXT = (Column("first", "text", "One."), Column("second", "text", "Two."))
 
@@ -58,13 +58,6 @@ def test_any_text_comes_back_through_the_csv_module(texts: list[tuple[str, str]]
     assert read_table(content, TEXT) == kept
 
 
-@given(number=st.floats(allow_nan=False, allow_infinity=False))
-def test_numbers_are_written_in_full_with_a_point(number: float) -> None:
-    cell = csv_bytes(TEXT[:1], [{"first": number}]).decode().splitlines()[1]
-    assert float(cell) == number
-    assert "," not in cell
-
-
 @pytest.mark.parametrize(
     ("value", "cell"),
     [(None, "n/a"), (math.nan, "n/a"), (-math.inf, "n/a"), (True, "true"), (False, "false"), (7, "7")],
@@ -93,17 +86,16 @@ def test_a_table_that_was_written_before_texts_were_guarded_is_what_the_journal_
     assert in_columns_of(changed, now, TEXT) == (now, TEXT)
 
 
-def test_half_a_surrogate_pair_does_not_stop_a_table() -> None:
-    assert csv_bytes(TEXT[:1], [{"first": "half \ud83c"}]) == b"first\nhalf ?\n"
-
-
 def test_a_response_is_a_row_with_its_trial() -> None:
     script = Script()
     script.trial(1)
     script.end(1)
-    script.answer(1, 6, None)
+    script.answer(1, 6, None, None)
+    script.lines[-1]["items"][2] |= {"first_s": None, "last_s": None, "changes": 0}  # left out
     rows = responses(script.lines)
-    assert [tuple(row) for row in rows] == [header(RESPONSES)] * 2
+    assert participant(script.lines)["responses"] == 2
+    assert [tuple(row) for row in rows] == [header(RESPONSES)] * 3
+    assert rows[2]["cannot_judge"] is False
     assert rows[0] == {
         "study": "brackish",
         "participant": "P007",
@@ -215,42 +207,6 @@ def test_a_participants_row_counts_main_trials_and_their_last_attempt() -> None:
     assert (ended["status"], ended["session_ended_at"]) == ("withdrawn", script.lines[-1]["at"])
 
 
-def test_the_latest_attempt_of_each_trial_is_kept_in_order() -> None:
-    rows = [{"trial": trial, "attempt": attempt} for trial, attempt in [(1, 1), (2, 1), (1, 2), (3, 1)]]
-    assert latest(rows) == [rows[1], rows[2], rows[3]]
-
-
-@pytest.mark.parametrize("lines", [[], [{"n": 1, "event": "page_shown"}]])
-def test_lines_that_are_no_session_are_refused(lines: list[dict[str, Any]]) -> None:
-    with pytest.raises(StoreError, match="does not begin with session_started"):
-        trials(lines)
-
-
-def test_the_end_of_a_trial_that_never_started_is_refused() -> None:
-    script = Script()
-    script.end(4)
-    with pytest.raises(StoreError, match="line 2 is about trial 4, which never started"):
-        trials(script.lines)
-
-
-def test_an_interval_of_a_trial_without_intervals_is_refused() -> None:
-    script = Script()
-    script.trial(4)
-    script.add("interval_started", trial=4, attempt=1, interval=1)
-    with pytest.raises(StoreError, match="line 3 is an interval of trial 4, which has none"):
-        trials(script.lines)
-
-
-def test_cannot_judge_is_an_answer_and_a_statement_left_out_is_none() -> None:
-    script = Script()
-    script.trial(1)
-    script.end(1)
-    script.answer(1, 7, None, None)
-    script.lines[-1]["items"][2] |= {"first_s": None, "last_s": None, "changes": 0}
-    assert [row["cannot_judge"] for row in responses(script.lines)] == [False, True, False]
-    assert participant(script.lines)["responses"] == 2
-
-
 def test_the_language_is_the_one_that_was_read_in_last() -> None:
     script = Script()
     assert participant(script.lines)["language"] == "en"
@@ -258,3 +214,17 @@ def test_the_language_is_the_one_that_was_read_in_last() -> None:
     assert participant(script.lines)["language"] == "nl"
     script.add("language_chosen", language="de")
     assert (participant(script.lines)["language"], progress_of(script.lines).language) == ("de", "de")
+
+
+def test_lines_that_make_no_session_are_refused() -> None:
+    script = Script()
+    script.trial(4)
+    head, interval = script.lines, {"n": 3, "event": "interval_started", "trial": 4, "attempt": 1, "interval": 1}
+    for lines, sentence in (
+        ([], "does not begin with session_started"),
+        ([{"n": 1, "event": "page_shown"}], "does not begin with session_started"),
+        ([*head, {"n": 3, "event": "trial_ended", "trial": 9, "attempt": 1}], "is about trial 9, which never started"),
+        ([*head, interval], "line 3 is an interval of trial 4, which has none"),
+    ):
+        with pytest.raises(StoreError, match=sentence):
+            trials(lines)

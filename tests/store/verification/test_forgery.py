@@ -29,6 +29,8 @@ from tests.store.forging import Lines, cover_up, forge
 pytestmark = pytest.mark.slow
 
 P007 = "data/sub-P007/ses-01"
+JOURNAL = f"{P007}/journal.jsonl"
+Act = Callable[[Path], None]
 
 
 @pytest.fixture
@@ -44,13 +46,31 @@ def told(study: Path, kept: Path | None = None) -> str:
     return "\n".join(map(str, verify(study, kept).errors))
 
 
-def journal_of(study: Path) -> Path:
-    return study / P007 / "journal.jsonl"
-
-
 def of_receipt(study: Path, **changes: Any) -> None:
     path = study / P007 / "receipt.json"
     receipt.write(path, receipt.read(path) | changes)
+
+
+def forging(
+    edit: Callable[[Lines], object], *, chained: bool = True, covered: bool = False, **of_the_receipt: Any
+) -> Act:
+    """Return what changes the journal, and the receipt, and computes checksums and fingerprints anew if ``covered``."""
+
+    def act(study: Path) -> None:
+        forge(study / JOURNAL, edit, chained=chained)
+        of_receipt(study, **of_the_receipt)
+        if covered:
+            cover_up(study)
+
+    return act
+
+
+def of_start(**changes: Any) -> Callable[[Lines], object]:
+    return lambda lines: lines[0].update(changes)
+
+
+def without_format(lines: Lines) -> None:
+    del lines[0]["format"]
 
 
 def other_responses(lines: Lines) -> None:
@@ -72,27 +92,16 @@ def half(lines: Lines) -> None:
     del lines[len(lines) // 2 :]
 
 
+def without_a_choice(lines: Lines) -> None:
+    del lines[next(n for n, line in enumerate(lines) if line["event"] == "choice")]
+
+
 def edit_a_response(study: Path) -> None:
-    path = journal_of(study)
+    path = study / JOURNAL
     path.write_bytes(path.read_bytes().replace(b'"value":7', b'"value":1'))
 
 
-def edit_the_responses(study: Path) -> None:
-    forge(journal_of(study), other_responses)
-    cover_up(study)
-
-
-def take_a_choice_away(study: Path) -> None:
-    def change(lines: Lines) -> None:
-        del lines[next(n for n, line in enumerate(lines) if line["event"] == "choice")]
-
-    forge(journal_of(study), change)
-    cover_up(study)
-
-
-def cut_the_journal(study: Path) -> None:
-    forge(journal_of(study), half)
-    of_receipt(study, status="unfinished", reason="", ended_at=None)
+cut_the_journal = forging(half, status="unfinished", reason="", ended_at=None)
 
 
 def cut_the_journal_and_delete_the_checksums(study: Path) -> None:
@@ -107,18 +116,8 @@ def delete_a_participant(study: Path) -> None:
     StudyFolder(study).fingerprints.write_bytes(kept)
 
 
-def call_the_simulated_real(study: Path) -> None:
-    """In the journal's first line alone."""
-    forge(journal_of(study), lambda lines: lines[0].update(simulated=False))
-
-
-def leave_out_the_chain(study: Path) -> None:
-    forge(journal_of(study), lambda lines: lines[0].pop("format"), chained=False)
-    cover_up(study)
-
-
 def begin_the_chain_late(study: Path) -> None:
-    path = journal_of(study)
+    path = study / JOURNAL
     first, second, *rest = path.read_bytes().splitlines(keepends=True)
     line = json.loads(first)
     del line["format"], line["previous"]
@@ -129,7 +128,7 @@ def begin_the_chain_late(study: Path) -> None:
 
 
 def change_and_rebuild(study: Path) -> None:
-    forge(journal_of(study), other_answers)
+    forge(study / JOURNAL, other_answers)
     (study / P007 / "checksums.sha256").unlink()
     rebuild(study / P007)
 
@@ -140,52 +139,26 @@ def change_and_rebuild(study: Path) -> None:
     ("act", "sentence"),
     [
         (edit_a_response, "was written after another line than the one before it, which was changed"),
-        (edit_the_responses, "another answer than was chosen before: it was changed"),
-        (take_a_choice_away, "another answer than was chosen before: it was changed"),
+        (forging(other_responses, covered=True), "another answer than was chosen before: it was changed"),
+        (forging(without_a_choice, covered=True), "another answer than was chosen before: it was changed"),
         (cut_the_journal, "was written after the session ended, but the journal has no end"),
         (cut_the_journal_and_delete_the_checksums, f"{P007}: is not the session that fingerprints.txt lists as"),
         (delete_a_participant, f"{P007}: is missing, but fingerprints.txt lists it"),
-        (call_the_simulated_real, "simulated: differ from the journal"),
-        (leave_out_the_chain, "has another format than receipt.json states"),
+        (forging(of_start(simulated=False)), "simulated: differ from the journal"),
+        (forging(without_format, chained=False, covered=True), "has another format than receipt.json states"),
         (begin_the_chain_late, "has previous, and the lines before it lack it"),
         (change_and_rebuild, f"{P007}: is not the session that fingerprints.txt lists as"),
     ],
 )
-def test_a_forgery_that_computes_no_fingerprint_is_found(
-    study: Path, tmp_path: Path, act: Callable[[Path], None], sentence: str
-) -> None:
+def test_a_forgery_that_computes_no_fingerprint_is_found(study: Path, tmp_path: Path, act: Act, sentence: str) -> None:
     assert verify(study, tmp_path / "kept.txt").sound
     act(study)
     assert sentence in told(study)
     assert not verify(study).sound
 
 
-def change_every_answer(study: Path) -> None:
-    forge(journal_of(study), other_answers)
-
-
-def call_everything_real(study: Path) -> None:
-    call_the_simulated_real(study)
-    of_receipt(study, simulated=False)
-
-
 def forget_a_participant(study: Path) -> None:
     shutil.rmtree(study / "data" / "sub-P007")
-
-
-def write_it_in_format_1(study: Path) -> None:
-    leave_out_the_chain(study)
-    of_receipt(study, format=1)
-
-
-def end_it_with_another_status(study: Path) -> None:
-    forge(journal_of(study), lambda lines: lines[-1].update(status="withdrawn"))
-    of_receipt(study, status="withdrawn")
-
-
-def change_the_seed(study: Path) -> None:
-    forge(journal_of(study), lambda lines: lines[0].update(seed=12))
-    of_receipt(study, seed=12)
 
 
 def add_a_session(study: Path) -> None:
@@ -209,18 +182,21 @@ def add_a_session(study: Path) -> None:
 @pytest.mark.parametrize(
     ("act", "sentence"),
     [
-        (change_every_answer, f"{P007}: is not the session that"),
+        (forging(other_answers), f"{P007}: is not the session that"),
         (cut_the_journal, "it no longer has an end"),
         (forget_a_participant, f"{P007}: is missing, but"),
-        (call_everything_real, f"{P007}: is not the session that"),
-        (write_it_in_format_1, f"{P007}: is not the session that"),
-        (end_it_with_another_status, f"{P007}: is not the session that"),
-        (change_the_seed, f"{P007}: is not the session that"),
+        (forging(of_start(simulated=False), simulated=False), f"{P007}: is not the session that"),
+        (forging(without_format, chained=False, format=1), f"{P007}: is not the session that"),
+        (
+            forging(lambda lines: lines[-1].update(status="withdrawn"), status="withdrawn"),
+            f"{P007}: is not the session that",
+        ),
+        (forging(of_start(seed=12), seed=12), f"{P007}: is not the session that"),
         (add_a_session, "it was added, or ended, after that copy was made"),
     ],
 )
 def test_a_forgery_that_computes_everything_anew_is_found_with_the_fingerprints_kept_elsewhere(
-    study: Path, tmp_path: Path, act: Callable[[Path], None], sentence: str
+    study: Path, tmp_path: Path, act: Act, sentence: str
 ) -> None:
     """Without them nothing can be found: so it is with files that anyone may write."""
     act(study)
@@ -269,15 +245,6 @@ def test_a_marker_of_another_machine_hides_no_forgery_from_the_fingerprints_kept
     assert f"{P007}: is not the session that" in told(study, tmp_path / "kept.txt")
 
 
-def test_a_torn_reveal_is_a_warning_and_opens_no_key(study: Path) -> None:
-    blinding.reveal(study, "AB", "done")
-    path = StudyFolder(study).reveals
-    path.write_bytes(path.read_bytes()[:-9])
-    assert blinding.revealed_key(study) is None
-    assert told(study) == ""
-    assert "line 1 is not a reveal: it is incomplete" in "\n".join(map(str, verify(study).warnings))
-
-
 def test_an_unfinished_session_with_a_changed_line_does_not_go_on(
     tmp_path: Path, start: Start, attend: Attend, protocol: Protocol
 ) -> None:
@@ -305,17 +272,6 @@ def test_a_fingerprint_is_what_the_documentation_says(study: Path) -> None:
         assert proof.replace("-", "") == letters[:12]
 
 
-def test_the_command_compares_with_the_copy(study: Path, tmp_path: Path) -> None:
-    words = ["verify", str(study), "--fingerprints", str(tmp_path / "kept.txt")]
-    done = CliRunner().invoke(commands, words)
-    assert (done.exit_code, done.output.splitlines()[-1]) == (0, "2 sessions: sound")
-    forget_a_participant(study)
-    cover_up(study)
-    done = CliRunner().invoke(commands, words)
-    assert (done.exit_code, done.output.splitlines()[-1]) == (3, "1 session: not sound")
-    assert f"error: {P007}: is missing, but" in done.output
-
-
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [
@@ -331,3 +287,23 @@ def test_a_copy_that_is_none_is_named(study: Path, tmp_path: Path, content: byte
         path.write_bytes(content)
     with pytest.raises(StoreError, match=sentence):
         verify(study, path)
+
+
+def test_the_command_compares_with_the_copy(study: Path, tmp_path: Path) -> None:
+    words = ["verify", str(study), "--fingerprints", str(tmp_path / "kept.txt")]
+    done = CliRunner().invoke(commands, words)
+    assert (done.exit_code, done.output.splitlines()[-1]) == (0, "2 sessions: sound")
+    forget_a_participant(study)
+    cover_up(study)
+    done = CliRunner().invoke(commands, words)
+    assert (done.exit_code, done.output.splitlines()[-1]) == (3, "1 session: not sound")
+    assert f"error: {P007}: is missing, but" in done.output
+
+
+def test_a_torn_reveal_is_a_warning_and_opens_no_key(study: Path) -> None:
+    blinding.reveal(study, "AB", "done")
+    path = StudyFolder(study).reveals
+    path.write_bytes(path.read_bytes()[:-9])
+    assert blinding.revealed_key(study) is None
+    assert told(study) == ""
+    assert "line 1 is not a reveal: it is incomplete" in "\n".join(map(str, verify(study).warnings))

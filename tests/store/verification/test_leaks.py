@@ -8,21 +8,13 @@ import pytest
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
-from study_app.store.blinded import blinding
-from study_app.store.verification.leaks import Telltales, certain_telltales, find_leaks, presented_numbers, telltales
+from study_app.store.verification.leaks import certain_telltales, find_leaks, presented_numbers, telltales
 from tests.protocol.trials.level_studies import study as levels_study
 from tests.store.conftest import Attend, Make, Start, Tables
 
 
 def found(folder: Path, protocol: Protocol) -> list[tuple[str, str]]:
     return [(leak.place, leak.word) for leak in find_leaks(folder, telltales(protocol))]
-
-
-def test_the_words_to_look_for_are_the_conditions(protocol: Protocol) -> None:
-    words = telltales(protocol).words
-    assert {"quagmire", "mildew", "see_tardy", "learn", "1013.7", "1391.3", "1717", "137", "0.137"} < words
-    assert {"137.0", "137000000", "137000", "0.99917"} < words
-    assert not {"drag", "wake", "0", "liquid", "delay_ms"} & words
 
 
 @pytest.mark.parametrize(
@@ -66,18 +58,6 @@ def test_a_leak_is_found_wherever_it_is(tmp_path: Path, protocol: Protocol, star
         (f"{session}/receipt.json, device, rate_hz", "1013.7"),
         (f"{session}/subject-P007_session-01_task-brackish_description-trials_data.csv, row 2, code", "see_tardy"),
     ]
-
-
-def test_the_moment_of_an_event_may_be_any_number(tmp_path: Path, protocol: Protocol, start: Start) -> None:
-    store = start()
-    store.append("note", t_s=0.137, kind="mark", text="")
-    store.close()
-    assert found(tmp_path, protocol) == []
-
-
-def test_a_leak_does_not_show_its_word_by_itself(tmp_path: Path, protocol: Protocol) -> None:
-    (tmp_path / "notes.txt").write_text("mildew")
-    assert "mildew" not in repr(find_leaks(tmp_path, telltales(protocol)))
 
 
 def test_statements_may_name_what_they_ask(tmp_path: Path, tables_of_study: Tables, start: Start) -> None:
@@ -124,14 +104,6 @@ def test_what_stands_somewhere_by_chance_or_is_published_tells_nothing_for_certa
     assert not {"honey", "practice", "1", "50", "0.068", "1000"} & words
 
 
-def test_the_sealed_key_gives_the_words_too(tmp_path: Path, protocol: Protocol, start: Start) -> None:
-    start().finish("completed")
-    key = blinding.read_key(tmp_path / "study")
-    words = certain_telltales(key.tables, receipt.without_conditions(protocol)).words
-    assert {"quagmire", "feel_mildew", "1013.7", "0.99917"} < words
-    assert "137" not in words
-
-
 def test_levels_standards_and_comparisons_are_looked_for_in_every_unit(tmp_path: Path) -> None:
     edits = (("standards = [1, 2]", "standards = [1.0713]"), ("[0.2, 0.4, 0.8]", "[0.2371]"))
     protocol = levels_study(*edits)
@@ -144,5 +116,8 @@ def test_levels_standards_and_comparisons_are_looked_for_in_every_unit(tmp_path:
     assert certain.in_text(f"{comparison!r} and 0.2371") == [repr(comparison)], "short numbers stand anywhere"
 
 
-def test_without_words_nothing_is_found() -> None:
-    assert Telltales([]).in_text("anything 137") == []
+def test_the_words_to_look_for_are_the_conditions(protocol: Protocol) -> None:
+    words = telltales(protocol).words
+    assert {"quagmire", "mildew", "see_tardy", "learn", "1013.7", "1391.3", "1717", "137", "0.137"} < words
+    assert {"137.0", "137000000", "137000", "0.99917"} < words
+    assert not {"drag", "wake", "0", "liquid", "delay_ms"} & words

@@ -1,4 +1,5 @@
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -47,8 +48,9 @@ def described(**changes: Any) -> Callable[[Path], None]:
     return lambda folder: describe(folder, **changes)
 
 
-def test_the_smallest_folder_keeps_the_rules(folder: Path) -> None:
-    assert validate(folder).errors == ()
+def with_repeated_rows(folder: Path) -> None:
+    describe(folder, variableMeasured=["trial", "response", "row_id"])
+    table(b"row_id\n1\n2\n1\n")(folder)
 
 
 @pytest.mark.parametrize(
@@ -84,6 +86,8 @@ def test_the_smallest_folder_keeps_the_rules(folder: Path) -> None:
         (table(b"trial\n1\n", "data/Subject-2_data.csv"), ["FILENAME_KEYWORD_FORMATTING_ERROR"]),
         (table(b"trial\n1\n", "data/visual_delay-2_data.csv"), ["FILENAME_KEYWORD_FORMATTING_ERROR"]),
         (table(b"{", "data/subject-1_data.json"), ["JSON_INVALID"]),
+        (with_repeated_rows, ["ROWID_VALUES_NOT_UNIQUE"]),
+        (lambda folder: shutil.rmtree(folder / "data"), ["MISSING_DATA_DIRECTORY"]),
         (table(b"{", "data/notes.json"), ["JSON_INVALID"]),
     ],
 )
@@ -98,19 +102,6 @@ def test_every_rule_is_an_error_where_it_is_broken(
     )
 
 
-def test_row_ids_come_once(folder: Path) -> None:
-    describe(folder, variableMeasured=["trial", "response", "row_id"])
-    table(b"row_id\n1\n2\n1\n")(folder)
-    assert codes(validate(folder).errors) == ["ROWID_VALUES_NOT_UNIQUE"]
-
-
-def test_without_data_there_is_nothing_to_describe(tmp_path: Path) -> None:
-    describe(tmp_path)
-    assert codes(validate(tmp_path).errors) == ["MISSING_DATA_DIRECTORY"]
-    (tmp_path / "data").mkdir()
-    assert codes(validate(tmp_path).errors) == ["MISSING_DATAFILE"]
-
-
 def test_a_file_of_its_own_metadata_overrides_the_nearest_and_the_datasets(folder: Path) -> None:
     table(b"mood\nfine\n", "data/sub-1/subject-1_session-2_data.csv")(folder)
     assert codes(validate(folder).errors) == ["CSV_COLUMN_MISSING_FROM_METADATA"]
@@ -122,29 +113,6 @@ def test_a_file_of_its_own_metadata_overrides_the_nearest_and_the_datasets(folde
         (folder / name).write_text(json.dumps({"variableMeasured": ["mood", "trial", "response"]}))
         assert validate(folder).errors == ()
         (folder / name).unlink()
-
-
-def test_what_is_recommended_is_a_warning(folder: Path) -> None:
-    recommended = codes(validate(folder).warnings)
-    assert recommended == [
-        "MISSING_README_DOC",
-        "MISSING_CHANGES_DOC",
-        "MISSING_ANALYSIS_DIRECTORY",
-        "MISSING_RESULTS_DIRECTORY",
-        "MISSING_MATERIALS_DIRECTORY",
-        "MISSING_DOCUMENTATION_DIRECTORY",
-        "MISSING_PSYCHDSIGNORE",
-        "JSON_KEY_RECOMMENDED",
-    ]
-    for name in ("README.md", "CHANGES.txt", ".psychds-ignore"):
-        (folder / name).write_text("# nothing\n")
-    for name in ("analysis", "results", "materials", "documentation"):
-        (folder / name).mkdir()
-    told = dict.fromkeys(
-        ("author", "citation", "license", "funder", "url", "identifier", "privacyPolicy", "keywords"), "x"
-    )
-    describe(folder, **told)
-    assert validate(folder).warnings == ()
 
 
 @pytest.mark.parametrize(
@@ -204,21 +172,6 @@ def with_cell(column: str, cell: str) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("column", "cells"),
-    [
-        ("name", ["", "n/a", '"two\nlines, ""quoted"""', "=1", "🌊"]),
-        ("count", ["1", "99"]),
-        ("speed", ["0", "0.0", "1e-05", "12.25", "n/a", "3e+20"]),
-        ("real", ["true", "false"]),
-        ("level", ["low", "high", "n/a"]),
-        ("at", ["2026-03-01T10:00:00.000+01:00", "1999-12-31T23:59:59.999-11:30"]),
-    ],
-)
-def test_what_the_dictionary_permits_is_right(column: str, cells: list[str]) -> None:
-    assert found(*(with_cell(column, cell) for cell in cells)) == []
-
-
-@pytest.mark.parametrize(
     ("column", "cell", "sentence"),
     [
         ("count", "0", "'0' is not a whole number from 1 to 99"),
@@ -237,18 +190,3 @@ def test_what_the_dictionary_permits_is_right(column: str, cells: list[str]) -> 
 )
 def test_what_it_does_not_permit_is_named_with_its_row(column: str, cell: str, sentence: str) -> None:
     assert found(RIGHT, with_cell(column, cell), with_cell(column, cell)) == [f"row 3, {column}: {sentence}"]
-
-
-def test_columns_are_those_of_the_dictionary_in_its_order() -> None:
-    names = header(COLUMNS)
-    assert found(names=names[1:]) == ["columns are missing: name"]
-    assert found(names=(*names, "mood")) == ["columns are unknown: mood"]
-    assert found(names=(names[1], names[0], *names[2:])) == ["columns are in another order or duplicated"]
-    assert found(names=(*names, "name")) == ["columns are in another order or duplicated"]
-    assert found(RIGHT, RIGHT[:-1]) == ["row 3 has 5 cells, not 6"]
-
-
-@pytest.mark.parametrize("content", [b"", b"\xff", b'name,"count\n'])
-def test_what_is_no_table_is_named(content: bytes) -> None:
-    (problem,) = problems(content, COLUMNS)
-    assert problem.startswith(("columns are missing", "is not CSV in UTF-8"))

@@ -30,6 +30,9 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Start) -> None:
     (store.folder.recordings / "trial-002.parquet").write_bytes(b"PAR1")
     (study / "data" / "sub-P010" / "ses-01").mkdir(parents=True)
     open_one = start("P011")
+    (study / SESSION / "crash.txt").touch()
+    assert "crash" not in warned(verify(study))
+    (study / SESSION / "crash.txt").write_text("Fatal Python error: Segmentation fault")
     findings = verify(study)
     open_one.close()
     for sentence in (
@@ -39,23 +42,13 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Start) -> None:
         "sub-P009/ses-01/.receipt.json.0123abcd.tmp: is an incomplete file",
         "sub-P009/ses-01/recordings: trial 1, attempt 1 has none: No space left on device",
         "sub-P009/ses-01/recordings/trial-002.parquet: is in no line of the journal",
+        "sub-P007/ses-01/crash.txt: shows where the program crashed",
         "sub-P010/ses-01: was created, but the program ended before it wrote a journal",
         "sub-P011/ses-01: is open in another program",
         "data/.x.csv.0123abcd.tmp: is an incomplete file of a program that was ended, or is being written",
     ):
         assert sentence in warned(findings)
     assert told(findings) == ""
-
-
-@pytest.mark.slow
-def test_the_trace_of_a_crash_is_told_and_an_empty_one_is_not(study: Path) -> None:
-    trace = study / SESSION / "crash.txt"
-    trace.touch()
-    assert "crash" not in warned(verify(study))
-    trace.write_text("Fatal Python error: Segmentation fault")
-    findings = verify(study)
-    assert findings.errors == ()
-    assert "sub-P007/ses-01/crash.txt: shows where the program crashed" in warned(findings)
 
 
 @pytest.mark.slow
@@ -119,15 +112,6 @@ def test_a_table_of_a_session_that_has_not_ended_tells_nothing_else_than_its_jou
     (path,) = study.glob(name)
     replace(old, new)(path)
     assert f"{path.relative_to(study).as_posix()}: differs from the journal" in told(verify(study))
-
-
-@pytest.mark.slow
-def test_a_trial_without_its_recording_is_known_at_the_end(study: Path, start: Start) -> None:
-    store = start("P009", recordings=True)
-    told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
-    store.append("trial_started", trial=1, attempt=1, **told_of)
-    store.finish("aborted")
-    assert "recordings: trial 1, attempt 1 has none, and the journal gives no reason" in warned(verify(study))
 
 
 def test_samples_that_were_dropped_are_known(study: Path) -> None:
