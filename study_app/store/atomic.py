@@ -17,6 +17,7 @@ from typing import BinaryIO
 from study_app.errors import StoreError
 
 OLD_S = 3600.0  # longer than from the last write of a temporary file to its renaming
+_NO_FLUSH = (errno.EINVAL, errno.EBADF, errno.ENOTSUP)  # of a folder that cannot be flushed
 _TEMPORARY = re.compile(r"\.[^.].*\.[0-9a-f]{8}\.tmp")  # without those of hidden files: markers are created and removed
 
 
@@ -246,12 +247,18 @@ def disk_time_ns(folder: Path) -> int:
 
 
 def sync_folder(path: Path) -> None:
-    """Flush the folder's entries, so that a file created or renamed in it survives a power cut."""
+    """Flush the folder's entries, so that a file created or renamed in it survives a power cut.
+
+    Some network drives cannot flush a folder; then the server orders its entries itself.
+    """
     if sys.platform == "win32":  # a folder cannot be opened there; the file system orders its entries itself
         return
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in _NO_FLUSH:
+            raise
     finally:
         os.close(descriptor)
 

@@ -175,15 +175,19 @@ class Journal:
         self.close()
 
     def _refuse_if_replaced(self) -> None:
-        """Refuse to write into a file that no longer has the journal's name."""
+        """Refuse to write into a file that no longer has the journal's name, or that another program wrote."""
+        torn = self._torn  # then the file may be longer
         try:
-            there = os.path.samestat(self.path.stat(), os.fstat(self.file.fileno()))
+            found = self.path.stat()
+            there = os.path.samestat(found, os.fstat(self.file.fileno()))
         except FileNotFoundError:
             there = False
         except OSError as error:
             raise cannot_write(self.path, error) from error
         if not there:
             raise StoreError(f"{self.path} was moved, deleted or replaced while the session ran: put it back")
+        if found.st_size != self._size and not torn:
+            raise StoreError(f"{self.path} was written by another program while the session ran: end this session")
 
     def _write(self, content: bytes) -> bool:
         """Write a line after the last whole one; return whether it must be waited for because something failed."""

@@ -1,0 +1,180 @@
+"""Results on what behaves as a network drive, as far as one computer can simulate it."""
+
+import errno
+import os
+import stat
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import Any, Self
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.cli import commands
+from study_app.errors import StoreError
+from study_app.session.pages import TroublePage
+from study_app.session.runner import RETRY_S
+from study_app.session.transitions.events import Note
+from study_app.session.transitions.state import Phase
+from study_app.store.folders import StudyFolder
+from study_app.store.sessions import folder_lock
+from study_app.store.sessions.open_session import SessionStore
+from study_app.store.sessions.reopen import reopen
+from study_app.store.verification.verify_study import verify
+from tests.faults.support.worlds import StoredWorld
+from tests.session import small
+from tests.studies import rehearsed
+
+Hide = Callable[[Path], AbstractContextManager[None]]
+
+
+@pytest.fixture
+def drive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder without locks and links, whose entries cannot be flushed, and of which nothing is renamed to another."""
+    fcntl = pytest.importorskip("fcntl", reason="imitates the errors of POSIX systems")
+
+    def refuse(*_given: object, **_named: object) -> None:
+        raise OSError(errno.ENOTSUP, os.strerror(errno.ENOTSUP))
+
+    def within_a_folder(rename: Callable[..., None]) -> Callable[..., None]:
+        def renamed(old: Any, new: Any, **given: Any) -> None:
+            if Path(old).parent != Path(new).parent:
+                raise OSError(errno.EXDEV, os.strerror(errno.EXDEV))
+            rename(old, new, **given)
+
+        return renamed
+
+    def flush(descriptor: int, whole: Callable[[int], None] = os.fsync) -> None:
+        if stat.S_ISDIR(os.fstat(descriptor).st_mode):
+            raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
+        whole(descriptor)
+
+    for module, name in ((fcntl, "flock"), (fcntl, "lockf"), (os, "link"), (os, "symlink")):
+        monkeypatch.setattr(module, name, refuse)
+    for name in ("rename", "replace"):
+        monkeypatch.setattr(os, name, within_a_folder(getattr(os, name)))
+    monkeypatch.setattr(os, "fsync", flush)
+    return tmp_path
+
+
+@pytest.mark.slow
+def test_sessions_and_commands_do_without_locks_links_and_flushes_of_folders(drive: Path) -> None:
+    world = StoredWorld(drive / "small")
+    world.start()
+    world.until(Phase.COMPLETE)
+    assert verify(drive / "small").sound
+    study, asked = rehearsed(drive), ("--by", "AB", "--reason", "a test")
+    session = study / "data" / "sub-P001" / "ses-01"
+    (session / "checksums.sha256").unlink()
+    for words in (
+        ("rebuild", session),
+        ("unblind", study, *asked),
+        ("exclude", study, "--participant", "P001", *asked),
+        ("include", study, "--participant", "P001", *asked),
+        ("export", study, "--to", drive / "exported"),
+        ("merge", "--site", f"A={study}", "--to", drive / "merged"),
+        ("withdraw", study, "--participant", "P002", *asked),
+        ("verify", study),
+    ):
+        done = CliRunner().invoke(commands, [str(word) for word in words])
+        assert done.exit_code == 0, (words, done.output, done.exception)
+
+
+@pytest.mark.parametrize(("call", "number"), [("fsync", errno.EDQUOT), ("fsync", errno.EIO), ("fstat", errno.ESTALE)])
+def test_a_drive_that_is_full_or_gone_at_a_flush_is_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str, number: int
+) -> None:
+    def fail(_descriptor: int) -> None:
+        raise OSError(number, os.strerror(number))
+
+    world = StoredWorld(tmp_path / "study")
+    world.start()
+    world.until(Phase.ANSWERING)
+    with monkeypatch.context() as patched:
+        patched.setattr(os, call, fail)
+        world.runner.post(Note(world.clock(), "note", "on a full drive"))
+        assert isinstance(world.pages[-1], TroublePage)
+        assert os.strerror(number) in (world.runner.stalled or "")
+    world.run(RETRY_S + 0.1)
+    world.until(Phase.COMPLETE)
+    assert [line["n"] for line in world.lines] == list(range(1, len(world.lines) + 1))
+    assert sum(len(line["items"]) for line in world.lines if line["event"] == "responses") == small.RESPONSES
+    assert verify(tmp_path / "study").sound
+
+
+class Entries(list[Any]):
+    """What ``os.scandir`` returns, of a list."""
+
+    def __next__(self) -> Any:
+        if not self:
+            raise StopIteration
+        return self.pop(0)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None: ...
+
+
+@pytest.fixture
+def hide(monkeypatch: pytest.MonkeyPatch) -> Hide:
+    """Let a path, and what lies below it, be seen neither in its folder nor by its name, though it is there."""
+
+    @contextmanager
+    def hidden(path: Path) -> Iterator[None]:
+        look, names, entries = os.stat, os.listdir, os.scandir
+
+        def stat_of(looked: Any, **given: Any) -> os.stat_result:
+            if not isinstance(looked, int) and path in (Path(looked), *Path(looked).parents):
+                raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(looked))
+            return look(looked, **given)
+
+        def scanned(folder: Any = ".") -> Any:
+            if isinstance(folder, int):
+                return entries(folder)
+            with entries(folder) as found:
+                return Entries([entry for entry in found if Path(folder) / entry.name != path])
+
+        with monkeypatch.context() as patched:
+            patched.setattr(os, "stat", stat_of)
+            patched.setattr(os, "listdir", lambda of=".": [it for it in names(of) if Path(of) / it != path])
+            patched.setattr(os, "scandir", scanned)
+            yield
+
+    return hidden
+
+
+def begun(study: Path, participant: str) -> SessionStore:
+    return StoredWorld(study, participant).store
+
+
+def test_what_another_computer_created_and_the_drive_shows_late_is_never_created_again(
+    tmp_path: Path, hide: Hide
+) -> None:
+    study = StudyFolder(tmp_path / "study")
+    first = begun(study.path, "P001")
+    before = {path: path.read_bytes() for path in study.path.rglob("*") if path.is_file()}
+    for late, participant in ((study.session("P001", 1).path, "P001"), (study.key.parent, "P002")):
+        with hide(late), pytest.raises(StoreError):
+            begun(study.path, participant)
+        assert before.items() <= {path: path.read_bytes() for path in study.path.rglob("*") if path.is_file()}.items()
+    first.close()
+    begun(study.path, "P002").close()
+    assert verify(study.path).errors == ()
+
+
+def test_of_two_programs_that_do_not_see_each_others_lock_the_first_writes_no_line_over_the_seconds(
+    tmp_path: Path, hide: Hide
+) -> None:
+    first = begun(tmp_path / "study", "P001")
+    (marker,) = folder_lock.markers(first.folder.path)
+    with hide(marker):
+        second = reopen(first.folder.path, small.protocol(), b"small", operator="AB", device={}, screens={})
+    second.append("note", kind="note", text="of the second")
+    with pytest.raises(StoreError, match=r"journal\.jsonl was written by another program"):
+        first.append("note", kind="note", text="of the first")
+    second.finish("completed")
+    first.close()
+    assert [line.get("text") for line in second.lines][-2] == "of the second"
+    assert verify(tmp_path / "study").errors == ()
