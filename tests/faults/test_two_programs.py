@@ -37,6 +37,7 @@ COMMANDS = {
     "withdraw P001": ("withdraw", "--participant", "P001", *ASKED),
     "withdraw P002": ("withdraw", "--participant", "P002", *ASKED),
     "export": ("export", "--to", "exported"),
+    "report": ("report", "--to", "exported"),
     "verify": ("verify",),
 }
 PAIRS = [
@@ -46,6 +47,8 @@ PAIRS = [
     ("withdraw P001", "withdraw P002"),
     ("withdraw P001", "unblind"),
     ("withdraw P001", "verify"),
+    pytest.param(("exclude P001", "report"), marks=pytest.mark.nightly),
+    pytest.param(("withdraw P001", "report"), marks=pytest.mark.nightly),
 ]
 
 
@@ -85,7 +88,7 @@ def test_two_programs_leave_a_sound_study(
         assert codes in ([0, 0], [0, 2], [0, 3], [2, 2]), ended  # of two that write, at most one continues
         for words, code, said in ended:
             assert "Traceback" not in said
-            assert code == 0 or len(said.splitlines()) == 1 or words[0] in ("export", "verify"), said
+            assert code == 0 or len(said.splitlines()) == 1 or words[0] in ("export", "report", "verify"), said
         assert verify(folder / "study").errors == (), ended
         effects = [words for words, code, _ in ended if code == 0]
         if reveals := sum(words[0] == "unblind" for words in effects):

@@ -12,7 +12,6 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.store import receipt
-from study_app.store.checksums import read_checksums
 from study_app.store.journals import journal
 from study_app.store.recording_files import read_facts
 from study_app.store.sessions.open_session import SessionStore
@@ -93,16 +92,6 @@ def test_a_recording_that_is_lost_is_said_to_be(start: Start, samples_of: Make) 
     (lost,) = [line for line in journal.read(store.folder.journal) if line["event"] == "recording_lost"]
     assert (lost["trial"], lost["attempt"], lost["reason"]) == (1, 1, "File exists")
     assert rows_of(store, "trials")[0]["recording"] == "n/a"
-
-
-def test_checksums_of_a_finished_session_are_those_of_its_files(finished: Start) -> None:
-    store = finished()
-    listed = read_checksums(store.folder)
-    assert sorted(listed) == sorted(
-        path.name for path in store.folder.path.iterdir() if path.name != "checksums.sha256"
-    )
-    for name, digest in listed.items():
-        assert hashlib.sha256((store.folder.path / name).read_bytes()).hexdigest() == digest
 
 
 def test_an_end_that_was_half_written_is_finished_by_another_call(

@@ -100,13 +100,16 @@ def test_a_changed_or_added_file_is_never_vouched_for(tmp_path: Path, ended: Ses
 
 
 def test_half_written_files_are_taken_away_and_nothing_else(ended: SessionStore) -> None:
-    ended.folder.recordings.mkdir()
-    half = [ended.folder.path / ".trials.csv.0123abcd.tmp", ended.folder.recordings / ".trial-001.parquet.0123abcd.tmp"]
-    kept = [ended.folder.path / "notes.tmp", ended.folder.path / ".mine.tmp", ended.folder.recordings / "own.parquet"]
-    for path in (*half, *kept):
+    here, below = ended.folder.path, ended.folder.recordings
+    below.mkdir()
+    half = [here / ".folder.0123abcd.tmp", here / ".trials.csv.0123abcd.tmp", below / ".trial-001.parquet.0123abcd.tmp"]
+    names = ("notes.tmp", ".mine.tmp", ".open-0123abcd.bak", "..open-01234567.json.0123abcd.tmp")
+    kept = [*(here / name for name in names), below / "own.parquet"]
+    half[0].mkdir()
+    for path in (half[0] / "inside", *half[1:], *kept):
         path.write_bytes(b"x")
-    assert rebuild(ended.folder.path).swept == tuple(half)
-    assert [path.exists() for path in (*half, *kept)] == [False, False, True, True, True]
+    assert rebuild(here).swept == tuple(half)
+    assert [path.exists() for path in (*half, *kept)] == [False] * 3 + [True] * 5
 
 
 def three_answers(store: SessionStore) -> None:

@@ -5,13 +5,14 @@ from typing import Any, BinaryIO
 
 import pytest
 
+from study_app.protocol.model import Protocol
 from study_app.store import atomic
 from study_app.store.blinded.blinding import reveal
-from study_app.store.journals.cut_journal import refuse_if_cut
 from study_app.store.sessions.open_session import SessionStore, table_files
 from study_app.store.sessions.rebuild import rebuild
+from study_app.store.sessions.reopen import check_can_go_on
 from study_app.store.verification.verify_study import verify
-from tests.store.conftest import FullDisk, Start
+from tests.store.conftest import SOURCE, FullDisk, Start
 
 PAGES = 5_000
 NOTES = ("first, of two lines\nand a comma", "=1+2", '"quoted"')
@@ -110,7 +111,7 @@ def test_a_table_that_somebody_changed_is_written_whole(start: Start, summary: d
 
 @pytest.mark.slow
 def test_killed_between_any_two_bytes_a_table_is_accepted_and_completed(
-    start: Start, summary: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+    start: Start, protocol: Protocol, summary: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A note of two lines is torn inside its quotes, too."""
     with start() as store:
@@ -138,7 +139,7 @@ def test_killed_between_any_two_bytes_a_table_is_accepted_and_completed(
         found = verify(store.place.study_folder.path)
         assert found.errors == ()
         assert any("differs from the journal" in one.message for one in found.warnings)
-        refuse_if_cut(store.place, store.lines)
+        check_can_go_on(store.folder.path, protocol, SOURCE)
         assert path in rebuild(store.folder.path).rewritten
         assert path.read_bytes() == whole
 

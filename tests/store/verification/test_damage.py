@@ -1,16 +1,18 @@
-"""Damaged files of a study: single bits and values of another type, with fixed seeds, in files of every kind."""
+"""Damaged files of a study: single bits and values of another type, with fixed seeds; recordings, too."""
 
 import contextlib
 import os
 import random
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from study_app.errors import StudyError
 from study_app.protocol.model import Protocol
+from study_app.store import recording_files
 from study_app.store.blinded import blinding
 from study_app.store.exclusions import exclude
 from study_app.store.journals.journal import scan
@@ -20,7 +22,7 @@ from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from study_app.viewmodels.sessions import sessions
 from tests.damage import with_a_bit_flipped, with_an_odd_value, with_deep_nesting
-from tests.store.conftest import SOURCE, Attend, Start
+from tests.store.conftest import SOURCE, Attend, Make, Start
 
 pytestmark = pytest.mark.slow
 
@@ -102,3 +104,52 @@ def test_a_damaged_journal_is_listed_as_damaged_and_never_sound(
         assert listed["P008"] == "unfinished"
         if scan(path).damage is not None:
             assert listed["P007"] == "damaged"
+
+
+@pytest.fixture
+def session(start: Start, samples_of: Make, summary: dict[str, Any]) -> Path:
+    """Return the folder of a session with one recorded trial, which ended."""
+    store = start(recordings=True)
+    assert store.recorder is not None
+    store.append("trial_started", trial=1, attempt=1, block="b", phase="main", part=1, index=1, of=1, code="L1")
+    store.recorder.start(1, 1, 1000.0)
+    store.recorder.append(samples_of(40))
+    for shown in range(9):
+        store.recorder.frame(16 * shown + 9, 16 * shown)
+    store.recorder.stop()
+    store.append("trial_ended", trial=1, attempt=1, outcome="complete", **summary)
+    store.finish("completed")
+    return store.folder.path
+
+
+def flipped(content: bytes, chance: random.Random, *, footer: bool) -> Iterator[bytes]:
+    """Yield the file with one bit changed, again and again: in its footer, or anywhere."""
+    size = 8 + int.from_bytes(content[-8:-4], "little") if footer else len(content)
+    while True:
+        at = len(content) - 1 - chance.randrange(size)
+        yield content[:at] + bytes([content[at] ^ 1 << chance.randrange(8)]) + content[at + 1 :]
+
+
+READERS = (
+    recording_files.read_samples,
+    recording_files.read_frames,
+    recording_files.read_checks,
+    recording_files.read_facts,
+)
+
+
+@pytest.mark.parametrize("footer", [False, True], ids=["anywhere", "footer"])
+@pytest.mark.parametrize("name", ["trial-001.parquet", "trial-001_frames.parquet"])
+def test_a_changed_bit_of_a_recording_is_an_error_and_never_a_traceback(session: Path, name: str, footer: bool) -> None:
+    path = session / "recordings" / name
+    content = path.read_bytes()
+    chance = random.Random(f"{SEED} {name} {footer}")  # noqa: S311 - a fixed choice of damage
+    changes = flipped(content, chance, footer=footer)
+    for number in range(CASES * 20):
+        path.write_bytes(next(changes))
+        for read in READERS:
+            with contextlib.suppress(StudyError):
+                read(path)
+        if number % 20 == 0:
+            findings = verify(session.parents[2])
+            assert any(name in str(error) for error in findings.errors)

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import json
 import re
 import shutil
 from collections.abc import Callable
@@ -12,6 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
+from study_app.errors import StoreError
 from study_app.evaluation.replay import replay
 from study_app.session.simulated.rehearsal import rehearse, resume
 from study_app.store.blinded.blinding import read_key
@@ -20,6 +22,7 @@ from study_app.store.blinded.unblinding import unblind
 from study_app.store.journals import journal
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
+from tests.compiled import needs_servo
 from tests.protocol.trials.level_studies import BLOCK, HEAD
 from tests.session.pairs import short_text
 from tests.store.forging import Lines, change, cut, nothing
@@ -159,3 +162,20 @@ def test_compared_conditions_follow_from_the_key(tmp_path: Path) -> None:
     found = reproduced(next((study / "data").glob("sub-*/ses-*")))
     assert found.differences == []
     assert found.followed == ["viscosity: 4 of 4 levels follow from the answers"]
+
+
+@needs_servo
+def test_a_rehearsed_session_is_reproduced_and_with_another_seed_it_is_not(tmp_path: Path) -> None:
+    session = rehearse("demo", participants=1, seed=3, results=tmp_path / "demo") / "data/sub-P001/ses-01"
+    assert reproduced(session).differences == []
+    receipt = session / "receipt.json"
+    told = json.loads(receipt.read_text())
+    differ = set()
+    for seed in range(8):
+        receipt.write_text(json.dumps(told | {"seed": seed}))
+        differ.add(bool(reproduced(session).differences))
+    assert True in differ
+    del told["seed"]
+    receipt.write_text(json.dumps(told))
+    with pytest.raises(StoreError, match="seed"):
+        reproduced(session)
