@@ -66,7 +66,7 @@ LIMITS: Final[Mapping[tuple[str, str], tuple[Limit, Limit, Limit]]] = {
     ("dampers", "kalman"): (Limit(3, 1), Limit(3, 1), Limit(3, 1)),
     (STEEP, "kalman"): (Limit(85, 87), Limit(92, 92), Limit(95, 95)),
     (HONEY, "ewma"): (Limit(40, 5), Limit(40, 26), Limit(74, 70)),
-    (BOUNDED, "ewma"): (Limit(4.2, 5), Limit(4.2, 5), Limit(10, 70)),
+    (BOUNDED, "ewma"): (Limit(4.2, 5), Limit(4.2, 5), Limit(11, 70)),
     (THESIS, "ewma"): (Limit(18, 5), Limit(40, 30), Limit(67, 60)),
     ("physical_liquids", "ewma"): (Limit(40, 5), Limit(40, 27), Limit(76, 73)),
     ("slime", "ewma"): (Limit(17, 5), Limit(58, 58), Limit(76, 76)),

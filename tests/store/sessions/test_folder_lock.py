@@ -81,6 +81,7 @@ def test_a_killed_program_that_nobody_has_waited_for_is_gone(tmp_path: Path) -> 
     "holder",
     ['{"host": "another-machine", "pid": 1, "began": 0.25}', "{torn", '{"host": HOST, "pid": null, "began": 0.25}']
     + [f'{{"host": HOST, "pid": {os.getpid()}, "began": {began}}}' for began in ('"1d2f 4711"', "null")],
+    ids=["another host", "torn", "no process", "other clock", "no start"],
 )
 def test_a_program_that_may_live_is_not_disturbed(tmp_path: Path, holder: str) -> None:
     marker = other(tmp_path)
