@@ -147,7 +147,8 @@ def test_a_lost_device_stays_lost_until_it_is_opened_again(subject: Subject) -> 
     subject.device.open()
     assert subject.is_quiet()
     assert subject.device.failure is None
-    assert subject.ticks(ticks.now_ns if subject.device.name == "falcon-emulated" else None).after(5) == READ_NEW
+    again = subject.ticks(ticks.now_ns if subject.device.name == "falcon-emulated" else None)
+    until(lambda: again.after(5) == READ_NEW, "it gives no position")
 
 
 @over(*MOVING)
@@ -390,7 +391,8 @@ def test_a_call_that_outlasts_closing_ends_the_force_when_it_returns(
     subject.device.close()
     assert kept
     subject.device.open()
-    assert subject.ticks(ticks.now_ns if subject.device.name == "falcon-emulated" else None).after(5) == READ_NEW
+    again = subject.ticks(ticks.now_ns if subject.device.name == "falcon-emulated" else None)
+    until(lambda: again.after(5) == READ_NEW, "it gives no position")
 
 
 PUSHES = """
@@ -434,6 +436,7 @@ def _served_force_dimension(
 
 
 @pytest.mark.slow
+@pytest.mark.flaky(reruns=2)  # on a busy machine an answer may come later than the driver waits for it
 @pytest.mark.parametrize("served", [_served_falcon, _served_inverse3, _served_force_dimension])
 def test_a_program_that_is_killed_while_it_pushes_leaves_no_force(
     served: Any, tmp_path: Path, request: pytest.FixtureRequest
