@@ -94,7 +94,8 @@ def _filled(paragraph: str) -> str:
 
 def _string(value: str, like: str, newline: str) -> str:
     if "\n" in value and "\r" not in value:
-        body = tomlkit.string(value, multiline=True).as_string()[3:-3]
+        # tomlkit writes another line break before a text that begins with one: with the sign, none does.
+        body = tomlkit.string(f"-{value}", multiline=True).as_string()[4:-3]
         return f'"""{newline}{body.replace(chr(10), newline)}"""'
     if like.startswith("'") and _LITERAL.fullmatch(value):
         return f"'{value}'"

@@ -4,7 +4,7 @@ import tomllib
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from study_app.authoring.writer.comments import comments_naming
@@ -21,6 +21,7 @@ VALUES = st.recursive(
 
 
 @pytest.mark.slow
+@example("\n", "", "\n")
 @given(VALUES, st.sampled_from(["", "'a'", '"""\n"""', "[\n  1,\n]"]), st.sampled_from(["\n", "\r\n"]))
 def test_written_is_read_back_as_the_same_value(value: Any, like: str, newline: str) -> None:
     assert tomllib.loads(f"key = {written(value, like, newline)}{newline}")["key"] == value
