@@ -13,7 +13,7 @@ from pytestqt.qtbot import QtBot
 
 from study_app.analysis.study_worker import carry_out
 from study_app.analysis.worker_client import start_analysis_worker
-from study_app.analysis.worker_messages import Answer, Order
+from study_app.analysis.worker_messages import Answer, Order, WriteReport
 from study_app.app.results_controller import ResultsController
 from study_app.errors import StudyError
 from study_app.gui.home.main_window import MainWindow
@@ -304,6 +304,29 @@ def test_other_results_can_be_looked_at(shown: Opened, tmp_path: Path) -> None:
 
 def nobody_left() -> bool:
     return not any(child.name == "analysis" for child in multiprocessing.active_children())
+
+
+def test_a_report_under_way_is_stopped(qtbot: QtBot, results: Path, tmp_path: Path) -> None:
+    workers: list[Here] = []
+
+    class Writes(Here):
+        """Never comes to the end of a report."""
+
+        def __init__(self) -> None:
+            super().__init__()
+            workers.append(self)
+
+        def order(self, order: Order) -> int:
+            return 0 if isinstance(order, WriteReport) else super().order(order)
+
+    opened = Opened(qtbot, results, Writes)
+    opened.click(opened.place.report)
+    dialog: Any = opened.place.writing
+    dialog.to.setText(str(tmp_path / "report"))
+    opened.click(dialog.go_on)
+    assert not workers[-1].stops
+    opened.click(dialog.cancel)
+    assert workers[-1].stops
 
 
 @pytest.mark.nightly

@@ -188,6 +188,12 @@ def test_keys_stay_sealed_and_are_opened_each(labs: dict[str, Path], pooled: Pat
     assert verify_folder(pooled).sound
 
 
+def test_no_key_is_opened_where_one_is_missing(pooled: Path) -> None:
+    (pooled / "sites/B/blinding/key.sealed").unlink()
+    assert "key.sealed cannot be read" in str(run("unblind", pooled, "--by", "AK", "--reason", "closed").exception)
+    assert reveals(pooled / "sites/A") == ()
+
+
 def test_exclusions_go_to_the_site(pooled: Path) -> None:
     assert run("exclude", pooled, "--participant", "B-P001", "--by", "AK", "--reason", "x").output == (
         "participant B-P001, session 1\n"
