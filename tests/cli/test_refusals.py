@@ -10,9 +10,11 @@ from click.testing import CliRunner
 from study_app import app
 from study_app.authoring.writer.refused import Refused
 from study_app.cli import commands, main
+from study_app.cli.devices import _ask_operator
 from study_app.errors import OutletError, ProtocolError, StudyError
 from study_app.store.workstation import DEFAULTS, MachineSettings, load, save
 from study_app.user_folder import settings_file
+from study_app.validation.accuracy import liquid_survey
 from tests.compiled import needs_servo
 
 
@@ -166,3 +168,22 @@ def test_bad_input_is_one_short_line_and_nothing_is_written(
     assert said in line
     assert len(line) < 600
     assert sorted(path.name for path in tmp_path.iterdir()) == ["far.csv", "fast.csv", "zero.csv"]
+
+
+def test_a_survey_of_liquids_is_written_into_a_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    written: list[tuple[Any, ...]] = []
+
+    def write(*what: Any) -> Path:
+        written.append(what)
+        return tmp_path / "survey.md"
+
+    monkeypatch.setattr(liquid_survey, "survey", lambda _scenes, _show: ("compared",))
+    monkeypatch.setattr(liquid_survey, "write_survey", write)
+    done = CliRunner().invoke(commands, ["accuracy", "--liquids", "--to", str(tmp_path)])
+    assert (done.exit_code, written) == (0, [(("compared",), tmp_path)]), done.output
+    assert done.stdout.strip() == str(tmp_path / "survey.md")
+
+
+def test_at_the_bench_enter_alone_answers_only_the_question_to_let_go() -> None:
+    asked: Any = SimpleNamespace(ask=lambda kind, _words: kind)
+    assert [_ask_operator(asked)(kind, "") for kind in ("let-go", "hang")] == ["let-go", "reading"]

@@ -13,6 +13,7 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
 from study_app.app.session import preflight_controller
+from study_app.app.session.live_session import LiveSession
 from study_app.app.session.preflight_controller import Appraisal, Preflight
 from study_app.errors import DeviceLost, DisplayError
 from study_app.evaluation.appraisal import Costs, Errors
@@ -148,6 +149,17 @@ def test_a_screen_that_is_removed_meanwhile_ends_the_question(asked: Preflight, 
     assert "cannot be used" in str(told.args[0])
     with qtbot.waitSignal(asked.failed, timeout=3000):
         asked.window.again.click()
+
+
+def test_a_session_on_two_screens_asks_about_the_participants(machine: Any, monkeypatch: Any, qapp: Any) -> None:
+    live = LiveSession(CHOSEN, LIGHT)
+    participants = SimpleNamespace(refreshRate=lambda: 75.0, devicePixelRatio=lambda: 1.5)
+    monkeypatch.setattr(live, "screens", lambda: (participants, QGuiApplication.primaryScreen()))
+    live._ask(Ready(machine, FACTS))
+    assert live.preflight is not None
+    said = [one.text() for one in live.preflight.window.findChildren(QLabel)]
+    live.preflight.close()
+    assert "75.0 Hz, 150 %" in said
 
 
 class ConnectedLater:

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QGuiApplication, QMouseEvent
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QBoxLayout, QWidget
 
 from study_app.authoring.fields import rows
 from study_app.gui.designer.form.special import EDITORS
@@ -61,6 +61,10 @@ def test_an_order_states_with_how_many_it_is_balanced(designer: Any) -> None:
         chip = designer.field("blocks", "liquids", "order").chip
         assert chip.isVisible()
         assert chip.word == words
+    field = designer.field("blocks", "liquids", "order")
+    for width, below in ((400, False), (150, True)):
+        field.resize(width, field.height())
+        assert (field.box.direction() == QBoxLayout.Direction.TopToBottom) == below
 
 
 def two_languages(designer: Any) -> None:

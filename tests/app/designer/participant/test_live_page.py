@@ -78,6 +78,11 @@ def test_the_page_is_that_of_the_selected_element(designer: Any, live: Any) -> N
     assert sorted(in_line, key=lambda part: part.x()) == in_line
     tab.moment_asked.emit(tab.view.moments[1][0])
     assert isinstance(live.page_window.page, QuestionnairePage)
+    designer.go_to("pages", "welcome")
+    first = tab.view.step
+    for by in (-1, 1, -1):
+        tab.step_asked.emit(by)
+    assert tab.view.step == first
 
 
 def test_a_trial_is_typed_stepped_to_and_played(qtbot: Any, designer: Any) -> None:

@@ -3,6 +3,7 @@
 import pytest
 
 from study_app.app.designer.participant.shown_step import STANDALONE, StepPosition, same_step, showing, step_name
+from study_app.app.designer.participant.sound_part import sound_part
 from study_app.app.designer.play.first_step import first_step
 from study_app.app.designer.play.playable import NotPlayableError, playable
 from study_app.authoring.edited_study import Study
@@ -72,6 +73,16 @@ def test_every_table_leads_to_the_first_step_that_shows_it(name: str, seed: int)
 
 def edited(name: str, *edits: Edit) -> Study:
     return Study(source_bytes(name).decode()).edited(*edits)[0]
+
+
+def test_an_element_that_is_gone_while_it_is_named_is_shown_as_it_was() -> None:
+    before = Study(source_bytes("demo").decode())
+    study = edited("demo", Unset(("liquids", "thin")))
+    found = sound_part(study, before.document)
+    assert study.protocol is None
+    assert found is not None
+    assert before.protocol is not None
+    assert found.liquids["thin"] == before.protocol.liquids["thin"]
 
 
 @pytest.mark.slow
