@@ -6,11 +6,10 @@ import pytest
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLabel, QLineEdit
+from PySide6.QtWidgets import QApplication, QLineEdit
 from shiboken6 import isValid
 
-from study_app.authoring.kept_settings import begin_settings, kept_original
-from study_app.gui.designer.outline.rows import ROW_ROLE
+from study_app.authoring.kept_settings import begin_settings
 from study_app.protocol.source.files import shipped
 from study_app.viewmodels.designer.requests import SetValue
 
@@ -40,23 +39,6 @@ def test_a_list_that_is_clicked_after_an_id_was_typed_stays_open(qtbot: Any, des
     liquids.hidePopup()
     qtbot.waitUntil(lambda: "[conditions.honey]" in designer.text)
     assert designer.place.view.form.path == ("conditions", "honey")
-
-
-def test_arrow_keys_walk_the_whole_outline_of_the_empty_study(qtbot: Any, designer: Any) -> None:
-    designer.controller.begin("template:empty", "walked")
-    tree = designer.place.outline.tree
-    qtbot.keyClick(designer.window, Qt.Key.Key_1, Qt.KeyboardModifier.ControlModifier)
-    seen = []
-    for _ in range(60):
-        qtbot.keyClick(tree, Qt.Key.Key_Down)
-        if tree.currentIndex().data(ROW_ROLE).path:
-            assert designer.editing.selected == tree.currentIndex().data(ROW_ROLE).path
-            assert designer.place.form.form.path == designer.editing.selected
-        seen.append(designer.editing.selected)
-    assert {("questionnaires",), ("groups",), ("scene",), ("limits",), ("analysis",)} <= set(seen)
-    designer.editing.select(("limits",))
-    designer.editing.ask(SetValue(("limits", "lateness_ms"), 3))
-    assert designer.value("limits") == {"lateness_ms": 3}
 
 
 def test_a_field_that_is_clicked_thrice_after_an_id_was_typed_takes_what_is_typed(qtbot: Any, designer: Any) -> None:
@@ -106,18 +88,6 @@ def test_an_entry_opens_by_enter_and_a_double_click(qtbot: Any, designer: Any, w
     else:
         qtbot.mouseDClick(field.rows[1], LEFT)
     assert designer.editing.selected == ("conditions", field.row.row.value[1])
-
-
-def test_the_question_before_a_delete_says_what_goes(designer: Any) -> None:
-    designer.controller.begin("template:compare-liquids", "liquids")
-    designer.go_to("liquids", "syrup")
-    designer.place.form.head.delete.click()
-    said = [one.text() for one in designer.place.prompt.findChildren(QLabel)]
-    assert "Condition Practice: Liquid" in said
-    assert "Also deletes: Block Practice, Condition Practice." in said
-    designer.place.prompt.all.click()
-    assert "practice" not in designer.value("blocks")
-    assert not designer.study.faults
 
 
 def listed(designer: Any) -> list[str]:
@@ -202,16 +172,6 @@ def test_ctrl_n_begins_a_study_anywhere_and_keeps_what_is_typed_for_one(
         assert title.hasFocus()
         qtbot.keyClicks(title, "a")
     assert title.text() == "aa"
-
-
-def test_the_fields_of_a_copy_can_be_edited_at_once(designer: Any) -> None:
-    title = ("pages", "welcome", "title")
-    designer.open("demo", *title[:2])
-    assert not designer.field(*title).isEnabled()
-    designer.controller.begin("demo", "mine")
-    designer.go_to(*title[:2])
-    assert designer.field(*title).isEnabled()
-    assert kept_original(designer.editing.opened.file) == "demo"
 
 
 def test_the_list_of_studies_is_no_wider_than_the_window_and_begins_at_its_first_line(designer: Any) -> None:

@@ -152,21 +152,6 @@ def test_a_file_that_may_not_be_written_is_read_only(designer: Any) -> None:
     assert "may not write" in designer.place.banner_words.text()
 
 
-def test_a_new_study_that_was_never_saved_is_found_again(designer: Any) -> None:
-    designer.controller.begin("template:compare-liquids", "mine")
-    file = designer.file.parent / "mine.toml"
-    assert not file.exists()
-    assert draft_of(file) is not None
-    again = type(designer.controller)(designer.results)
-    again.enter()
-    assert "mine.toml" in [choice.file for choice in again.place.header.state.studies]
-    again.open(str(file))
-    assert again.editing.opened.study.document["study"]["name"] == "mine"
-    again.saving.save()
-    assert file.exists()
-    again.place.deleteLater()
-
-
 def test_a_file_that_is_not_utf_8_is_refused_with_a_message(designer: Any) -> None:
     designer.file.write_bytes(b"format = 1\n# \xff\n")
     designer.open()

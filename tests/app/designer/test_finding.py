@@ -3,11 +3,10 @@
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QItemSelectionModel, QPoint, Qt
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.designer.outline.rows import ROW_ROLE
-from study_app.viewmodels.designer.requests import SetText
 
 pytestmark = pytest.mark.slow
 
@@ -36,29 +35,6 @@ def index_of(designer: Any, *path: str | int) -> Any:
 def expanded(designer: Any) -> set[Any]:
     tree = designer.place.outline.tree
     return {one.data(ROW_ROLE).path for one in designer.place.outline.indexes() if tree.isExpanded(one)}
-
-
-def test_the_drawer_opens_as_it_was_closed(qtbot: Any, small: Any) -> None:
-    outline, tree = small.place.outline, small.place.outline.tree
-    open_drawer(qtbot, small)
-    for path in (("liquids",), ("conditions",), ("questionnaires",)):
-        tree.expand(index_of(small, *path))
-    index = index_of(small, "conditions", "delay_125")
-    tree.selectionModel().setCurrentIndex(index, QItemSelectionModel.SelectionFlag.ClearAndSelect)
-    tree.verticalScrollBar().setValue(tree.verticalScrollBar().value() + 60)  # away from the lower edge
-    before, at = expanded(small), tree.visualRect(tree.currentIndex()).top()
-    assert tree.verticalScrollBar().value() > 60
-    qtbot.keyClick(tree, KEY.Key_Return)
-    assert not outline.isVisible()
-    assert small.place.form.isAncestorOf(small.keyboard)
-    small.editing.ask(SetText(("study", "title"), "en", "Another title"))  # the rows are made anew
-    small.controller.show_outline()
-    open_drawer(qtbot, small)
-    assert small.editing.selected == ("conditions", "delay_125")
-    assert tree.currentIndex().data(ROW_ROLE).path == ("conditions", "delay_125")
-    assert outline.selected == (("conditions", "delay_125"),)
-    assert expanded(small) == before
-    assert tree.visualRect(tree.currentIndex()).top() == at
 
 
 def test_a_click_in_the_drawer_leads_to_the_form_and_leaves_what_is_open(qtbot: Any, small: Any) -> None:

@@ -106,18 +106,6 @@ def test_typing_into_the_file_reaches_the_form_and_a_fault_its_field(qtbot: Any,
     assert not designer.form_row("blocks", "liquids", "order").wrong.isVisible()
 
 
-def test_esc_restores_what_was_accepted_last(qtbot: Any, designer: Any) -> None:
-    designer.open("kitchen", "device")
-    line = designer.field("device", "force_limit_n").line
-    line.setFocus()
-    for typed, key in (("5", "Return"), ("strong", "Return"), ("", "Escape")):
-        line.selectAll()
-        qtbot.keyClicks(line, typed)
-        designer.key(key)
-    assert line.text() == "5"
-    assert designer.value("device", "force_limit_n") == 5
-
-
 def test_a_file_that_is_not_toml_keeps_the_outline_and_says_its_fault(qtbot: Any, designer: Any) -> None:
     designer.open()
     rows = len(designer.place.outline.rows)

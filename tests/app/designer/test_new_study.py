@@ -187,30 +187,6 @@ def test_tab_goes_through_the_questions_to_the_button_that_makes_the_study(qtbot
         assert designer.keyboard is page.make
 
 
-@pytest.mark.parametrize("width", [1600, 1024])
-def test_arrows_skip_no_card_and_no_row(qtbot: Any, designer: Any, width: int) -> None:
-    designer.window.resize(width, 1000)
-    designer.controller.ask_for_new()
-    page = designer.place.new_page
-    qtbot.waitUntil(lambda: page.buttons[-1].y() > 0)
-    rows = sorted({one.y() for one in page.buttons})
-
-    def press(key: Qt.Key, one: Any) -> Any:
-        one.setChecked(True)
-        one.setFocus()
-        qtbot.keyClick(one, key)
-        there = designer.keyboard
-        assert there.isChecked()
-        return there
-
-    for at, one in enumerate(page.buttons):
-        row = rows.index(one.y())
-        assert press(Qt.Key.Key_Right, one) is page.buttons[min(at + 1, len(page.buttons) - 1)]
-        assert press(Qt.Key.Key_Left, one) is page.buttons[max(at - 1, 0)]
-        for key, by in ((Qt.Key.Key_Down, 1), (Qt.Key.Key_Up, -1)):
-            assert rows.index(press(key, one).y()) == min(max(row + by, 0), len(rows) - 1)
-
-
 def test_a_draft_can_be_continued_where_no_study_is_open(designer: Any) -> None:
     designer.open("kitchen", "device")
     designer.editing.ask(SetValue(("device", "force_limit_n"), 3.0))
@@ -224,17 +200,3 @@ def test_a_draft_can_be_continued_where_no_study_is_open(designer: Any) -> None:
     assert another.editing.opened.study.text == text
     assert another.editing.selected == ("device",)
     another.place.deleteLater()
-
-
-def test_enter_begins_a_study_at_a_language_too(qtbot: Any, designer: Any) -> None:
-    designer.controller.ask_for_new()
-    page = designer.place.new_page
-    begun: list[str] = []
-    page.begin_asked.connect(lambda _source, name, _answers: begun.append(name))
-    qtbot.keyClicks(page.card.questions.title, "Two drinks")
-    dutch = page.card.questions.languages["nl"]
-    dutch.setFocus()
-    qtbot.keyClick(dutch, Qt.Key.Key_Space)
-    qtbot.keyClick(dutch, Qt.Key.Key_Return)
-    assert begun == ["twodrinks"]
-    assert designer.value("study", "languages") == ("en", "nl")

@@ -23,29 +23,6 @@ def leave(part: QWidget) -> None:
     QApplication.sendEvent(part, QEvent(QEvent.Type.Leave))
 
 
-def test_the_list_keeps_its_height_and_stays_while_the_pointer_is_over_it(designer: Any) -> None:
-    text = designer.file.read_text()
-    broken = text.replace("force_limit_n = 6", "force_limit_n = 60").replace('liquid = "thick"', 'liquid = "thik"', 1)
-    designer.file.write_text(broken.replace("[blocks.liquids]\n", "[blocks.liquids]\nnonsense = 1\n"))
-    designer.open()
-    designer.place.header.problems.click()
-    problems, count = designer.place.problems, len(designer.place.view.problems)
-    assert count >= 2
-    enter(problems)
-    high = problems.height()
-    designer.editing.ask(SetValue(("device", "force_limit_n"), 6))
-    assert len(designer.place.view.problems) < count
-    assert problems.height() == high
-    leave(problems)
-    assert problems.height() < high
-    enter(problems)
-    designer.editing.type_text("Correct the file", text)
-    assert designer.place.view.problems == ()
-    assert problems.isVisible()
-    leave(problems)
-    assert not problems.isVisible()
-
-
 def test_no_line_moves_while_the_pointer_is_over_the_list(qtbot: Any, designer: Any) -> None:
     text = designer.file.read_text()
     broken = text.replace("force_limit_n = 6", "force_limit_n = 60").replace('liquid = "thick"', 'liquid = "thik"', 1)

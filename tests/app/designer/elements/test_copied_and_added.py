@@ -7,11 +7,6 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
-from study_app.app.designer.edit_steps import Steps
-from study_app.authoring.edited_study import Study
-from study_app.protocol.source.files import shipped_file
-from study_app.viewmodels.designer.requests import DuplicateEntries, MoveEntries
-
 pytestmark = pytest.mark.slow
 
 CONDITIONS = ("blocks", "liquids", "conditions")
@@ -83,44 +78,6 @@ def test_entries_are_selected_by_keys_alone(qtbot: Any, four: Any) -> None:
     assert [one in copied for one in ("conditions.thick", "conditions.c", "conditions.d")] == [True] * 3
     four.key("Delete")
     assert names(four) == "thin"
-
-
-def test_several_questions_are_selected_in_the_form_and_copied_and_deleted_together(qtbot: Any, designer: Any) -> None:
-    designer.open()
-    items = designer.value("questionnaires", "liquid", "items")
-    count = len(items)
-    designer.go_to(*ITEMS, 0)
-    rows = designer.place.form.others
-    qtbot.mouseClick(rows[0], Qt.MouseButton.LeftButton, CONTROL, QPoint(60, 10))
-    assert designer.place.view.form.path == (*ITEMS, 0)
-    assert designer.place.outline.selected == ((*ITEMS, 0), (*ITEMS, 1))
-    assert rows[0].chosen
-    qtbot.mouseClick(rows[0], Qt.MouseButton.LeftButton, CONTROL, QPoint(60, 10))
-    assert not rows[0].chosen
-    qtbot.mouseClick(rows[0], Qt.MouseButton.LeftButton, SHIFT, QPoint(60, 10))
-    designer.place.form.head.copy.click()
-    after = [item["id"] for item in designer.value("questionnaires", "liquid", "items")]
-    assert len(after) == count + 2
-    assert after[1].startswith(items[0]["id"])
-    assert after[3].startswith(items[1]["id"])
-    assert designer.place.outline.selected == ((*ITEMS, 1), (*ITEMS, 3))
-    designer.place.form.head.delete.click()
-    assert designer.place.prompt is None
-    left = designer.value("questionnaires", "liquid", "items")
-    assert [item["id"] for item in left] == [item["id"] for item in items]
-
-
-def test_values_of_a_list_are_moved_and_copied_with_the_others_in_place() -> None:
-    study = Study(shipped_file("demo").read_text())
-    targets = ("tasks", "reach", "targets_mm")
-    first, second = study.document["tasks"]["reach"]["targets_mm"]
-    step = Steps().step(study, DuplicateEntries(((*targets, 0), (*targets, 1))))
-    copied, _ = study.edited(*step.edits)
-    assert copied.document["tasks"]["reach"]["targets_mm"] == (first, first, second, second)
-    step = Steps().step(copied, MoveEntries(((*targets, 0), (*targets, 1)), 4))
-    moved, _ = copied.edited(*step.edits)
-    assert moved.document["tasks"]["reach"]["targets_mm"] == (second, second, first, first)
-    assert step.select is None
 
 
 LEFT = Qt.MouseButton.LeftButton
@@ -196,18 +153,6 @@ def test_a_language_is_added_everywhere_filled_in_and_taken_away(qtbot: Any, des
     assert not designer.field("pages", "welcome", "title").copied.isVisible()
     for _ in range(3):
         designer.editing.undo()
-    assert designer.text == before
-
-
-def test_a_picker_adds_what_it_names_in_one_step(designer: Any) -> None:
-    designer.open()
-    before = designer.text
-    designer.editing.select(("conditions", "thin"))
-    choice = designer.field("conditions", "thin", "liquid").list
-    choice.activated.emit(choice.findText("New liquid …"))
-    assert designer.editing.selected == ("liquids", "liquid")
-    assert designer.value("conditions", "thin", "liquid") == "liquid"
-    designer.editing.undo()
     assert designer.text == before
 
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QLabel
+from PySide6.QtWidgets import QLabel
 
 from study_app.app.designer.edit_steps import Steps
 from study_app.authoring.edited_study import read
@@ -13,49 +13,10 @@ from study_app.authoring.writer.edits import Set
 from study_app.protocol.source.document import value_at
 from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.addable import addable
-from study_app.viewmodels.designer.form.form_rows import position_of
-from study_app.viewmodels.designer.requests import (
-    AddElement,
-    AddKey,
-    ChangeLanguage,
-    DuplicateElement,
-    MoveElement,
-    RenameElement,
-    SetText,
-    SwitchKind,
-)
+from study_app.viewmodels.designer.requests import ChangeLanguage, RenameElement, SetText, SwitchKind
 from tests.authoring.grown import PROTOCOLS
 
 pytestmark = pytest.mark.slow
-
-
-def test_elements_are_added_copied_moved_renamed_and_deleted(designer: Any) -> None:
-    controller = designer.controller
-    controller.open("kitchen")
-    first = designer.text
-
-    controller.editing.ask(AddElement(("liquids",)))
-    assert controller.editing.opened.history.selected == ("liquids", "liquid")
-    controller.editing.ask(RenameElement(("liquids", "liquid"), "syrup2"))
-    assert designer.place.view.form.id == "syrup2"
-
-    controller.editing.ask(DuplicateElement(("blocks", "liquids")))
-    assert controller.editing.opened.history.selected == ("blocks", "liquids_2")
-    assert controller.editing.opened.study.faults == ()
-    steps = controller.editing.opened.study.document["sequence"]
-    assert steps.index("liquids_2") == steps.index("liquids") + 1
-    controller.editing.ask(MoveElement(("blocks", "liquids_2"), -1))
-    moved = controller.editing.opened.study.document["sequence"]
-    assert moved.index("liquids_2") == moved.index("liquids") - 1
-
-    controller.ask_to_delete(("tasks", "explore"))
-    assert designer.place.prompt is not None
-    designer.place.prompt.all.click()
-    assert "explore" not in controller.editing.opened.study.document["tasks"]
-
-    while controller.editing.opened.history.done:
-        controller.editing.undo()
-    assert designer.text == first
 
 
 def test_deleting_the_only_task_asks_what_becomes_of_the_blocks_that_leave_its_name_out(designer: Any) -> None:
@@ -68,19 +29,6 @@ def test_deleting_the_only_task_asks_what_becomes_of_the_blocks_that_leave_its_n
     assert "Also deletes: Analysis Published, Block Delay." in words
     designer.place.prompt.all.click()
     assert "[blocks.delay]" not in designer.text
-
-
-@pytest.mark.parametrize("path", [("questionnaires", "liquid", "items", 0), ("pages", "thanks"), ("pages", "welcome")])
-def test_a_copy_comes_right_after_its_original(designer: Any, path: tuple[str | int, ...]) -> None:
-    designer.change(('\nintro = "', '\nintro.en = "'))
-    designer.open()
-    at = position_of(designer.study.document, path)
-    designer.editing.select(path)
-    designer.place.form.head.copy.click()
-    study = designer.study
-    assert {fault.message for fault in study.faults} <= {"reads as an earlier item does"}
-    assert at is not None
-    assert position_of(study.document, designer.editing.opened.history.selected) == (at[0] + 1, at[1] + 1)
 
 
 def test_what_can_be_added_is_filtered_by_typing_and_comes_after_the_selected_element(
@@ -150,18 +98,6 @@ def test_one_key_is_given_in_place_of_another_and_back_without_losing_its_value(
     )
 
 
-def test_every_optional_key_of_a_liquid_can_be_added_and_undone(designer: Any) -> None:
-    designer.open("kitchen", "liquids", "thick")
-    before = designer.text
-    absent = [row.path for section in designer.place.view.form.sections for row in section.absent]
-    assert len(absent) > 5
-    for path in absent:
-        designer.editing.ask(AddKey(path))
-        assert path[-1] in designer.value("liquids", "thick"), path
-        designer.editing.undo()
-        assert designer.text == before
-
-
 def test_after_a_rename_comments_that_mention_the_old_name_are_listed_and_left(designer: Any, qtbot: Any) -> None:
     text = designer.file.read_text()
     designer.file.write_text(f"{text}# No thanks to common words.\n# The pages `thanks` and `thanks_2` are short.\n")
@@ -214,19 +150,6 @@ def test_a_rename_says_once_how_many_references_followed(
 ITEMS = ("questionnaires", "liquid", "items")
 
 
-def write(qtbot: Any, designer: Any, field: str, words: str) -> None:
-    line = designer.field(*designer.editing.selected, field).lines["en"]
-    line.setFocus(Qt.FocusReason.TabFocusReason)
-    line.selectAll()
-    qtbot.keyClicks(line, words)
-    designer.place.flush()
-    QApplication.processEvents()
-
-
-def short(designer: Any) -> Any:
-    return designer.form_row(*designer.editing.selected, "short").row.row.value
-
-
 @pytest.mark.parametrize(
     ("first", "typed", "other", "found"),
     [
@@ -255,21 +178,3 @@ def test_which_languages_follow_is_decided_where_typing_begins(
     copies = back.edited("Copy", Set(text, {"en": "Hot", "nl": "Hot"})).study
     edits = steps.step(copies, SetText(text, "en", "Hotter")).edits
     assert value_at(copies.edited(*edits)[0].document, text)["nl"] == "Hotter"
-
-
-def test_the_short_text_follows_the_text_until_it_is_edited(qtbot: Any, designer: Any) -> None:
-    designer.open()
-    designer.editing.ask(AddElement(ITEMS))
-    before = designer.text
-    assert short(designer) == "New question"
-    write(qtbot, designer, "text", "Was it cold?")
-    assert short(designer) == "Was it cold"
-    assert designer.study.faults == ()
-    write(qtbot, designer, "text", "Was it warm?")
-    assert short(designer) == "Was it warm"
-    designer.editing.undo()
-    assert designer.text == before
-    designer.editing.redo()
-    write(qtbot, designer, "short", "Warm")
-    write(qtbot, designer, "text", "Was it warm or cold?")
-    assert short(designer) == "Warm"

@@ -10,8 +10,8 @@ from study_app.app.designer.edit_steps import Steps
 from study_app.authoring.edited_study import read
 from study_app.authoring.undo_stack import History
 from study_app.authoring.writer.refused import Refused
-from study_app.protocol.source.document import Path
-from study_app.viewmodels.designer.requests import AddElement, AddKey, AddNamed, RenameElement, Request, SetText
+from study_app.protocol.source.document import Path, value_at
+from study_app.viewmodels.designer.requests import AddElement, AddNamed, RenameElement, Request, SetText
 from tests.authoring.grown import PROTOCOLS
 
 ITEMS = ("questionnaires", "liquid", "items")
@@ -45,7 +45,7 @@ def test_the_id_of_a_new_question_follows_its_text_until_it_is_edited() -> None:
     typist = Typist()
     typist.ask(AddElement(ITEMS))
     before = typist.history
-    ids = []
+    ids, shorts = [], []
     for text in (
         "H",
         "How thick",
@@ -57,10 +57,12 @@ def test_the_id_of_a_new_question_follows_its_text_until_it_is_edited() -> None:
     ):
         typist.write(text)
         ids.append(typist.id)
+        shorts.append(value_at(typist.history.study.document, (*typist.history.selected, "short")))
     assert ids == [
         "h", "how_thick", "how_thick_was_it", "how_thick_was_it", "this_liquid", "feels_liquid_2",
         "a_longer_sentence_about",
     ]  # fmt: skip
+    assert shorts[:3] == ["H", "How thick", "How thick was it"]
     assert typist.history.study.faults == ()
     for _ in ids:
         typist.history = typist.history.undo()
@@ -144,20 +146,3 @@ def test_the_keyboard_stays_in_the_title_whose_block_gets_another_id(qtbot: Any,
     qtbot.keyClicks(designer.keyboard, "Last")
     designer.place.outline.chosen.emit(("blocks", name))  # what is typed is handed on before
     assert designer.editing.selected == ("blocks", "last")
-
-
-@pytest.mark.slow
-def test_a_question_is_added_after_the_title_that_is_being_typed(designer: Any) -> None:
-    designer.open()
-    designer.editing.ask(AddElement(("questionnaires",)))
-    form = designer.editing.selected
-    designer.editing.ask(AddKey((*form, "title")))
-    line = title(designer)
-    designer.fill(line, "Afterwards", "")
-    designer.field(*form, "items").add.click()
-    after = ("questionnaires", "afterwards")
-    assert designer.editing.selected[:3] == (*after, "items")
-    assert designer.keyboard is designer.field(*designer.editing.selected, "text").lines["en"]
-    designer.editing.undo()
-    assert designer.editing.selected == after
-    assert title(designer).text() == "Afterwards"

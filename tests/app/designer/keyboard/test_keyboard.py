@@ -276,22 +276,3 @@ def test_what_is_typed_into_the_file_stays_there_where_the_form_is_made_anew(
     qtbot.wait(300)
     assert editor.hasFocus()
     assert typed.strip() in designer.text
-
-
-def test_what_is_typed_into_a_missing_text_stays_in_its_language(qtbot: Any, designer: Any) -> None:
-    designer.open()
-    designer.editing.ask(SetValue(("study", "languages"), ("en", "de")))
-    designer.editing.ask(SetValue(("study", "title"), {"en": "Kitchen"}))
-    designer.editing.select(("study",))
-    form = designer.place.form
-    qtbot.waitUntil(lambda: bool(form.rows))
-    row = next(one for one in form.rows if one.row.row.path == ("study", "title"))
-    row.field.lines["de"].setFocus()
-    for letter in "Kueche und Bad":
-        field = designer.keyboard
-        assert field is not None
-        QTest.keyClicks(field, letter)
-        qtbot.wait(60)
-    qtbot.wait(400)
-    form.flush()
-    assert designer.value("study", "title") == {"en": "Kitchen", "de": "Kueche und Bad"}

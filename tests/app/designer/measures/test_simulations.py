@@ -81,17 +81,6 @@ def test_slow_numbers_come_are_given_up_and_are_kept(qtbot: Any, designer: Any, 
     designer.controller.measures.fit.found.emit()  # as what was looked for when it was left
     qtbot.wait(120)
     assert not designer.controller.measures.slow.rest.isActive()
-    designer.window.go("designer")
-    designer.editing.make("Break", Set(("study", "version"), 1))
-    qtbot.wait(120)
-    assert page.numbers.isVisible()  # nothing of them depends on the version
-    before = [part.number.text() for part in page.numbers.parts]
-    designer.editing.make("Break", Set(("device", "force_limit_n"), 60))
-    qtbot.waitUntil(lambda: page.cards["forces"].chips[0].word == "– of 31 as asked")
-    assert page.forces.shown.bars == ()
-    assert [part.number.text() for part in page.numbers.parts] == before  # no threshold depends on the device
-    assert page.area.widget().isEnabled()
-    assert not page.earlier.isVisible()
 
 
 @pytest.mark.slow
