@@ -34,7 +34,7 @@ from study_app.analysis.tables.measures import number_or_none, quartiles_or_none
 from study_app.analysis.tables.study_tables import Study
 from study_app.analysis.tables.tracks import answers_timed, tracks
 from study_app.protocol.quantities import quantity, quantity_words
-from study_app.protocol.trials.design import Reply
+from study_app.protocol.trials.designs import Reply
 from study_app.protocol.trials.stimuli import OF_LINK
 
 SUMMARIES: Final[dict[Reply, Summary]] = {

@@ -10,7 +10,7 @@ from study_app.protocol.blocks import Phase
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import every_step_of
 from study_app.protocol.texts import text_in
-from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.kinds import DESIGN_KINDS, default_design
 from study_app.protocol.trials.method import Method
 from study_app.protocol.trials.psychometric import Assumed, assumed_for, rises

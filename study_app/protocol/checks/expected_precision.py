@@ -13,7 +13,7 @@ from study_app.protocol.checks.expected_means import MeanPlan, expected_mean, me
 from study_app.protocol.levels.presented_levels import Clipping, clipping
 from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity
-from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.method import Method, TrackSetting
 from study_app.protocol.trials.psychometric import analysis_grid, guesses_of, rises
 from study_app.protocol.trials.stimuli import Stimulus

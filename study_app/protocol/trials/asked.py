@@ -14,7 +14,7 @@ from study_app.protocol.questions.number import Number
 from study_app.protocol.questions.question import Question
 from study_app.protocol.questions.rating import Rating
 from study_app.protocol.texts import Localised
-from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.designs import Design
 from study_app.protocol.wording.languages import words
 
 LEAST: Final = 1e-9

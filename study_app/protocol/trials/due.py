@@ -14,7 +14,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial
 from study_app.protocol.streams import Draw, shuffle
-from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.keyed import Key, keyed_stream
 from study_app.protocol.trials.method import Heard, TrackSetting
 from study_app.protocol.trials.stimuli import Stimulated

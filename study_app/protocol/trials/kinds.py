@@ -1,4 +1,4 @@
-"""The kinds of designs and methods: found by importing the modules of one folder each."""
+"""The kinds of designs, those of a list, and of methods, found by importing the modules of their folder."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pydantic import Field
 from study_app.discovery import modules_of
 from study_app.protocol.table import Table
 from study_app.protocol.trials import designs, methods
-from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.method import Method
 
 
@@ -31,7 +31,9 @@ def _union(kinds: dict[str, Any]) -> Any:
     return Annotated[reduce(or_, dict.fromkeys(kinds.values())), Field(discriminator="kind")]
 
 
-DESIGN_KINDS: Final[dict[str, type[Design]]] = _kinds(designs, Design)
+DESIGN_KINDS: Final[dict[str, type[Design]]] = {
+    kind: design for design in designs.KINDS for kind in get_args(design.model_fields["kind"].annotation)
+}
 METHOD_KINDS: Final[dict[str, type[Method]]] = _kinds(methods, Method)
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from study_app.protocol.streams import Draw
 from study_app.protocol.table import Table
-from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.psychometric import Assumed, assumed_for
 from study_app.protocol.trials.stimuli import Stimulus
 

@@ -9,7 +9,7 @@ from study_app.haptics.model.scene import Scene
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Condition, Protocol
 from study_app.protocol.streams import stream
-from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulated
 from study_app.protocol.trials.tracks import standards_of, stimulus_of
 

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
-from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.stimuli import Stimulus
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.questions.choice import ChoiceView
 from study_app.protocol.questions.question import ItemView, plain_number
 from study_app.protocol.questions.rating import RatingView
-from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.stimuli import DELAYS, FORCE_DELAY, OF_LINK
 from study_app.protocol.trials.tracks import design_of, stimulus_of
 

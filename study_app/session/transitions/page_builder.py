@@ -10,7 +10,7 @@ from study_app.protocol.orders.schedule import FormStep, Trial
 from study_app.protocol.questions.choice import ChoiceView
 from study_app.protocol.questions.number import NumberView
 from study_app.protocol.questions.question import Context, Question
-from study_app.protocol.trials.design import ORDINALS
+from study_app.protocol.trials.designs import ORDINALS
 from study_app.protocol.trials.tracks import design_of
 from study_app.protocol.wording.languages import Words, words
 from study_app.session.pages import (

@@ -10,7 +10,7 @@ from study_app.protocol.forms.show_if import Value, shown
 from study_app.protocol.model import Protocol, Questionnaire
 from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial
 from study_app.protocol.questions.question import Context, Question
-from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.due import Due, next_level
 from study_app.protocol.trials.keyed import Key
 from study_app.protocol.trials.method import Heard

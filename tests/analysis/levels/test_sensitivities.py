@@ -11,8 +11,7 @@ from study_app.analysis.designs.sensitivities import sensitivities
 from study_app.analysis.results.level_results import SensitivityFound
 from study_app.analysis.tables.compared_blocks import Setting
 from study_app.analysis.tables.level_blocks import LevelBlock
-from study_app.protocol.trials.design import Design
-from study_app.protocol.trials.designs.rating_of_interval import Rated
+from study_app.protocol.trials.designs import Design, Rated
 from study_app.protocol.trials.kinds import default_design
 from study_app.protocol.trials.methods.constant import Constant
 from study_app.protocol.trials.presentation import arrangement_text

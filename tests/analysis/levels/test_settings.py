@@ -18,7 +18,7 @@ from study_app.analysis.report.answers.level_limits import level_limits
 from study_app.analysis.report.write_report import report
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.study_tables import load_study
-from study_app.protocol.trials.designs.adjustment import Adjusted
+from study_app.protocol.trials.designs import Adjusted
 from study_app.protocol.trials.kinds import default_method
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.session.simulated.answers_only import rehearse_answers

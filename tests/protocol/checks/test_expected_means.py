@@ -19,7 +19,7 @@ from study_app.protocol.checks.expected_means import (
 )
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.trials.designs.rating_of_interval import Rated
+from study_app.protocol.trials.designs import Rated
 from study_app.protocol.trials.kinds import default_design
 from study_app.protocol.trials.methods.constant import Constant
 from study_app.protocol.trials.stimuli import Stimulus

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.protocol.trials.design import Design
-from study_app.protocol.trials.designs.rating_of_interval import Rated
+from study_app.protocol.trials.designs import Design, Rated
 from study_app.protocol.trials.kinds import DESIGN_KINDS, default_design
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.protocol.trials.tasks.follow import Follow

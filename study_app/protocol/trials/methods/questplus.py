@@ -12,7 +12,7 @@ from pydantic import Field
 from study_app.haptics.model.ranges import within
 from study_app.protocol.table import Table
 from study_app.protocol.trials.adaptive import Adaptive, Count
-from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.method import Heard, TrackSetting
 from study_app.protocol.trials.psychometric import LAPSES, Assumed, Family, assumed_for, ratio_in_u, running_grid
 from study_app.protocol.trials.stimuli import Stimulus

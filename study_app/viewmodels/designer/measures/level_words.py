@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from study_app.protocol.quantities import quantity
-from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.protocol.trials.tracks import success_name
 from study_app.viewmodels.designer.measures.number_cards import Ticks

@@ -8,7 +8,7 @@ from study_app.authoring.fields import Row, label_of
 from study_app.protocol.model import Follow, Reach
 from study_app.protocol.orders.durations import ANSWER_S, CHOICE_S
 from study_app.protocol.source.document import Path
-from study_app.protocol.trials.design import ORDINALS
+from study_app.protocol.trials.designs import ORDINALS
 from study_app.protocol.trials.methods.adjustment import Adjustment
 from study_app.protocol.trials.task import AnyTask
 from study_app.protocol.trials.tracks import design_of, method_of

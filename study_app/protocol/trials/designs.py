@@ -1,0 +1,430 @@
+"""Designs of a trial: its intervals, their arrangements, the answers, and which answer is correct.
+
+A kind is a subclass of `Design` whose ``kind`` is a ``Literal`` with a default, in `KINDS`. The study file's key, the
+page, the tables, d′, the report and simulated observers follow from its values and methods.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Collection, Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, Protocol, TypeAlias
+
+from pydantic import Field
+
+from study_app.haptics.model.ranges import within
+from study_app.protocol.table import Table
+from study_app.protocol.texts import Id, Localised
+from study_app.psychophysics import detection
+from study_app.psychophysics.detection import Sensitivity
+
+Feedback: TypeAlias = Literal["never", "practice", "always"]
+Reply: TypeAlias = Literal["choice", "rating", "number", "setting"]
+Arrangement: TypeAlias = tuple[bool, ...]
+"""Per interval whether it presents the comparison, in the order of presentation."""
+AnswerCounts: TypeAlias = Mapping[tuple[int, str], int]
+"""How often each answer was given to each arrangement."""
+
+ORDINALS: Final = ("first", "second", "third", "fourth")
+
+
+class Attention(Protocol):
+    """What a simulated observer attends to in the intervals of a trial."""
+
+    @property
+    def smallest(self) -> bool:
+        """Whether the weaker one is asked for."""
+
+    def distinct(self, difference: float, about: float) -> bool:
+        """Return whether a difference between two around ``about`` is noticed."""
+
+
+class Modulus(Table):
+    """The level of a block's first trial and the number that the participant is given for it; it is not analysed."""
+
+    level: float = Field(description="The level that is presented.")
+    number: Annotated[float, within(1e-6, 1e9, "a number that a person can name")] = Field(
+        description="The number that stands for it."
+    )
+
+
+class Design(Table):
+    """How a trial is built and answered: the keys that all kinds share, and what each kind must say.
+
+    ``roving`` says that standards vary from trial to trial, so that intervals can only be compared with each other.
+    """
+
+    if TYPE_CHECKING:
+        kind: str
+
+    item: Id | None = Field(
+        default=None, description="The answer's name in tables; default: the kind, such as choice_2ifc or yesno."
+    )
+    question: Localised | None = Field(default=None, description="The question; default: the program's own words.")
+    pause_s: Annotated[float, within(0.3, 10, "hands need 0.3 s to settle; memory fades within seconds")] = Field(
+        default=0.6, description="Interstimulus interval: zero force between two intervals [s]."
+    )
+    between_s: Annotated[float, within(0.0, 60, "a minute is a break, which has a page")] = Field(
+        default=0.8, description="Zero force between an answer and the next trial [s]."
+    )
+    feedback: Feedback | None = Field(
+        default=None,
+        description="never: the participant does not see whether an answer was correct; practice: in practice alone, "
+        'the default; always: after every answer. Where no answer is correct, "never" is the default.',
+    )
+    feedback_s: Annotated[float, within(0.2, 10, "a sign needs 0.2 s to be seen")] = Field(
+        default=0.6, description="How long the feedback is shown [s]."
+    )
+
+    reply: ClassVar[Reply] = "choice"
+    has_standard: ClassVar[bool] = True
+    """Whether intervals are compared with a standard; otherwise there is one interval, the level itself."""
+    has_correct_answer: ClassVar[bool] = True
+    has_noise: ClassVar[bool] = False
+    """Whether some slots present the standard alone."""
+    asks_for_more: ClassVar[bool] = False
+    """Whether the correct answer is the interval with more (or less), so that levels on both sides have none."""
+    success_name: ClassVar[str] = "correct"
+    """What `success` counts."""
+    adaptive: ClassVar[bool] = True
+    """Whether answers can choose the next level; otherwise the method must be "constant"."""
+
+    @property
+    def adjusts(self) -> bool:
+        """Whether the participant sets the level of the last interval while it is presented."""
+        return self.reply == "setting"
+
+    @property
+    def name(self) -> str:
+        """The answer's name in tables."""
+        return self.item or (self.kind if self.kind[:1].isalpha() else f"choice_{self.kind}")
+
+    @property
+    def paper_name(self) -> str:
+        """What a paper calls it."""
+        return self.kind
+
+    @property
+    def wording(self) -> str:
+        """The name of its question among the program's own words."""
+        return self.kind
+
+    @property
+    @abstractmethod
+    def answers(self) -> tuple[str, ...]:
+        """The answers that may be chosen, in temporal order; empty where the reply is not a choice."""
+
+    @property
+    @abstractmethod
+    def arrangements(self) -> tuple[Arrangement, ...]:
+        """All arrangements of standard and comparison; each comes equally often."""
+
+    @property
+    @abstractmethod
+    def guess_rate(self) -> float | None:
+        """The probability of a correct answer at chance; None where it is free or no answer is correct."""
+
+    @property
+    def intervals(self) -> int:
+        """How many intervals a trial has."""
+        return len(self.arrangements[0])
+
+    @property
+    def first(self) -> Modulus | None:
+        """What a block's first trial presents and names, before those that are analysed; None: nothing."""
+        return None
+
+    def noise(self, comparisons: int) -> int:
+        """Return how many slots present the standard alone, in addition to so many comparisons."""
+        return 0
+
+    def correct(self, arrangement: int) -> str | None:
+        """Return the correct answer to an arrangement; None where no answer is correct."""
+        return None
+
+    def is_correct(self, arrangement: int, answer: str) -> bool | None:
+        """Return whether an answer to an arrangement is correct; None where no answer is."""
+        correct = self.correct(arrangement)
+        return None if correct is None else answer == correct
+
+    def correct_of(self, answers: AnswerCounts) -> tuple[int, int]:
+        """Return how many answers were correct, and of how many."""
+        right = sum(count for pair, count in answers.items() if self.is_correct(*pair))
+        return right, sum(answers.values())
+
+    def success(self, arrangement: int, answer: str) -> bool | None:
+        """Return what an answer counts as for a psychometric function; None where it does not enter one."""
+        return self.is_correct(arrangement, answer)
+
+    def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
+        """Return d′ and bias of one observer; None where the answers do not give them."""
+        return None
+
+    def proportion_correct(self, d_prime: float, *, roving: bool) -> float:
+        """Return P(correct) of an unbiased observer at a d′ of 0 or more, where answers can be correct."""
+        return detection.proportion_correct(self.kind, d_prime)
+
+    def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
+        """Return the answer of a simulated observer, where the reply is a choice.
+
+        Each interval is ``perceived`` as a number; ``mean`` is that of all intervals of the block so far.
+        """
+        raise NotImplementedError
+
+    def shows_feedback(self, practice: bool) -> bool:
+        """Return whether the participant sees if an answer was correct."""
+        when = self.feedback or ("practice" if self.has_correct_answer else "never")
+        return when == "always" or (when == "practice" and practice)
+
+
+def _counts(answers: AnswerCounts, arrangements: Collection[int], answer: str) -> tuple[int, int]:
+    """Return how often an answer was given to some arrangements, and how many answers they had."""
+    counts = {pair: count for pair, count in answers.items() if pair[0] in arrangements}
+    return sum(count for (_, given), count in counts.items() if given == answer), sum(counts.values())
+
+
+def _one_differs(count: int, *, among: bool) -> tuple[Arrangement, ...]:
+    """Return the arrangements of ``count`` intervals of which one alone is ``among``."""
+    return tuple(tuple((at == odd) is among for at in range(count)) for odd in range(count))
+
+
+def _model(roving: bool) -> detection.Model:
+    return "differencing" if roving else "independent"
+
+
+class ForcedChoice(Design):
+    """The answer is the interval that held the comparison.
+
+    Green & Swets 1966, Signal Detection Theory and Psychophysics: an observer at chance is correct in 1/m.
+    """
+
+    kind: Literal["2ifc", "3ifc", "4ifc"] = "2ifc"
+
+    wording: ClassVar = "forced_choice"
+    asks_for_more: ClassVar = True
+
+    @property
+    def intervals(self) -> int:
+        """Two to four."""
+        return int(self.kind[0])
+
+    @property
+    def paper_name(self) -> str:
+        """The number of intervals, in words."""
+        return f"{('two', 'three', 'four')[self.intervals - 2]}-interval forced choice"
+
+    @property
+    def answers(self) -> tuple[str, ...]:
+        """The intervals, by their place in time."""
+        return ORDINALS[: self.intervals]
+
+    @property
+    def arrangements(self) -> tuple[Arrangement, ...]:
+        """The comparison in each interval once."""
+        return _one_differs(self.intervals, among=True)
+
+    @property
+    def guess_rate(self) -> float:
+        """1/m for m intervals."""
+        return 1 / self.intervals
+
+    def correct(self, arrangement: int) -> str:
+        """Return the interval of the comparison."""
+        return self.answers[self.arrangements[arrangement].index(True)]
+
+    def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
+        """Return d′ of the intervals, and of two intervals the criterion: above 0 the second is preferred."""
+        if self.kind != "2ifc":
+            return detection.from_correct(self.kind, *self.correct_of(answers))
+        return detection.two_intervals(*_counts(answers, {0}, "first"), *_counts(answers, {1}, "first"))
+
+    def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
+        """Return the strongest interval, or the weakest."""
+        return self.answers[perceived.index(min(perceived) if attention.smallest else max(perceived))]
+
+
+class Oddity(Design):
+    """Which one differed? The odd one is the comparison or the standard (Frijters 1979, J. Math. Psychol. 20)."""
+
+    kind: Literal["oddity"] = "oddity"
+
+    paper_name: ClassVar = "oddity (triangle test)"
+    answers: ClassVar = ORDINALS[:3]
+    arrangements: ClassVar = _one_differs(3, among=True) + _one_differs(3, among=False)
+    guess_rate: ClassVar = 1 / 3
+
+    def correct(self, arrangement: int) -> str:
+        """Return the odd interval."""
+        presented = self.arrangements[arrangement]
+        return self.answers[presented.index(presented.count(True) == 1)]
+
+    def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
+        """Return d′ of the triangle test."""
+        return detection.from_correct(self.kind, *self.correct_of(answers))
+
+    def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
+        """Return the interval that is farthest from the mean of the others."""
+        total = sum(perceived)
+        distances = [abs(one - (total - one) / (len(perceived) - 1)) for one in perceived]
+        return self.answers[distances.index(max(distances))]
+
+
+class _TwoModels(Design):
+    """Designs with two models of the observer: differencing where standards rove, else independent observations."""
+
+    def proportion_correct(self, d_prime: float, *, roving: bool) -> float:
+        """Return P(correct) under the model of `sensitivity`."""
+        return detection.proportion_correct(f"{self.kind} {_model(roving)}", d_prime)
+
+
+class Abx(_TwoModels):
+    """Which of the first two was repeated as the third? (Munson & Gardner 1950, J. Acoust. Soc. Am. 22, 675)."""
+
+    kind: Literal["abx"] = "abx"
+
+    paper_name: ClassVar = "ABX"
+    answers: ClassVar = ("like_first", "like_second")
+    arrangements: ClassVar = ((False, True, False), (False, True, True), (True, False, True), (True, False, False))
+    guess_rate: ClassVar = 0.5
+
+    def correct(self, arrangement: int) -> str:
+        """Return which of the first two was repeated."""
+        first, _, third = self.arrangements[arrangement]
+        return self.answers[first != third]
+
+    def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
+        """Return d′ under one model, and under the other one."""
+        return detection.abx(*self.correct_of(answers), _model(roving))
+
+    def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
+        """Return which of the first two is closer to the third."""
+        first, second, third = perceived
+        return self.answers[abs(third - first) >= abs(third - second)]
+
+
+class SameDifferent(_TwoModels):
+    """Were the two the same? (Macmillan & Creelman 2005, Detection Theory, chapter 9)."""
+
+    kind: Literal["samedifferent"] = "samedifferent"
+
+    paper_name: ClassVar = "same–different"
+    answers: ClassVar = ("same", "different")
+    arrangements: ClassVar = ((False, False), (True, True), (False, True), (True, False))
+    guess_rate: ClassVar = None
+    adaptive: ClassVar = False
+
+    def correct(self, arrangement: int) -> str:
+        """Return whether the two were the same."""
+        first, second = self.arrangements[arrangement]
+        return self.answers[first != second]
+
+    def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
+        """Return d′ under one model, with k of differencing, and d′ under the other one."""
+        hits, false_alarms = _counts(answers, {2, 3}, "different"), _counts(answers, {0, 1}, "different")
+        return detection.same_different(*hits, *false_alarms, _model(roving))
+
+    def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
+        """Return "different" where a difference is noticed."""
+        first, second = perceived
+        return self.answers[attention.distinct(first - second, (first + second) / 2)]
+
+
+class YesNo(Design):
+    """Was it there? (Green & Swets 1966): the answer "yes" to a comparison is a hit, to a standard a false alarm."""
+
+    kind: Literal["yesno"] = "yesno"
+    noise_share: Annotated[float, within(0.05, 0.5, "fewer say nothing of false alarms; half is balanced")] = Field(
+        default=0.3, description="Share of trials that present the standard."
+    )
+
+    paper_name: ClassVar = "yes–no"
+    answers: ClassVar = ("yes", "no")
+    arrangements: ClassVar = ((True,), (False,))
+    guess_rate: ClassVar = None
+    has_noise: ClassVar = True
+    success_name: ClassVar = "yes"
+
+    def noise(self, comparisons: int) -> int:
+        """Return how many slots present the standard, so that they are a share of all."""
+        return round(comparisons * self.noise_share / (1 - self.noise_share))
+
+    def correct(self, arrangement: int) -> str:
+        """Return yes for the comparison, no for the standard."""
+        return self.answers[arrangement]
+
+    def success(self, arrangement: int, answer: str) -> bool:
+        """Return whether the answer was yes, whatever was presented."""
+        return answer == "yes"
+
+    def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
+        """Return d′ and the criterion: above 0 the observer says yes less often than no."""
+        return detection.yes_no(*_counts(answers, {0}, "yes"), *_counts(answers, {1}, "yes"))
+
+    def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
+        """Return "yes" above the mean of the intervals so far."""
+        return "yes" if perceived[0] > mean else "no"
+
+
+class JudgementDesign(Design):
+    """Designs whose reply is a scale point, a number or a setting."""
+
+    answers: ClassVar = ()
+    guess_rate: ClassVar = None
+    has_standard: ClassVar = False
+    has_correct_answer: ClassVar = False
+    adaptive: ClassVar = False
+
+    @property
+    def arrangements(self) -> tuple[Arrangement, ...]:
+        """The comparison alone."""
+        return ((True,),)
+
+
+class Rated(JudgementDesign):
+    """How much was it? One point of a scale for each level."""
+
+    kind: Literal["rating"] = "rating"
+    scale: Id = Field(description="The scale of the answer.")
+
+    paper_name: ClassVar = "ratings"
+    reply: ClassVar = "rating"
+
+
+class Estimation(JudgementDesign):
+    """How strong was it, as a number? (Stevens 1957, Psychological Review 64, 153)."""
+
+    kind: Literal["estimation"] = "estimation"
+    modulus: Modulus | None = Field(default=None, description="The first trial's level and number; default: free.")
+
+    paper_name: ClassVar = "magnitude estimation"
+    reply: ClassVar = "number"
+
+    @property
+    def first(self) -> Modulus | None:
+        """The modulus."""
+        return self.modulus
+
+
+class Adjusted(JudgementDesign):
+    """The standard, then an interval that the participant adjusts to it (Gescheider 1997, Psychophysics, ch. 3)."""
+
+    kind: Literal["adjustment"] = "adjustment"
+    standard: bool = Field(
+        default=True, description="Whether an interval presents the standard before the one that is adjusted."
+    )
+
+    paper_name: ClassVar = "the method of adjustment"
+    reply: ClassVar = "setting"
+
+    @property
+    def wording(self) -> str:
+        """The name of its question among the program's own words."""
+        return self.kind if self.standard else "adjustment_alone"
+
+    @property
+    def arrangements(self) -> tuple[Arrangement, ...]:
+        """The standard and the interval that is adjusted, or the latter alone."""
+        return ((False, True),) if self.standard else ((True,),)
+
+
+KINDS: Final = (Abx, Adjusted, Estimation, ForcedChoice, Oddity, Rated, SameDifferent, YesNo)

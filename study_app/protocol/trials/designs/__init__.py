@@ -1,1 +1,0 @@
-"""Designs of trials: one module per kind; a new kind is a new module here."""
