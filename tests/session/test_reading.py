@@ -31,7 +31,7 @@ from study_app.session.transitions.table import advance, open_session
 from study_app.store.journals.journal_events import CAUSE_WITHHELD
 from study_app.store.progress import progress_of
 from study_app.store.tables import session_tables
-from study_app.store.verification.response_checks import wrong_responses
+from study_app.store.verification.verify_session import wrong_responses
 from tests.faults.support.worlds import StoredWorld
 from tests.protocol.forms.mixed import mixed_file
 from tests.session import small

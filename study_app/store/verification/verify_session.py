@@ -1,47 +1,46 @@
 """One session against its journal, its receipt, its checksums and its recordings.
 
-Of a session that runs in a program only what that program does not change again is judged: tables, receipt, checksums
-and fingerprint follow its journal. A session that a program wrote while it was checked is checked again.
+Of a session that is open in a program only what that program does not change again is judged: its journal, its receipt
+and its recordings, but neither tables nor checksums, which follow the journal.
 """
 
 import contextlib
 import time
-from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from study_app.errors import StoreError
 from study_app.store import receipt
-from study_app.store.atomic import is_there, paths_in, read_own, study_root, temporaries
+from study_app.store.atomic import is_there, read_own, read_regular, study_root, temporaries
 from study_app.store.blinded.blinding import Key
-from study_app.store.blinded.sealing import opened
-from study_app.store.checksums import files, read_checksums, sha256
+from study_app.store.blinded.sealing import opened, opened_key
+from study_app.store.checksums import files, hashed, read_checksums
 from study_app.store.folders import FINGERPRINTS, SessionFolder
 from study_app.store.journals import journal
 from study_app.store.journals.cut_journal import RESTORE, beyond
 from study_app.store.journals.journal import Contents, Line
 from study_app.store.journals.journal_events import shortened, unknown_events
-from study_app.store.progress import named, progress_of, recordable
+from study_app.store.progress import Given, Progress, named, progress_of, recordable
 from study_app.store.recorder import recording_files
 from study_app.store.sessions.folder_lock import is_open
-from study_app.store.sessions.open_session import Place
+from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.sessions.unstarted_sessions import never_begun
 from study_app.store.tables import csv_files
+from study_app.store.tables.column import Column
 from study_app.store.tables.participants import opened_or_none, row_from
+from study_app.store.tables.session_tables import table_columns
+from study_app.store.verification import table_checks
 from study_app.store.verification.fingerprints import fingerprint
-from study_app.store.verification.response_checks import wrong_responses
-from study_app.store.verification.table_comparison import check_tables
 from study_app.store.verification.violations import Gathered
 
-LOOKS = 20
-"""So often is looked again at what was found in files that another program wrote meanwhile."""
-BETWEEN_S = 0.05
+AGAIN_S: Final = 0.2
+"""After this time is looked again at errors in files that another program may have been writing."""
 
 _BEGUN = "but receipt, tables, recordings or checksums show that the session began: restore it from a copy"
-NOTHING = Contents([], 0)
-READERS = 4  # files whose checksums are computed at the same time
+_ROUNDED_S = 1.1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,12 +49,12 @@ class Checked:
 
     ``row`` is its row of the participants table: None where it has not begun, or its journal cannot be read
     (``readable`` is False). ``running`` says that a program has it open, ``chained`` that its journal's lines tell what
-    was before them. ``trials`` are their numbers. ``fingerprint`` is that of a session that has ended.
+    was before them. ``trials`` are their numbers. ``fingerprint`` is that of a session whose journal has its end.
     """
 
     place: Place
-    readable: bool
-    running: bool
+    readable: bool = False
+    running: bool = False
     chained: bool = False
     row: csv_files.Row | None = None
     trials: frozenset[int] = frozenset()
@@ -63,57 +62,59 @@ class Checked:
 
 
 def check_session(place: Place, key: Key | None, found: Gathered) -> Checked:
-    """Check one session; again, where there is an error and a program wrote it meanwhile."""
-    folder = place.folder
-    for _ in range(LOOKS):
-        before, seen = _state(folder), found.alike()
-        checked = Checked(place, readable=False, running=False)
-        with seen.reading(folder.path):
-            checked = _look(place, key, seen)
-        if not seen.errors or _state(folder) == before:
-            break
-        time.sleep(BETWEEN_S)
-    found.take(seen)
+    """Check one session; a second time where there is an error and a program has it open."""
+    errors = found.alike()
+    checked = _check(place, key, errors)
+    if errors.errors and is_open(place.folder.path):
+        time.sleep(AGAIN_S)
+        errors = found.alike()
+        checked = _check(place, key, errors)
+    found.take(errors)
     return checked
 
 
-def _state(folder: SessionFolder) -> dict[str, tuple[int, int, int]]:
-    """Return what tells that a file of the session came, went or changed."""
-    found = {}
-    for path in paths_in(folder.path):
-        with contextlib.suppress(OSError):  # it has just gone
-            facts = path.stat()
-            found[str(path)] = (facts.st_ino, facts.st_size, facts.st_mtime_ns)
-    return found
+def _check(place: Place, key: Key | None, found: Gathered) -> Checked:
+    try:
+        return _check_files(place, key, found)
+    except StoreError as error:
+        found.failure(place.folder.path, error)
+        return Checked(place)
 
 
-def _look(place: Place, key: Key | None, found: Gathered) -> Checked:
+def _check_files(place: Place, key: Key | None, found: Gathered) -> Checked:
     folder = place.folder
     running = is_open(folder.path)
-    half = () if running else (*temporaries(folder.path), *temporaries(folder.recordings))
-    for path in half:
-        found.warning(path, "is an incomplete file of a program that was ended; rebuild removes it")
     if running:
         found.warning(folder.path, "is open in another program")
-    elif is_there(folder.crash) and folder.crash.stat().st_size:
-        found.warning(folder.crash, "shows where the program crashed: send it to the developers")
+    else:
+        for path in (*temporaries(folder.path), *temporaries(folder.recordings)):
+            found.warning(path, "is an incomplete file of a program that was ended; rebuild removes it")
+        if is_there(folder.crash) and folder.crash.stat().st_size:
+            found.warning(folder.crash, "shows where the program crashed: send it to the developers")
     contents = _journal(folder, found, running=running)
     lines = contents.lines
     _receipt(folder, lines, key.hash if key else None, found, running=running)
     if not lines:
         return Checked(place, readable=running or never_begun(folder.path), running=running)
-    _place(place, lines[0], found)
+    expected = {"participant": folder.participant, "session": folder.number, "study": place.study}
+    for name, value in expected.items():
+        if lines[0].get(name) != value:
+            found.error(folder.journal, f"is of {name} {lines[0].get(name)!r}, but is stored with those of {value!r}")
     with found.reading(folder.journal):
         opened(lines, key)
     for wrong in wrong_responses(lines):
         found.error(folder.journal, wrong)
-    hashes = _hashes(folder)
-    ended = lines[-1]["event"] == "session_ended" and not running
+    ended = lines[-1]["event"] == "session_ended"
+    hashes = {name: _hash(folder, name) for name in files(folder)}
     if not running:
-        check_tables(place, lines, _more(place, lines, found), found)
-        _checksums(folder, lines, hashes, found)
+        _tables(place, lines, found, ended=ended)
+        if ended:
+            _checksums(folder, hashes, found)
     _recordings(folder, lines, hashes, found, running=running)
-    _rebuilt(folder, found)
+    if is_there(folder.rebuilt):
+        with found.reading(folder.rebuilt):
+            for line in read_own(folder.rebuilt, study_root(folder.rebuilt)).decode("utf-8", "replace").splitlines():
+                found.warning(folder.rebuilt, f"{shortened(line)}; only a copy of {FINGERPRINTS} proves more")
     return Checked(
         place,
         readable=True,
@@ -126,23 +127,23 @@ def _look(place: Place, key: Key | None, found: Gathered) -> Checked:
 
 
 def _journal(folder: SessionFolder, found: Gathered, *, running: bool) -> Contents:
-    """Return what the journal holds: no line where none can be gone by."""
+    """Return what the journal holds: no line where it says nothing of the session."""
+    nothing = Contents([], 0)
     if not is_there(folder.journal):
         if never_begun(folder.path):
-            if running:
-                return NOTHING
-            found.warning(
-                folder.path,
-                "was created, but the program ended before it wrote a journal: begin it again, or delete it",
-            )
+            if not running:
+                found.warning(
+                    folder.path,
+                    "was created, but the program ended before it wrote a journal: begin it again, or delete it",
+                )
         else:
             found.error(folder.journal, f"is missing, {_BEGUN}")
-        return NOTHING
+        return nothing
     try:
         contents = journal.scan(folder.journal)
     except StoreError as error:
         found.failure(folder.journal, error)
-        return NOTHING
+        return nothing
     if contents.damage is not None:
         found.error(folder.journal, contents.damage.removeprefix(f"{folder.journal}, "))
     if contents.torn_bytes and not running:
@@ -153,14 +154,14 @@ def _journal(folder: SessionFolder, found: Gathered, *, running: bool) -> Conten
                 found.warning(folder.journal, "has no complete line: nothing was recorded")
         elif contents.damage is None:
             found.error(folder.journal, f"has no complete line, {_BEGUN}")
-        return NOTHING
+        return nothing
     for name in unknown_events(contents.lines):
         found.warning(folder.journal, f"has events {name!r}, which this version does not know")
     try:
         done = progress_of(contents.lines)
     except StoreError as error:
         found.error(folder.journal, str(error))
-        return NOTHING
+        return nothing
     if done.ended is None:
         if not running:
             found.warning(folder.path, "is unfinished: resume it, or leave it unfinished")
@@ -189,62 +190,95 @@ def _receipt(folder: SessionFolder, lines: list[Line], key_hash: str | None, fou
         found.error(path, f"{', '.join(differing)}: differ from the journal")
     if receipt.other_format(held, lines[0]):
         found.error(
-            folder.journal, (f"has another format than {path.name} states: it was changed; restore it from a copy")
+            folder.journal, f"has another format than {path.name} states: it was changed; restore it from a copy"
         )
     last = lines[-1]
-    status = last["status"] if last["event"] == "session_ended" else receipt.UNFINISHED
-    if held.get("status") != status and last["event"] == "session_ended" and not running:
-        found.error(path, f"its status is {held.get('status')!r}, the journal's {status!r}; rebuild renews it")
+    if last["event"] == "session_ended" and held.get("status") != last["status"] and not running:
+        found.error(path, f"its status is {held.get('status')!r}, the journal's {last['status']!r}; rebuild renews it")
 
 
-def _place(place: Place, start: Line, found: Gathered) -> None:
-    expected = {"participant": place.folder.participant, "session": place.folder.number, "study": place.study}
-    for name, value in expected.items():
-        if start.get(name) != value:
-            found.error(
-                place.folder.journal, (f"is of {name} {start.get(name)!r}, but is stored with those of {value!r}")
-            )
+def wrong_responses(lines: Sequence[Line]) -> Iterator[str]:
+    """Yield a sentence on each answer in ``responses`` that is not the one given by the choices before it."""
+    now = Progress()
+    for line in lines:
+        if line["event"] in ("responses", "form_answered"):
+            chosen = dict(now.answers)
+            where = f"form {line['form']}" if "form" in line else f"trial {line['trial']}"
+            line_name = f"line {line['n']} ({line['event']})"
+            hides = any("kind" in row for row in line["items"])  # format 2: a question may have been shown for a while
+            for row in line["items"]:
+                if not _is_of(row, chosen.pop(row["item"], Given())):
+                    wrong = "another answer than was chosen before: it was changed"
+                    yield f"{line_name} has for {row['item']!r} in {where} {wrong}"
+            for item, given in chosen.items():
+                if given.first_s is not None or not hides:
+                    yield f"{line_name} lacks {item!r}, answered in {where}: it was changed"
+        now.take(line)
 
 
-def _rebuilt(folder: SessionFolder, found: Gathered) -> None:
-    """Say that the proof of a session was made again after its end."""
-    if not is_there(folder.rebuilt):
-        return
-    with found.reading(folder.rebuilt):
-        for line in read_own(folder.rebuilt, study_root(folder.rebuilt)).decode("utf-8", "replace").splitlines():
-            found.warning(folder.rebuilt, f"{shortened(line)}; only a copy of {FINGERPRINTS} proves more")
+def _is_of(row: Mapping[str, Any], given: Given) -> bool:
+    """Return whether an answer in ``responses`` is what was ``given``; moments of a line are rounded to 1 µs."""
+    moments = ((row[name], getattr(given, name)) for name in ("onset_s", "first_s", "last_s"))
+    return (row["value"], row["changes"]) == (given.value, given.changes) and all(
+        listed == ours or (None not in (listed, ours) and abs(listed - ours) <= _ROUNDED_S) for listed, ours in moments
+    )
 
 
-def _more(place: Place, lines: list[Line], found: Gathered) -> set[Path]:
-    """Return the files that tell more than the journal, having said so."""
+def _tables(place: Place, lines: list[Line], found: Gathered, *, ended: bool) -> None:
+    """Compare the tables with what the journal gives; one that tells more than the journal is named as such."""
     telling: set[Path] = set()
     with contextlib.suppress(StoreError):  # said of receipt or journal already
         for path, what in beyond(place, lines):
             found.error(path, f"{what}: {RESTORE}")
             telling.add(path)
-    return telling
-
-
-def _hashes(folder: SessionFolder) -> dict[str, str]:
-    """Return the checksums of the session's files as they are now; a file that cannot be read has none."""
-
-    def hashed(name: str) -> str:
-        try:
-            return sha256(folder.path / name)
-        except StoreError:
-            return ""
-
-    names = files(folder)
-    with ThreadPoolExecutor(READERS) as readers:
-        return dict(zip(names, readers.map(hashed, names), strict=True))
-
-
-def _checksums(folder: SessionFolder, lines: list[Line], hashes: Mapping[str, str], found: Gathered) -> None:
-    if lines[-1]["event"] != "session_ended":
+    try:
+        expected = table_files(place, lines, opened_key(place.study_folder))
+    except StoreError as error:
+        found.error(place.folder.journal, f"gives no tables: {error}")
         return
+    columns = table_columns(lines, opened=True)
+    for (path, content), name in zip(expected, columns, strict=True):
+        if path not in telling:
+            check_table(path, content, columns[name], found, may_differ=lambda _: not ended)
+
+
+def check_table(
+    path: Path, expected: bytes, columns: tuple[Column, ...], found: Gathered, *, may_differ: Callable[[int], bool]
+) -> None:
+    """Compare a table with what the journals give, and its cells with the dictionary.
+
+    ``may_differ`` says of a line's number whether it is of a session that has not ended, whose tables follow its
+    journal with the next page or when it is rebuilt: a difference there is only a warning.
+    """
+    try:
+        content = read_regular(path)
+    except OSError:
+        found.error(path, "is missing or cannot be read; rebuild makes it again")
+        return
+    expected, columns = csv_files.in_columns_of(content, expected, columns)
+    pairs = zip_longest(content.split(b"\n"), expected.split(b"\n"))
+    differing = [number for number, (held, whole) in enumerate(pairs, start=1) if held != whole]
+    follows = all(map(may_differ, differing))
+    if differing:
+        report = found.warning if follows else found.error
+        report(path, f"differs from the journal, from line {differing[0]} on; rebuild renews it")
+    if not (differing and follows):  # else a row may be half written
+        for problem in table_checks.problems(content, columns):
+            found.error(path, problem)
+
+
+def _hash(folder: SessionFolder, name: str) -> str:
+    """Return the checksum of a file as it is now; none where it cannot be read."""
+    try:
+        return hashed(folder, name)
+    except StoreError:
+        return ""
+
+
+def _checksums(folder: SessionFolder, hashes: Mapping[str, str], found: Gathered) -> None:
     if not is_there(folder.checksums):
         found.error(
-            folder.checksums, ("is missing: was the program killed at the end of the session? rebuild creates it")
+            folder.checksums, "is missing: was the program killed at the end of the session? rebuild creates it"
         )
         return
     with found.reading(folder.checksums):
@@ -301,10 +335,10 @@ def _recordings(
         for recorded in recordable(lines)
         for path in recording_files(folder.recordings, *recorded)
     }
-    for name in sorted(hashes.keys() - listed):
-        if name.endswith(".parquet") and name not in of_trials:
+    for name in sorted(name for name in hashes.keys() - listed if name.endswith(".parquet")):
+        if name not in of_trials:
             found.error(folder.path / name, "is of a trial that the journal never started")
-        elif name.endswith(".parquet"):
+        else:
             then = "" if ends else "; resuming the session adds it"
             found.warning(folder.path / name, f"is in no line of the journal{then}")
 
@@ -313,17 +347,10 @@ def _facts(folder: SessionFolder, line: Line, kind: str, name: str, rows: int, f
     from study_app.store import recording_files as recording  # noqa: PLC0415 - loads the Parquet library, where there are recordings
 
     path = folder.path / name
+    expected = {"participant": folder.participant, "session": folder.number, "kind": kind, "rows": rows}
+    expected |= {"trial": line["trial"], "attempt": line["attempt"], "interval": line.get("interval")}
     with found.reading(path):
         facts: dict[str, Any] = recording.read_facts(path)
-        expected = {
-            "participant": folder.participant,
-            "session": folder.number,
-            "trial": line["trial"],
-            "attempt": line["attempt"],
-            "kind": kind,
-            "rows": rows,
-            "interval": line.get("interval"),
-        }
         for fact, value in expected.items():
             if facts.get(fact) != value:
                 found.error(path, f"holds {fact} {facts.get(fact)!r}, the journal says {value!r}")

@@ -1,8 +1,8 @@
 """Whether a study folder is what it says: every file against the journals, the dictionary, the checksums and the key.
 
 Nothing is changed. An error is a file that cannot be trusted as it is; a warning is something to know before the
-analysis, such as a session that was not finished. No sentence shows a condition. What another program is writing is
-looked at again before it is called an error.
+analysis, such as a session that was not finished. No sentence shows a condition. Of sessions that are open in a program
+journals are judged, and what the list of fingerprints says of them, but no tables.
 """
 
 from __future__ import annotations
@@ -26,9 +26,8 @@ from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import Place
-from study_app.store.tables import csv_files
 from study_app.store.tables.columns import EXCLUSIONS
-from study_app.store.tables.participants import columns_of, opened_or_none, row_of, table_bytes
+from study_app.store.tables.participants import columns_of, table_bytes
 from study_app.store.tables.study_description import (
     described_study,
     describes_alike,
@@ -39,14 +38,12 @@ from study_app.store.tables.study_description import (
 from study_app.store.verification import psychds, table_checks
 from study_app.store.verification.fingerprints import listed, place_of, read_copy, unreadable
 from study_app.store.verification.leaks import certain_telltales, find_leaks, presented_numbers, recorded_numbers
-from study_app.store.verification.table_comparison import check_table
 from study_app.store.verification.verify_allocation import check_allocation
-from study_app.store.verification.verify_session import BETWEEN_S, LOOKS, Checked, check_session
+from study_app.store.verification.verify_session import AGAIN_S, Checked, check_session, check_table
 from study_app.store.verification.violations import Finding, Gathered
 from study_app.store.withdrawals.tombstones import Tombstone, tombstones
 
 Sessions: TypeAlias = list[Checked]
-Rows: TypeAlias = list[tuple[csv_files.Row, bool]]  # and whether the session runs
 Proofs: TypeAlias = Sequence[tuple[str, str]]  # fingerprint and session
 
 
@@ -150,29 +147,26 @@ def _erased(study: StudyFolder, withdrawn: Mapping[str, Tombstone]) -> set[tuple
 def _participants(study: StudyFolder, name: str, sessions: Sessions, found: Gathered) -> None:
     """Check the table of all sessions, where each session's journal could be read.
 
-    Where it differs, journals and table are read again, until no program is about to write the table.
+    Lines of sessions that have not ended may be behind their journals; all lines, where a program has a session open or
+    began one meanwhile.
     """
-    if not all(one.readable for one in sessions):
+    if is_open(study.path) or not all(one.readable for one in sessions):  # a program writes the table when it ends
         return
-    path = study.participants(name)
-    rows: Rows = [(one.row, one.running) for one in sessions if one.row is not None]
-    before: Rows | None = None
-    for _ in range(LOOKS):
-        if is_open(study.path):  # by a program that writes the table when it ends
-            return
-        held = [row for row, _ in rows]
-        content, tables = table_bytes(study, held), {"participants": columns_of(study, held)}
-        behind = [running or row["status"] == receipt.UNFINISHED for row, running in rows]
-        late = {number for number, may_be in enumerate(behind, start=2) if may_be}
-        seen = found.alike()
-        check_table(path, content, "participants", seen, may_be_behind=late.__contains__, tables=tables)
-        if not seen.errors or (rows == before and not any(running for _, running in rows)):
-            break
-        time.sleep(BETWEEN_S)
-        open_now = {session.path for session in study.sessions() if is_open(session.path)}
-        again = [(row, one.path in open_now) for one in study.sessions() for row in row_of(one, opened_or_none(study))]
-        before, rows = rows, again
-    found.take(seen)
+    rows = [one.row for one in sessions if one.row is not None]
+    content, columns = table_bytes(study, rows), columns_of(study, rows)
+    late = {number for number, row in enumerate(rows, start=2) if row["status"] == receipt.UNFINISHED}
+    errors = found.alike()
+    check_table(study.participants(name), content, columns, errors, may_differ=late.__contains__)
+    if errors.errors and _written(study, sessions):
+        errors = found.alike()
+        check_table(study.participants(name), content, columns, errors, may_differ=lambda _: True)
+    found.take(errors)
+
+
+def _written(study: StudyFolder, sessions: Sessions) -> bool:
+    """Return whether a program has had a session open since the check began."""
+    now = study.sessions()
+    return len(now) != len(sessions) or any(one.running for one in sessions) or any(is_open(one.path) for one in now)
 
 
 def _chains(study: StudyFolder, sessions: Sessions, found: Gathered) -> None:
@@ -184,16 +178,19 @@ def _chains(study: StudyFolder, sessions: Sessions, found: Gathered) -> None:
 def _fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, found: Gathered) -> None:
     """Compare the sessions with the study's own list, as it was before they were checked.
 
-    A session that ended without being listed then is looked up again: it may have ended meanwhile.
+    A program lists a session once its files are final, just before it lets go of it: a listed one is judged even where
+    it is open. One that ended without being listed then is looked up again: it may have ended meanwhile.
     """
     path = study.fingerprints
     for number in unreadable(path):
         found.error(path, f"line {number} is not a fingerprint: restore it from a copy")
     _compare(study, sessions, early, path.name, found)
-    ended = [place_of(study, one.place.folder) for one in sessions if one.fingerprint and one.chained]
+    ended = [
+        place_of(study, one.place.folder) for one in sessions if one.fingerprint and one.chained and not one.running
+    ]
     lacking = _lacking(path, ended)
     if lacking and is_open(study.path):  # by a program that lists a session just after it is there
-        time.sleep(BETWEEN_S)
+        time.sleep(AGAIN_S)
         lacking = _lacking(path, ended)
     for place in lacking:
         found.error(path, f"lacks {place}, which has ended; rebuild adds it")
@@ -209,7 +206,7 @@ def _copy(study: StudyFolder, sessions: Sessions, copy: Proofs, path: Path, foun
     _compare(study, sessions, copy, str(path), found)
     known = {place for _, place in copy}
     for one in sessions:
-        if one.fingerprint and place_of(study, one.place.folder) not in known:
+        if one.fingerprint and not one.running and place_of(study, one.place.folder) not in known:
             lacks = f"(its fingerprint is {one.fingerprint}) is not in {path}"
             found.error(one.place.folder.path, f"{lacks}: it was added, or ended, after that copy was made")
 
@@ -221,19 +218,9 @@ def _compare(study: StudyFolder, sessions: Sessions, proofs: Proofs, name: str, 
         if one is None:
             found.error(path, f"is missing, but {name} lists it: it was deleted after it had ended")
             continue
-        proved = _left(one).fingerprint
-        if proof != proved:
-            now = f"its fingerprint is {proved}" if proved else "it no longer has an end"
+        if proof != one.fingerprint:
+            now = f"its fingerprint is {one.fingerprint}" if one.fingerprint else "it no longer has an end"
             found.error(path, f"is not the session that {name} lists as {proof}: it was changed ({now})")
-
-
-def _left(one: Checked) -> Checked:
-    """Return a session as it is when its program has let go of it, which it does just after it has listed it."""
-    for _ in range(LOOKS if one.running else 0):
-        if not is_open(one.place.folder.path):
-            break
-        time.sleep(BETWEEN_S)
-    return check_session(one.place, None, Gathered(one.place.folder.path)) if one.running else one
 
 
 def _description(study: StudyFolder, found: Gathered) -> None:

@@ -232,17 +232,36 @@ def test_changed_tables_do_not_survive_a_rebuild(study: Path, tmp_path: Path) ->
     assert verify(study, tmp_path / "kept.txt").sound
 
 
-@pytest.mark.slow
-def test_a_marker_of_another_machine_hides_no_forgery_from_the_fingerprints_kept_elsewhere(
-    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+OF_ANOTHER_MACHINE = json.dumps({"host": "elsewhere", "pid": 1, "began": "x"})
+
+
+@pytest.mark.parametrize(
+    ("harm", "sentence"),
+    [
+        (lambda journal: edit_a_response(journal.parents[3]), "was written after another line than the one before it"),
+        (lambda journal: forge(journal, lambda lines: lines[0].update(participant="P008")), "is of participant 'P008'"),
+        (lambda journal: journal.unlink(), "is missing, but receipt"),
+        (lambda journal: journal.write_bytes(b""), "is not the session that"),
+    ],
+)
+def test_a_marker_of_another_machine_hides_no_forgery_of_the_journal(
+    study: Path, harm: Callable[[Path], object], sentence: str
 ) -> None:
-    """A session that seems to run in a program is not judged, but one that had ended cannot run."""
-    monkeypatch.setattr("study_app.store.verification.verify_study.LOOKS", 2)
+    """The tables of a session that seems to run in a program are not judged; its journal is."""
+    (study / P007 / ".open-0123abcd.json").write_text(OF_ANOTHER_MACHINE)
+    assert verify(study).running == 1
+    assert told(study) == ""
+    harm(study / P007 / "journal.jsonl")
+    assert sentence in told(study)
+
+
+def test_a_marker_of_another_machine_hides_no_forgery_from_fingerprints(study: Path, tmp_path: Path) -> None:
+    """A session that is listed had ended and cannot run, whatever its marker says."""
     cut_the_journal(study)
-    (study / P007 / ".open-0123abcd.json").write_text(json.dumps({"host": "elsewhere", "pid": 1, "began": "x"}))
-    findings = verify(study)
-    assert findings.running == 1
-    assert f"{P007}: is not the session that" in told(study, tmp_path / "kept.txt")
+    (study / P007 / ".open-0123abcd.json").write_text(OF_ANOTHER_MACHINE)
+    assert verify(study).running == 1
+    for copy in (None, tmp_path / "kept.txt"):
+        assert f"{P007}: is not the session that" in told(study, copy)
 
 
 def test_an_unfinished_session_with_a_changed_line_does_not_go_on(
