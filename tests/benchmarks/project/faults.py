@@ -188,6 +188,14 @@ def durations(folder: Path, circle: str) -> dict[str, float]:
     return found
 
 
+@cache
+def _is_left(test: str) -> bool:
+    """Return whether a test of the contexts still exists: pytest runs none where one of those named does not."""
+    module, _, name = test.partition("::")
+    function = name.split("[")[0].rsplit("::", 1)[-1]
+    return (ROOT / module).is_file() and f"def {function}(" in (ROOT / module).read_text(encoding="utf-8")
+
+
 def covering(folder: Path, circle: str, fault: Fault) -> list[str]:
     """Return tests of a circle that run the function: first those of the faulty line, of its package, quick ones."""
     data = CoverageData(str(folder / f"{circle}.coverage"))
@@ -196,7 +204,8 @@ def covering(folder: Path, circle: str, fault: Fault) -> list[str]:
     times_s = durations(folder, circle)
 
     def at(*lines: int) -> set[str]:
-        return {name.split("|")[0] for line in lines for name in by_line.get(line, ()) if name}
+        names = {name.split("|")[0] for line in lines for name in by_line.get(line, ()) if name}
+        return set(filter(_is_left, names))
 
     at_fault, package = at(fault.line), f"tests/{Path(fault.path).parts[1]}/"
     total_s, chosen = 0.0, []
@@ -211,16 +220,32 @@ def covering(folder: Path, circle: str, fault: Fault) -> list[str]:
     return chosen
 
 
+def cache_of(copy: Path, environment: dict[str, str]) -> Path:
+    """Return the folder of compiled code of a work tree as it stands: its name follows from all its modules."""
+    command = [sys.executable, "-c", "import study_app.haptics.kernels.compiled, numba; print(numba.config.CACHE_DIR)"]
+    return Path(subprocess.check_output(command, cwd=copy, env=environment, text=True).strip())
+
+
 def noticed_by(fault: Fault, folder: Path, copy: Path) -> str:
-    """Return the circle whose tests fail with the fault, or "none"; a test that fails without it does not count."""
+    """Return the circle whose tests fail with the fault, or "none"; a test that fails without it does not count.
+
+    A module with kernels runs uncompiled; with a fault in any other one, what is compiled stays.
+    """
     faulty = copy / fault.path
     sound = faulty.read_bytes()
+    compiled = b"kernels.compiled import" not in sound
     environment = os.environ | {
         "PYTHONPATH": str(copy),
         "LIQUID_STUDY_WORKSPACE": str(copy),
         "LIQUID_STUDY_CONFIG": str(copy / "config"),
-        "NUMBA_DISABLE_JIT": "1" if fault.path.startswith(("study_app/haptics", "study_app/devices")) else "0",
+        "NUMBA_DISABLE_JIT": "0" if compiled else "1",
     }
+    cache = cache_of(copy, environment)
+    faulty.write_bytes(fault.apply(sound))
+    cache_with_fault = cache_of(copy, environment)
+    faulty.write_bytes(sound)
+    if compiled and cache_with_fault != cache:
+        shutil.copytree(cache, cache_with_fault, dirs_exist_ok=True)
 
     def failed(tests: list[str]) -> list[str]:
         command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider", *tests]
@@ -235,6 +260,7 @@ def noticed_by(fault: Fault, folder: Path, copy: Path) -> str:
         named = [line.split()[1] for line in done.stdout.splitlines() if line.startswith(("FAILED ", "ERROR "))]
         return [test for test in tests if any(test.startswith(name) for name in named)][:1] or tests[:1]
 
+    found = "none"
     for circle in CIRCLES:
         if not (tests := covering(folder, circle, fault)):
             continue
@@ -242,8 +268,11 @@ def noticed_by(fault: Fault, folder: Path, copy: Path) -> str:
         first = failed(tests)
         faulty.write_bytes(sound)
         if first and not failed(first):
-            return circle
-    return "none"
+            found = circle
+            break
+    if cache_with_fault != cache:
+        shutil.rmtree(cache_with_fault, ignore_errors=True)
+    return found
 
 
 def main() -> None:

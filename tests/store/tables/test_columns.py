@@ -87,3 +87,11 @@ def test_no_study_is_begun_around_or_within_others(tmp_path: Path, protocol: Pro
     for within in (study.data, study.path / "new" / "deep"):
         with pytest.raises(StoreError, match="which is a study's folder"):
             check_study(StudyFolder(within), "brackish")
+
+
+def test_a_description_that_cannot_be_read_is_named(tmp_path: Path, protocol: Protocol) -> None:
+    folder = StudyFolder(tmp_path)
+    folder.description.mkdir()
+    for attempt in (lambda: check_study(folder, "brackish"), lambda: write_description(folder, protocol.study)):
+        with pytest.raises(StoreError, match=r"dataset_description\.json cannot be read \(it is not a file\)"):
+            attempt()
