@@ -7,28 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pytest
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QImage, QPainter
 from PySide6.QtWidgets import QApplication, QLabel, QWidget
-
-from study_app.gui.participant.pages import page_widget
-
-MODULES = tuple(
-    f"study_app.gui.participant.{name}"
-    for name in (
-        "tank_widget",
-        "forms.foot",
-        "forms.option_button",
-        "forms.question_words",
-        "pages.column_labels",
-        "pages.key_caps",
-        "pages.language_switch",
-        "pages.notices",
-        "pages.progress_line",
-        "pages.reading_page",
-        "pages.text_page",
-    )
-)
 
 
 @dataclass(frozen=True)
@@ -66,17 +48,15 @@ class Recorder(QPainter):
 def recorded() -> Iterator[list[Drawn]]:
     """Keep what is drawn meanwhile."""
     kept: list[Drawn] = []
-    before = {}
-    for name in MODULES:
-        module = sys.modules[name]
-        if hasattr(module, "page_painter"):
-            before[name] = page_widget.page_painter
-            module.page_painter = lambda widget: Recorder(widget, kept)  # type: ignore[attr-defined]
-    try:
+    painting = [
+        module
+        for name, module in sys.modules.items()
+        if name.startswith("study_app.gui.participant.") and hasattr(module, "page_painter")
+    ]
+    with pytest.MonkeyPatch.context() as patch:
+        for module in painting:
+            patch.setattr(module, "page_painter", lambda widget: Recorder(widget, kept))
         yield kept
-    finally:
-        for name, painter in before.items():
-            sys.modules[name].page_painter = painter  # type: ignore[attr-defined]
 
 
 def drawn_by(window: QWidget) -> list[Drawn]:

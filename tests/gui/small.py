@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from study_app.protocol.forms.show_if import ShowIf
+from study_app.protocol.load import load
 from study_app.protocol.questions.choice import ChoiceView
 from study_app.protocol.questions.number import NumberView
 from study_app.protocol.questions.question import ItemView
@@ -19,28 +20,9 @@ from study_app.session.pages import Progress, QuestionnairePage, TaskPage, TextP
 from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView
 
-LABELS = (
-    "Completely disagree",
-    "Mostly disagree",
-    "Somewhat disagree",
-    "Neutral",
-    "Somewhat agree",
-    "Mostly agree",
-    "Completely agree",
-)
-STATEMENTS = (
-    "I think this feels like interacting with a liquid.",
-    "Interacting with this application feels immersive.",
-    "The strength of the force feedback is adequate.",
-    "The simulated liquid behaves in a way I expect.",
-    "This liquid behaves like honey.",
-    "This liquid behaves like water.",
-    "This liquid behaves like slime.",
-    "This liquid behaves like oil.",
-    "This liquid behaves like tar.",
-)
-
-
+THESIS = load("rek2024")
+LABELS, DUTCH_LABELS = (THESIS.scales["agreement"].labels[language] for language in ("en", "nl"))
+STATEMENTS = tuple(item.text["en"] for item in THESIS.questionnaires["liquid"].items)
 FIVE = ("Not at all", "Slightly", "Somewhat", "Rather", "Very")
 HANDS = (("left", "Left"), ("right", "Right"), ("both", "Both"))
 DEVICES = (("mouse", "A mouse"), ("falcon", "A haptic device"), ("other", "Another one"))

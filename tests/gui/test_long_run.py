@@ -49,15 +49,6 @@ def test_windows_are_open_while_work_is_done_and_gone_after_it() -> None:
 
 
 @pytest.mark.usefixtures("qapp")
-def test_what_work_raises_is_raised_where_the_windows_are() -> None:
-    def work() -> None:
-        raise KeyError("lost")
-
-    with pytest.raises(KeyError, match="lost"):
-        lend("none").during(work)
-
-
-@pytest.mark.usefixtures("qapp")
 def test_a_timer_of_qt_fires_as_often_as_asked_in_the_windows_thread() -> None:
     windows = lend("none")
     fired: list[threading.Thread] = []

@@ -95,6 +95,11 @@ def test_a_lost_recording_is_told_first_by_the_recorder_or_the_journal(told):
     told.tell("recording_lost", trial=1, attempt=1, reason="No space left on device")
     assert told.view().beyond[0] == line
     assert len(told.view(lost={1: "No space left on device"}).beyond) == 2
+    for trial, count in ((1, 1200), (2, 0), (3, 7)):
+        told.tell("recorded", trial=trial, attempt=1, samples_unrecorded=count)
+    third, first = told.view().beyond[1:3]
+    assert first == "Recording of Liquid setting 1 lacks 1\u2009200 samples: the disk does not keep up"
+    assert third.startswith("Recording of Delay setting 1 lacks 7 samples")
 
 
 def test_a_failed_outlet_is_shown_by_the_outlets_or_the_journal(told):

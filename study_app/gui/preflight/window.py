@@ -80,7 +80,7 @@ class PreflightWindow(QWidget):
         vbox(head, (middle, 1), Rule(), foot, spacing=16, margins=(32, 22, 32, 20), parent=self)
 
     def _beside(self) -> QWidget:
-        """Return the column next to the checks: how late the servo is, and what will run."""
+        """Return the column next to the checks: how late the servo is, and what will run; it scrolls if it must."""
         lateness = Card("Servo lateness", label("measured at rest, µs", "small", "text2"), padding=18, gap=6)
         self.plot.setMinimumHeight(150)
         lateness.column.addWidget(self.plot, 1)
@@ -91,9 +91,8 @@ class PreflightWindow(QWidget):
         add_layout(self.runs.column, self._grid)
         if self.masking is not None:
             self.runs.column.addWidget(self.masking)
-        side = QWidget()
+        side = scrolled(vbox((lateness, 1), self.runs, spacing=12, margins=0))
         side.setFixedWidth(ASIDE)
-        vbox((lateness, 1), self.runs, spacing=14, margins=0, parent=side)
         return side
 
     def show_view(self, view: PreflightView) -> None:

@@ -144,6 +144,10 @@ def test_entries_of_a_list_are_dragged_or_moved_by_keys(qtbot: Any, designer: An
     row.setFocus()
     qtbot.keyClick(row, Qt.Key.Key_Down, Qt.KeyboardModifier.AltModifier)
     assert listed() == (second, third, first)
+    row = designer.field(*path).rows[2]
+    row.setFocus()
+    qtbot.keyClick(row, Qt.Key.Key_Up, Qt.KeyboardModifier.AltModifier)
+    assert listed() == (second, first, third)
     row = designer.field(*path).rows[0]
     row.setFocus()
     qtbot.keyClick(row, Qt.Key.Key_C, CONTROL)

@@ -69,17 +69,20 @@ def order(dialog):
     return [row.finding.number for row in sorted(dialog.rows, key=lambda row: row.y())]
 
 
-def test_every_mode_has_a_row_that_waits(dialog, begun):
+def test_every_mode_has_a_row_that_waits_and_what_goes_on_is_told(dialog, begun, qtbot):
     assert [row.finding.id for row in dialog.rows] == [mode.id for mode in MODES]
     assert {row.chip.word for row in dialog.rows} == {"Waiting"}
     assert dialog.bar.isVisible()
     assert not dialog.copy.isEnabled()
     assert [one.name for one in begun] == ["falcon"]
-
-
-def test_what_is_to_be_done_is_told(dialog, begun, qtbot):
     begun[0].told = ["Pull the grip out.", "Push it in."]
     qtbot.waitUntil(lambda: dialog.step.text() == "Push it in.")
+    begun[0].told = [Refused("'mouse' is none")]
+    with qtbot.waitSignal(dialog.over):
+        pass
+    assert dialog.step.text() == "'mouse' is none."
+    assert {row.chip.word for row in dialog.rows} == {"Waiting"}
+    assert dialog.report is None
 
 
 def test_what_is_found_stands_first_open_with_cause_cure_and_what_to_paste(dialog, begun, qtbot):
@@ -91,6 +94,7 @@ def test_what_is_found_stands_first_open_with_cause_cure_and_what_to_paste(dialo
     found = [row for row in dialog.rows if row.found]
     assert [row.finding.id for row in found] == ["permission"]
     assert found[0].words.text() == capital(found[0].finding.symptom)
+    assert (capital("macOS denies it"), capital("it is not found")) == ("macOS denies it", "It is not found")
     qtbot.waitUntil(lambda: order(dialog)[0] == found[0].finding.number)
     (mode,) = (mode for mode in MODES if mode.id == "permission")
     told = words(found[0].body)
@@ -105,8 +109,16 @@ def test_what_is_found_stands_first_open_with_cause_cure_and_what_to_paste(dialo
     assert "FOUND" in QGuiApplication.clipboard().text()
 
 
-def test_others_say_why_when_they_are_asked(dialog, begun, qtbot):
-    begun[0].told = [WELL]
+def test_again_begins_anew_once_the_first_has_left_and_others_say_why_when_they_are_asked(dialog, begun, qtbot):
+    begun[0].told = [REFUSED]
+    with qtbot.waitSignal(dialog.over):
+        pass
+    qtbot.mouseClick(dialog.again, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: len(begun) == 2)
+    assert begun[0].closed
+    assert {row.chip.word for row in dialog.rows} == {"Waiting"}
+    assert order(dialog) == sorted(order(dialog))
+    begun[1].told = [WELL]
     with qtbot.waitSignal(dialog.over) as over:
         pass
     assert over.args == [True]
@@ -120,26 +132,6 @@ def test_others_say_why_when_they_are_asked(dialog, begun, qtbot):
     assert not row.body.isVisible()
 
 
-def test_what_cannot_be_examined_is_said_in_a_sentence(dialog, begun, qtbot):
-    begun[0].told = [Refused("'mouse' is none")]
-    with qtbot.waitSignal(dialog.over):
-        pass
-    assert dialog.step.text() == "'mouse' is none."
-    assert {row.chip.word for row in dialog.rows} == {"Waiting"}
-    assert dialog.report is None
-
-
-def test_again_begins_anew_once_the_first_has_left(dialog, begun, qtbot):
-    begun[0].told = [REFUSED]
-    with qtbot.waitSignal(dialog.over):
-        pass
-    qtbot.mouseClick(dialog.again, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: len(begun) == 2)
-    assert begun[0].closed
-    assert {row.chip.word for row in dialog.rows} == {"Waiting"}
-    assert order(dialog) == sorted(order(dialog))
-
-
 @pytest.mark.parametrize("close", ["cancel", "escape", "window"])
 def test_closing_ends_what_goes_on(dialog, begun, qtbot, close):
     if close == "cancel":
@@ -150,12 +142,6 @@ def test_closing_ends_what_goes_on(dialog, begun, qtbot, close):
         dialog.close()
     qtbot.waitUntil(lambda: begun[0].closed)
     assert not dialog.isVisible()
-
-
-def test_names_that_begin_small_stay_so():
-    assert capital("macOS denies access to it") == "macOS denies access to it"
-    assert capital("it is not found") == "It is not found"
-    assert capital("") == ""
 
 
 @needs_servo

@@ -3,33 +3,19 @@
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QPoint, QSize, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractButton, QFileDialog
 
-from study_app.devices.descriptor import NONE, NOT_AVAILABLE, READY, Backend
-from study_app.gui.devices.view import NO_FILE, DevicesPlace
-from study_app.gui.theme.theme import DARK
-from study_app.gui.theme.themed import apply_theme
+from study_app.devices.descriptor import Backend
+from study_app.gui.devices.view import NO_FILE
 from study_app.viewmodels.devices.bench import BenchShown
 from study_app.viewmodels.devices.list_view import devices_shown
-
-FOUND = [
-    Backend("mouse", "the window", READY, "seen, not felt"),
-    Backend("falcon", "libusb 1.0", NONE, "felt, up to 8 N", "plug it in"),
-    Backend("falcon", "ftd2xx", NOT_AVAILABLE, "the same", "for Windows alone"),
-    Backend("falcon-emulated", "the program", READY, "moves by itself"),
-    Backend("falcon-socket:PATH", "a Unix socket", READY, "another program's"),
-]
+from tests.gui import windows
 
 
 @pytest.fixture
 def place(qtbot):
-    made = DevicesPlace()
-    qtbot.addWidget(made)
-    made.resize(1200, 700)
-    made.show_devices(devices_shown(FOUND), "mouse")
-    made.show()
-    return made
+    return windows.devices(qtbot)
 
 
 def rows(place):
@@ -56,9 +42,9 @@ def test_one_is_marked_and_another_can_be_chosen_by_the_keyboard(place, qtbot):
     with qtbot.waitSignal(place.chosen) as chosen:
         qtbot.keyClick(rows(place)["falcon"].title, Qt.Key.Key_Space)
     assert chosen.args == ["falcon"]
-    place.show_devices(devices_shown(FOUND), "falcon-emulated")
+    place.show_devices(devices_shown(windows.FOUND), "falcon-emulated")
     assert marked(place) == ["falcon-emulated"]
-    place.show_devices(devices_shown(FOUND), "falcon-socket:/run/falcon")
+    place.show_devices(devices_shown(windows.FOUND), "falcon-socket:/run/falcon")
     assert marked(place) == []
 
 
@@ -77,7 +63,9 @@ def test_entering_and_refresh_look_again_and_rows_stay(place, qtbot):
     before = rows(place)["falcon"]
     place.show_looking(True)
     assert not place.refresh.isEnabled()
-    found = [one if one.by != "libusb 1.0" else Backend("falcon", one.by, "connected: FT1", one.can) for one in FOUND]
+    found = [
+        one if one.by != "libusb 1.0" else Backend("falcon", one.by, "connected: FT1", one.can) for one in windows.FOUND
+    ]
     place.show_devices(devices_shown(found), "mouse")
     place.show_looking(False)
     assert place.refresh.text() == "Refresh"
@@ -99,20 +87,6 @@ def test_a_falcons_firmware_is_chosen_and_forgotten(place, qtbot, monkeypatch):
     assert chosen.args == ["firmware", None]
 
 
-@pytest.mark.parametrize("size", [QSize(952, 640), QSize(1294, 768), QSize(1704, 1080)])
-def test_no_word_is_cut_at_any_size(place, qtbot, size):
-    apply_theme(place, DARK)
-    place.resize(size)
-
-    def whole():
-        for one in place.findChildren(QAbstractButton):
-            if one.isVisible() and one.text():
-                assert one.width() >= one.fontMetrics().horizontalAdvance(one.text()), one.text()
-                assert 0 <= one.mapTo(place, QPoint()).x() <= size.width() - one.width()
-
-    qtbot.waitUntil(whole)
-
-
 def test_the_last_bench_is_shown_and_its_report_is_asked_for(place, qtbot, tmp_path):
     report = tmp_path / "bench.md"
     place.show_benches({"falcon": BenchShown("Measured 2026-11-21: mass 0.20 kg.", report)})
@@ -123,7 +97,7 @@ def test_the_last_bench_is_shown_and_its_report_is_asked_for(place, qtbot, tmp_p
     with qtbot.waitSignal(place.report_asked) as asked:
         qtbot.mouseClick(falcon.report, Qt.MouseButton.LeftButton)
     assert asked.args == [report]
-    place.show_devices(devices_shown(FOUND), "mouse")
+    place.show_devices(devices_shown(windows.FOUND), "mouse")
     assert falcon.bench.isVisible()
     place.show_benches({"falcon": BenchShown("Measured. The report is missing: /gone.", None)})
     assert (falcon.bench.isVisible(), falcon.report.isVisible()) == (True, False)

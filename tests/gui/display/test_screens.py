@@ -10,26 +10,7 @@ from study_app.gui.display.screens import place
 pytestmark = pytest.mark.slow
 
 
-def shown_in(qtbot, size, least):
-    window = QWidget()
-    qtbot.addWidget(window)
-    window.setMinimumSize(least)
-    window.resize(size)
-    place(window, window.screen(), corner=True)
-    window.show()
-    qtbot.waitExposed(window)
-    return window
-
-
-def test_window_as_large_as_the_screen_makes_room_for_its_frame(qtbot) -> None:
-    room = QGuiApplication.primaryScreen().availableGeometry()
-    window = shown_in(qtbot, room.size(), QSize(room.width(), 400))
-    assert window.frameGeometry() != window.geometry()
-    qtbot.waitUntil(lambda: room.contains(window.frameGeometry()))
-    assert window.frameGeometry().size() == room.size()
-
-
-def test_window_makes_room_for_a_frame_that_a_busy_machine_adds_late(qtbot) -> None:
+def test_window_as_large_as_the_screen_makes_room_for_a_frame_that_comes_late(qtbot) -> None:
     room = QGuiApplication.primaryScreen().availableGeometry()
     window = QWidget()
     qtbot.addWidget(window)
@@ -39,18 +20,21 @@ def test_window_makes_room_for_a_frame_that_a_busy_machine_adds_late(qtbot) -> N
     window.show()
     qtbot.waitExposed(window)
     qtbot.waitUntil(lambda: room.contains(window.frameGeometry()))
+    assert window.frameGeometry() != window.geometry()
     assert window.frameGeometry().size() == room.size()
 
 
-def test_window_that_fits_keeps_size_and_least_size(qtbot) -> None:
-    window = shown_in(qtbot, QSize(500, 400), QSize(300, 200))
+def test_window_that_fits_or_fills_the_screen_keeps_size_and_least_size(qtbot) -> None:
+    window = QWidget()
+    qtbot.addWidget(window)
+    window.setMinimumSize(QSize(300, 200))
+    window.resize(500, 400)
+    place(window, window.screen(), corner=True)
+    window.show()
+    qtbot.waitExposed(window)
     qtbot.wait(400)
     assert window.size() == QSize(500, 400)
     assert window.minimumSize() == QSize(300, 200)
-
-
-def test_full_screen_window_is_left_alone(qtbot) -> None:
-    window = shown_in(qtbot, QSize(500, 400), QSize(300, 200))
     window.showFullScreen()
     qtbot.wait(400)
     assert window.windowState() & Qt.WindowState.WindowFullScreen

@@ -4,21 +4,15 @@ import pytest
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QFontDatabase, QTextDocument, QTextTable
 
-from study_app.gui.help.view import PAGE, HelpPlace
-from study_app.gui.theme.theme import LIGHT
-from study_app.gui.theme.themed import apply_theme
+from study_app.gui.help.view import PAGE
+from tests.gui import windows
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
 def place(qtbot):
-    made = HelpPlace()
-    qtbot.addWidget(made)
-    apply_theme(made, LIGHT)
-    made.resize(1266, 768)
-    made.show()
-    return made
+    return windows.help_pages(qtbot)
 
 
 def shown(place):

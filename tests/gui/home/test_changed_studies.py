@@ -18,14 +18,17 @@ from tests.gui.home.home_window import cell, open_home, study_cards
 pytestmark = pytest.mark.slow
 
 
+@pytest.fixture(autouse=True)
+def workspace(monkeypatch, tmp_path):
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+
+
 def own_study(folder, title="Own"):
     """Write a study into a workspace, and return its file."""
     file = folder / "protocols" / "own.toml"
     file.parent.mkdir(exist_ok=True)
-    text = (
-        source_bytes("demo").decode().replace('name = "demo"', 'name = "own"').replace('"A first look"', f'"{title}"')
-    )
-    file.write_text(text, encoding="utf-8")
+    text = source_bytes("demo").decode().replace('name = "demo"', 'name = "own"')
+    file.write_text(text.replace('"A first look"', f'"{title}"'), encoding="utf-8")
     return file
 
 
@@ -34,8 +37,7 @@ def titles(home):
 
 
 @pytest.mark.parametrize("way", ["enter", "activation"])
-def test_a_study_that_is_added_edited_or_damaged_changes_its_card(qtbot, tmp_path, monkeypatch, way):
-    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+def test_a_study_that_is_added_edited_or_damaged_changes_its_card(qtbot, tmp_path, way):
     home = open_home(qtbot, tmp_path / "results")
     before = titles(home)
 
@@ -57,6 +59,16 @@ def test_a_study_that_is_added_edited_or_damaged_changes_its_card(qtbot, tmp_pat
     own_study(tmp_path, "Own, edited")
     come_back()
     qtbot.waitUntil(lambda: "Own, edited" in titles(home))
+    cards = home.grid.cards
+    home.enter()
+    qtbot.waitUntil(lambda: not home.reading)
+    assert home.grid.cards is cards, "no file has changed"
+    own_study(tmp_path, "A first look")
+    come_back()
+    qtbot.waitUntil(lambda: titles(home).count("A first look") == 2)
+    cards = [card for card in study_cards(home) if card.facts.title == "A first look"]
+    assert [card.origin.whole for card in cards] == ["Own study  ·  own.toml", "Shipped study  ·  demo.toml"]
+    assert len({card.new.accessibleName() for card in cards}) == 2
     file.write_text("format = 1\n")
     come_back()
     qtbot.waitUntil(lambda: "broken" in titles(home))
@@ -65,8 +77,7 @@ def test_a_study_that_is_added_edited_or_damaged_changes_its_card(qtbot, tmp_pat
     qtbot.waitUntil(lambda: titles(home) == before)
 
 
-def test_cards_of_drafts_come_first_say_what_was_not_saved_and_continue_it(qtbot, tmp_path, monkeypatch):
-    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+def test_cards_of_drafts_come_first_say_what_was_not_saved_and_continue_it(qtbot, tmp_path):
     file, fresh = own_study(tmp_path), tmp_path / "protocols" / "fresh.toml"
     home = open_home(qtbot, tmp_path / "results")
 
@@ -155,25 +166,8 @@ def test_studies_that_cannot_be_read_are_named_and_the_sessions_stay(qtbot, resu
     qtbot.waitUntil(lambda: len(home.grid.cards) > 1)
 
 
-def test_cards_stay_where_no_file_has_changed(home, qtbot):
-    cards = home.grid.cards
-    home.enter()
-    qtbot.waitUntil(lambda: not home.reading)
-    assert home.grid.cards is cards
-
-
-def test_cards_of_studies_with_one_title_show_their_files(qtbot, tmp_path, monkeypatch):
-    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
-    own_study(tmp_path, "A first look")
-    home = open_home(qtbot, tmp_path / "results")
-    cards = [card for card in study_cards(home) if card.facts.title == "A first look"]
-    assert [card.origin.whole for card in cards] == ["Own study  ·  own.toml", "Shipped study  ·  demo.toml"]
-    assert len({card.new.accessibleName() for card in cards}) == 2
-
-
 @pytest.mark.parametrize("after", ["saved", "never saved"])
-def test_the_card_that_one_went_on_from_keeps_the_keyboard_and_is_in_sight(qtbot, tmp_path, monkeypatch, after):
-    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+def test_the_card_that_one_went_on_from_keeps_the_keyboard_and_is_in_sight(qtbot, tmp_path, after):
     text = own_study(tmp_path, "Zest").read_text(encoding="utf-8")
     for name in "abcdefgh":
         made = text.replace('name = "own"', f'name = "{name}"').replace("Zest", f"Study {name}")

@@ -38,27 +38,65 @@ def log():
 
 @pytest.fixture
 def main(qtbot, log):
-    names = [place.name for place in DESTINATIONS]
-    window = MainWindow({name: lambda name=name: Room(name, log) for name in names})
+    return opened(qtbot, {place.name: lambda name=place.name: Room(name, log) for place in DESTINATIONS}, {})
+
+
+def opened(qtbot, makes, prepares):
+    window = MainWindow(makes, prepares=prepares)
     qtbot.addWidget(window)
     window.show()
     return window
 
 
-def test_one_begins_at_the_first_place_and_goes_by_the_rail(main, log, qtbot):
+def test_one_begins_at_the_first_place_goes_by_the_rail_and_a_session_and_the_end_leave_it(main, log, qtbot):
     assert (main.here, log) == ("home", ["enter home"])
     qtbot.mouseClick(main.rail.buttons["lab"], Qt.MouseButton.LeftButton)
     assert (main.here, log[1:]) == ("lab", ["leave home", "enter lab"])
     assert [name for name, button in main.rail.buttons.items() if button.here] == ["lab"]
+    main.rest()
+    assert (main.isVisible(), log[-1]) == (False, "leave lab")
+    main.come_back()
+    assert (main.isVisible(), log[-1]) == (True, "enter lab")
+    main.close()
+    assert log[-1].startswith("leave")
+    assert "leave lab" in log[-2:]
 
 
-def test_places_are_reached_by_the_keyboard_alone(main, qtbot):
-    main.rail.buttons["home"].setFocus()
+def test_what_a_place_says_is_shown_until_one_leaves_it_and_after_a_session(main):
+    main.place("home").go_asked.emit("devices")
+    assert main.here == "devices"
+    main.place("devices").message.emit("It did not work", "The cable is out.")
+    assert main.notice.isVisible()
+    main.go("home")
+    assert not main.notice.isVisible()
+    main.place("devices").message.emit("It did not work", "The cable is out.")
+    main.go("devices")
+    assert main.notice.isVisible(), "it is said before one goes there, too"
+    main.go("home")
+    main.rest()
+    main.show_message("The studies could not be read", "The folder is gone.")
+    assert not main.notice.isVisible()
+    main.come_back()
+    assert main.notice.isVisible()
+    main.notice.accept()
+
+
+def test_every_place_wears_the_theme_that_the_rail_chooses(main, qtbot):
+    qtbot.mouseClick(main.rail.switch, Qt.MouseButton.LeftButton)
+    assert main.rail.switch.text() == "Light theme"
+    main.go("results")
+    assert [main.place(name).theme for name in ("home", "results")] == [DARK, DARK]
+
+
+def test_places_are_reached_and_the_window_is_closed_by_the_keyboard_alone(main, qtbot):
     for key, place in ((Qt.Key.Key_Space, "designer"), (Qt.Key.Key_Return, "results")):
         main.rail.buttons[main.here].setFocus()
         qtbot.keyClick(main.focusWidget(), Qt.Key.Key_Tab)
         qtbot.keyClick(main.focusWidget(), key)
         assert main.here == place
+    with qtbot.waitSignal(main.closed):
+        qtbot.keyClick(main, Qt.Key.Key_Q, Qt.KeyboardModifier.ControlModifier)
+    assert not main.isVisible()
 
 
 @pytest.mark.parametrize("key", [Qt.Key.Key_Space, Qt.Key.Key_Return])
@@ -83,48 +121,6 @@ def test_keyboard_goes_from_the_rail_into_the_place(main, qtbot, key):
     assert main.focusWidget() is main.rail.buttons["lab"], "a place without parts takes no keyboard"
 
 
-def test_the_window_closes_by_the_keyboard_where_no_frame_has_a_way(main, qtbot):
-    with qtbot.waitSignal(main.closed):
-        qtbot.keyClick(main, Qt.Key.Key_Q, Qt.KeyboardModifier.ControlModifier)
-    assert not main.isVisible()
-
-
-def test_a_place_may_ask_for_another_and_have_something_said(main):
-    main.place("home").go_asked.emit("devices")
-    assert main.here == "devices"
-    main.place("devices").message.emit("It did not work", "The cable is out.")
-    assert main.notice.isVisible()
-    main.notice.accept()
-
-
-def test_what_a_place_has_said_is_closed_when_one_leaves_it(main):
-    main.place("devices").message.emit("It did not work", "The cable is out.")
-    main.go("devices")
-    assert main.notice.isVisible(), "it is said before one goes there, too"
-    main.go("home")
-    assert not main.notice.isVisible()
-
-
-def test_a_session_and_the_end_leave_the_place(main, log):
-    main.go("lab")
-    main.rest()
-    assert (main.isVisible(), log[-1]) == (False, "leave lab")
-    main.come_back()
-    assert (main.isVisible(), log[-1]) == (True, "enter lab")
-    main.close()
-    assert log[-1].startswith("leave")
-    assert "leave lab" in log[-2:]
-
-
-def test_what_is_said_during_a_session_is_shown_after_it(main):
-    main.rest()
-    main.show_message("The studies could not be read", "The folder is gone.")
-    assert not main.notice.isVisible()
-    main.come_back()
-    assert main.notice.isVisible()
-    main.notice.accept()
-
-
 def test_keyboard_is_after_a_session_where_it_was_before(main, qtbot):
     qtbot.waitUntil(main.isActiveWindow)
     began = main.place("home").findChild(QPushButton)
@@ -134,12 +130,6 @@ def test_keyboard_is_after_a_session_where_it_was_before(main, qtbot):
     assert main.focusWidget() is not began
     main.come_back()
     assert main.focusWidget() is began
-
-
-def test_a_place_made_later_wears_the_theme(main):
-    main.rail.theme_asked.emit()
-    main.go("results")
-    assert main.place("results").theme is DARK
 
 
 @pytest.mark.parametrize(
@@ -152,9 +142,7 @@ def test_the_rail_gives_way(main, size, place, width):
 
 
 def test_whoever_goes_on_before_a_prepared_place_is_shown_gets_where_they_asked_to(qtbot):
-    window = MainWindow({"home": Place, "lab": Place, "devices": Place}, prepares={"lab": lambda: iter((None,))})
-    qtbot.addWidget(window)
-    window.show()
+    window = opened(qtbot, {"home": Place, "lab": Place, "devices": Place}, {"lab": lambda: iter((None,))})
     window.go("lab")
     window.go("devices")
     for _ in range(3):
@@ -181,9 +169,7 @@ def test_a_place_whose_step_fails_says_so_and_a_second_entry_tries_again(qtbot, 
         step("fill")
         yield
 
-    window = MainWindow({"home": Place, "lab": make}, prepares={"lab": lambda: fill() if ready else None})
-    qtbot.addWidget(window)
-    window.show()
+    window = opened(qtbot, {"home": Place, "lab": make}, {"lab": lambda: fill() if ready else None})
     with qtbot.captureExceptions() as raised:
         QTimer.singleShot(0, lambda: window.go("lab"))
         qtbot.waitUntil(lambda: not waits or window.here == "lab")
@@ -214,9 +200,7 @@ def test_a_place_that_cannot_be_made_says_why_and_is_tried_again(qtbot, error, s
             raise fails.pop()
         return Place()
 
-    window = MainWindow({"home": Place, "results": make, "lab": Place}, prepares={"lab": lambda: None})
-    qtbot.addWidget(window)
-    window.show()
+    window = opened(qtbot, {"home": Place, "results": make, "lab": Place}, {"lab": lambda: None})
     window.go("lab")
     with qtbot.captureExceptions() as raised:
         qtbot.mouseClick(window.rail.buttons["results"], Qt.MouseButton.LeftButton)

@@ -12,7 +12,7 @@ from study_app.gui.home import new_session_dialog
 from study_app.gui.home.new_session_dialog import NewSessionDialog
 from study_app.gui.widgets.background import Background
 from study_app.protocol.load import source_bytes
-from study_app.session.request import MAX_SEED, draw_seed
+from study_app.session.request import MAX_SEED
 from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.workstation import MachineSettings
 from study_app.viewmodels.home import study_facts
@@ -29,11 +29,21 @@ def results(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def dialog(qtbot, results):
-    made = NewSessionDialog(study_facts("rek2024"), results)
-    qtbot.addWidget(made)
-    made.open()
-    return made
+def opened(qtbot, results):
+    """Return a function that opens the dialog of a study on a machine with these settings."""
+
+    def open_(facts=None, **settings):
+        made = NewSessionDialog(facts or study_facts("rek2024"), results, machine=MachineSettings(**settings))
+        qtbot.addWidget(made)
+        made.open()
+        return made
+
+    return open_
+
+
+@pytest.fixture
+def dialog(opened):
+    return opened()
 
 
 def use(results: Path, participant: str, session: int = 1) -> None:
@@ -59,28 +69,46 @@ def files(folder: Path) -> list[Path]:
     return sorted(folder.rglob("*"))
 
 
-def test_a_free_id_is_suggested(qtbot, results):
+def test_a_free_id_is_suggested(opened, results):
     use(results, "P001")
     use(results, "P004")
-    made = NewSessionDialog(study_facts("rek2024"), results)
-    qtbot.addWidget(made)
+    made = opened()
+    assert int(made.seed.text()) in range(1, MAX_SEED + 1)
+    assert not made.row_of.isVisible(), "no rows are assigned in this study"
+    assert made.windowed.isChecked(), "there is one screen for both windows"
     assert made.participant.text() == "P005"
     assert made.begin.isEnabled()
     assert "free" in made.verdict.text()
 
 
-@pytest.mark.parametrize("wrong", ["P-007", "P 7", "", "P_7", "Zoë", "x" * 33])
-def test_an_id_no_file_name_can_take_is_refused_as_it_is_typed(dialog, wrong):
-    dialog.participant.setText(wrong)
+def test_an_id_no_file_name_can_take_and_a_folder_of_another_study_are_refused(dialog, tmp_path):
+    for wrong in ("P-007", "P 7", "", "P_7", "Zoë", "x" * 33):
+        dialog.participant.setText(wrong)
+        assert not dialog.begin.isEnabled()
+        assert repr(wrong) in dialog.verdict.text()
+        assert "P007" in dialog.verdict.text()
+    dialog.participant.setText("P007")
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "dataset_description.json").write_text('{"name": "otherstudy"}')
+    dialog.results.setText(str(other))
     assert not dialog.begin.isEnabled()
-    assert repr(wrong) in dialog.verdict.text()
-    assert "P007" in dialog.verdict.text()
+    assert "otherstudy" in dialog.verdict.text()
 
 
-@pytest.mark.parametrize("kept", ["test", "Pilot"])
-def test_ids_kept_for_pilots_are_refused(dialog, kept):
-    dialog.participant.setText(kept)
-    assert not dialog.begin.isEnabled()
+def test_a_falcon_by_its_serial_number_can_be_preferred_and_an_unknown_device_is_the_mouse(opened):
+    assert opened(device="falcon:FT123").chosen().device == "falcon:FT123"
+    assert opened(device="hammer").chosen().device == "mouse"
+    assert opened(device="scripted").chosen().results.name == "rek2024-scripted"
+
+
+def test_a_simulated_hand_is_kept_apart_unless_a_folder_was_chosen(dialog, tmp_path):
+    for device, name in (("scripted", "rek2024-scripted"), ("mouse", "rek2024")):
+        dialog.device.setCurrentIndex(dialog.device.findData(device))
+        assert Path(dialog.results.text()).name == name
+    dialog.results.setText(str(tmp_path / "mine"))
+    dialog.device.setCurrentIndex(dialog.device.findData("scripted"))
+    assert dialog.results.text() == str(tmp_path / "mine")
 
 
 def test_a_used_id_is_refused_with_the_ways_to_go_on_until_one_is_taken(dialog, results, qtbot):
@@ -115,18 +143,15 @@ def test_a_pilot_is_in_a_window_apart_and_may_have_an_id_kept_for_it(dialog, res
     assert chosen.results.name == f"{dialog.facts.protocol.study.name}-pilot"
     dialog.pilot.setChecked(False)
     assert not dialog.begin.isEnabled()
+    for windowed in (True, False):
+        dialog.windowed.setChecked(windowed)
+        dialog.pilot.click()
+        dialog.pilot.click()
+        assert dialog.windowed.isEnabled()
+        assert dialog.chosen().windowed is windowed, "as it was before"
 
 
-@pytest.mark.parametrize("windowed", [True, False])
-def test_without_pilot_the_window_is_again_what_it_was_before(dialog, windowed):
-    dialog.windowed.setChecked(windowed)
-    dialog.pilot.click()
-    dialog.pilot.click()
-    assert dialog.windowed.isEnabled()
-    assert dialog.chosen().windowed is windowed
-
-
-def test_a_study_whose_conditions_were_changed_since_is_refused_with_what_to_do(qtbot, results):
+def test_a_study_whose_conditions_were_changed_since_is_refused_with_what_to_do(results, opened):
     facts = study_facts("demo")
     (results / "demo" / "data" / "sub-P001" / "ses-01").mkdir(parents=True)
     (results / "demo" / "data" / "sub-P001" / "ses-01" / "checksums.sha256").touch()
@@ -134,41 +159,10 @@ def test_a_study_whose_conditions_were_changed_since_is_refused_with_what_to_do(
     liquids = facts.protocol.liquids
     unused = next(iter(liquids.values())).model_copy(update={"id": "unused"})
     changed = facts.protocol.model_copy(update={"liquids": {**liquids, "unused": unused}})
-    made = NewSessionDialog(replace(facts, protocol=changed), results)
-    qtbot.addWidget(made)
+    made = opened(replace(facts, protocol=changed))
     assert not made.begin.isEnabled()
     assert "undo that change" in made.verdict.text()
     assert made.participant.text() == "P002"
-
-
-def test_a_folder_of_another_study_is_refused(dialog, tmp_path):
-    other = tmp_path / "other"
-    other.mkdir()
-    (other / "dataset_description.json").write_text('{"name": "otherstudy"}')
-    dialog.results.setText(str(other))
-    assert not dialog.begin.isEnabled()
-    assert "otherstudy" in dialog.verdict.text()
-
-
-def test_no_seed_no_session(dialog):
-    dialog.seed.setText("")
-    assert not dialog.begin.isEnabled()
-    dialog.seed.setText("12")
-    assert dialog.begin.isEnabled()
-
-
-def test_seeds_are_drawn_anew(dialog):
-    seen = {draw_seed() for _ in range(50)}
-    assert len(seen) > 40
-    assert all(1 <= seed <= MAX_SEED for seed in seen)
-    assert int(dialog.seed.text()) in range(1, MAX_SEED + 1)
-
-
-def test_cancel_creates_nothing(dialog, results, qtbot):
-    dialog.participant.setText("P009")
-    with qtbot.waitSignal(dialog.rejected):
-        qtbot.mouseClick(dialog.cancel, Qt.MouseButton.LeftButton)
-    assert files(results.parent) == []
 
 
 def test_begin_creates_nothing_by_itself_and_gives_what_was_chosen(dialog, results, qtbot):
@@ -188,45 +182,25 @@ def test_begin_creates_nothing_by_itself_and_gives_what_was_chosen(dialog, resul
     assert files(results.parent) == []
 
 
-def test_a_simulated_hand_is_kept_apart_unless_a_folder_was_chosen(dialog, tmp_path):
-    scripted, mouse = dialog.device.findData("scripted"), dialog.device.findData("mouse")
-    dialog.device.setCurrentIndex(scripted)
-    assert dialog.results.text().endswith("rek2024-scripted")
-    dialog.device.setCurrentIndex(mouse)
-    assert dialog.results.text().endswith("rek2024")
-    dialog.results.setText(str(tmp_path / "mine"))
-    dialog.device.setCurrentIndex(scripted)
-    assert dialog.results.text() == str(tmp_path / "mine")
-
-
 def test_enter_begins_only_what_can_begin(dialog, qtbot):
-    dialog.participant.setText("P-9")
+    for participant, seed in (("P-9", "12"), ("test", "12"), ("P9", "")):
+        dialog.participant.setText(participant)
+        dialog.seed.setText(seed)
+        assert not dialog.begin.isEnabled()
     with qtbot.assertNotEmitted(dialog.accepted):
         qtbot.keyClick(dialog.participant, Qt.Key.Key_Return)
-    dialog.participant.setText("P9")
+    dialog.seed.setText("12")
     with qtbot.waitSignal(dialog.accepted):
         qtbot.keyClick(dialog.participant, Qt.Key.Key_Return)
 
 
-def test_every_field_has_a_name_for_those_who_cannot_see_it(dialog):
-    fields = (dialog.participant, dialog.session, dialog.seed, dialog.operator, dialog.language, dialog.device)
-    assert all(field.accessibleName() for field in (*fields, dialog.screen_choice, dialog.results))
-
-
-def begun_with(qtbot, results, **settings):
-    made = NewSessionDialog(study_facts("rek2024"), results, machine=MachineSettings(**settings))
-    qtbot.addWidget(made)
-    made.open()
-    return made
-
-
-def test_a_session_begins_with_what_is_set_for_this_machine(qtbot, results, tmp_path, monkeypatch):
+def test_a_session_begins_with_what_is_set_for_this_machine_unless_its_firmware_is_gone(tmp_path, monkeypatch, opened):
     screens = tuple(ScreenShown(n, name, 1920, 1080, 60.0, 1.0, 0, 0) for n, name in ((1, "A"), (2, "B"), (3, "C")))
     monkeypatch.setattr(new_session_dialog, "screens_shown", lambda: screens)
     firmware = tmp_path / "firmware.bin"
     firmware.write_bytes(b"x")
     set_here = {"device": "falcon", "screen": "B", "screen_number": 2, "firmware": str(firmware), "operator": "AK"}
-    made = begun_with(qtbot, results, **set_here)
+    made = opened(**set_here)
     assert made.chosen().operator == "AK"
     assert made.device_options.fields["firmware"].isVisible()
     chosen = made.chosen()
@@ -234,27 +208,12 @@ def test_a_session_begins_with_what_is_set_for_this_machine(qtbot, results, tmp_
     made.device.setCurrentIndex(made.device.findData("mouse"))
     assert not made.device_options.fields["firmware"].isVisible()
     assert made.chosen().device_options == {}
-
-
-def test_a_falcon_by_its_serial_number_can_be_preferred_and_nobody_knows_a_hammer(qtbot, results):
-    assert begun_with(qtbot, results, device="falcon:FT123").chosen().device == "falcon:FT123"
-    assert begun_with(qtbot, results, device="scripted").chosen().results.name == "rek2024-scripted"
-    assert begun_with(qtbot, results, device="hammer").chosen().device == "mouse"
-
-
-def test_firmware_that_is_not_there_is_refused_as_it_is_typed(qtbot, results, tmp_path):
-    made = begun_with(qtbot, results, device="falcon", firmware=str(tmp_path / "gone.bin"))
+    made = opened(device="falcon", firmware=str(tmp_path / "gone.bin"))
     assert not made.begin.isEnabled()
     assert "gone.bin" in made.verdict.text()
     made.device_options.fields["firmware"].clear()
     assert made.begin.isEnabled()
     assert made.chosen().device_options == {}
-
-
-def test_enter_presses_the_button_that_has_the_keyboard_and_no_other(dialog, qtbot):
-    dialog.cancel.setFocus()
-    with qtbot.waitSignal(dialog.rejected):
-        qtbot.keyClick(dialog.cancel, Qt.Key.Key_Return)
 
 
 def test_the_foot_stays_on_a_small_screen_and_every_question_is_reached(dialog, results, qtbot):
@@ -278,11 +237,10 @@ def test_the_foot_stays_on_a_small_screen_and_every_question_is_reached(dialog, 
         assert at.visibleRegion().boundingRect() == at.rect()
 
 
-def test_a_session_beyond_the_last_is_refused(qtbot, tmp_path):
+def test_a_session_beyond_the_last_is_refused(qtbot, tmp_path, opened):
     source = tmp_path / "grouped.toml"
     source.write_text(STUDY.replace("format = 2\n", 'format = 2\nsequences = [["hello", "thin"], ["thick", "end"]]\n'))
-    made = NewSessionDialog(study_facts(str(source)), tmp_path / "results")
-    qtbot.addWidget(made)
+    made = opened(study_facts(str(source)))
     made.session.setValue(2)
     settle(qtbot, made)
     assert made.begin.isEnabled()
@@ -291,12 +249,10 @@ def test_a_session_beyond_the_last_is_refused(qtbot, tmp_path):
     assert "permitted: 1 to 2" in made.verdict.text()
 
 
-def test_replaced_participant_is_asked_for_where_rows_are_dealt(qtbot, results, tmp_path):
+def test_replaced_participant_is_asked_for_where_rows_are_dealt(qtbot, tmp_path, opened):
     study = tmp_path / "square.toml"
     study.write_text(source_bytes("demo").decode().replace('\norder = "shuffled"', '\norder = "latin"'))
-    dialog = NewSessionDialog(study_facts(str(study)), results)
-    qtbot.addWidget(dialog)
-    dialog.open()
+    dialog = opened(study_facts(str(study)))
     settle(qtbot, dialog)
     assert dialog.row_of.isVisible()
     for part in dialog.findChildren(QWidget):  # no part is wider than there is room for
@@ -308,10 +264,3 @@ def test_replaced_participant_is_asked_for_where_rows_are_dealt(qtbot, results, 
     dialog.row_of.setText("anna")
     assert "rows are assigned by the number" in dialog.verdict.text()
     assert not dialog.begin.isEnabled()
-
-
-def test_replaced_participant_is_not_asked_for_in_a_study_without_squares(qtbot, results):
-    dialog = NewSessionDialog(study_facts("demo"), results)
-    qtbot.addWidget(dialog)
-    dialog.open()
-    assert not dialog.row_of.isVisible()

@@ -1,42 +1,31 @@
-"""Home: cards, sessions, and the ways into a session or a rehearsal, whose dialog counts, fails and stops."""
-
-from dataclasses import replace
+"""Home: cards, sessions, and the ways into a session."""
 
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAccessible, QFontMetrics
-from PySide6.QtWidgets import QApplication, QFileDialog, QPushButton
+from PySide6.QtWidgets import QFileDialog
 
 from study_app.devices.descriptor import NONE, Backend
-from study_app.gui.home import view
 from study_app.gui.home.main_window import LEAST
-from study_app.gui.home.rehearsal_dialog import RehearsalDialog
 from study_app.gui.home.study_cards import BrokenCard, StudyCard
-from study_app.gui.theme.theme import DARK, font
+from study_app.gui.theme.theme import font
 from study_app.gui.widgets.row_table import GAP
 from study_app.protocol.load import source_bytes
 from study_app.protocol.source.files import shipped_file
 from study_app.store.exclusions import exclude
-from study_app.store.folders import rehearsal_folder
 from study_app.store.workstation import MachineSettings
 from study_app.viewmodels.devices.list_view import devices_shown
-from study_app.viewmodels.home import study_facts
 from tests.gui.home.home_window import cell, hold, open_home, study_cards
 
 pytestmark = pytest.mark.slow
 
 
-def test_every_protocol_has_a_card_and_one_is_the_next_step(home):
-    cards = study_cards(home)
-    assert {card.facts.protocol.study.name for card in cards} >= {"rek2024", "demo"}
-    assert [card.new.property("role") for card in cards].count("primary") == 1
-
-
-def test_sessions_are_listed_with_status_and_answers(home):
-    assert cell(home, 0, "Status") == "Complete"
-    assert cell(home, 0, "Answers") == "0 of 8"
-    demo = next(card for card in study_cards(home) if card.facts.protocol.study.name == "demo")
-    assert demo.held.text() == "1 session, 1 complete"
+def test_every_protocol_has_a_card_one_is_the_next_step_and_sessions_have_status_and_answers(home):
+    cards = {card.facts.protocol.study.name: card for card in study_cards(home)}
+    assert set(cards) >= {"rek2024", "demo"}
+    assert [card.new.property("role") for card in cards.values()].count("primary") == 1
+    assert (cell(home, 0, "Status"), cell(home, 0, "Answers")) == ("Complete", "0 of 8")
+    assert cards["demo"].held.text() == "1 session, 1 complete"
 
 
 def test_participants_pilots_simulated_and_sample_sessions_are_shown_apart(qtbot, tmp_path):
@@ -58,6 +47,7 @@ def test_participants_pilots_simulated_and_sample_sessions_are_shown_apart(qtbot
 def test_a_fresh_clone_greets_with_no_session_and_says_what_is_not_shown(qtbot, tmp_path):
     hold(tmp_path / "sample-demo", "P001", simulated=True)
     home = open_home(qtbot, tmp_path)
+    assert not (tmp_path / "demo").exists()
     assert home.sessions.shown == ()
     assert home.sessions.none.isVisible()
     assert home.sessions.none.text().endswith("Not shown: 1 sample session.")
@@ -117,14 +107,6 @@ def test_an_excluded_session_is_not_called_valid(qtbot, tmp_path):
     assert "fell asleep" in cell(home, rows["P001"], "Validity", Qt.ItemDataRole.ToolTipRole)
 
 
-def test_an_empty_results_folder_says_so(qtbot, tmp_path):
-    home = open_home(qtbot, tmp_path / "none")
-    home.show_sessions()
-    assert not home.sessions.none.isHidden()
-    assert home.sessions.shown == ()
-    assert not (tmp_path / "none").exists()
-
-
 def test_new_session_opens_the_questions_and_passes_the_answers_on(home, qtbot):
     card = study_cards(home)[0]
     qtbot.mouseClick(card.new, Qt.MouseButton.LeftButton)
@@ -165,25 +147,6 @@ def test_a_protocol_opened_from_elsewhere_gets_a_card(home, qtbot, tmp_path, mon
     qtbot.waitUntil(lambda: isinstance(home.grid.cards[0], BrokenCard))
 
 
-def test_the_theme_changes(home, qtbot):
-    rail = home.main.rail
-    qtbot.mouseClick(rail.switch, Qt.MouseButton.LeftButton)
-    assert home.sessions.rows.table.theme is DARK
-    assert rail.switch.text() == "Light theme"
-
-
-def test_a_long_title_is_cut_after_two_lines_and_whole_in_tip_and_name(qtbot, results, monkeypatch):
-    long = "How people tell " + ", ".join(f"liquid {number}" for number in range(20)) + " apart"
-    home = open_home(qtbot, results)
-    monkeypatch.setattr(view, "read_studies", lambda _opened: (replace(study_facts("demo"), title=long),))
-    home.show_studies()
-    qtbot.waitUntil(lambda: not home.reading)
-    QApplication.processEvents()
-    (card,) = home.grid.cards
-    assert card.title.text().count("\n") == 1
-    assert (card.title.toolTip(), card.title.accessibleName()) == (long, long)
-
-
 def test_keys_begin_a_study_and_open_a_protocol(home, qtbot, monkeypatch):
     asked = []
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: asked.append("open") or ("", ""))
@@ -197,35 +160,6 @@ def test_keys_begin_a_study_and_open_a_protocol(home, qtbot, monkeypatch):
         "Open protocol … (Ctrl+O)",
         "New study … (Ctrl+N)",
     ]
-
-
-def test_a_small_window_cuts_nothing_off_sideways(home, qtbot):
-    window = home.main
-    window.resize(LEAST)
-    inside, seen = home.area.widget(), home.area.viewport()
-
-    def fits():
-        """One round of events need not lay out what the new size asks for: other events may come first."""
-        assert window.size() == LEAST
-        assert inside.width() <= seen.width()
-        assert inside.minimumSizeHint().width() <= seen.width()
-
-    qtbot.waitUntil(fits)
-
-
-def test_no_button_is_dead(home):
-    for button in home.main.findChildren(QPushButton):
-        assert button.receivers("2clicked(bool)") or button.receivers("2clicked()"), button.text()
-
-
-def test_the_end_of_the_program_ends_a_rehearsal(home, qtbot, monkeypatch):
-    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.TASK", "tests.gui.home.rehearsal_tasks:endless")
-    home.ask_for_rehearsal(study_facts("demo"))
-    dialog = home.dialog
-    dialog.start.click()
-    assert dialog.worker.works
-    home.end()
-    assert dialog.worker.ended
 
 
 def test_the_preferred_device_is_shown_as_it_was_found_and_sessions_begin_with_it(home, qtbot):
@@ -251,113 +185,3 @@ def test_tab_goes_through_home_as_it_is_read(home, qtbot):
     begun = [name for name in names if name.startswith("New session")]
     assert len(begun) == len(home.grid.cards)
     assert max(map(names.index, begun)) < names.index("Sessions shown") < names.index("Sessions")
-
-
-def test_rehearsals_get_a_folder_of_their_own(tmp_path):
-    assert rehearsal_folder(tmp_path, "demo").name == "demo-rehearsal-1"
-    (tmp_path / "demo-rehearsal-1").mkdir()
-    assert rehearsal_folder(tmp_path, "demo").name == "demo-rehearsal-2"
-
-
-@pytest.mark.parametrize(
-    ("task", "said"),
-    [("fail", "no room left"), ("end", "the process ended with exit code 7; the terminal may show why")],
-)
-def test_a_failed_rehearsal_says_why_and_stays(qtbot, tmp_path, monkeypatch, task, said):
-    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
-    qtbot.addWidget(dialog)
-    dialog.open()
-    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.TASK", f"tests.gui.home.rehearsal_tasks:{task}")
-    qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: dialog.cancel.text() == "Close", timeout=20_000)
-    assert dialog.isVisible()
-    assert dialog.said.text() == said
-    qtbot.mouseClick(dialog.cancel, Qt.MouseButton.LeftButton)
-    assert not dialog.isVisible()
-
-
-def test_a_rehearsal_counts_participants_and_leads_to_its_results(qtbot, tmp_path, monkeypatch):
-    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
-    qtbot.addWidget(dialog)
-    dialog.open()
-    dialog.participants.setValue(2)
-    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.TASK", "tests.gui.home.rehearsal_tasks:two")
-    qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: dialog.progress.value() == 1, timeout=20_000)
-    assert dialog.said.text() == "1 of 2: R1: 8 responses (simulated)"
-    assert (dialog.progress.minimum(), dialog.progress.maximum()) == (0, 2)
-    dialog.worker.stop()
-    qtbot.waitUntil(lambda: dialog.over, timeout=20_000)
-    assert dialog.progress.value() == 2
-    assert dialog.isVisible()
-    assert str(dialog.folder) in dialog.said.text()
-    assert dialog.start.text() == "Open results"
-    with qtbot.waitSignal(dialog.accepted):
-        qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
-
-
-@pytest.mark.parametrize("at", ["participants", "seed", "start", "dialog"])
-def test_enter_begins_the_rehearsal_wherever_the_keyboard_is(qtbot, tmp_path, monkeypatch, at):
-    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
-    qtbot.addWidget(dialog)
-    dialog.open()
-    qtbot.waitUntil(dialog.isActiveWindow)
-    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.TASK", "tests.gui.home.rehearsal_tasks:endless")
-    pressed = dialog if at == "dialog" else getattr(dialog, at)
-    pressed.setFocus()
-    qtbot.keyClick(pressed, Qt.Key.Key_Return)
-    assert dialog.worker.works
-    dialog.end()
-    assert dialog.worker.ended
-
-
-def test_enter_on_cancel_cancels(qtbot, tmp_path):
-    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
-    qtbot.addWidget(dialog)
-    dialog.open()
-    qtbot.waitUntil(dialog.isActiveWindow)
-    dialog.cancel.setFocus()
-    qtbot.keyClick(dialog.cancel, Qt.Key.Key_Return)
-    assert not dialog.isVisible()
-    assert dialog.worker is None
-
-
-def test_cancelling_a_rehearsal_stops_it(qtbot, tmp_path, monkeypatch):
-    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
-    qtbot.addWidget(dialog)
-    dialog.open()
-    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.TASK", "tests.gui.home.rehearsal_tasks:endless")
-    qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
-    assert dialog.worker.works
-    with qtbot.waitSignal(dialog.rejected):
-        qtbot.mouseClick(dialog.cancel, Qt.MouseButton.LeftButton)
-        assert dialog.isVisible()  # and nobody waits
-    assert dialog.worker.ended
-    assert not dialog.isVisible()
-
-
-def test_a_rehearsal_that_does_not_listen_is_killed(qtbot, tmp_path, monkeypatch):
-    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
-    qtbot.addWidget(dialog)
-    dialog.open()
-    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.TASK", "tests.gui.home.rehearsal_tasks:deaf")
-    monkeypatch.setattr("study_app.workers.client.PATIENCE_S", 0.05)
-    dialog.start.click()
-    qtbot.waitUntil(lambda: dialog.said.text() == "1 of 5: deaf", timeout=20_000)
-    with qtbot.waitSignal(dialog.rejected):
-        dialog.close()
-    assert dialog.worker.ended
-
-
-def test_a_rehearsal_that_cannot_be_run_says_so(qtbot, tmp_path, monkeypatch):
-    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
-    qtbot.addWidget(dialog)
-    dialog.open()
-
-    def none(*_args, **_named):
-        raise OSError("no more processes")
-
-    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.WorkerClient", none)
-    dialog.start.click()
-    qtbot.waitUntil(lambda: dialog.cancel.text() == "Close")
-    assert dialog.said.text() == "no more processes"

@@ -6,9 +6,8 @@ import numba
 import pytest
 
 from study_app.gui.lab.view import LabPlace
-from study_app.gui.theme.theme import LIGHT
-from study_app.gui.theme.themed import apply_theme
 from study_app.viewmodels.lab import LabView
+from tests.gui import windows
 from tests.gui.lab.sample import lab_view, still_view
 
 
@@ -26,11 +25,6 @@ def still() -> LabView:
 
 @pytest.fixture
 def place(qtbot: Any) -> Any:
-    made = LabPlace()
-    apply_theme(made, LIGHT)
-    qtbot.addWidget(made)
-    made.resize(1528, 900)
-    made.show()
-    qtbot.waitExposed(made)
+    made = windows.shown(qtbot, LabPlace(), (1528, 900))
     made.activateWindow()
     return made

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from PySide6.QtWidgets import QApplication
 
 from study_app.haptics.kernels.safety import begin_scene, new_safety
 from study_app.haptics.model.layout import SAMPLE, records
@@ -63,9 +62,8 @@ def felt_samples(scene: Scene, hand_m: Any) -> Any:
 
 def workbench(a: str = "water", b: str = "light_oil", **changes: float) -> Workbench:
     """Return a liquid, water edited by ``changes`` (of the wake), beside another."""
-    bench = Workbench(
-        *(Setting(spoken(name), scene, scene) for name in (a, b) for scene in (load_scene("rek2024", name),))
-    )
+    scenes = {name: load_scene("rek2024", name) for name in (a, b)}
+    bench = Workbench(*(Setting(spoken(name), scene, scene) for name, scene in scenes.items()))
     if a != "water":
         return bench
     for name, value in (changes or {"scaling": 2600.0, "exponent": 0.6, "breaking_angle_deg": 40.0}).items():
@@ -129,9 +127,3 @@ def heard(place: Any, name: str) -> list[tuple[Any, ...]]:
     said: list[tuple[Any, ...]] = []
     getattr(place, name).connect(lambda *what: said.append(what))
     return said
-
-
-def settle() -> None:
-    """Let layouts within layouts come to rest."""
-    for _ in range(4):
-        QApplication.processEvents()

@@ -16,7 +16,8 @@ from study_app.lab.steady_curves import RATES_PER_S, steady_curves
 from study_app.protocol.load import load_scene
 from study_app.viewmodels.estimation import LSL, SOURCES, EstimateRow, EstimateShown
 from study_app.viewmodels.lab import CostRow, LabView
-from tests.gui.lab.sample import blind, heard, settle, still_view
+from tests.gui.lab.sample import blind, heard, still_view
+from tests.gui.walk import settle
 
 pytestmark = pytest.mark.slow
 
@@ -52,13 +53,9 @@ def test_the_height_grows_at_once_and_shrinks_only_by_half(plot: CurvePlot) -> N
     assert tops[1:4] == [4, 4, 4]
     assert tops[4] < 4
     assert tops[5] == 1
-
-
-def test_the_limit_is_always_inside(plot: CurvePlot) -> None:
     plot.show_curves(np.empty(0), (np.empty(0), np.empty(0)), limit=8.0)
     assert top(plot) >= 8
     assert plot.limit.isVisible()
-    assert plot.limit.value() == 8.0
 
 
 @pytest.mark.parametrize("count", [0, 1, 7, 240, 241, 2500])
@@ -138,54 +135,25 @@ def bench(a: str, b: str) -> Workbench:
     return Workbench(*(Setting(spoken(name), scenes[name], scenes[name]) for name in (a, b)))
 
 
-def test_the_row_is_hidden_between_newtonian_liquids(place: Any) -> None:
-    place.show_view(still_view())
-    assert not place.curves.isVisible()
-    place.show_view(still_view(bench("water", "ketchup")))
-    assert place.curves.isVisible()
-    place.show_view(still_view(bench("water", "honey")))
-    assert not place.curves.isVisible()
-
-
-def test_both_settings_are_drawn_with_the_limit(place: Any) -> None:
+def test_flow_curves_are_shown_of_non_newtonian_liquids_and_follow_edits_and_the_limit(place: Any) -> None:
+    for liquids, shown in ((None, False), (("water", "ketchup"), True), (("water", "honey"), False)):
+        place.show_view(still_view(bench(*liquids) if liquids else None))
+        assert place.curves.isVisible() is shown
     view = still_view(bench("ketchup", "honey"))
     place.show_view(view)
-    settle()
+    settle(place)
     b, a = place.curves.stress.stresses.curves
     assert np.allclose(a.getData()[1], np.log10(15 + 10 * RATES_PER_S**0.25))
     assert np.allclose(b.getData()[1], np.log10(10 * RATES_PER_S))
     forces = place.curves.force.forces
-    assert forces.limit.value() == 8.0
     assert forces.curves[0].getData()[1].max() == steady_curves(view.workbench.b.scene).force_n.max()
     assert "thixotropy" in place.curves.stress.plot.accessibleDescription()
-
-
-def test_an_edit_moves_the_curve(place: Any) -> None:
-    before = bench("ketchup", "honey")
-    place.show_view(still_view(before))
-    place.show_view(still_view(before.change("non_newtonian.yield_stress_pa", 60.0)))
-    _, a = place.curves.stress.stresses.curves
+    place.show_view(still_view(view.workbench.change("non_newtonian.yield_stress_pa", 60.0)))
     assert np.allclose(a.getData()[1], np.log10(60 + 10 * RATES_PER_S**0.25))
-
-
-def test_the_limit_is_that_of_the_setting_in_hand(place: Any) -> None:
-    other = bench("ketchup", "honey").switch().change("scene.force_limit_n", 4.0)
-    limit = place.curves.force.forces.limit
-    for shown, limit_n in ((other, 4.0), (other.switch(), 8.0)):
-        place.show_view(still_view(shown))
-        assert limit.value() == limit_n
-
-
-def test_while_blind_the_curves_are_hidden_and_nothing_moves(place: Any) -> None:
-    view = still_view(bench("ketchup", "honey"))
-    place.show_view(view)
-    settle()
-    before = [place.curves.stress.size(), place.tank.size()]
-    place.show_view(dataclasses.replace(view, workbench=blind(view.workbench)))
-    settle()
-    assert [place.curves.stress.size(), place.tank.size()] == before
-    for card in (place.curves.stress, place.curves.force):
-        assert not card.plot.isVisible()
+    other = view.workbench.switch().change("scene.force_limit_n", 4.0)
+    for shown_bench, limit_n in ((other, 4.0), (other.switch(), 8.0)):
+        place.show_view(still_view(shown_bench))
+        assert forces.limit.value() == limit_n
 
 
 FOUND = EstimateShown(
@@ -198,9 +166,14 @@ FOUND = EstimateShown(
 )
 
 
-def test_values_stand_with_their_intervals_and_are_applied_on_request(place: Any, still: LabView) -> None:
+def test_values_stand_with_their_intervals_and_are_applied_on_request_where_they_are_sound(
+    place: Any, still: LabView
+) -> None:
+    def show(**changes: Any) -> None:
+        place.show_view(dataclasses.replace(still, estimate=dataclasses.replace(FOUND, **changes)))
+
     said = {name: heard(place, name) for name in ("estimate_apply_asked", "estimate_follow_asked")}
-    place.show_view(dataclasses.replace(still, estimate=FOUND))
+    show()
     name, value, interval = place.estimate.lines[0]
     assert (name.whole, value.text(), interval.text()) == ("Drag coefficient", "0.4203", "0.419 … 0.422")
     assert place.estimate.message.text().startswith("Residual 0.052 N")
@@ -208,41 +181,33 @@ def test_values_stand_with_their_intervals_and_are_applied_on_request(place: Any
     place.estimate.follow.click()
     assert said == {"estimate_apply_asked": [()], "estimate_follow_asked": [(True,)]}
     assert not place.estimate.follow.isChecked()  # the view says when it is
-    place.show_view(dataclasses.replace(still, estimate=dataclasses.replace(FOUND, follows=True)))
+    show(follows=True)
     assert place.estimate.follow.isChecked()
-
-
-def test_what_is_not_identified_cannot_be_applied(place: Any, still: LabView) -> None:
-    vague = dataclasses.replace(FOUND, sound=False, may_apply=False, message="This motion does not identify it.")
-    place.show_view(dataclasses.replace(still, estimate=vague))
+    show(sound=False, may_apply=False, message="This motion does not identify it.")
     assert not place.estimate.apply.isEnabled()
     assert place.estimate.message.property("role") == "warn"
 
 
-def test_sources_and_parameters_are_chosen(place: Any, still: LabView) -> None:
+def test_sources_a_file_and_parameters_are_chosen(place: Any, still: LabView, tmp_path: Path) -> None:
     sources, parameters = heard(place, "estimate_source_chosen"), heard(place, "estimate_parameters_chosen")
     place.show_view(dataclasses.replace(still, estimate=dataclasses.replace(FOUND, sources=(*SOURCES, *LSL))))
-    place.estimate.source.activated.emit(2)
-    place.estimate.source.activated.emit(4)
+    for at in (2, 4, 3):
+        place.estimate.source.activated.emit(at)
     place.estimate.parameters.activated.emit(1)
-    assert sources == [("device", None), ("lsl", None)]
-    assert parameters == [("wake",)]
-
-
-def test_a_file_is_asked_for(place: Any, still: LabView, tmp_path: Path) -> None:
-    sources = heard(place, "estimate_source_chosen")
-    place.show_view(still)
-    place.estimate.source.activated.emit(3)
     assert isinstance(place.dialog, QFileDialog)
     place.dialog.fileSelected.emit(str(tmp_path / "robot.csv"))
     place.dialog.reject()
-    assert sources == [("file", tmp_path / "robot.csv")]
+    assert sources == [("device", None), ("lsl", None), ("file", tmp_path / "robot.csv")]
+    assert parameters == [("wake",)]
 
 
-def test_nothing_of_it_is_seen_in_a_blind_comparison(place: Any, still: LabView) -> None:
-    shown = dataclasses.replace(still, estimate=FOUND)
-    place.show_view(shown)
-    blind = dataclasses.replace(shown, workbench=dataclasses.replace(still.workbench, blind=True))
-    place.show_view(blind)
-    assert not place.estimate.lines[0][1].isVisible()
-    assert not place.estimate.source.isVisible()
+def test_while_blind_neither_curves_nor_values_are_seen_and_nothing_moves(place: Any) -> None:
+    view = still_view(bench("ketchup", "honey"), estimate=FOUND)
+    place.show_view(view)
+    settle(place)
+    before = [place.curves.stress.size(), place.tank.size()]
+    place.show_view(dataclasses.replace(view, workbench=blind(view.workbench)))
+    settle(place)
+    assert [place.curves.stress.size(), place.tank.size()] == before
+    hidden = (place.curves.stress.plot, place.curves.force.plot, place.estimate.lines[0][1], place.estimate.source)
+    assert not any(one.isVisible() for one in hidden)

@@ -12,7 +12,8 @@ from study_app.gui.lab.parameter_rows import ChoiceRow, NumberRow, SwitchRow
 from study_app.gui.widgets.escape_key import HOLD_MS, EscapeAnywhere
 from study_app.lab.parameters import sections
 from study_app.viewmodels.lab import LabView, form
-from tests.gui.lab.sample import blind, heard, settle, still_view, workbench
+from tests.gui.lab.sample import blind, heard, still_view, workbench
+from tests.gui.walk import settle
 
 pytestmark = pytest.mark.slow
 
@@ -29,33 +30,29 @@ def fields(place: Any) -> dict[str, NumberRow]:
     return {name: row for name, row in place.form.rows.items() if isinstance(row, NumberRow)}
 
 
-def test_there_is_a_row_for_every_parameter(place: Any, told: Any, still: LabView) -> None:
+def enter(field: Any, text: str) -> None:
+    field.selectAll()
+    QTest.keyClicks(field, text)
+    QTest.keyClick(field, Qt.Key.Key_Return)
+
+
+def test_every_parameter_has_a_row_in_units_people_read_and_changed_ones_are_marked(
+    place: Any, told: Any, still: LabView
+) -> None:
     wanted = [it for section in sections(still.workbench.a.scene) for it in section.parameters]
     assert list(place.form.rows) == [it.name for it in wanted]
-    kinds = {NumberRow: 0, ChoiceRow: 0, SwitchRow: 0}
-    for it in wanted:
-        kinds[type(place.form.rows[it.name])] += 1  # type: ignore[index]
-    assert all(kinds.values())
+    assert {type(row) for row in place.form.rows.values()} == {NumberRow, ChoiceRow, SwitchRow}
     assert list(place.form.blocks) == [section.title for section in form(still.workbench.a)]
-
-
-def test_units_and_numbers_are_those_people_read(place: Any, told: Any) -> None:
     rows = fields(place)
-    assert rows["wake.breaking_span_m"].field.text() == "68"
-    assert rows["wake.decay"].field.text() == "0.999975"
-    assert rows["liquid.viscosity_pa_s"].field.text() == ""
+    texts = {"wake.breaking_span_m": "68", "wake.decay": "0.999975", "liquid.viscosity_pa_s": ""}
+    assert {name: rows[name].field.text() for name in texts} == texts
     assert rows["wake.breaking_span_m"].slider.number == pytest.approx(68)
     assert rows["body.diameter_m"].field.accessibleName() == "Diameter, mm"
-
-
-def test_changed_ones_are_bold_with_a_tick_where_they_were(place: Any, told: Any) -> None:
-    rows = fields(place)
     changed = {name for name, row in rows.items() if row.field.state == "changed"}
     assert changed == {"wake.scaling", "wake.exponent", "wake.breaking_angle_deg"}
     assert all((row.name.font().weight() == 600) == (name in changed) for name, row in rows.items())
     assert rows["wake.scaling"].slider.tick == 1700
-    assert place.form.blocks["Wake"].count.text() == "3 of 8 changed"
-    assert place.form.blocks["Body"].count.text() == ""
+    assert [place.form.blocks[title].count.text() for title in ("Wake", "Body")] == ["3 of 8 changed", ""]
 
 
 def test_every_number_says_exactly_what_it_shows_when_entered_again(place: Any, told: Any, still: LabView) -> None:
@@ -71,15 +68,10 @@ def test_every_number_says_exactly_what_it_shows_when_entered_again(place: Any, 
         assert told == [(name, value, False)]
 
 
-def test_typing_takes_si_units(place: Any, told: Any) -> None:
-    row = fields(place)["body.diameter_m"]
-    row.field.selectAll()
-    QTest.keyClicks(row.field, "50")
-    QTest.keyClick(row.field, Qt.Key.Key_Return)
+def test_typing_and_sliding_take_si_units_and_say_when_it_is_held(place: Any, told: Any) -> None:
+    enter(fields(place)["body.diameter_m"].field, "50")
     assert told == [("body.diameter_m", pytest.approx(0.05), False)]
-
-
-def test_sliding_takes_si_units_and_says_when_it_is_held(place: Any, told: Any) -> None:
+    told.clear()
     row = fields(place)["wake.breaking_span_m"]
     middle = QPoint(row.slider.width() // 2, row.slider.height() // 2)
     QTest.mousePress(row.slider, Qt.MouseButton.LeftButton, pos=middle)
@@ -93,9 +85,7 @@ def test_sliding_takes_si_units_and_says_when_it_is_held(place: Any, told: Any) 
 
 def test_what_is_no_number_is_said_in_one_line_and_stays(place: Any, told: Any, still: LabView) -> None:
     row = fields(place)["wake.exponent"]
-    row.field.selectAll()
-    QTest.keyClicks(row.field, "0.5.5")
-    QTest.keyClick(row.field, Qt.Key.Key_Return)
+    enter(row.field, "0.5.5")
     assert told == []
     assert row.why.isVisible()
     assert "“0.5.5” is not a number" in row.why.text()
@@ -110,9 +100,7 @@ def test_what_is_no_number_is_said_in_one_line_and_stays(place: Any, told: Any, 
 
 def test_what_the_model_refuses_stays_with_the_reason_until_it_is_mended(place: Any, told: Any, still: LabView) -> None:
     row = fields(place)["wake.length"]
-    row.field.selectAll()
-    QTest.keyClicks(row.field, "9000")
-    QTest.keyClick(row.field, Qt.Key.Key_Return)
+    enter(row.field, "9000")
     why = "length 9000 exceeds scaling 2600: lower length or raise scaling"
     refused = dataclasses.replace(still, refused=("wake.length", why))
     for _ in range(3):
@@ -200,14 +188,12 @@ def test_the_liquid_and_the_copy_name_their_sides(place: Any, told: Any, still: 
     assert [(side, choice.title) for side, choice in chosen] == [("A", "Honey"), ("B", "Syrup")]
 
 
-def test_stop_force_speaks_at_the_press(place: Any, still: LabView) -> None:
+def test_stop_force_speaks_at_the_press_and_is_never_disabled_hidden_or_moved(place: Any, still: LabView) -> None:
     place.show_view(still)
     said = heard(place, "stop_asked")
     QTest.mousePress(place.header.stop, Qt.MouseButton.LeftButton)
     assert len(said) == 1
-
-
-def test_stop_force_is_never_disabled_hidden_or_moved(place: Any, still: LabView) -> None:
+    QTest.mouseRelease(place.header.stop, Qt.MouseButton.LeftButton)
     views = [
         still,
         dataclasses.replace(still, force_on=False),
@@ -217,11 +203,11 @@ def test_stop_force_is_never_disabled_hidden_or_moved(place: Any, still: LabView
     ]
     for width in (1528, 952):
         place.resize(width, 640)
-        settle()
+        settle(place)
         places = set()
         for view in views:
             place.show_view(view)
-            settle()
+            settle(place)
             stop = place.header.stop
             assert stop.isEnabled()
             assert stop.isVisible()
@@ -231,17 +217,15 @@ def test_stop_force_is_never_disabled_hidden_or_moved(place: Any, still: LabView
         assert len(places) == 1
 
 
-def test_esc_held_stops_the_force_from_any_part(place: Any, still: LabView, qtbot: Any) -> None:
+def test_esc_held_stops_the_force_from_any_part_also_while_a_preset_is_being_saved(
+    place: Any, still: LabView, qtbot: Any
+) -> None:
     place.show_view(still)
     qtbot.waitUntil(lambda: QGuiApplication.focusWindow() is not None)
     with qtbot.waitSignal(place.stop_asked, timeout=HOLD_MS + 2000):
         QTest.keyPress(QGuiApplication.focusWindow(), Qt.Key.Key_Escape)
     QTest.keyRelease(QGuiApplication.focusWindow(), Qt.Key.Key_Escape)
-
-
-def test_the_force_can_be_stopped_while_a_preset_is_being_saved(place: Any, still: LabView, qtbot: Any) -> None:
     said = heard(place, "stop_asked")
-    place.show_view(still)
     place.header.save.click()
     assert not place.dialog.isModal()
     place.dialog.activateWindow()
@@ -252,21 +236,11 @@ def test_the_force_can_be_stopped_while_a_preset_is_being_saved(place: Any, stil
     qtbot.waitUntil(lambda: QGuiApplication.focusWindow() is not None)
     QTest.keyRelease(QGuiApplication.focusWindow(), Qt.Key.Key_Escape)
     assert len(said) == 1
-
-
-def test_a_dialog_goes_with_the_place(place: Any, still: LabView) -> None:
-    place.show_view(still)
     place.header.save.click()
     place.hide()
-    assert place.dialog is None
-
-
-def test_esc_held_elsewhere_asks_nothing_of_a_lab_that_was_left(place: Any, still: LabView) -> None:
-    place.show_view(still)
-    said = heard(place, "stop_asked")
-    place.hide()
+    assert place.dialog is None, "a dialog goes with the place"
     place.findChild(EscapeAnywhere).held.emit()
-    assert said == []
+    assert len(said) == 1, "Esc held elsewhere asks nothing of a lab that was left"
 
 
 def test_a_knob_held_while_the_other_side_is_called_for_changes_nothing_there(place: Any, still: LabView) -> None:

@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-import pytest
 from PySide6.QtCore import QPointF
 
-from study_app.gui.lab.tail_painting import SHADES, STEP_PX, tail_places
+from study_app.gui.lab.tail_painting import tail_places
 from study_app.gui.participant.tank.camera import Box, Camera
 from study_app.viewmodels.lab import Floats, LabView
 
@@ -41,13 +40,6 @@ def apart(one: QPointF, other: QPointF) -> float:
     return float(np.hypot(one.x() - other.x(), one.y() - other.y()))
 
 
-def test_it_begins_and_ends_where_the_body_was() -> None:
-    places = tail_places(tail([(-40, 0, 0), (0, 0, 10), (40, 5, 0)]), CAMERA, BOX)
-    assert apart(places.runs[0][1].first(), pixel((-40, 0, 0))) < 1e-6
-    assert apart(places.runs[-1][1].last(), pixel((40, 5, 0))) < 1e-6
-    assert apart(places.breaks[0], pixel((-40, 0, 0))) < 1e-6
-
-
 def test_a_break_is_a_ring_where_the_segment_before_ended_and_each_side_has_an_arrow() -> None:
     places = tail_places(tail([(-40, 0, 0), (40, 0, 0), (-40, 0, 20)], (0, 50)), CAMERA, BOX)
     assert len(places.breaks) == 2
@@ -56,26 +48,6 @@ def test_a_break_is_a_ring_where_the_segment_before_ended_and_each_side_has_an_a
     assert abs(right) < 0.1
     assert abs(left) > np.pi / 2
     assert len(places.floor) == 2
-
-
-def test_no_more_points_than_can_be_seen_and_none_left_out_that_could() -> None:
-    made = tail([(-40, 0, 0), (0, 20, 10), (40, -20, 0)], count=400)
-    places = tail_places(made, CAMERA, BOX)
-    drawn = np.array([(p.x(), p.y()) for _, run in places.runs for p in run.toList()])
-    length = float(np.hypot(*np.diff(drawn, axis=0).T).sum())
-    assert len(drawn) < length / STEP_PX + 2 * SHADES + 2
-    for place in made.positions_m:
-        at = QPointF(*CAMERA.point(tuple(place.tolist())))
-        assert min(np.hypot(drawn[:, 0] - at.x(), drawn[:, 1] - at.y())) < 1.5 * STEP_PX
-
-
-@pytest.mark.parametrize("count", [0, 1])
-def test_nothing_yet(count: int) -> None:
-    made = Made(np.zeros((count, 3)), np.ones(count, bool), np.zeros(count), alive=count, segments=count)
-    places = tail_places(made, CAMERA, BOX)
-    assert places.runs == ()
-    assert places.heads == ()
-    assert len(places.breaks) == count
 
 
 def test_a_real_wake_has_as_many_rings_as_segments(moved: LabView) -> None:

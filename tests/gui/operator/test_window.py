@@ -10,7 +10,6 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.operator import OperatorWindow
-from study_app.gui.operator.current_step import Tally
 from study_app.gui.operator.stop_panel import LEAST_HEIGHT, LEAST_WIDTH
 from study_app.gui.theme.theme import DARK
 from study_app.gui.widgets.escape_key import HOLD_MS
@@ -41,17 +40,6 @@ def running(window, told, health):
     return window
 
 
-def test_a_view_becomes_texts(running, told, health):
-    assert running.header.study.text() == "demo"
-    assert running.header.state.word == "Running"
-    assert running.header.trials.text() == "0 of 4 trials"
-    assert running.rail.heading.text() == "Trial 1 of 4"
-    assert running.rail.now.elapsed.text() == "0:00 of 0:30"
-    assert [card.value.text() for card in running.tiles.cards[:2]] == ["1000.0", "15"]
-    assert len(running.rail.lines) == len(told.view(health).steps)
-    assert running.stop.word.text() == "Force is on"
-
-
 def test_without_force_on_the_hand_the_cockpit_says_so(qtbot, told):
     window = OperatorWindow("demo", lateness_limit_s=0.002, reach_m=0.05, pointer=True, felt=False)
     qtbot.addWidget(window)
@@ -61,6 +49,81 @@ def test_without_force_on_the_hand_the_cockpit_says_so(qtbot, told):
     window.show_view(told.view(force_on=False))
     assert window.stop.word.text() == "Force is off"
     window.may_close = True
+
+
+def test_a_view_becomes_texts_and_plots(running, told, health):
+    assert running.header.study.text() == "demo"
+    assert running.header.state.word == "Running"
+    assert running.header.trials.text() == "0 of 4 trials"
+    assert running.rail.heading.text() == "Trial 1 of 4"
+    assert running.rail.now.elapsed.text() == "0:00 of 0:30"
+    assert [card.value.text() for card in running.tiles.cards[:2]] == ["1000.0", "15"]
+    assert len(running.rail.lines) == len(told.view(health).steps)
+    assert running.stop.word.text() == "Force is on"
+    running.show_lateness(health)
+    plot = running.lateness.plot
+    assert plot.p99_name.textItem.toPlainText() == "p99 15"
+    assert "2" in plot.limit_name.textItem.toPlainText()
+    health.hand(100.0, (0.09, 0.0, 0.0))
+    running.show_traces(health, 100.0)
+    assert running.position.plot.reach >= 90.0, "a hand beyond the plot widens it"
+
+
+def pressed(qtbot, running, signal, question, reason):
+    """Give a question its reason, which it needs, and go on; return what is asked for."""
+    assert not question.go_on.isEnabled()
+    question.reason.setText("  ")
+    assert not question.go_on.isEnabled()
+    question.reason.setText(reason)
+    with qtbot.waitSignal(signal) as asked:
+        qtbot.mouseClick(question.go_on, Qt.MouseButton.LeftButton)
+    assert running.question is None
+    return asked.args
+
+
+def test_repeating_and_leaving_out_need_a_reason(running, qtbot):
+    running.buttons.repeat.click()
+    assert pressed(qtbot, running, running.repeat_asked, running.question, "phone rang") == ["phone rang"]
+    for choice, trial in ((0, 1), (1, None)):
+        running.buttons.exclude.click()
+        running.question.choices.button(choice).setChecked(True)
+        asked = pressed(qtbot, running, running.exclude_asked, running.question, "talked during the trial")
+        assert asked == [trial, "talked during the trial"]
+
+
+def test_ending_asks_first_one_question_at_a_time_and_says_status_and_reason(running, qtbot):
+    qtbot.mouseClick(running.buttons.end, Qt.MouseButton.LeftButton)
+    question = running.question
+    running.ask_to_repeat()
+    running.ask_to_end()
+    assert running.question is question
+    qtbot.waitUntil(lambda: question.focusWidget() is not None)
+    assert question.focusWidget() is question.choices.checkedButton()
+    with qtbot.assertNotEmitted(running.end_asked):
+        qtbot.mouseClick(question.back, Qt.MouseButton.LeftButton)
+    assert running.question is None
+    running.ask_to_end()
+    running.question.choices.button(0).click()
+    running.question.reason.setText("felt unwell")
+    with qtbot.waitSignal(running.end_asked) as asked:
+        qtbot.mouseClick(running.question.go_on, Qt.MouseButton.LeftButton)
+    assert asked.args == ["withdrawn", "felt unwell"]
+
+
+def test_a_note_is_kept_by_enter_unless_it_is_empty_and_listed_newest_first(running, told, health, qtbot):
+    with qtbot.assertNotEmitted(running.note_written):
+        qtbot.keyClick(running.notes.field, Qt.Key.Key_Return)
+        qtbot.mouseClick(running.notes.add, Qt.MouseButton.LeftButton)
+    running.notes.field.setPlainText("left-handed")
+    with qtbot.waitSignal(running.note_written) as written:
+        qtbot.keyClick(running.notes.field, Qt.Key.Key_Return)
+    assert written.args == ["left-handed"]
+    assert running.notes.field.toPlainText() == ""
+    told.tell("note", kind="note", text="one")
+    told.tell("note", kind="mark", text="")
+    running.show_view(told.view(health))
+    assert [line.text.text() for line in running.notes.lines[:2]] == ["Mark", "one"]
+    assert running.notes.lines[2].isHidden()
 
 
 @pytest.mark.parametrize("done", range(5))
@@ -95,11 +158,6 @@ def test_the_limit_a_trial_broke_can_be_read_in_the_smallest_window(window, told
     qtbot.waitUntil(lambda: window.rail.tally.rect().contains(line.geometry()))
 
 
-def test_stop_force_speaks_at_the_press_not_at_the_release(running, qtbot):
-    with qtbot.waitSignal(running.stop_asked):
-        qtbot.mousePress(running.stop.stop, Qt.MouseButton.LeftButton)
-
-
 def test_stop_force_is_large_and_never_disabled_or_moved(window, told, health):
     told.welcome()
     place = window.stop.stop.mapTo(window, window.stop.stop.rect().topLeft())
@@ -121,17 +179,6 @@ def test_stop_force_is_large_and_never_disabled_or_moved(window, told, health):
         assert window.stop.stop.size() == size
 
 
-def test_after_a_stop_the_panel_says_so_and_offers_the_way_back(running, told, health, qtbot):
-    told.tell("force_stopped", by="operator")
-    told.tell("paused", by="operator")
-    running.show_view(told.view(health, force_on=False))
-    assert running.stop.word.text() == "Force is off"
-    assert running.stop.fade_in.isVisible()
-    with qtbot.waitSignal(running.fade_in_asked):
-        qtbot.mouseClick(running.stop.fade_in, Qt.MouseButton.LeftButton)
-
-
-@pytest.mark.slow
 def test_escape_held_stops_the_force_and_a_tap_does_not(running, qtbot):
     handle = running.windowHandle()
     asked = []
@@ -145,7 +192,7 @@ def test_escape_held_stops_the_force_and_a_tap_does_not(running, qtbot):
     QTest.keyRelease(handle, Qt.Key.Key_Escape)
 
 
-def test_pause_becomes_resume(running, told, health, qtbot):
+def test_pause_becomes_resume_and_after_a_stop_the_panel_offers_the_way_back(running, told, health, qtbot):
     with qtbot.waitSignal(running.pause_asked):
         qtbot.mouseClick(running.buttons.pause, Qt.MouseButton.LeftButton)
     told.tell("paused", by="operator")
@@ -153,19 +200,12 @@ def test_pause_becomes_resume(running, told, health, qtbot):
     assert running.buttons.pause.text() == "Resume"
     with qtbot.waitSignal(running.resume_asked):
         qtbot.mouseClick(running.buttons.pause, Qt.MouseButton.LeftButton)
-
-
-def test_a_trial_is_repeated_only_with_a_reason(running, qtbot):
-    qtbot.mouseClick(running.buttons.repeat, Qt.MouseButton.LeftButton)
-    question = running.question
-    assert not question.go_on.isEnabled()
-    question.reason.setText("  ")
-    assert not question.go_on.isEnabled()
-    question.reason.setText("phone rang")
-    with qtbot.waitSignal(running.repeat_asked) as asked:
-        qtbot.mouseClick(question.go_on, Qt.MouseButton.LeftButton)
-    assert asked.args == ["phone rang"]
-    assert running.question is None
+    told.tell("force_stopped", by="operator")
+    running.show_view(told.view(health, force_on=False))
+    assert running.stop.word.text() == "Force is off"
+    assert running.stop.fade_in.isVisible()
+    with qtbot.waitSignal(running.fade_in_asked):
+        qtbot.mouseClick(running.stop.fade_in, Qt.MouseButton.LeftButton)
 
 
 def test_a_question_about_a_trial_goes_with_the_trial(running, told, health, qtbot):
@@ -180,22 +220,6 @@ def test_a_question_about_a_trial_goes_with_the_trial(running, told, health, qtb
     assert running.question is None
 
 
-def test_ending_asks_first_and_says_status_and_reason(running, qtbot):
-    qtbot.mouseClick(running.buttons.end, Qt.MouseButton.LeftButton)
-    question = running.question
-    question.choices.button(0).click()
-    question.reason.setText("felt unwell")
-    with qtbot.waitSignal(running.end_asked) as asked:
-        qtbot.mouseClick(question.go_on, Qt.MouseButton.LeftButton)
-    assert asked.args == ["withdrawn", "felt unwell"]
-
-
-def test_end_question_gives_the_keyboard_to_the_choice_that_is_made(running, qtbot):
-    running.ask_to_end()
-    qtbot.waitUntil(lambda: running.question.focusWidget() is not None)
-    assert running.question.focusWidget() is running.question.choices.checkedButton()
-
-
 def test_keyboard_is_on_close_session_once_the_session_is_over(running, told, health, qtbot):
     running.header.page.show()  # as where both windows share a screen
     running.buttons.end.setFocus()
@@ -206,75 +230,17 @@ def test_keyboard_is_on_close_session_once_the_session_is_over(running, told, he
         qtbot.keyClick(running.focusWidget(), Qt.Key.Key_Return)
 
 
-def test_leaving_out_asks_what_and_why(running, qtbot):
-    running.buttons.exclude.click()
-    question = running.question
-    assert not question.go_on.isEnabled()
-    question.reason.setText("talked during the trial")
-    with qtbot.waitSignal(running.exclude_asked) as asked:
-        question.go_on.click()
-    assert asked.args == [1, "talked during the trial"]
-    running.buttons.exclude.click()
-    running.question.choices.button(1).setChecked(True)
-    running.question.reason.setText("no consent")
-    with qtbot.waitSignal(running.exclude_asked) as asked:
-        running.question.go_on.click()
-    assert asked.args == [None, "no consent"]
-
-
-def test_going_on_with_the_session_ends_nothing(running, qtbot):
-    qtbot.mouseClick(running.buttons.end, Qt.MouseButton.LeftButton)
-    with qtbot.assertNotEmitted(running.end_asked):
-        qtbot.mouseClick(running.question.back, Qt.MouseButton.LeftButton)
-    assert running.question is None
-
-
-def test_only_one_question_at_a_time(running):
-    running.ask_to_end()
-    first = running.question
-    running.ask_to_repeat()
-    running.ask_to_end()
-    assert running.question is first
-
-
-def test_no_question_keeps_a_hand_from_the_force_stop(running, qtbot):
+def test_no_question_keeps_a_hand_from_the_force_stop_or_from_escape(running, qtbot):
     running.ask_to_end()
     assert running.question.windowModality() == Qt.WindowModality.NonModal
     with qtbot.waitSignal(running.stop_asked):
         qtbot.mousePress(running.stop.stop, Qt.MouseButton.LeftButton)
-    assert running.question is not None
-
-
-@pytest.mark.slow
-def test_escape_held_over_a_question_stops_the_force_too(running, qtbot):
-    running.ask_to_end()
+    qtbot.mouseRelease(running.stop.stop, Qt.MouseButton.LeftButton)
+    running.question.activateWindow()
     handle = running.question.windowHandle()
     qtbot.waitUntil(lambda: QGuiApplication.focusWindow() is handle)
     with qtbot.waitSignal(running.stop_asked, timeout=HOLD_MS * 5):
         QTest.keyPress(handle, Qt.Key.Key_Escape)
-
-
-def test_enter_keeps_a_note_and_empties_the_field(running, qtbot):
-    running.notes.field.setPlainText("left-handed")
-    with qtbot.waitSignal(running.note_written) as written:
-        qtbot.keyClick(running.notes.field, Qt.Key.Key_Return)
-    assert written.args == ["left-handed"]
-    assert running.notes.field.toPlainText() == ""
-
-
-def test_an_empty_note_is_no_note(running, qtbot):
-    with qtbot.assertNotEmitted(running.note_written):
-        qtbot.keyClick(running.notes.field, Qt.Key.Key_Return)
-        qtbot.mouseClick(running.notes.add, Qt.MouseButton.LeftButton)
-
-
-def test_notes_and_marks_are_listed_newest_first(running, told, health):
-    told.tell("note", kind="note", text="one")
-    told.tell("note", kind="mark", text="")
-    running.show_view(told.view(health))
-    assert running.notes.lines[0].text.text() == "Mark"
-    assert running.notes.lines[1].text.text() == "one"
-    assert running.notes.lines[2].isHidden()
 
 
 def test_closing_is_left_to_who_listens_until_the_session_is_over(running, told, health, qtbot):
@@ -307,20 +273,6 @@ def test_the_theme_changes_everything_at_once(running, qtbot):
     assert running.position.plot.curves[0].opts["pen"].color().name().upper() == DARK.trace_x
 
 
-def test_a_hand_beyond_the_plot_widens_it(running, health):
-    health.hand(100.0, (0.09, 0.0, 0.0))
-    running.show_traces(health, 100.0)
-    assert running.position.plot.reach >= 90.0
-
-
-def test_the_histogram_shows_limit_and_percentile(running, health):
-    running.show_lateness(health)
-    plot = running.lateness.plot
-    assert plot.p99_name.isVisible()
-    assert plot.p99_name.textItem.toPlainText() == "p99 15"
-    assert "2" in plot.limit_name.textItem.toPlainText()
-
-
 @pytest.mark.slow
 def test_repainting_the_live_plots_keeps_no_reference_to_none(running, health):
     """The PySide pin: from 6.10 on this count drifts with every repaint until the interpreter aborts."""
@@ -338,11 +290,8 @@ def test_repainting_the_live_plots_keeps_no_reference_to_none(running, health):
 
 
 def test_the_state_of_a_track_is_shown_where_there_is_one(running, told, health):
-    tally = running.findChild(Tally)
-    assert not tally.track.isVisible()
-    lines = ("Track V1: 9 of at most 24 answered", "longest run 8: check")
-    running.show_view(replace(told.view(health), track=lines))
-    assert tally.track.isVisible()
-    assert tally.track.text() == "Track V1: 9 of at most 24 answered  ·  longest run 8: check"
-    running.show_view(told.view(health))
-    assert not tally.track.isVisible()
+    track = running.rail.tally.track
+    for lines in ((), ("Track V1: 9 of at most 24 answered", "longest run 8: check"), ()):
+        running.show_view(replace(told.view(health), track=lines))
+        assert track.isVisible() is bool(lines)
+        assert not lines or track.text() == "Track V1: 9 of at most 24 answered  ·  longest run 8: check"

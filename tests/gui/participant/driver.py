@@ -1,5 +1,9 @@
 """The participant's window, driven by keys, mouse and touch, which finds widgets by the names on them."""
 
+import json
+import os
+import subprocess
+import sys
 from typing import Any
 
 from PySide6.QtCore import QPoint, Qt
@@ -11,6 +15,8 @@ from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.wording.languages import Words, words
 from study_app.session.pages import Page
 from study_app.session.transitions.events import Chosen, ItemShown
+from tests.documented import ROOT
+from tests.end_to_end.real_windows import virtual_display
 from tests.gui.small import ManualClock
 
 KEY = Qt.Key
@@ -143,3 +149,14 @@ def name_of(widget: Any) -> str:
 
 def description_of(widget: Any) -> str:
     return str(told_of(widget).text(QAccessible.Text.Description))
+
+
+def on_a_display(script: str) -> Any:
+    """Run a script with a virtual display, and return the JSON of its last line."""
+    with virtual_display() as display:
+        environment = os.environ | {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb", "PYTHONPATH": str(ROOT)}
+        done = subprocess.run(
+            [sys.executable, "-c", script], env=environment, cwd=ROOT, capture_output=True, text=True, check=False
+        )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])

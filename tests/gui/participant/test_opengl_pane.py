@@ -1,19 +1,13 @@
 """The tank on an OpenGL surface, on a virtual display: the same picture, a swap for every frame, frames in step."""
 
-import json
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 
 from study_app.gui.display.opengl import IN_SOFTWARE, has_card, renderer
-from tests.end_to_end.real_windows import needs_display, virtual_display
+from tests.end_to_end.real_windows import needs_display
+from tests.gui.participant.driver import on_a_display
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).resolve().parents[3]
 FRAMES = 30
 
 # Shows the same views in a window with and one without the surface, and prints what came of it.
@@ -66,13 +60,7 @@ print(json.dumps(told))
 
 @pytest.fixture(scope="module")
 def told():
-    with virtual_display() as display:
-        environment = os.environ | {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb", "PYTHONPATH": str(ROOT)}
-        done = subprocess.run(
-            [sys.executable, "-c", SCRIPT], env=environment, cwd=ROOT, capture_output=True, text=True, check=False
-        )
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout.splitlines()[-1])
+    found = on_a_display(SCRIPT)
     if found["renderer"] is None:
         pytest.skip("no OpenGL on this display")
     return found
@@ -80,21 +68,14 @@ def told():
 
 @needs_display
 @pytest.mark.xvfb
-class TestOnASurface:
-    def test_the_picture_is_the_same(self, told):
-        share, mean = told["apart"]
-        assert mean < 1.0
-        assert share < 0.005  # edges may be smoothed differently
-
-    def test_every_view_is_told_of_once_after_its_swap(self, told):
-        assert told["painted"] == list(range(FRAMES))
-        assert told["swaps"] >= FRAMES
-
-    def test_frames_follow_the_swaps(self, told):
-        assert told["locked"]
-
-    def test_what_draws_in_software_is_no_card(self, told):
-        assert told["card"] == (not any(word in told["renderer"].lower() for word in IN_SOFTWARE))
+def test_the_picture_on_a_surface_is_the_same_and_every_view_is_told_of_once_after_its_swap(told):
+    share, mean = told["apart"]
+    assert mean < 1.0
+    assert share < 0.005  # edges may be smoothed differently
+    assert told["painted"] == list(range(FRAMES))
+    assert told["swaps"] >= FRAMES
+    assert told["locked"], "frames follow the swaps"
+    assert told["card"] == (not any(word in told["renderer"].lower() for word in IN_SOFTWARE))
 
 
 def test_without_a_screen_there_is_no_card(qapp):

@@ -37,8 +37,11 @@ def test_keys_and_the_button_go_on_but_no_space_bar_agrees(opening: Opening, kin
         assert seen.kinds == ([] if kind == "consent" and key == KEY.Key_Space else [Continue]), key
 
 
-def test_title_and_paragraphs_are_shown_as_written(opening: Opening) -> None:
-    seen = opening(text_page(paragraphs=("Less than < 8 N & more.", "Second.")), FULL)
+def test_title_paragraphs_and_progress_are_shown_as_written(opening: Opening) -> None:
+    progress = Progress(2, 2, "Delay setting 3", 3, 7)
+    seen = opening(text_page(paragraphs=("Less than < 8 N & more.", "Second."), progress=progress), FULL)
+    names = [one.accessibleName() for one in seen.page.findChildren(QWidget)]
+    assert "Part 2 of 2 · Delay setting 3 of 7" in names
     for text in ("Before you begin", "Less than &lt; 8 N &amp; more.", "Second."):
         assert text in seen.texts
     assert seen.page.accessibleName() == "Before you begin"
@@ -79,17 +82,16 @@ def test_a_pause_resumes_with_enter_and_says_whether_the_force_is_off(opening: O
 
 @pytest.mark.parametrize("language", ["en", "nl"])
 @pytest.mark.parametrize("page", [PausePage(True, "force"), PausePage(True, "pause"), PausePage(False, "pause")])
-def test_what_the_operator_stopped_has_nothing_to_press(opening: Opening, page: PausePage, language: str) -> None:
+def test_what_the_operator_stopped_and_trouble_have_nothing_to_press(
+    opening: Opening, page: PausePage, language: str
+) -> None:
     said, seen = words(language), opening(page, FULL, language)
     assert seen.page.button is None
     seen.press(*GO)
     assert seen.told == []
     assert (said.force_held_title in seen.texts) is (page.held == "force")
     assert (said.force_held_body if page.force_off else said.pause_held_body) in seen.texts
-
-
-def test_trouble_has_nothing_to_press(opening: Opening) -> None:
-    seen = opening(TroublePage("One moment", "Help comes."), FULL)
+    seen.show(TroublePage("One moment", "Help comes."))
     seen.press(*GO)
     assert (seen.page.button, seen.told) == (None, [])
     assert "Help comes." in seen.texts
@@ -113,12 +115,6 @@ def test_the_last_page_asks_to_let_go_of_the_device_unless_that_is_the_mouse(ope
             assert (said.let_go in unescape(seen.texts)) is not mouse
 
 
-def test_progress_says_part_and_setting(opening: Opening) -> None:
-    seen = opening(text_page("break", progress=Progress(2, 2, "Delay setting 3", 3, 7)), FULL)
-    names = [one.accessibleName() for one in seen.page.findChildren(QWidget)]
-    assert "Part 2 of 2 · Delay setting 3 of 7" in names
-
-
 def test_a_break_counts_down_and_then_offers_its_button(opening: Opening, qtbot: Any) -> None:
     seen = opening(size=FULL)
     seen.clock.step_s = 0.0
@@ -136,13 +132,10 @@ def test_a_break_counts_down_and_then_offers_its_button(opening: Opening, qtbot:
     assert seen.focus is seen.page.button
     seen.press(KEY.Key_Space)
     assert seen.kinds == [Continue]
-
-
-def test_a_break_that_comes_back_after_its_time_waits_no_more(opening: Opening) -> None:
-    seen = opening(text_page("break", stays_until_s=90.0), FULL)
-    assert seen.page.count == ""
+    seen.show(text_page("break", stays_until_s=90.0))
+    assert seen.page.count == "", "it comes back after its time"
     seen.press(KEY.Key_Space)
-    assert seen.kinds == [Continue]
+    assert seen.kinds == [Continue, Continue]
 
 
 def test_a_long_text_is_read_by_the_keyboard_or_a_finger_and_keeps_its_button(opening: Opening) -> None:
@@ -194,6 +187,7 @@ def test_the_language_of_the_page_is_marked_and_choosing_it_tells_nothing(openin
     seen = opening(consent("en", "nl", language="nl"), FULL, "nl")
     for name, marked in (("English", False), ("Nederlands", True)):
         assert bool(told_of(seen.find(name)).state().checked) is marked
+    assert name_of(seen.find("Nederlands").parentWidget()) == words("nl").choose_language
     seen.click("Nederlands")
     assert seen.told == []
     assert seen.find("Nederlands").isChecked()

@@ -1,18 +1,12 @@
 """The pointer as the hand, on a virtual display: no motion is lost where it is put back into the middle."""
 
-import json
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 
-from tests.end_to_end.real_windows import needs_display, virtual_display
+from tests.end_to_end.real_windows import needs_display
+from tests.gui.participant.driver import on_a_display
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).resolve().parents[3]
 STEP_PX, STEPS = 300, 4
 
 # Moves the pointer again before the program has seen that it was put back, as a quick hand does.
@@ -51,12 +45,6 @@ print(json.dumps({{"moved": (places[-1] - places[0]) / capture.gain, "left": [le
 @needs_display
 @pytest.mark.xvfb
 def test_quick_motion_is_counted_whole_and_the_pointer_comes_back() -> None:
-    with virtual_display() as display:
-        environment = os.environ | {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb", "PYTHONPATH": str(ROOT)}
-        done = subprocess.run(
-            [sys.executable, "-c", SCRIPT], env=environment, cwd=ROOT, capture_output=True, text=True, check=False
-        )
-    assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout.splitlines()[-1])
+    told = on_a_display(SCRIPT)
     assert told["moved"] == pytest.approx(STEP_PX * STEPS, abs=2)
     assert told["left"] == [0, 0]

@@ -15,21 +15,13 @@ from tests.gui.participant.driver import Participant
 from tests.gui.small import questionnaire, task_page, text_page
 
 
-def test_pointer_is_free_where_it_is_not_the_device(opened: Participant) -> None:
-    opened.show(task_page())
-    assert not opened.window.findChild(PointerCapture).held
-    assert opened.page.cursor().shape() == Qt.CursorShape.BlankCursor
-
-
-def test_pointer_is_held_and_hidden_in_the_tank_alone(captured: Participant) -> None:
-    captured.show(text_page())
-    assert not captured.window.findChild(PointerCapture).held
-    captured.show(task_page())
-    assert captured.window.findChild(PointerCapture).held
-    assert captured.page.cursor().shape() == Qt.CursorShape.BlankCursor
-    captured.show(questionnaire())
-    assert not captured.window.findChild(PointerCapture).held
-    assert captured.page.cursor().shape() == Qt.CursorShape.ArrowCursor
+@pytest.mark.parametrize("device", ["opened", "captured"])
+def test_pointer_is_hidden_in_the_tank_alone_and_held_there_if_it_is_the_device(request: Any, device: str) -> None:
+    window = request.getfixturevalue(device)
+    for page, in_tank in ((text_page(), False), (task_page(), True), (questionnaire(), False)):
+        window.show(page)
+        assert window.window.findChild(PointerCapture).held is (in_tank and device == "captured")
+        assert (window.page.cursor().shape() == Qt.CursorShape.BlankCursor) is in_tank
 
 
 def other_window(captured: Participant, qtbot: Any) -> QWidget:
@@ -116,14 +108,11 @@ def hand(qtbot: Any) -> Any:
     made.capture.release()
 
 
-def test_motion_moves_the_hand_right_and_up(hand: Hand) -> None:
+def test_motion_moves_the_hand_right_and_up_shift_and_wheel_are_depth(hand: Hand) -> None:
     hand.move(hand.middle + QPoint(30, -20))
     assert hand.places[-1] == pytest.approx((30 * hand.gain, 20 * hand.gain, 0))
-
-
-def test_shift_and_wheel_are_depth(hand: Hand) -> None:
-    hand.move(hand.middle + QPoint(10, -20), Qt.KeyboardModifier.ShiftModifier)
-    assert hand.places[-1] == pytest.approx((10 * hand.gain, 0, -20 * hand.gain))
+    hand.move(hand.middle + QPoint(40, -40), Qt.KeyboardModifier.ShiftModifier)
+    assert hand.places[-1] == pytest.approx((40 * hand.gain, 20 * hand.gain, -20 * hand.gain))
     hand.wheel(-120)
     assert hand.places[-1][2] == pytest.approx(-20 * hand.gain + 0.08 / NOTCHES)
 

@@ -93,7 +93,7 @@ def test_the_nearer_of_ball_and_target_is_painted_over_the_other(made: Make, oth
     assert far.blue() > near.blue() + 40
 
 
-def test_lit_and_dim_targets_differ_in_shape_and_light(tank: TankWidget) -> None:
+def test_lit_and_dim_targets_differ_and_the_dwell_arc_closes_clockwise_from_the_top(tank: TankWidget) -> None:
     tank.show_view(view((0, 0.02, 0), lit=0))
     left = shown(tank)
     tank.show_view(view((0, 0.02, 0), lit=1))
@@ -103,9 +103,6 @@ def test_lit_and_dim_targets_differ_in_shape_and_light(tank: TankWidget) -> None
     assert left[y, round(target.middle.x() + target.radius)].min() > 120  # a pale ring
     box = np.s_[y - 60 : y + 60, x - 60 : x + 60]
     assert left[box].mean() > right[box].mean() + 4
-
-
-def test_dwell_arc_closes_clockwise_from_the_top(tank: TankWidget) -> None:
     tank.show_view(view((0, 0.02, 0), dwell=0.5))
     target = tank.targets[1]
     y, x, radius = target.middle.y(), target.middle.x(), target.radius

@@ -240,27 +240,20 @@ def test_a_late_frame_of_the_tank_before_is_not_told_as_one_of_the_next(opened: 
     opened.show(task_page())
     with qtbot.assertNotEmitted(opened.window.painted):
         before.painted.emit(1)
-
-
-def test_views_without_a_tank_are_ignored(opened: Participant) -> None:
     opened.show(questionnaire())
     opened.window.show_view(view())
-    assert opened.window.tank is None
+    assert opened.window.tank is None, "a view without a tank is ignored"
 
 
-def test_pause_lies_over_the_tank(opened: Participant) -> None:
+def test_closing_by_accident_is_a_pause_which_lies_over_the_tank(opened: Participant) -> None:
     opened.show(task_page())
+    assert not opened.window.close()
+    assert opened.kinds == [PauseAsked]
     opened.show(PausePage(force_off=True))
     under = opened.page.under
     assert under is not None
     opened.show(PausePage(force_off=False))
     assert opened.page.under is under
-
-
-def test_closing_by_accident_is_a_pause(opened: Participant) -> None:
-    opened.show(task_page())
-    assert not opened.window.close()
-    assert opened.kinds == [PauseAsked]
     opened.window.may_close = True
     assert opened.window.close()
 

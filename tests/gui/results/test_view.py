@@ -5,61 +5,65 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QPoint, QSize, Qt
-from PySide6.QtWidgets import QLabel, QPushButton, QWidget
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QLabel
 
-from study_app.gui.home.main_window import LEAST, MainWindow
-from study_app.gui.results.view import STACKED_BELOW, ResultsPlace
+from study_app.gui.results.view import ResultsPlace
 from study_app.gui.theme.theme import DARK
 from study_app.gui.widgets.controls import ActionButton
-from study_app.gui.widgets.main_view import Place
 from study_app.viewmodels.results import FigureShown, Going, Opened, Trouble
 from tests.gui.results.sample import LEFT_OUT, STUDY, SVG, facts, view
+from tests.gui.windows import results
 
 pytestmark = pytest.mark.slow
-
-USUAL = QSize(1366, 768)
-
-
-def opened(qtbot, size=USUAL, shown=None):
-    window = MainWindow({"home": Place, "results": lambda: ResultsPlace(handed_to=Path("/somewhere"))})
-    qtbot.addWidget(window)
-    window.resize(size)
-    window.show()
-    window.go("results")
-    place = window.place("results")
-    place.main = window  # or it would be collected here
-    place.show_view(shown or view())
-    qtbot.waitUntil(lambda: all(card.drawing is None or card.drawing.settled for card in place.figures.cards))
-    return place
 
 
 @pytest.fixture
 def place(qtbot):
-    return opened(qtbot)
-
-
-def chips(place):
-    return [chip.word for chip in place.chips]
+    return results(qtbot)
 
 
 def click(qtbot, button):
     qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
 
 
-def test_an_open_study_says_by_whom_and_why_and_cannot_be_unblinded_again(place):
+def decided(qtbot, asked, dialog, by, reason):
+    """Press the button of a dialog without a name, then with a name and a reason; return what is asked for."""
+    click(qtbot, dialog.go_on)
+    assert dialog.isVisible()
+    assert "name" in dialog.missing.text()
+    dialog.by.setText(by)
+    qtbot.keyClick(dialog.by, Qt.Key.Key_Return)
+    assert "reason" in dialog.missing.text()
+    dialog.reason.setText(reason)
+    with qtbot.waitSignal(asked) as heard:
+        click(qtbot, dialog.go_on)
+    return heard.args
+
+
+def test_what_needs_care_is_first_and_an_open_study_says_by_whom_and_why(place):
+    assert place.sessions.rows.shown[0].participant == "P007"
+    assert place.sessions.head.text() == "6 of 7 sessions in the figures"
+    assert place.sessions.why.text() == "P007 is not complete."
     by = Opened(datetime(2026, 11, 19, tzinfo=UTC), "AK", "collection closed, " + "and so on " * 20)
     place.show_view(replace(view(), sealed=False, opened=by))
-    assert chips(place)[1].startswith("Unblinded 19 Nov by AK: collection closed")
+    assert place.chips[1].word.startswith("Unblinded 19 Nov by AK: collection closed")
     assert place.chips[1].toolTip() == by.words
     assert not place.unblind.isVisible()
 
 
-def test_what_needs_care_is_first_and_the_foot_says_who_counts(place):
-    rows = place.sessions.rows
-    assert rows.shown[0].participant == "P007"
-    assert place.sessions.head.text() == "6 of 7 sessions in the figures"
-    assert place.sessions.why.text() == "P007 is not complete."
+@pytest.mark.parametrize(("width", "stacked"), [(1024, True), (1920, False)])
+def test_figures_keep_their_proportions_and_stand_below_the_sessions_in_a_narrow_window(place, qtbot, width, stacked):
+    place.main.resize(width, 1080)
+
+    def fits():
+        for card in place.figures.cards:
+            assert card.drawing.settled
+            assert card.drawing.height() == card.drawing.heightForWidth(card.drawing.width())
+
+    qtbot.waitUntil(fits)
+    figures, sessions = (part.mapTo(place, QPoint()).y() for part in (place.figures, place.sessions))
+    assert (figures > sessions + 100) is stacked
 
 
 def test_sessions_are_searched_and_filtered(place, qtbot):
@@ -108,14 +112,8 @@ def test_leaving_out_wants_a_name_and_a_reason(place, qtbot):
         "Whole session", "Trial 2: Part 1, L2", "Trial 3: Part 1, L1"
     ]  # fmt: skip
     dialog.trial.setCurrentIndex(2)
-    click(qtbot, dialog.go_on)
-    assert dialog.isVisible()
-    assert "name" in dialog.missing.text()
-    dialog.by.setText("AK")
-    dialog.reason.setText("phone rang")
-    with qtbot.waitSignal(place.leave_out_asked) as asked:
-        click(qtbot, dialog.go_on)
-    assert asked.args[0] == ("P001", 1, 3, "AK", "phone rang")
+    asked = decided(qtbot, place.leave_out_asked, dialog, "AK", "phone rang")
+    assert asked == [("P001", 1, 3, "AK", "phone rang")]
 
 
 def test_unblinding_warns_of_sessions_that_go_on(place, qtbot):
@@ -124,13 +122,7 @@ def test_unblinding_warns_of_sessions_that_go_on(place, qtbot):
     said = " ".join(one.text() for one in dialog.findChildren(QLabel))
     assert "1 session is not complete" in said
     assert "cannot be undone" in said
-    dialog.by.setText("AK")
-    qtbot.keyClick(dialog.by, Qt.Key.Key_Return)
-    assert "reason" in dialog.missing.text()
-    dialog.reason.setText("closed")
-    with qtbot.waitSignal(place.unblind_asked) as asked:
-        click(qtbot, dialog.go_on)
-    assert asked.args == ["AK", "closed"]
+    assert decided(qtbot, place.unblind_asked, dialog, "AK", "closed") == ["AK", "closed"]
 
 
 def test_what_is_left_out_is_listed_the_last_first_with_its_reason(place, qtbot):
@@ -150,14 +142,8 @@ def test_what_is_left_out_is_taken_back_with_a_name_and_a_reason(place, qtbot):
     back = place.exclusions.lines[0].findChild(ActionButton)
     assert back.accessibleName() == "Include again: P003, trial 4"
     click(qtbot, back)
-    dialog = place.dialog
-    click(qtbot, dialog.go_on)
-    assert "name" in dialog.missing.text()
-    dialog.by.setText("CD")
-    dialog.reason.setText("wrong trial")
-    with qtbot.waitSignal(place.take_back_asked) as asked:
-        click(qtbot, dialog.go_on)
-    assert asked.args[0] == ("P003", 1, 4, "CD", "wrong trial")
+    asked = decided(qtbot, place.take_back_asked, place.dialog, "CD", "wrong trial")
+    assert asked == [("P003", 1, 4, "CD", "wrong trial")]
     back.setFocus()
     place.show_view(view())
     assert place.window().focusWidget() is place.exclusions.leave_out
@@ -173,8 +159,24 @@ def test_choosing_a_study_asks_for_it_and_showing_one_does_not(place, qtbot):
     assert asked == [STUDY]
 
 
-def test_exporting_asks_for_what_the_command_has(qtbot):
-    place = opened(qtbot)
+@pytest.mark.parametrize("sealed", [True, False])
+def test_outputs_say_that_settings_appear_as_codes_while_the_key_is_sealed_and_what_cannot_be_written(qtbot, sealed):
+    place = ResultsPlace(handed_to=Path(), no_sav="It needs pyreadstat.")
+    qtbot.addWidget(place)
+    place.show_view(view(sealed=sealed))
+    place.show()
+    for button in (place.export, place.report):
+        click(qtbot, button)
+        said = [one.text() for one in place.writing.findChildren(QLabel)]
+        (explanation,) = (text for text in said if "very " in text)
+        assert explanation.endswith("Settings appear as codes because the key is sealed.") is sealed
+        if button is place.export:
+            assert not place.writing.extras["sav"].isEnabled()
+            assert "It needs pyreadstat." in said
+        place.writing.reject()
+
+
+def test_exporting_asks_for_what_the_command_has(place, qtbot):
     click(qtbot, place.export)
     dialog = place.writing
     assert set(dialog.extras) == {"wide", "parquet", "sav", "psych-ds"}
@@ -194,16 +196,6 @@ def test_exporting_asks_for_what_the_command_has(qtbot):
     assert place.writing is None
 
 
-@pytest.mark.parametrize("sealed", [True, False])
-def test_both_outputs_say_that_settings_appear_as_codes_while_the_key_is_sealed(qtbot, sealed):
-    place = opened(qtbot, shown=view(sealed=sealed))
-    for button in (place.export, place.report):
-        click(qtbot, button)
-        (explanation,) = (one.text() for one in place.writing.findChildren(QLabel) if "very " in one.text())
-        assert explanation.endswith("Settings appear as codes because the key is sealed.") is sealed
-        place.writing.reject()
-
-
 def test_a_report_can_be_given_up_and_a_refusal_lets_one_try_again(place, qtbot):
     click(qtbot, place.report)
     dialog = place.writing
@@ -216,17 +208,6 @@ def test_a_report_can_be_given_up_and_a_refusal_lets_one_try_again(place, qtbot)
     assert dialog.isVisible(), "until it is known that nothing was written"
     dialog.stopped()
     assert place.writing is None
-
-
-def test_without_its_library_sav_is_named_and_cannot_be_chosen(qtbot):
-    place = ResultsPlace(handed_to=Path(), no_sav="It needs pyreadstat.")
-    qtbot.addWidget(place)
-    place.show_view(view())
-    place.show()
-    click(qtbot, place.export)
-    assert not place.writing.extras["sav"].isEnabled()
-    assert "It needs pyreadstat." in [one.text() for one in place.writing.findChildren(QLabel)]
-    place.writing.reject()
 
 
 @pytest.mark.parametrize("remedy", ["again", "read", "stop"])
@@ -281,38 +262,6 @@ def test_figures_take_the_colours_of_the_theme(place, qtbot):
     qtbot.waitUntil(
         lambda: drawing.settled and drawing.grab().toImage().pixelColor(3, 3).name() == DARK.surface.lower()
     )
-
-
-@pytest.mark.parametrize("size", [LEAST, QSize(1366, 768), QSize(1920, 1080)])
-def test_nothing_is_cut_off_sideways_and_figures_keep_their_proportions(qtbot, size):
-    by = Opened(datetime(2026, 11, 19, tzinfo=UTC), "AK", "collection closed")
-    place = opened(qtbot, size, replace(view(), opened=by, left_out=(LEFT_OUT,)))
-    inside, seen = place.area.widget(), place.area.viewport()
-
-    def fits():
-        assert inside.width() <= seen.width()
-        for part in (*place.findChildren(QPushButton), *place.chips, place.study):
-            if part.isVisible():
-                assert part.width() >= part.minimumSizeHint().width(), part
-        for card in place.figures.cards:
-            assert card.drawing.settled
-            assert card.drawing.height() == card.drawing.heightForWidth(card.drawing.width())
-            left = card.drawing.mapTo(inside, QPoint(0, 0)).x()
-            assert 0 <= left <= left + card.drawing.width() <= inside.width()
-
-    qtbot.waitUntil(fits)
-    stacked = place.width() < STACKED_BELOW
-    below = place.figures.mapTo(inside, QPoint(0, 0)).y() > place.sessions.mapTo(inside, QPoint(0, 0)).y() + 100
-    assert below == stacked
-
-
-def test_everything_that_can_be_pressed_has_a_name_and_does_something(place):
-    for button in place.findChildren(QPushButton):
-        assert button.receivers("2clicked(bool)") or button.receivers("2clicked()") or button.isCheckable()
-        assert button.accessibleName() or button.text() or not button.isVisible()
-    for part in place.findChildren(QWidget):
-        if part.isVisible() and part.focusPolicy() & Qt.FocusPolicy.TabFocus and not isinstance(part, QPushButton):
-            assert part.accessibleName(), part
 
 
 @pytest.mark.parametrize(

@@ -35,21 +35,25 @@ def study(whole, tmp_path):
     return Path(shutil.copytree(whole, tmp_path / "results" / "demo"))
 
 
+def held(study):
+    """Begin a session of the demo."""
+    start = SessionStart(
+        "P007", seed=1, operator="AK", language="en", device={"name": "mouse"}, screens={}, simulated=False
+    )
+    return begin(study, load("demo"), source_bytes("demo"), start)
+
+
+def trial(store, number, **measured):
+    which = {"block": "feeling", "phase": "main", "part": 1, "of": 2}
+    store.append("trial_started", trial=number, attempt=1, index=number, code=f"L{number}", **which)
+    store.append("trial_ended", trial=number, attempt=1, outcome="complete", **measured)
+
+
 def measured(study):
     """Hold a session with a trial that kept the limits and one that broke two, and a note on it."""
-    with begin(
-        study,
-        load("demo"),
-        source_bytes("demo"),
-        SessionStart(
-            "P007", seed=1, operator="AK", language="en", device={"name": "mouse"}, screens={}, simulated=False
-        ),
-    ) as store:
-        which = {"block": "feeling", "phase": "main", "part": 1, "of": 2}
-        for trial, (gap_ms, late_ms) in enumerate(((3.0, 0.2), (41.26, 2.5)), start=1):
-            store.append("trial_started", trial=trial, attempt=1, index=trial, code=f"L{trial}", **which)
-            fields = {"worst_gap_ms": gap_ms, "lateness_p99_ms": late_ms, "first_frame_gap_ms": 12.0}
-            store.append("trial_ended", trial=trial, attempt=1, outcome="complete", **fields)
+    with held(study) as store:
+        trial(store, 1, worst_gap_ms=3.0, lateness_p99_ms=0.2, first_frame_gap_ms=12.0)
+        trial(store, 2, worst_gap_ms=41.26, lateness_p99_ms=2.5, first_frame_gap_ms=12.0)
         store.append("recording_lost", trial=1, attempt=1, reason="its thread ended")
         store.append("note", kind="note", text="phone rang")
         store.finish("completed")
@@ -82,8 +86,9 @@ def test_a_page_says_which_trial_broke_which_limit_and_what_out_of_limits_means(
     assert [said(page, row, 3) for row in range(2)] == ["Valid", "Out of limits"]
     page.trials.selectRow(0)
     assert page.trial.text() == "Trial 1: within all limits. The recording was lost: its thread ended."
-    assert said(page, 0, 5) == "recording lost"
+    assert (said(page, 0, 5), page.trial.property("role")) == ("recording lost", "text2")
     page.trials.selectRow(1)
+    assert page.trial.property("role") == "warn"
     assert page.trial.text() == (
         "Trial 2: lateness of ticks (99th percentile): 2.5 ms, limit 2 ms; "
         "longest time between two ticks: 41.3 ms, limit 20 ms."
@@ -97,19 +102,12 @@ def test_a_page_says_which_trial_broke_which_limit_and_what_out_of_limits_means(
 
 
 def test_choices_that_were_not_confirmed_stay_visible(qtbot, tmp_path):
-    with begin(
-        tmp_path / "demo",
-        load("demo"),
-        source_bytes("demo"),
-        SessionStart("P007", seed=1, operator="", language="en", device={"name": "mouse"}, screens={}, simulated=False),
-    ) as store:
-        which = {"block": "feeling", "phase": "main", "part": 1, "of": 2}
-        for trial in (1, 2):
-            store.append("trial_started", trial=trial, attempt=1, index=trial, code=f"L{trial}", **which)
-            store.append("trial_ended", trial=trial, attempt=1, outcome="complete")
-            store.append("choice", trial=trial, item="feels_liquid", value=3)
-            store.append("choice", trial=trial, item="feels_liquid", value=5)
-            if trial == 1:
+    with held(tmp_path / "demo") as store:
+        for number in (1, 2):
+            trial(store, number)
+            for value in (3, 5):
+                store.append("choice", trial=number, item="feels_liquid", value=value)
+            if number == 1:
                 given = {"item": "feels_liquid", "number": 1, "value": 5, "changes": 1}
                 times = {"onset_s": 0.0, "first_s": 0.1, "last_s": 0.2}
                 store.append("responses", trial=1, attempt=1, items=[given | times])
@@ -155,7 +153,7 @@ def test_a_trial_is_left_out_and_taken_back(qtbot, study):
     (one,) = exclusions(study)
     assert (one.trial, one.reason) == (number, "phone rang")
     assert "phone rang" in page.lines[0].findChild(QLabel).text()
-    row = next(row for row, trial in enumerate(page.model.trials) if trial.number == number)
+    row = next(row for row, one in enumerate(page.model.trials) if one.number == number)
     assert said(page, row, 3) == "Excluded"
     qtbot.mouseClick(page.lines[0].findChild(QPushButton), Qt.MouseButton.LeftButton)
     page.decision.by.setText("BC")

@@ -1,34 +1,22 @@
 """The machine's place: it shows what is set, says what is to be changed, and changes nothing itself."""
 
 import pytest
-from PySide6.QtCore import QPoint, QSize, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontMetricsF
-from PySide6.QtWidgets import QAbstractButton, QFileDialog, QLabel
+from PySide6.QtWidgets import QFileDialog, QLabel
 
-from study_app.gui.display.screens import ScreenShown
-from study_app.gui.settings import view as module
-from study_app.gui.settings.view import MachinePlace
-from study_app.gui.theme.theme import DARK, font
-from study_app.gui.theme.themed import apply_theme
-from study_app.store.workstation import CAMERA_LENGTH, DEFAULTS, STATEMENT_X_HEIGHT_PX, DisplayOffset, MachineSettings
+from study_app.gui.theme.theme import font
+from study_app.store.workstation import CAMERA_LENGTH, STATEMENT_X_HEIGHT_PX, DisplayOffset, MachineSettings
+from tests.gui.windows import SCREENS, machine, two_screens
+from tests.gui.windows import show_settings as show
 
-ONE = ScreenShown(1, "eDP-1", 1366, 768, 60.0, 1.0, 344.0, 194.0)
-TWO = ScreenShown(2, "DP-1", 1920, 1080, 144.0, 1.0, 527.0, 296.0)
+ONE, TWO = SCREENS
 
 
 @pytest.fixture
 def place(qtbot, monkeypatch):
-    monkeypatch.setattr(module, "screens_shown", lambda: (ONE, TWO))
-    made = MachinePlace()
-    qtbot.addWidget(made)
-    made.resize(1300, 760)
-    show(made, DEFAULTS)
-    made.show()
-    return made
-
-
-def show(place, settings, undo=""):
-    place.show_settings(settings, folder="/there", undo=undo, kept_in="/there/machine.json")
+    two_screens(monkeypatch)
+    return machine(qtbot)
 
 
 def type_into(qtbot, field, text):
@@ -38,23 +26,17 @@ def type_into(qtbot, field, text):
     qtbot.keyClick(field, Qt.Key.Key_Return)
 
 
-def test_screens_are_listed_with_size_rate_and_scaling_and_the_last_is_the_participants(place):
+def test_screens_are_listed_and_another_is_chosen_by_name_and_number_and_one_that_is_gone_is_named(place, qtbot):
     assert [radio.isChecked() for radio in place.screens.radios] == [False, True]
     said = [one.text() for one in place.screens.findChildren(QLabel)]
     assert any("1920 × 1080, 144 Hz, 100\u202f%" in words and "527 × 296 mm" in words for words in said)
     assert not place.screens.note.isVisible()
-
-
-def test_another_screen_is_chosen_by_name_and_number(place, qtbot):
     with qtbot.waitSignal(place.changed) as changed:
         qtbot.keyClick(place.screens.radios[0], Qt.Key.Key_Space)
     assert changed.args == [{"screen": "eDP-1", "screen_number": 1}]
     show(place, MachineSettings(screen="eDP-1", screen_number=1))
     assert [radio.isChecked() for radio in place.screens.radios] == [True, False]
     assert place.participants is ONE
-
-
-def test_a_screen_that_is_gone_is_named(place):
     show(place, MachineSettings(screen="HDMI-7", screen_number=2))
     assert "HDMI-7 is not connected" in place.screens.note.text()
     assert place.participants is TWO
@@ -65,14 +47,10 @@ def test_the_distance_is_typed_and_the_words_grow(place, qtbot):
         type_into(qtbot, place.seen.distance.field, "600")
     assert changed.args == [{"viewing_distance_mm": 600.0}]
     assert place.seen.sample.scale == 1.0
+    assert QFontMetricsF(font("statement")).xHeight() == pytest.approx(STATEMENT_X_HEIGHT_PX, abs=0.3)  # px: rounding
     show(place, MachineSettings(viewing_distance_mm=600))
     assert place.seen.sample.scale == pytest.approx(1.747, abs=0.001)
     assert "1.75 times the default size" in place.seen.said.text()
-
-
-def test_an_x_of_the_sample_is_as_high_as_the_settings_reckon(qapp):
-    measured = QFontMetricsF(font("statement")).xHeight()
-    assert measured == pytest.approx(STATEMENT_X_HEIGHT_PX, abs=0.3)  # px: the font engine's rounding
 
 
 def test_a_distance_out_of_range_is_refused_and_an_empty_one_forgotten(place, qtbot):
@@ -100,6 +78,8 @@ def test_an_offset_is_that_of_the_participants_screen(place, qtbot):
     with qtbot.waitSignal(place.changed) as changed:
         qtbot.mouseClick(form.forget, Qt.MouseButton.LeftButton)
     assert changed.args == [{"display_offset": None}]
+    show(place, MachineSettings(display_offset=DisplayOffset(mean_ms=23.5, screen="HDMI-1")))
+    assert form.said.text() == "23.5 ± 0 ms by photodiode for another screen (HDMI-1): not used here."
 
 
 def test_device_folder_theme_and_sound_are_chosen(place, qtbot, monkeypatch, tmp_path):
@@ -138,10 +118,7 @@ def test_undo_names_what_it_takes_back(place, qtbot):
 
 @pytest.fixture
 def real_place(qtbot):
-    made = MachinePlace()
-    qtbot.addWidget(made)
-    show(made, DEFAULTS)
-    made.show()
+    made = machine(qtbot)
     yield made
     made.leave()
 
@@ -169,29 +146,6 @@ def test_the_display_test_is_opened_once_and_left_by_esc(real_place, qtbot):
     with qtbot.waitSignal(test.left):
         qtbot.keyClick(test, Qt.Key.Key_Escape)
     assert real_place.test is None
-
-
-@pytest.mark.parametrize("size", [QSize(952, 640), QSize(1294, 768), QSize(1704, 1080)])
-def test_no_button_is_cut_at_any_size(place, qtbot, size):
-    apply_theme(place, DARK)
-    show(place, MachineSettings(viewing_distance_mm=600), undo="width of the screen")
-    place.resize(size)
-
-    def whole():
-        for one in place.findChildren(QAbstractButton):
-            if one.isVisible() and one.text():
-                assert one.width() >= one.fontMetrics().horizontalAdvance(one.text()), one.text()
-                assert 0 <= one.mapTo(place, QPoint()).x() <= size.width() - one.width()
-
-    qtbot.waitUntil(whole)
-
-
-def test_every_field_has_a_name_for_those_who_cannot_see_it(place):
-    fields = (
-        place.seen.distance.field, place.seen.width_mm.field, place.offset.form.mean, place.offset.form.spread,
-        place.offset.form.how, place.sessions.device, place.windows.theme_choice, *place.screens.radios,
-    )  # fmt: skip
-    assert all(field.accessibleName() for field in fields)
 
 
 def test_markers_and_samples_are_switched(place, qtbot):

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QApplication, QLabel, QStyleOptionViewItem, QWidge
 from study_app.gui.theme.theme import LIGHT
 from study_app.gui.widgets.background import Background, wait_for_jobs
 from study_app.gui.widgets.controls import Choice
-from study_app.gui.widgets.labels import Elided, figures, label
+from study_app.gui.widgets.labels import Clamped, Elided, figures, label
 from study_app.gui.widgets.live_plots import LatenessPlot, TracePlot
 from study_app.gui.widgets.row_table import BELOW_ROLE, CHIP_ROLE, ROW_HEIGHT, Table
 
@@ -122,6 +122,16 @@ def test_titles_are_headings_to_a_screen_reader_and_other_labels_are_not(qtbot: 
         qtbot.addWidget(made)
         told = QAccessible.queryAccessibleInterface(made)
         assert (told.role(), told.text(QAccessible.Text.Name)) == (role, "Second")
+
+
+def test_a_long_title_is_cut_after_two_lines_and_whole_in_tip_and_name(qtbot: Any) -> None:
+    long = "How people tell liquids apart " * 20
+    title = Clamped(long, 2, "card", steady=False)
+    qtbot.addWidget(title)
+    title.resize(300, 80)
+    title.show()
+    assert (title.text().count("\n"), title.text()[-1]) == (1, "…")
+    assert (title.toolTip(), title.accessibleName()) == (long, long)
 
 
 def test_a_choice_is_labelled_by_what_it_is_of(qtbot: Any) -> None:

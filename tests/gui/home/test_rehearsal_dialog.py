@@ -1,0 +1,111 @@
+"""The dialog of a rehearsal: it counts participants, says why it failed, and stops."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+
+from study_app.gui.home import rehearsal_dialog
+from study_app.gui.home.rehearsal_dialog import RehearsalDialog
+from study_app.viewmodels.home import study_facts
+
+pytestmark = pytest.mark.slow
+
+LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture
+def opened(qtbot: Any, tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], RehearsalDialog]:
+    """Return a function that opens the dialog for a task that stands for the rehearsal."""
+
+    def open_(task: str = "endless") -> RehearsalDialog:
+        dialog = RehearsalDialog(study_facts("demo"), tmp_path)
+        qtbot.addWidget(dialog)
+        monkeypatch.setattr(rehearsal_dialog, "TASK", f"tests.gui.home.rehearsal_tasks:{task}")
+        dialog.open()
+        qtbot.waitUntil(dialog.isActiveWindow)
+        return dialog
+
+    return open_
+
+
+@pytest.mark.parametrize(
+    ("task", "said"),
+    [
+        ("fail", "no room left"),
+        ("end", "the process ended with exit code 7; the terminal may show why"),
+        ("", "no more processes"),
+    ],
+)
+def test_a_failed_rehearsal_says_why_and_stays(
+    qtbot: Any, opened: Any, monkeypatch: pytest.MonkeyPatch, task: str, said: str
+) -> None:
+    def none(*_args: Any, **_named: Any) -> None:
+        raise OSError("no more processes")
+
+    if not task:
+        monkeypatch.setattr(rehearsal_dialog, "WorkerClient", none)
+    dialog = opened(task)
+    qtbot.mouseClick(dialog.start, LEFT)
+    qtbot.waitUntil(lambda: dialog.cancel.text() == "Close", timeout=20_000)
+    assert dialog.isVisible()
+    assert dialog.said.text() == said
+    qtbot.mouseClick(dialog.cancel, LEFT)
+    assert not dialog.isVisible()
+
+
+def test_a_rehearsal_counts_participants_and_leads_to_its_results(qtbot: Any, opened: Any) -> None:
+    dialog = opened("two")
+    dialog.participants.setValue(2)
+    qtbot.mouseClick(dialog.start, LEFT)
+    qtbot.waitUntil(lambda: dialog.progress.value() == 1, timeout=20_000)
+    assert dialog.said.text() == "1 of 2: R1: 8 responses (simulated)"
+    assert (dialog.progress.minimum(), dialog.progress.maximum()) == (0, 2)
+    dialog.worker.stop()
+    qtbot.waitUntil(lambda: dialog.over, timeout=20_000)
+    assert dialog.progress.value() == 2
+    assert dialog.isVisible()
+    assert str(dialog.folder) in dialog.said.text()
+    assert dialog.start.text() == "Open results"
+    with qtbot.waitSignal(dialog.accepted):
+        qtbot.mouseClick(dialog.start, LEFT)
+
+
+@pytest.mark.parametrize("at", ["participants", "seed", "start", "dialog"])
+def test_enter_begins_the_rehearsal_wherever_the_keyboard_is_and_the_end_of_the_program_ends_it(
+    qtbot: Any, opened: Any, at: str
+) -> None:
+    dialog = opened()
+    pressed = dialog if at == "dialog" else getattr(dialog, at)
+    pressed.setFocus()
+    qtbot.keyClick(pressed, Qt.Key.Key_Return)
+    assert dialog.worker.works
+    dialog.end()
+    assert dialog.worker.ended
+
+
+def test_cancel_closes_the_dialog_and_stops_a_rehearsal(qtbot: Any, opened: Any) -> None:
+    dialog = opened()
+    dialog.cancel.setFocus()
+    qtbot.keyClick(dialog.cancel, Qt.Key.Key_Return)
+    assert not dialog.isVisible()
+    assert dialog.worker is None
+    dialog = opened()
+    qtbot.mouseClick(dialog.start, LEFT)
+    assert dialog.worker.works
+    with qtbot.waitSignal(dialog.rejected):
+        qtbot.mouseClick(dialog.cancel, LEFT)
+        assert dialog.isVisible()  # and nobody waits
+    assert dialog.worker.ended
+    assert not dialog.isVisible()
+
+
+def test_a_rehearsal_that_does_not_listen_is_killed(qtbot: Any, opened: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    dialog = opened("deaf")
+    monkeypatch.setattr("study_app.workers.client.PATIENCE_S", 0.05)
+    dialog.start.click()
+    qtbot.waitUntil(lambda: dialog.said.text() == "1 of 5: deaf", timeout=20_000)
+    with qtbot.waitSignal(dialog.rejected):
+        dialog.close()
+    assert dialog.worker.ended

@@ -1,0 +1,105 @@
+"""What must hold in every window: nothing is cut, everything has a name, no button is dead."""
+
+from PySide6.QtCore import QRect, QSize, Qt
+from PySide6.QtGui import QAccessible
+from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QApplication, QLabel, QPushButton, QWidget
+
+from study_app.gui.widgets.labels import Elided
+from study_app.gui.widgets.live_plots import Plot
+
+
+def settle(window: QWidget, size: QSize | tuple[int, int] | None = None) -> None:
+    """Give a window a size, and let layouts within layouts come to rest."""
+    if size is not None:
+        window.resize(size if isinstance(size, QSize) else QSize(*size))
+    for _ in range(4):
+        QApplication.processEvents()
+
+
+def place_of(widget: QWidget, window: QWidget) -> QRect:
+    return QRect(widget.mapTo(window, widget.rect().topLeft()), widget.size())
+
+
+def scrolls(widget: QWidget, window: QWidget) -> bool:
+    """Whether a part of the window that may scroll holds ``widget``."""
+    parent = widget.parentWidget()
+    while parent is not None and parent is not window:
+        if isinstance(parent, QAbstractScrollArea):
+            return True
+        parent = parent.parentWidget()
+    return False
+
+
+def cut(window: QWidget) -> list[str]:
+    """Return what cannot be read whole: words without room, or beyond the window or their parent."""
+    found = []
+    for widget in window.findChildren(QWidget):
+        if not widget.isVisible() or not isinstance(widget, QLabel | QPushButton):
+            continue
+        words = widget.accessibleName() or widget.text()
+        place = place_of(widget, window)
+        inside = window.rect().contains(place)
+        across = place.left() >= 0 and place.right() <= window.width()
+        if not (across if scrolls(widget, window) else inside):
+            found.append(f"{words}: outside")
+        parent = widget.parentWidget()
+        if parent is not None and not parent.rect().adjusted(-1, -1, 1, 1).contains(widget.geometry()):
+            found.append(f"{words}: beyond its parent")
+        if isinstance(widget, QPushButton) and widget.text() and widget.width() < widget.minimumSizeHint().width():
+            found.append(f"{words}: {widget.width()} px for {widget.minimumSizeHint().width()}")
+        if (
+            isinstance(widget, QLabel)
+            and not isinstance(widget, Elided)
+            and widget.textFormat() != Qt.TextFormat.RichText
+        ):
+            metrics = widget.fontMetrics()
+            if widget.wordWrap() and widget.height() < widget.heightForWidth(widget.width()):
+                found.append(f"{words}: too low")
+            lines = map(metrics.horizontalAdvance, widget.text().split("\n"))
+            if not widget.wordWrap() and widget.width() < max(lines):
+                found.append(f"{words}: too narrow")
+            if widget.text() and widget.height() < metrics.height():
+                found.append(f"{words}: lower than a line")
+    return found
+
+
+def unnamed(window: QWidget) -> list[str]:
+    """Return what takes the keyboard, or shows a curve, and has no name for those who cannot see it."""
+    found = [str(window)] if not QAccessible.queryAccessibleInterface(window) else []
+    for part in window.findChildren(QWidget):
+        if not part.isVisible() or part.focusProxy() is not None:
+            continue
+        told = QAccessible.queryAccessibleInterface(part)
+        name = told.text(QAccessible.Text.Name)
+        if part.focusPolicy() & Qt.FocusPolicy.TabFocus and not isinstance(part, QAbstractScrollArea) and not name:
+            found.append(repr(part))
+        if isinstance(part, Plot):
+            sentence = told.text(QAccessible.Text.Description)
+            if told.role() != QAccessible.Role.Chart or not name or len(sentence.split()) <= 5 or sentence[-1] != ".":
+                found.append(f"{part!r}: {sentence}")
+    return found
+
+
+def unreached(window: QWidget) -> list[str]:
+    """Return what takes the keyboard but is not in the chain of the Tab key."""
+    chain, part = set(), window.nextInFocusChain()
+    while part is not window:
+        chain.add(part)
+        part = part.nextInFocusChain()
+    takes = (
+        one for one in window.findChildren(QWidget) if one.isVisible() and one.focusPolicy() & Qt.FocusPolicy.TabFocus
+    )
+    return [repr(one) for one in takes if one not in chain]
+
+
+def dead(window: QWidget) -> list[str]:
+    """Return the buttons that do nothing, and those too small to be hit."""
+    signals = ("2clicked(bool)", "2clicked()", "2pressed()")
+    found = []
+    for one in window.findChildren(QAbstractButton):
+        words = one.text() or one.accessibleName()
+        if isinstance(one, QPushButton) and not one.isCheckable() and not any(map(one.receivers, signals)):
+            found.append(f"dead: {words}")
+        if one.isVisible() and one.isEnabled() and min(one.width(), one.height()) < 24:
+            found.append(f"small: {words}")
+    return found

@@ -1,0 +1,153 @@
+"""Every window but the participant's, opened with what a study would show in it."""
+
+import os
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from study_app.devices.descriptor import NONE, NOT_AVAILABLE, READY, Backend
+from study_app.gui.devices.view import DevicesPlace
+from study_app.gui.display.screens import ScreenShown
+from study_app.gui.help.view import HelpPlace
+from study_app.gui.home.main_window import MainWindow
+from study_app.gui.lab.view import LabPlace
+from study_app.gui.preflight import PreflightWindow
+from study_app.gui.results.view import ResultsPlace
+from study_app.gui.settings import view as settings_view
+from study_app.gui.settings.display_test import DisplayTest
+from study_app.gui.settings.view import MachinePlace
+from study_app.gui.theme.theme import DARK, LIGHT
+from study_app.gui.theme.themed import apply_theme
+from study_app.gui.widgets.main_view import Place
+from study_app.haptics.runtime.clocks.grants import Grant
+from study_app.haptics.runtime.telemetry import Timing
+from study_app.protocol.load import load
+from study_app.session.preflight import Facts, Screen, checks
+from study_app.store.workstation import DEFAULTS, MachineSettings
+from study_app.viewmodels.devices.list_view import devices_shown
+from study_app.viewmodels.preflight import PreflightView, preflight_view
+from study_app.viewmodels.results import Opened
+from tests.gui.lab.sample import still_view
+from tests.gui.results.sample import LEFT_OUT, view
+
+FOUND = [
+    Backend("mouse", "the window", READY, "seen, not felt"),
+    Backend("falcon", "libusb 1.0", NONE, "felt, up to 8 N", "plug it in"),
+    Backend("falcon", "ftd2xx", NOT_AVAILABLE, "the same", "for Windows alone"),
+    Backend("falcon-emulated", "the program", READY, "moves by itself"),
+    Backend("falcon-socket:PATH", "a Unix socket", READY, "another program's"),
+]
+SCREENS = (
+    ScreenShown(1, "eDP-1", 1366, 768, 60.0, 1.0, 344.0, 194.0),
+    ScreenShown(2, "DP-1", 1920, 1080, 144.0, 1.0, 527.0, 296.0),
+)
+WELL = Facts(
+    device="mouse",
+    fresh_share=1.0,
+    timing=Timing(2000, 1000.0, 6.2e-5, 2e-3, 0),
+    sample_age_s=0.001,
+    screen=Screen(60.0, 1.0),
+    probe_s=0.002,
+    probe_fault="",
+    free_bytes=212 * 10**9,
+    participant="P007",
+    recordings=True,
+    tick_s=146e-9,
+    grant=Grant("real-time", "SCHED_FIFO 60", locked=True),
+    lateness_ns=np.arange(1, 2001) * 31,
+)
+SCALED = replace(WELL, screen=Screen(60.0, 1.5))
+GOES_ON = (("Continues at", "Liquid setting 2, attempt\u00a02"), ("Kept", "2 of 8 answers"))
+OPENED = Opened(datetime(2026, 11, 19, tzinfo=UTC), "AK", "collection closed")
+
+
+def shown(qtbot: Any, made: Any, size: tuple[int, int], theme: Any = LIGHT) -> Any:
+    """Return a window or a place on the screen."""
+    qtbot.addWidget(made)
+    if hasattr(made, "apply_theme"):
+        apply_theme(made, theme)
+    made.resize(*size)
+    made.show()
+    qtbot.waitExposed(made)
+    return made
+
+
+def devices(qtbot: Any) -> DevicesPlace:
+    made: DevicesPlace = shown(qtbot, DevicesPlace(), (1200, 700), DARK)
+    made.show_devices(devices_shown(FOUND), "mouse")
+    return made
+
+
+def machine(qtbot: Any) -> MachinePlace:
+    """Return the settings of a machine with two screens, if `two_screens` is used."""
+    made: MachinePlace = shown(qtbot, MachinePlace(), (1300, 760))
+    show_settings(made, DEFAULTS)
+    return made
+
+
+def set_machine(qtbot: Any) -> MachinePlace:
+    made = machine(qtbot)
+    apply_theme(made, DARK)
+    show_settings(made, MachineSettings(viewing_distance_mm=600), undo="width of the screen")
+    return made
+
+
+def show_settings(place: MachinePlace, settings: MachineSettings, undo: str = "") -> None:
+    place.show_settings(settings, folder="/there", undo=undo, kept_in="/there/machine.json")
+
+
+def two_screens(monkeypatch: Any) -> None:
+    monkeypatch.setattr(settings_view, "screens_shown", lambda: SCREENS)
+
+
+def checked(facts: Facts, **more: Any) -> PreflightView:
+    protocol = load("rek2024")
+    now = datetime(2026, 3, 2, 14, 20)
+    return preflight_view(protocol, facts, checks(facts, protocol), "Participant P007", now=now, **more)
+
+
+def preflight(
+    qtbot: Any, facts: Facts = WELL, goes_on: tuple[tuple[str, str], ...] = (), **more: Any
+) -> PreflightWindow:
+    made = PreflightWindow(1000.0, **more)
+    qtbot.addWidget(made)
+    made.show_view(checked(facts, error_n=0.004, goes_on=goes_on))
+    made.show()
+    return made
+
+
+def results(qtbot: Any, seen: Any = None) -> ResultsPlace:
+    """Return the results in their main window, with drawn figures."""
+    window = MainWindow({"home": Place, "results": lambda: ResultsPlace(handed_to=Path(os.sep, "somewhere"))})
+    qtbot.addWidget(window)
+    window.resize(1366, 768)
+    window.show()
+    window.go("results")
+    place: Any = window.place("results")
+    place.main = window  # or it would be collected here
+    place.show_view(seen or view())
+    qtbot.waitUntil(lambda: all(card.drawing is None or card.drawing.settled for card in place.figures.cards))
+    return place  # type: ignore[no-any-return]
+
+
+def opened_results(qtbot: Any) -> ResultsPlace:
+    return results(qtbot, view(opened=OPENED, left_out=(LEFT_OUT,)))
+
+
+def lab(qtbot: Any) -> LabPlace:
+    made: LabPlace = shown(qtbot, LabPlace(), (1528, 900))
+    made.show_view(still_view())
+    return made
+
+
+def help_pages(qtbot: Any) -> HelpPlace:
+    made: HelpPlace = shown(qtbot, HelpPlace(), (1266, 768))
+    return made
+
+
+def display_test(qtbot: Any, **clock: Any) -> DisplayTest:
+    made: DisplayTest = shown(qtbot, DisplayTest("Screen 1", 60.0, least_s=0.05, **clock), (1366, 768))
+    return made
