@@ -34,9 +34,9 @@ def check(protocol: str | None, *, schema: bool, delay_ticks: int) -> None:
     if schema:
         import json
 
-        from study_app.protocol.source.json_schema import schema as protocol_schema
+        from study_app.protocol.source.json_schema import editor_schema
 
-        click.echo(json.dumps(protocol_schema(), indent=2, ensure_ascii=False))
+        click.echo(json.dumps(editor_schema(), indent=2, ensure_ascii=False))
         return
     if protocol is None:
         raise click.UsageError("check needs a protocol: a file, or one of " + ", ".join(load.shipped()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from functools import cache
 from typing import Any, Final
 
@@ -30,7 +31,7 @@ class _Generator(GenerateJsonSchema):
 
 @cache
 def schema(of: type[BaseModel] = Protocol) -> dict[str, Any]:
-    """Return the JSON Schema of a protocol file, for editors that complete and check while one writes."""
+    """Return the JSON Schema of a protocol file: what each key may be, and what it means."""
     described = of.model_json_schema(schema_generator=_Generator)
     for node in described["properties"].values():
         if "patternProperties" in node:
@@ -48,3 +49,19 @@ def schema(of: type[BaseModel] = Protocol) -> dict[str, Any]:
         items = described["$defs"]["Questionnaire"]["properties"]["items"]["items"]
         items["anyOf"] = items.pop("oneOf")  # a statement, which has no kind, is a text too, whose kind has a default
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}
+
+
+def editor_schema() -> dict[str, Any]:
+    """Return the JSON Schema for editors that complete and check while one writes.
+
+    Unlike `schema` it asks for whole questions only where no instrument supplies what a study leaves out of them.
+    """
+    described = deepcopy(schema())
+    tables = described["$defs"]
+    questions = tables["Questionnaire"]
+    items = questions["properties"]["items"]["items"]
+    whole = items["anyOf"]
+    partial = [{**tables[kind["$ref"].rsplit("/", 1)[-1]], "required": ["id"]} for kind in whole]
+    items["anyOf"] = [*whole, *partial]
+    questions["then"]["properties"] = {"items": {"items": {"anyOf": whole}}}
+    return described
