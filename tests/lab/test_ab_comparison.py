@@ -112,4 +112,4 @@ def test_while_blind_nothing_can_be_edited_and_switching_goes_on() -> None:
     assert blind.blinded(Random(2)) == blind  # noqa: S311 - a test draws
     revealed = blind.revealed()
     assert revealed.shown_name("A") == "Water, edited"
-    assert revealed.may_undo
+    assert (revealed.may_undo, revealed.may_redo) == (True, False)

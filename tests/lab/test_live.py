@@ -27,7 +27,8 @@ def sent_n(live: Live, ticks: int) -> np.ndarray:
 
 def test_a_scene_is_presented_by_the_next_tick_and_felt_whole_within_fifty() -> None:
     live = live_with(scripted())
-    sides = bench("honey", "honey")
+    honey = SCENES["honey"].model_copy(update={"rate_hz": 500.0})  # the servo's rate counts
+    sides = bench("honey", "honey").choose("B", "honey", honey)
     live.feel(sides)
     live.play("circle")
     run(live, 1500)

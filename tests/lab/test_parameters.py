@@ -49,6 +49,7 @@ def test_a_preset_beyond_the_labs_range_widens_it() -> None:
         update={"liquids": (liquid.model_copy(update={"wake": liquid.wake.model_copy(update={"scaling": 1e7})}),)}
     )
     assert parameter(wide, "wake.scaling").most == 1e7
+    assert parameter(wide, "liquid.density_kg_m3").default == 1000  # has no other: its own
 
 
 def test_smoothing_left_open_follows_from_the_estimator() -> None:

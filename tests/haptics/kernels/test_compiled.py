@@ -12,11 +12,10 @@ from study_app.haptics.kernels import compiled
 from study_app.haptics.kernels.compiled import kernel, part
 from tests.haptics.scenes import COMPILED
 
-pytestmark = pytest.mark.slow
-
 about_compiled_code = pytest.mark.skipif(not COMPILED, reason="about compiled code")
 
 
+@pytest.mark.slow
 @about_compiled_code
 @pytest.mark.parametrize("decorator", [kernel, part])
 def test_code_of_the_servo_that_would_allocate_does_not_compile(decorator):
@@ -60,6 +59,7 @@ def nowhere(tmp_path: Path) -> Path:
 about_user_cache = pytest.mark.skipif(sys.platform != "linux", reason="XDG_CACHE_HOME is Linux's")
 
 
+@pytest.mark.slow
 @about_user_cache
 def test_a_cache_that_cannot_be_written_is_kept_in_the_users_folder_with_a_word(tmp_path: Path, nowhere: Path) -> None:
     at, said = said_at_start(tmp_path, {"NUMBA_CACHE_DIR": str(nowhere), "XDG_CACHE_HOME": str(tmp_path)})
@@ -68,6 +68,7 @@ def test_a_cache_that_cannot_be_written_is_kept_in_the_users_folder_with_a_word(
     assert said == f"{nowhere} cannot be written: compiled code is stored in {tmp_path / 'liquid-study'}\n"
 
 
+@pytest.mark.slow
 @about_user_cache
 def test_where_nothing_can_be_kept_the_program_works_and_says_what_to_do(tmp_path: Path, nowhere: Path) -> None:
     at, said = said_at_start(tmp_path, {"NUMBA_CACHE_DIR": str(nowhere), "XDG_CACHE_HOME": str(nowhere)})
@@ -137,3 +138,13 @@ def test_a_shipped_cache_is_copied_once_and_a_torn_copy_is_swept(
     (own / "haptics" / "tick.nbi").write_bytes(b"mine")
     compiled.copy_shipped(own)
     assert (own / "haptics" / "tick.nbi").read_bytes() == b"mine"
+
+
+def test_a_cache_is_removed_unless_a_program_started_with_it_meanwhile(tmp_path: Path) -> None:
+    cache = tmp_path / ("a" * 16)
+    cache.mkdir()
+    seen_at = cache.stat().st_mtime
+    compiled.remove_cache(cache, seen_at - 1.0)
+    assert list(tmp_path.iterdir()) == [cache]
+    compiled.remove_cache(cache, seen_at)
+    assert list(tmp_path.iterdir()) == []

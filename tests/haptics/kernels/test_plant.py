@@ -12,6 +12,7 @@ if numba.config.DISABLE_JIT:
     pytest.skip("too many sub-steps for plain Python", allow_module_level=True)
 
 from study_app.haptics.kernels.plant import move, new_handle, push
+from study_app.haptics.kernels.tick_schedule import new_schedule, next_tick
 from study_app.haptics.model.layout import MOST_DELAY
 
 STILL = np.zeros(3)
@@ -111,3 +112,10 @@ def test_motors_saturate_each_on_its_own_and_give_whole_steps():
     assert handle.force_n.tolist() == [8.0, -8.0, 0.25]
     push(handle, 0.38, -0.38, 0.124)
     assert handle.force_n.tolist() == [0.5, -0.5, 0.0]
+
+
+def test_a_share_of_ticks_is_missed_and_the_others_are_late_by_the_jitter_at_most():
+    pace = new_schedule(1e-3, jitter_s=2e-4, missed=0.2)
+    steps_s = np.array([next_tick(pace) for _ in range(4000)])
+    assert steps_s.mean() == pytest.approx(1e-3 / (1 - 0.2), rel=0.03)
+    assert abs(steps_s / 1e-3 - np.rint(steps_s / 1e-3)).max() == pytest.approx(0.2, rel=0.05)

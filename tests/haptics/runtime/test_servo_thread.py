@@ -20,9 +20,6 @@ from tests.haptics.scenes import HONEY, WATER
 pytestmark = needs_servo
 
 
-# in a thread of its own
-
-
 def test_the_thread_ticks_while_python_computes_and_ends_when_told(probe):
     with Servo(probe) as servo:
         reader = servo.telemetry.reader()
@@ -81,8 +78,6 @@ def test_a_program_keeps_the_signal_handlers_it_has_set(probe):
     finally:
         signal.signal(signal.SIGTERM, before)
 
-
-# however the process ends
 
 SCRIPT = """
 import os, signal, sys, threading

@@ -27,9 +27,6 @@ def push(telemetry, count=1, *, position=None):
         telemetry.written[0] += 1
 
 
-# readers
-
-
 def test_a_reader_gets_what_came_since_it_last_read_in_order():
     telemetry = Telemetry(64)
     push(telemetry, 5)
@@ -93,9 +90,6 @@ def test_beside_a_racing_writer_every_sample_read_is_whole():
     assert seen + reader.dropped == count
 
 
-# the newest sample, and the place at a moment
-
-
 @pytest.mark.slow
 @settings(deadline=None)  # the first example compiles
 @given(st.integers(40, 99), st.floats(0, 1, exclude_max=True))
@@ -143,9 +137,6 @@ def test_positions_that_were_refused_are_passed_over():
     telemetry.ring[5].limiters = LIMITER_GLITCH
     position, moment = telemetry.position_at(6 * MS)
     assert (position[0], moment) == (4e-3, 4 * MS)
-
-
-# timing
 
 
 def ticks(times_ms, lateness_ms=None, first_tick=0):

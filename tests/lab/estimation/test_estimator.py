@@ -43,6 +43,12 @@ def test_the_drag_coefficient_is_found_within_its_interval(seed: int) -> None:
     assert found.rms_n == pytest.approx(NOISE_N * np.sqrt(3), rel=0.05)
 
 
+def test_a_stream_without_noise_leaves_no_residual() -> None:
+    rows = measured(planted(drag=1.0, length=WHOLE, scaling=WHOLE), *stirring(4.0), noise_n=0.0)
+    found = fed(OnlineEstimator(WATER), rows)
+    assert (found.values[DRAG], found.rms_n) == (pytest.approx(1.0, rel=1e-3), pytest.approx(0.0, abs=1e-3))
+
+
 def test_drag_length_and_scaling_are_found_together() -> None:
     found = fed(OnlineEstimator(WATER, NAMES), measured(planted(), *stirring()))
     assert found.identified

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.protocol.orders.constrained import PROPOSALS, Remaining, arrange, propose
+from study_app.protocol.orders.constrained import PROPOSALS, arrange, propose
 from study_app.protocol.orders.order_constraint import Constraint, longest_run, shortest_distance
 from study_app.protocol.streams import stream
 
@@ -122,39 +122,6 @@ def test_every_order_is_proposed_none_is_lost_in_a_dead_end(codes: int, repetiti
     """The chances that proposals claim for themselves are those of all orders, and sum to exactly one."""
     chances = proposals(codes, repetitions, constraint)
     assert sum(chances.values()) == 1
-
-
-def dead_ends(codes: int, repetitions: int, apart: int, run: int) -> int:
-    """Visit every state that proposals can reach, alike but for the names of codes, and count those without a next."""
-    waiting: list[Order] = [()]
-    seen: set[object] = set()
-    dead = 0
-    while waiting:
-        order = waiting.pop()
-        left = Remaining(codes, repetitions, apart, run)
-        for code in order:
-            left.take(code)
-        recent = order[len(order) - (apart - 1) :] if apart > 1 else order[-1:]
-        counts = tuple(left.count[code] for code in recent)
-        others = tuple(sorted(left.count[code] for code in range(codes) if code not in recent))
-        in_a_row = next((run for run in range(len(order)) if order[-run - 1] != order[-1]), len(order))
-        state = (counts, others, in_a_row if apart == 1 else 0)
-        if state in seen:
-            continue
-        seen.add(state)
-        longer = [(*order, code) for code in left.may_come()]
-        dead += not longer and len(order) < codes * repetitions
-        waiting += longer
-    return dead
-
-
-@pytest.mark.parametrize("codes", range(2, 6))
-@pytest.mark.parametrize("repetitions", range(2, 5))
-def test_no_state_that_can_be_reached_is_a_dead_end(codes: int, repetitions: int):
-    for apart in range(2, codes + 1):
-        assert dead_ends(codes, repetitions, apart, codes * repetitions) == 0, apart
-    for run in range(1, repetitions + 1):
-        assert dead_ends(codes, repetitions, 1, run) == 0, run
 
 
 @pytest.mark.variants(4)

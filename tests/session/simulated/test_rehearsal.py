@@ -22,6 +22,7 @@ from study_app.protocol.model import Protocol, Reach
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.questions.rating import RatingView
 from study_app.session.simulated import rehearsal
+from study_app.session.simulated.design_observer import OBSERVER, Comparison
 from study_app.session.simulated.exploration import RATE_HZ, exploration
 from study_app.session.simulated.observers import Reacher, SensedTrial, choices
 from study_app.session.simulated.rehearsed_session import RehearsedSession
@@ -87,6 +88,8 @@ def test_senses_measure_force_speed_of_the_hand_roughness_and_delay() -> None:
     assert felt.speed_rms_mps == pytest.approx(0.2)
     assert felt.roughness_n == pytest.approx(5)
     assert felt.delay_s == pytest.approx(0.105)
+    for delays, vary, sensed in ((True, "delay_ms", 0.105), (False, "force_loss", 5.0), (False, "", 12.5)):
+        assert Comparison(delays, False, OBSERVER, vary).sensed(felt) == pytest.approx(sensed)
 
 
 class StillHand:

@@ -71,6 +71,11 @@ def test_rest_displaces_the_wake_element_by_element():
     assert wake[200] == 0.0
 
 
+def test_a_turn_ends_a_segment_whose_oldest_elements_are_of_a_rest_or_gone():
+    legs = [(10, 1.0, 0, 0.0, 0.0), (5, 0.0, 0, 0.0, 0.0), (20, 1.0, 0, 0.0, 0.0), (10, 1.0, 90, 0.0, 0.0)]
+    assert difference(tank(length=23, scaling=23, breaking_span_m=1.0), walk(legs)) <= 1e-9
+
+
 def test_motion_below_a_millimetre_a_second_is_rest():
     creeping = moving(np.tile([0.9e-3, 0.0, 0.0], (50, 1)))
     assert not simulate(tank(), creeping).wake_x_mps.any()
