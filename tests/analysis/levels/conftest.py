@@ -6,98 +6,11 @@ from pathlib import Path
 import pytest
 
 from study_app.analysis.report.write_report import report
-from study_app.protocol.forms.simulated_observer import NO_FEATURES
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
-from tests.protocol.trials.level_studies import FIVE_POINTS, SHORT, text_of, text_of_damper
-from tests.studies import once, quick_pdfs
-
-MORE = """
-[stimuli.around]
-condition = "oil"
-vary = "viscosity_pa_s"
-level = "value"
-standards = [2]
-levels = [0.5, 8]
-
-[designs.numbered]
-kind = "estimation"
-modulus = { level = 2, number = 10 }
-
-[methods.five]
-kind = "constant"
-levels = [0.5, 2, 8]
-repetitions = 2
-
-[blocks.detect]
-task = "stir"
-stimulus = "viscosity"
-standards = [1]
-design = "yesno"
-method = "few"
-
-[blocks.rate]
-task = "stir"
-stimulus = "value"
-design = "rated"
-method = "five"
-
-[blocks.number]
-task = "stir"
-stimulus = "value"
-design = "numbered"
-method = "five"
-
-[blocks.equal]
-task = "stir"
-stimulus = "around"
-design = "2ifc"
-method = "five"
-
-[blocks.odd]
-task = "stir"
-stimulus = "around"
-design = "oddity"
-method = "five"
-
-[blocks.pairs]
-task = "stir"
-design = "2ifc"
-conditions = ["oil", "other", "late"]
-standard = "oil"
-repetitions = 4
-"""
-SEQUENCE = ('sequence = ["viscosity"]', 'sequence = ["viscosity", "detect", "rate", "number", "equal", "odd", "pairs"]')
-ADAPTIVE = """
-[methods.steps]
-kind = "updown"
-tracks = 2
-trials = 24
-step_up = 2
-
-[methods.quest]
-kind = "questplus"
-trials = 9
-
-[blocks.staircase]
-stimulus = "damping"
-design = "2ifc"
-method = "steps"
-
-[blocks.quest]
-stimulus = "damping"
-standards = [8]
-design = "3ifc"
-method = "quest"
-
-[[analysis.published]]
-block = "staircase"
-measure = "weber"
-value = 0.1917
-percent = 71
-n = 10
-source = "Jones et al. 1997"
-"""
+from tests.analysis.levels.level_studies import ADAPTIVE, levels_file
+from tests.protocol.trials.level_studies import text_of_damper
+from tests.studies import made_up, once, quick_pdfs
 
 
 @pytest.fixture(scope="session")
@@ -132,9 +45,8 @@ def opened_catch(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def sealed_levels(tmp_path_factory: pytest.TempPathFactory) -> Path:
     def make(folder: Path) -> None:
-        (folder / "levels.toml").write_text(text_of(SEQUENCE, *SHORT, more=FIVE_POINTS + MORE))
-        felt = {("pairs", name): (NO_FEATURES,) for name in ("oil", "other", "late")}
-        rehearse_answers(folder / "levels.toml", participants=3, seed=2, results=folder / "study", felt=felt)
+        file = levels_file(folder)
+        rehearse_answers(file, participants=3, seed=2, results=folder / "study", felt=made_up(str(file)))
 
     return once(tmp_path_factory, "levels", make) / "study"
 

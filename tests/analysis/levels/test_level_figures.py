@@ -17,7 +17,7 @@ from study_app.analysis.statistics.psychometrics.posterior import fitted, narrow
 from study_app.analysis.tables.study_tables import load_study
 from study_app.protocol.trials.kinds import default_design
 from study_app.protocol.trials.psychometric import analysis_grid, assumed_for
-from tests.analysis.levels.test_thresholds import STIMULUS, block, rows
+from tests.analysis.levels.level_studies import STIMULUS, block, rows
 
 
 def found(level_kind: str, *ones: ThresholdFound) -> LevelsFound:

@@ -2,7 +2,6 @@
 
 import re
 import shutil
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -18,7 +17,7 @@ from study_app.analysis.results.level_results import LevelsFound
 from study_app.analysis.tables.study_tables import Study
 from study_app.protocol.trials.kinds import default_design
 from study_app.protocol.trials.presentation import arrangement_text
-from tests.analysis.levels.test_sensitivities import ONE, ROVING, block
+from tests.analysis.levels.level_studies import ONE, ROVING, block
 from tests.analysis.report.read_report import numbers, run_in_r
 
 pytestmark = pytest.mark.slow
@@ -84,7 +83,7 @@ def test_r_computes_d_prime_of_every_design(design: str, settings: tuple, tmp_pa
         held.append(("P001", "b", 8.0, "8/1", 0.2, arrangement_text(kind, arrangement), answer, True, answer == right))
     names = ["participant", "block", "standard", "track", "level", "arrangement", "response", "analysed", "right"]
     frame = pd.DataFrame(held, columns=names)
-    tested = replace(block(design, settings=settings), id="b")
+    tested = block(design, settings=settings)
     found = LevelsFound(
         "b", "Block", design, True, (), "share", "correct", sensitivities=tuple(sensitivities(tested, frame))
     )

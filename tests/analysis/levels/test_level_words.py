@@ -28,8 +28,7 @@ from study_app.protocol.trials.kinds import default_design
 from study_app.protocol.trials.methods.constant import Constant
 from study_app.protocol.trials.methods.questplus import QuestPlus
 from study_app.protocol.trials.methods.updown import UpDown
-from study_app.protocol.trials.stimuli import Stimulus
-from tests.analysis.levels.test_thresholds import block
+from tests.analysis.levels.level_studies import STIMULUS, block
 
 GOOD = ThresholdFound(
     "P001", 8.0, 100, 0.2, 0.15, 0.27, width=1.4, lapse=0.01, guess=0.5, flat_width=0.205, fit_p=0.4, drift=0.05
@@ -126,9 +125,6 @@ def test_two_participants_give_no_group_interval() -> None:
     assert few.startswith("Block: two participants; below 3 the group has no interval, since differences between")
     assert (device, motors) == (DEVICE, MOTORS)
     assert list(level_limits(replace(found(), thresholds=()))) == []
-
-
-STIMULUS = Stimulus(vary="damping_nspm", levels=(0.02, 0.6), standards=(8.0,))
 
 
 @pytest.mark.parametrize(

@@ -9,29 +9,18 @@ from scipy.stats import norm
 
 from study_app.analysis.designs.sensitivities import sensitivities
 from study_app.analysis.results.level_results import SensitivityFound
-from study_app.analysis.tables.compared_blocks import Setting
 from study_app.analysis.tables.level_blocks import LevelBlock
-from study_app.protocol.trials.designs import Design, Rated
+from study_app.protocol.trials.designs import Rated
 from study_app.protocol.trials.kinds import default_design
-from study_app.protocol.trials.methods.constant import Constant
 from study_app.protocol.trials.presentation import arrangement_text
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.detection import different_rate, proportion_correct
+from tests.analysis.levels.level_studies import ONE, ROVING, block
 
 pytestmark = pytest.mark.slow
 
-STIMULUS = Stimulus(vary="damping_nspm", levels=(0.02, 0.6), standards=(4.0, 8.0))
-ROVING = tuple(Setting(f"V{number}", f"{standard}/1") for number, standard in enumerate((4, 8), start=1))
-ONE = (Setting("V1", "8/1"),)
 NAMES = ["participant", "block", "standard", "track", "level", "arrangement", "response", "value", "analysed"]
 TRIALS = 60_000
-
-
-def block(
-    design: Design | str, stimulus: Stimulus | None = STIMULUS, settings: tuple[Setting, ...] = ROVING
-) -> LevelBlock:
-    kind = default_design(design) if isinstance(design, str) else design
-    return LevelBlock("b", "Block", "main", kind, stimulus, settings, Constant() if stimulus else None)
 
 
 def rows(design: str, chosen: dict[int, float], answers: tuple[str, str], person: str = "P001") -> pd.DataFrame:
@@ -74,7 +63,10 @@ def test_same_different_is_differencing_where_standards_rove_and_independent_oth
     d_prime, k = 1.8, 1.4
     high, low = different_rate(d_prime, k), different_rate(0, k)
     frame = rows("samedifferent", {0: 1 - low, 1: 1 - low, 2: 1 - high, 3: 1 - high}, ("same", "different"))
-    roving, fixed = own(block("samedifferent"), frame), own(block("samedifferent", settings=ONE), frame)
+    roving, fixed = (
+        own(block("samedifferent", settings=ROVING), frame),
+        own(block("samedifferent", settings=ONE), frame),
+    )
     assert (roving.model, fixed.model) == ("differencing", "independent")
     assert roving.d_prime == pytest.approx(d_prime, abs=3e-3)
     assert roving.criterion == pytest.approx(k, abs=3e-3)

@@ -11,7 +11,6 @@ from study_app.analysis.designs.thresholds import counts_of, thresholds
 from study_app.analysis.statistics.psychometrics.goodness import p_of_fit
 from study_app.analysis.statistics.psychometrics.posterior import band, fitted
 from study_app.analysis.statistics.random_effects import group_mean
-from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.protocol.analysis_plan import Published
 from study_app.protocol.trials.kinds import default_design
 from study_app.protocol.trials.method import Heard, TrackSetting
@@ -20,28 +19,7 @@ from study_app.protocol.trials.methods.updown import UpDown
 from study_app.protocol.trials.psychometric import analysis_grid, assumed_for
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.families import success
-
-STIMULUS = Stimulus(vary="damping_nspm", levels=(0.02, 0.6), standards=(8.0,))
-LEVELS = STIMULUS.spaced(9)
-NAMES = ["participant", "session", "trial", "block", "standard", "level", "level_delivered", "analysed", "success"]
-
-
-def block(design: str = "2ifc", stimulus: Stimulus = STIMULUS) -> LevelBlock:
-    return LevelBlock("b", "Block", "main", default_design(design), stimulus, ())
-
-
-def rows(
-    people: dict[str, float], trials: int = 400, delivered: float = 1.0, levels: tuple[float, ...] = LEVELS
-) -> pd.DataFrame:
-    """Return rows of tracks of people with planted thresholds; each level is delivered so many times too high."""
-    draw, found = np.random.default_rng(4), []
-    for person, threshold in people.items():
-        for number in range(trials):
-            level = levels[number % len(levels)]
-            u = math.log10(level * delivered) if level > 0 else -math.inf
-            right = bool(draw.random() < success("weibull", u, math.log10(threshold), 1.4, 0.5, 0.01))
-            found.append((person, "01", number + 1, "b", 8.0, level, level * delivered, True, right))
-    return pd.DataFrame(found, columns=NAMES).astype({"level_delivered": "Float64", "success": "boolean"})
+from tests.analysis.levels.level_studies import LEVELS, NAMES, STIMULUS, block, rows
 
 
 def test_planted_thresholds_are_found_per_participant_and_for_the_group() -> None:
@@ -135,11 +113,10 @@ def test_a_threshold_beyond_the_levels_presented_is_said_to_be(planted: float, b
 
 
 def test_noise_trials_determine_the_guess_rate_of_yes_no() -> None:
-    stimulus = Stimulus(vary="damping_nspm", levels=(0.02, 0.6), standards=(8.0,))
     draw, found = np.random.default_rng(2), []
     for number in range(600):
         level = (0.0, *LEVELS)[number % 10] if number % 3 else 0.0
-        u = stimulus.coordinate(level)
+        u = STIMULUS.coordinate(level)
         found.append(
             (
                 "P001", "01", number, "b", 8.0, level, level, True,

@@ -24,7 +24,7 @@ from study_app.store.exclusions import exclude
 from study_app.store.sites.merge import merge
 from study_app.store.sites.unblind_sites import unblind_folder
 from study_app.store.withdrawals.withdraw import withdraw
-from tests.analysis.levels.conftest import ADAPTIVE
+from tests.analysis.levels.level_studies import ADAPTIVE
 from tests.analysis.made_up import delays, everybody, liquids, study
 from tests.analysis.report.read_report import numbers, read, run_in_r
 from tests.protocol.trials.level_studies import text_of_damper
