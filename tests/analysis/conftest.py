@@ -86,6 +86,8 @@ task = "explore"
 questionnaire = "felt"
 """
 
+SAMPLE = StudyFolder(Path(__file__).resolve().parents[2] / "results" / "sample-rek2024")
+"""Rehearsed, and shipped sealed."""
 CANNOT_JUDGE = "cannot judge"
 DELAY_ERROR_MS = 3.5
 

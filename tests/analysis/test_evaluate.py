@@ -15,18 +15,14 @@ from study_app.analysis.evaluate import evaluate
 from study_app.analysis.findings.contrast_with_control import FINDING as CONTRASTS
 from study_app.analysis.findings.contrast_with_control import equivalent_up_to
 from study_app.analysis.findings.delay_trend import FINDING as TREND
-from study_app.analysis.findings.detection_threshold import FINDING as THRESHOLD
 from study_app.analysis.findings.liquid_recognition import FINDING as RECOGNITION
-from study_app.analysis.findings.lowest_delay import FINDING as LOWEST
 from study_app.analysis.findings.other_assumptions import FINDING as AGAIN
-from study_app.analysis.findings.over_all_statements import FINDING as OVERALL
 from study_app.analysis.findings.pair_comparison import FINDING as PAIRS
 from study_app.analysis.findings.pair_comparison import pairs_of
 from study_app.analysis.findings.settings_differ import FINDING as OMNIBUS
 from study_app.analysis.report.json_values import plain
 from study_app.analysis.results import item_test
 from study_app.analysis.results.block_results import BlockFound, Results
-from study_app.analysis.results.conduct import orders
 from study_app.analysis.statistics.friedman import friedman
 from study_app.analysis.statistics.multiple_comparisons import false_discovery, holm
 from study_app.analysis.statistics.outcome import DRAWS
@@ -35,7 +31,7 @@ from study_app.analysis.tables.compared_blocks import Block, Item, Setting
 from study_app.analysis.tables.planned_analysis import Decided
 from study_app.analysis.tables.study_tables import load_study
 from study_app.errors import AnalysisError
-from study_app.protocol.load import load, parse, source_bytes
+from study_app.protocol.load import parse, source_bytes
 from tests.analysis.conftest import Answer, make_results, twelve
 from tests.analysis.conftest import Results as Folder
 
@@ -106,46 +102,8 @@ def test_results_hold_no_number_that_is_none() -> None:
         plain({"a": (1.0, float("nan"))})
 
 
-@pytest.fixture(scope="module")
-def of_twelve(tmp_path_factory: pytest.TempPathFactory) -> tuple[BlockFound, BlockFound]:
-    return blocks(opened(make_results(tmp_path_factory.mktemp("twelve") / "rek2024", load("rek2024")), 12))
-
-
-def test_the_thesis_study_of_twelve(of_twelve: tuple[BlockFound, BlockFound]) -> None:
-    liquids, delays = of_twelve
-    assert liquids.names == ("Water", "Honey", "Light oil")
-    assert OVERALL.of(liquids) is not None
-    assert OVERALL.of(liquids).n == 12
-    assert [one.item for one in OMNIBUS.of(liquids)] == [item.id for item in liquids.items]
-    assert {(one.members, one.correction, one.primary) for one in OMNIBUS.of(liquids)} == {(9, "Holm", True)}
-    assert (
-        {one.tested.item for one in PAIRS.of(liquids)}
-        == {one.item for one in OMNIBUS.of(liquids) if one.verdict == "shown"}
-        != set()
-    )
-    assert {one.tested.members for one in PAIRS.of(liquids)} == {len(PAIRS.of(liquids))}
-    assert len(PAIRS.of(liquids)) % 3 == 0
-    assert RECOGNITION.of(liquids) is not None
-    assert RECOGNITION.of(liquids).right == ("like_water", "like_honey", "like_oil")
-    assert sum(map(sum, RECOGNITION.of(liquids).found.table)) == 36
-    assert len(AGAIN.of(liquids).mixed) == 9
-    assert list(delays.delays_ms) == [0, 50, 75, 100, 125, 150, 200]
-    assert [one.outcome.method.split("(")[1][:-1] for one in TREND.of(delays)] == ["increasing"] * 4 + ["decreasing"]
-    assert {one.verdict for one in TREND.of(delays)} == {"shown"}
-    assert all(one.steps.lowest_ms is not None for one in LOWEST.of(delays))
-    assert len(CONTRASTS.of(delays)) == 5 * 6
-    assert {(one.control_ms, one.found.bound) for one in CONTRASTS.of(delays)} == {(0.0, 1.0)}
-    assert THRESHOLD.of(delays) is not None
-    assert THRESHOLD.of(delays).effect is not None
-    assert 50 < THRESHOLD.of(delays).effect < 200
-    assert not OMNIBUS.of(delays)
-    assert not (*liquids.absent, *delays.absent)
-
-
-def test_equivalence_goes_up_from_the_shortest_delay_and_stops_at_the_first_that_is_not(
-    of_twelve: tuple[BlockFound, BlockFound],
-) -> None:
-    _, delays = of_twelve
+def test_equivalence_goes_up_from_the_shortest_delay_and_stops_at_the_first_that_is_not(rek: Folder) -> None:
+    _, delays = blocks(opened(rek, 12))
     for item, up_to in equivalent_up_to(CONTRASTS.of(delays)).items():
         verdicts = [one.verdict == "equivalent" for one in CONTRASTS.of(delays) if one.item == item]
         run = verdicts.index(False) if False in verdicts else len(verdicts)
@@ -251,14 +209,6 @@ def test_where_one_liquid_differs_the_others_are_seldom_told_apart(n: int) -> No
         wrong += any(one.tested.verdict == "shown" for one in pairs if "honey" not in (one.first, one.second))
     assert right >= 100 * 9
     assert wrong <= binom.ppf(0.999, 100, 0.05)
-
-
-def test_orders_are_counted_as_run(rek: Folder) -> None:
-    twelve(rek)
-    counts = orders(load_study(rek.folder))["delays"]
-    assert counts.orders == 12
-    assert [sum(line) for line in counts.positions] == [12] * 7
-    assert sum(map(sum, counts.follows)) == 12 * 6
 
 
 @pytest.mark.parametrize(("statements", "alpha"), [(5, 0.05), (40, 0.05), (9, 0.001), (100, 0.01)])

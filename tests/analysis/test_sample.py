@@ -7,9 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from study_app.analysis.evaluate import evaluate
-from study_app.analysis.report.json_values import plain
-from study_app.analysis.tables.study_tables import load_study
 from study_app.store import receipt
 from study_app.store.blinded.blinding import read_key
 from study_app.store.blinded.sealing import opened
@@ -18,12 +15,11 @@ from study_app.store.journals import journal
 from study_app.store.tables.columns import LATER
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
+from tests.analysis.conftest import SAMPLE
 from tests.compiled import needs_servo
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
-ROOT = Path(__file__).resolve().parents[2]
-SAMPLE = StudyFolder(ROOT / "results" / "sample-rek2024")
 MAKE_AGAIN = "make the sample again, by the command in results/README.md"
 
 
@@ -78,12 +74,3 @@ def test_its_answers_and_forces_are_those_of_a_rehearsal_today(rehearsal_of: Cal
         for kept, made in zip(known(sample, SAMPLE.path), known(again, folder), strict=True):
             assert len(made) > 10
             assert kept == pytest.approx(made, rel=1e-3), MAKE_AGAIN
-
-
-def test_its_results_have_the_fields_of_format_1_alone() -> None:
-    """A field that a later format adds would change the report.json of every earlier study."""
-    results = plain(evaluate(load_study(SAMPLE.path), planning=False))
-    assert set(results) == {"decided", "people", "blocks", "delivered", "orders", "performance", "seed", "failures"}
-    assert {name for block in results["blocks"] for one in block["settings"] for name in one} == {
-        "code", "condition", "liquid", "delay_ms", "label",
-    }  # fmt: skip

@@ -19,7 +19,7 @@ from study_app.analysis.study_worker import carry_out
 from study_app.analysis.tables.study_tables import Study, load_study, pooled
 from study_app.analysis.worker_messages import FigureDrawn, ReadStudy
 from study_app.store.blinded.unblinding import unblind
-from tests.analysis.conftest import HIDDEN, Results, twelve
+from tests.analysis.conftest import HIDDEN, SAMPLE, Results, twelve
 from tests.analysis.made_up import delays, everybody, liquids, study
 from tests.analysis.random_studies import check, keeps_contract
 
@@ -27,8 +27,6 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 TOY = Path(__file__).parent / "toy"
 KEY = "highest_answers"
-SAMPLE = Path(__file__).parents[3] / "results" / "sample-rek2024"
-"""Rehearsed, and shipped sealed."""
 RANDOM = 12
 """tests/benchmarks/analysis/random_studies.py checks 2,000."""
 
@@ -107,7 +105,7 @@ def toy(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 @pytest.mark.nightly
 @pytest.mark.usefixtures("toy")
 def test_a_finding_that_is_one_file_stands_in_every_output(tmp_path: Path) -> None:
-    folder = Path(shutil.copytree(SAMPLE, tmp_path / "sample"))
+    folder = Path(shutil.copytree(SAMPLE.path, tmp_path / "sample"))
     unblind(folder, by="AB", reason="a test")
     report(folder, tmp_path, failed=pytest.fail)
     written = json.loads((tmp_path / "report.json").read_bytes())

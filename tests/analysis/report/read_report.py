@@ -35,6 +35,7 @@ class Text(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.add(tag)
+        assert re.fullmatch(r"[a-z0-9 -]*", dict(attrs).get("class") or ""), attrs
         self.fetched += [value or "" for name, value in attrs if name in ("src", "href")]
         if tag not in self.VOID:
             self.open.append(tag)

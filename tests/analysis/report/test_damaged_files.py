@@ -14,7 +14,7 @@ from study_app.analysis.tables.study_tables import load_study
 from study_app.cli import commands
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.sessions.rebuild import rebuild
-from tests.analysis.test_sample import SAMPLE
+from tests.analysis.conftest import SAMPLE
 
 
 @pytest.fixture

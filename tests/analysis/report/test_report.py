@@ -23,29 +23,12 @@ from tests.analysis.report.read_report import answered_by_two, numbers, read, ru
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 
-def test_a_study_of_twelve_tells_what_was_found(of_twelve: Path) -> None:
+def test_figures_have_every_form_and_the_page_names_every_file_read(of_twelve: Path) -> None:
     names = {path.name for path in of_twelve.iterdir()}
-    assert {"report.json", "report.R", "methods.txt", "tests.csv", "motion.csv", "codebook.json"} <= names
     for figure in ("liquids", "recognition", "delays"):
         assert {f"{figure}.{form}" for form in ("png", "svg", "pdf", "txt")} <= names
-    told = read(of_twelve)
-    assert "SIMULATED" in told
-    for heading in (
-        *("In short", "What this study cannot show", "Do the liquids differ, statement by statement?"),
-        *("Which of them differ?", "Were the liquids recognised?", "Do answers follow the delay?"),
-        *("The lowest delay that shows", "Each delay against 0 ms", "Motion and force", "How it was run", "Exclusions"),
-        *("Were delays displayed as specified?", "Orders as run", "Methods, to paste", "Reproducing this report"),
-        *("Licence and citation", "Licence: not stated; ask the authors before you use the data."),
-    ):
-        assert heading in told
-    assert re.search(r"What was drawn was [\d.]+ ms old .*, and [\d.]+ ms at the shortest delay, with which", told)
-    assert "upper bound" in told
     found = numbers(of_twelve)
-    assert found["study"]["participants"] == 12
-    assert found["results"]["seed"] == 1
-    assert found["methods"] in told
-    assert (of_twelve / "methods.txt").read_text(encoding="utf-8").strip() == found["methods"]
-    assert set(found["versions"]) >= {"liquid-study", "numpy", "scipy"}
+    assert found["methods"] in read(of_twelve)
     assert "blinding/key.sealed" in found["files"]
     assert sum(name.endswith("receipt.json") for name in found["files"]) == 12
 
@@ -110,6 +93,7 @@ def test_what_progress_raises_ends_the_report_at_every_step_and_nothing_is_writt
     told: list[tuple[str, float]] = []
     report(small.folder, tmp_path / "whole", progress=lambda what, share: told.append((what, share)))
     shares = [share for _, share in told]
+    assert [what for what, _ in told if what.startswith("drawing")] == ["drawing: liquids"]
     assert shares == sorted(shares)
     assert shares[-1] <= 1
     for step in (0, len(told) // 2):
@@ -155,18 +139,6 @@ def test_an_unreadable_place_leaves_nothing(small: Results, tmp_path: Path) -> N
     with pytest.raises(AnalysisError, match="cannot be written"):
         report(small.folder, tmp_path / "file" / "report")
     assert load_study(small.folder).n == 2
-
-
-def test_the_script_in_r_has_every_number_of_the_report(of_twelve: Path) -> None:
-    script = (of_twelve / "report.R").read_text(encoding="utf-8")
-    assert 'read.csv(file.path(folder, "study-rek2024_description-responses_data.csv")' in script
-    for left, right in ("()", "{}"):
-        assert script.count(left) == script.count(right)
-    found = numbers(of_twelve)["results"]["blocks"]
-    for one in (*found[0]["omnibus"], *found[1]["trends"]):
-        assert repr(one["outcome"]["statistic"]) in script
-    for one in found[1]["against"]:
-        assert repr(one["found"]["p"]) in script
 
 
 def test_r_computes_the_same_numbers(of_twelve: Path) -> None:
