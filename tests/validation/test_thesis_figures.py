@@ -118,8 +118,9 @@ def test_figure_8_the_wake_fills_as_the_power_of_the_share_that_is_filled():
 
 @pytest.mark.slow
 def test_every_figure_has_its_number_title_and_caption():
-    for make in FIGURES:
-        shown = make()
+    made = [make() for make in FIGURES]
+    assert [shown.number for shown in made] == list(range(3, 3 + len(made)))
+    for shown in made:
         drawn = thesis_figures.draw(shown)
         words = " ".join(text.get_text().replace("\n", " ") for text in drawn.texts)
         assert f"Fig. {shown.number}" in words

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,21 +14,21 @@ from study_app.analysis.results.level_results import OwnDynamics
 from study_app.analysis.tables import planned_analysis
 from study_app.analysis.tables.performance import performance
 from study_app.analysis.tables.reaches import Targets, path_length_m, reaches
-from study_app.analysis.tables.study_tables import load_study
+from study_app.analysis.tables.study_tables import load_study, pooled
 from study_app.errors import AnalysisError
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
-from tests.analysis.conftest import Results, twelve
+from tests.analysis.conftest import SAMPLE, Results, twelve
+from tests.analysis.made_up import delays, study
 from tests.compiled import needs_servo
 
-SAMPLE = Path(__file__).resolve().parents[3] / "results" / "sample-rek2024"
 BENCH = {"measured": "2026-11-21", "damping_nspm": [0.4, 0.5, 0.6], "friction_n": [0.1] * 3, "mass_kg": [0.2, 0.2, 0.5]}
 
 
 @pytest.fixture
 def sample(tmp_path: Path) -> StudyFolder:
-    shutil.copytree(SAMPLE, tmp_path / "study")
+    shutil.copytree(SAMPLE.path, tmp_path / "study")
     return StudyFolder(tmp_path / "study")
 
 
@@ -50,6 +51,12 @@ def test_they_are_means_over_the_sessions_that_know_them(sample: StudyFolder) ->
     assert load_study(sample.path).own_dynamics == OwnDynamics(
         pytest.approx(1.0), pytest.approx(0.1), pytest.approx(0.3), 2, len(sample.sessions())
     )
+
+
+def test_those_of_sites_are_weighted_by_their_sessions() -> None:
+    one, other = (replace(study(delays([0]), []), own_dynamics=own) for own in (OwnDynamics(1, 2, 3, 1, 2), None))
+    third = replace(one, own_dynamics=OwnDynamics(4, 5, 9, 2, 2))
+    assert pooled(Path("nowhere"), {"A": one, "B": other, "C": third}, 0).own_dynamics == OwnDynamics(3, 4, 7, 3, 0)
 
 
 def test_a_bench_that_lacks_a_value_is_refused_with_the_receipt(sample: StudyFolder) -> None:
@@ -179,15 +186,3 @@ def test_reaches_are_those_that_the_session_decided_and_absent_recordings_are_to
         "1 × recording is not in the folder",
         "1 × recording is damaged (liquid-study verify says which)",
     )
-
-
-@pytest.mark.slow
-def test_without_recordings_there_are_measures_of_trials_alone(tmp_path: Path) -> None:
-    folder = Path(shutil.copytree(SAMPLE, tmp_path / "rek2024"))
-    unblind(folder, by="AB", reason="a test")
-    measured = performance(load_study(folder))
-    assert (measured.recorded, measured.unread) == (0, ("84 × no recording was kept",))
-    assert {one.measure for one in measured.moved} == {
-        *("duration_s", "path_m", "force_mean_n", "force_peak_n", "at_limit_percent")
-    }
-    assert all(one.median is not None and one.n == 12 for one in measured.moved)

@@ -5,7 +5,7 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
-from study_app.evaluation.identify import preset
+from study_app.evaluation.identify import measured_force, preset
 from study_app.evaluation.identify.fit import fit
 from study_app.haptics.model.effects.current import Uniform
 from study_app.haptics.model.overrides import override_all
@@ -72,6 +72,13 @@ def test_the_residuals_in_the_table_are_measured_less_fitted(fitted, tmp_path):
         assert rows[f"residual_{axis}_n"] == pytest.approx(found.measured_n[:, k] - force_n[:, k], abs=1e-12)
 
 
+def test_places_along_a_line_follow_from_the_velocity(tmp_path):
+    (tmp_path / "line.csv").write_text("t_s,velocity_mps,force_n\n0,0,1\n0.01,0.2,2\n0.02,0.4,3\n0.04,0.4,4\n")
+    read = measured_force.read(tmp_path / "line.csv")
+    assert read.motion.position_m[:, 0] == pytest.approx([0, 0.001, 0.004, 0.012])
+    assert read.force_n[:, 0].tolist() == [1, 2, 3, 4]
+
+
 def identify(*words):
     return CliRunner().invoke(commands, ["identify", *map(str, words)], catch_exceptions=False)
 
@@ -84,7 +91,7 @@ def test_from_a_file_to_a_preset(tmp_path):
         "--measured", path, "rek2024", "--liquid", "honey", "--fit", "drag_coefficient", "--to", tmp_path / "out"
     )
     assert told.exit_code == 0
-    assert f"honey: {len(REACH.t_s)} rows over 1.8 s; residual 0.0283 N RMS" in told.output
+    assert f"honey: {len(REACH.t_s)} rows over 1.8 s; residual 0.0283 N RMS, 1.2 % of the force" in told.output
     written = load_scene(tmp_path / "out" / "honey.toml", "honey")
     assert written.body.drag_coefficient == pytest.approx(0.61, rel=0.01)
     assert written == true.model_copy(update={"body": written.body, "velocity": Kalman()})

@@ -64,3 +64,4 @@ def test_the_ladder_has_the_gates_own_choice(speed_mps, expects):
     assert choice in rungs
     assert expects in choice.name
     assert isinstance(rungs[0], LinearRung)
+    assert candidate_sets.numerical(TANK)[1].name == "O(1) wake"

@@ -87,6 +87,7 @@ def streamed(**changed: object) -> Streamed:
         ({"markers_lost": 1}, False),
         ({"intact": False}, False),
         ({"errors_us": np.full(60, 1001.0)}, False),
+        ({"errors_us": np.append(np.full(199, 30.0), 5000.0)}, True),
         ({"errors_us": np.empty(0)}, False),
     ],
 )
