@@ -8,7 +8,7 @@ import pandas as pd
 
 from study_app.analysis.tables.compared_blocks import Setting
 from study_app.analysis.tables.level_blocks import LevelBlock
-from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.kinds import default_design
 from study_app.protocol.trials.methods.constant import Constant
 from study_app.protocol.trials.stimuli import Stimulus

@@ -7,6 +7,7 @@ import csv
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +16,17 @@ import pytest
 pytest.importorskip("PySide6.QtWidgets", reason="Qt's system libraries are missing", exc_type=ImportError)
 
 from PySide6.QtCore import QPoint
-from PySide6.QtWidgets import QSlider
+from PySide6.QtWidgets import QWidget
 
 from study_app.gui.operator.strip import Strip
+from study_app.gui.participant.forms.question_form import FormWidget
+from study_app.gui.participant.intervals.choice_page import ChoiceWidget
+from study_app.gui.participant.intervals.number_page import NumberWidget
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.load import parse
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.wording.languages import words
-from study_app.session.pages import ChoicePage, NumberPage, QuestionnairePage
+from study_app.session.pages import ChoicePage, DesignPage, NumberPage, QuestionnairePage
 from study_app.session.transitions.events import Begin, Chosen, Submitted, TaskDone, TimeUp
 from study_app.session.transitions.page_builder import page
 from study_app.session.transitions.state import FINAL, Phase, SessionState
@@ -82,10 +86,10 @@ PRESSED = ("first", "second", "second", "first")
 NUMBER = 12
 
 
-class ByKeys:
-    """Goes through the study by keys alone; the session's own transitions say what comes next."""
+class Walker:
+    """Goes through the study; how a page is answered is the subclass's affair."""
 
-    device, never = "scripted", {"click", "mousedown", "mousemove", "mousemove_relative"}
+    device = ""
 
     def __init__(self, display: str, folder: Path) -> None:
         file = folder / "smallest.toml"
@@ -100,19 +104,14 @@ class ByKeys:
         self.orders |= set(orders)
         return self.program.xdotool(*orders)
 
-    def press(self, *keys: str) -> None:
-        assert self.xdotool("getwindowfocus") == self.window
-        self.xdotool("key", "--delay", "30", *keys)
+    def answer_form(self, asked: QuestionnairePage) -> None:
+        raise NotImplementedError
 
-    def answer(self, asked: Any, value: str) -> None:
-        """Answer a form, a pair with ``value``, or a number."""
-        match asked:
-            case QuestionnairePage():
-                self.press("4", "2", "Return", "2", "End", "Down", "Return")
-            case ChoicePage():
-                self.press({"first": "1", "second": "Right"}[value])
-            case NumberPage():
-                self.press("1", "2", "Return")
+    def choose(self, asked: ChoicePage, value: str) -> None:
+        raise NotImplementedError
+
+    def enter(self, asked: NumberPage) -> None:
+        raise NotImplementedError
 
     def walk(self) -> None:
         """Go from the first page to the last."""
@@ -123,43 +122,26 @@ class ByKeys:
         while state.phase not in FINAL:
             at_s += 100.0
             if state.phase is Phase.ANSWERING:
-                asked: Any = page(state)
-                form = isinstance(asked, QuestionnairePage)
-                self.program.wait_for_event("item_shown", len(asked.items) if form else len(ANSWERS) + 2 + answered)
-                self.answer(asked, "" if form else (*PRESSED, "", "")[answered])
-                answered += not form
-                self.program.wait_for_event(*(("form_answered",) if form else ("responses", answered)))
+                answered += self._answer(page(state), answered)
             state = ahead(state, at_s)
         self.program.wait_for_event("session_ended")
 
-
-class ByMouse(ByKeys):
-    """Goes through it by the mouse alone; the same widgets, laid out off screen, say where to click."""
-
-    device, never = "mouse", {"key", "keydown", "type"}
-
-    def __init__(self, display: str, folder: Path) -> None:
-        super().__init__(display, folder)
-        self.plan = ParticipantWindow(words("en"), clock=ManualClock(), windowed=True, strip=Strip())
-        self.plan.may_close = True
-
-    def answer(self, asked: Any, value: str) -> None:
-        self.plan.show_page(asked)
-        laid_out(self.plan, SCREEN)
-        widget: Any = self.plan.widget
+    def _answer(self, asked: Any, answered: int) -> int:
+        """Answer the page that is shown; return how many trials that answers."""
+        if isinstance(asked, QuestionnairePage):
+            self.program.wait_for_event("item_shown", len(asked.items))
+            self.answer_form(asked)
+            self.program.wait_for_event("form_answered")
+            return 0
+        assert isinstance(asked, DesignPage)
+        self.program.wait_for_event("item_shown", len(ANSWERS) + 1 + answered + 1)
         if isinstance(asked, ChoicePage):
-            parts = [widget.buttons[("first", "second").index(value)]]
-        elif isinstance(asked, NumberPage):
-            keys = {key.text(): key for key in widget.keys}
-            parts = [keys["1"], keys["2"], widget.button]
+            self.choose(asked, PRESSED[answered])
         else:
-            age, hand, rested, _ = widget.fields
-            keys = {key.text(): key for key in age.keys}
-            parts = [keys["4"], keys["2"], hand.options[1], rested.line, widget.button]
-        for part in parts:
-            right_end = QPoint(part.width() // 2 - 2 if isinstance(part, QSlider) else 0, 0)
-            place = place_in(self.plan, part) + right_end
-            self.xdotool("mousemove", "--window", self.window, str(place.x()), str(place.y()), "click", "1")
+            assert isinstance(asked, NumberPage)
+            self.enter(asked)
+        self.program.wait_for_event("responses", answered + 1)
+        return 1
 
 
 def opened() -> SessionState:
@@ -185,20 +167,74 @@ def ahead(state: SessionState, at_s: float) -> SessionState:
             return advance(state, Submitted(at_s))[0]
 
 
-@pytest.mark.parametrize("kind", [ByKeys, ByMouse])
-def test_pairs_and_numbers_are_answered_by_keys_or_the_mouse_alone(tmp_path: Path, qapp: Any, kind: Any) -> None:
-    with virtual_display(size=SCREEN) as display:
-        walker = kind(display, tmp_path)
-        try:
-            walker.walk()
-            check(walker.program)
-        finally:
-            walker.program.close()
-    assert not walker.orders & walker.never
+class ByKeys(Walker):
+    device = "scripted"
+
+    def press(self, *keys: str) -> None:
+        assert self.xdotool("getwindowfocus") == self.window
+        self.xdotool("key", "--delay", "30", *keys)
+
+    def answer_form(self, _asked: QuestionnairePage) -> None:
+        self.press("4", "2", "Return", "2", "End", "Down", "Return")
+
+    def choose(self, _asked: ChoicePage, value: str) -> None:
+        self.press({"first": "1", "second": "Right"}[value])
+
+    def enter(self, _asked: NumberPage) -> None:
+        self.press("1", "2", "Return")
 
 
-def check(program: Program) -> None:
+class ByMouse(Walker):
+    device = "mouse"
+
+    def __init__(self, display: str, folder: Path, qtbot: Any) -> None:
+        super().__init__(display, folder)
+        self._plan = ParticipantWindow(words("en"), clock=ManualClock(), windowed=True, strip=Strip())
+        self._plan.may_close = True
+        qtbot.addWidget(self._plan)
+
+    def shown(self, asked: Any) -> QWidget:
+        self._plan.show_page(asked)
+        laid_out(self._plan, SCREEN)
+        return self._plan.widget
+
+    def click(self, *places: QPoint) -> None:
+        for place in places:
+            at = (str(place.x()), str(place.y()))
+            self.xdotool("mousemove", "--window", self.window, *at, "click", "1")
+
+    def answer_form(self, asked: QuestionnairePage) -> None:
+        form = self.shown(asked)
+        assert isinstance(form, FormWidget)
+        age, hand, rested, _ = (one for one in form.fields)
+        keys = {key.text(): key for key in age.keys}  # type: ignore[attr-defined]
+        parts = [keys["4"], keys["2"], hand.options[1]]  # type: ignore[attr-defined]
+        line = rested.line  # type: ignore[attr-defined]
+        end = line.mapTo(self._plan, QPoint(line.width() - 2, line.height() // 2))
+        places = [place_in(self._plan, part) for part in parts]
+        self.click(*places, end, place_in(self._plan, form.button))
+
+    def choose(self, asked: ChoicePage, value: str) -> None:
+        widget = self.shown(asked)
+        assert isinstance(widget, ChoiceWidget)
+        self.click(place_in(self._plan, widget.buttons[("first", "second").index(value)]))
+
+    def enter(self, asked: NumberPage) -> None:
+        widget = self.shown(asked)
+        assert isinstance(widget, NumberWidget)
+        keys = {key.text(): key for key in widget.keys}
+        self.click(*(place_in(self._plan, part) for part in (keys["1"], keys["2"], widget.button)))
+
+
+@pytest.fixture
+def display() -> Iterator[str]:
+    with virtual_display(size=SCREEN) as number:
+        yield number
+
+
+def check(walker: Walker) -> None:
     """Check what is on the disk."""
+    program = walker.program
     (path,) = program.folder.glob("results/*/data/sub-*/ses-01/*_description-responses_data.csv")
     with path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -216,3 +252,23 @@ def check(program: Program) -> None:
         words_given = [sys.executable, "-m", "study_app", command, str(place)]
         found = subprocess.run(words_given, capture_output=True, text=True, check=False)
         assert found.returncode == 0, found.stdout + found.stderr
+
+
+def test_pairs_and_numbers_are_answered_by_keys_alone(display: str, tmp_path: Path) -> None:
+    walker = ByKeys(display, tmp_path)
+    try:
+        walker.walk()
+        check(walker)
+    finally:
+        walker.program.close()
+    assert not walker.orders & {"click", "mousedown", "mousemove", "mousemove_relative"}
+
+
+def test_pairs_and_numbers_are_answered_by_the_mouse_alone(display: str, tmp_path: Path, qtbot: Any) -> None:
+    walker = ByMouse(display, tmp_path, qtbot)
+    try:
+        walker.walk()
+        check(walker)
+    finally:
+        walker.program.close()
+    assert not walker.orders & {"key", "keydown", "type"}
