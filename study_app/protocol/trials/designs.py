@@ -15,8 +15,10 @@ from pydantic import Field
 from study_app.haptics.model.ranges import within
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Id, Localised
-from study_app.psychophysics import detection
-from study_app.psychophysics.detection import Sensitivity
+
+if TYPE_CHECKING:
+    from study_app.psychophysics import detection
+    from study_app.psychophysics.detection import Sensitivity
 
 Feedback: TypeAlias = Literal["never", "practice", "always"]
 Reply: TypeAlias = Literal["choice", "rating", "number", "setting"]
@@ -162,6 +164,8 @@ class Design(Table):
 
     def proportion_correct(self, d_prime: float, *, roving: bool) -> float:
         """Return P(correct) of an unbiased observer at a d′ of 0 or more, where answers can be correct."""
+        from study_app.psychophysics import detection  # noqa: PLC0415 - loads numpy
+
         return detection.proportion_correct(self.kind, d_prime)
 
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
@@ -234,6 +238,8 @@ class ForcedChoice(Design):
 
     def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
         """Return d′ of the intervals, and of two intervals the criterion: above 0 the second is preferred."""
+        from study_app.psychophysics import detection  # noqa: PLC0415 - loads numpy
+
         if self.kind != "2ifc":
             return detection.from_correct(self.kind, *self.correct_of(answers))
         return detection.two_intervals(*_counts(answers, {0}, "first"), *_counts(answers, {1}, "first"))
@@ -260,6 +266,8 @@ class Oddity(Design):
 
     def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
         """Return d′ of the triangle test."""
+        from study_app.psychophysics import detection  # noqa: PLC0415 - loads numpy
+
         return detection.from_correct(self.kind, *self.correct_of(answers))
 
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
@@ -274,6 +282,8 @@ class _TwoModels(Design):
 
     def proportion_correct(self, d_prime: float, *, roving: bool) -> float:
         """Return P(correct) under the model of `sensitivity`."""
+        from study_app.psychophysics import detection  # noqa: PLC0415 - loads numpy
+
         return detection.proportion_correct(f"{self.kind} {_model(roving)}", d_prime)
 
 
@@ -294,6 +304,8 @@ class Abx(_TwoModels):
 
     def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
         """Return d′ under one model, and under the other one."""
+        from study_app.psychophysics import detection  # noqa: PLC0415 - loads numpy
+
         return detection.abx(*self.correct_of(answers), _model(roving))
 
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
@@ -320,6 +332,8 @@ class SameDifferent(_TwoModels):
 
     def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
         """Return d′ under one model, with k of differencing, and d′ under the other one."""
+        from study_app.psychophysics import detection  # noqa: PLC0415 - loads numpy
+
         hits, false_alarms = _counts(answers, {2, 3}, "different"), _counts(answers, {0, 1}, "different")
         return detection.same_different(*hits, *false_alarms, _model(roving))
 
@@ -358,6 +372,8 @@ class YesNo(Design):
 
     def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
         """Return d′ and the criterion: above 0 the observer says yes less often than no."""
+        from study_app.psychophysics import detection  # noqa: PLC0415 - loads numpy
+
         return detection.yes_no(*_counts(answers, {0}, "yes"), *_counts(answers, {1}, "yes"))
 
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
