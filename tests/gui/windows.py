@@ -1,20 +1,26 @@
 """Every window but the participant's, opened with what a study would show in it."""
 
 import os
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PySide6.QtWidgets import QWidget
 
 from study_app.devices.descriptor import NONE, NOT_AVAILABLE, READY, Backend
 from study_app.gui.devices.view import DevicesPlace
 from study_app.gui.display.screens import ScreenShown
 from study_app.gui.help.view import HelpPlace
 from study_app.gui.home.main_window import MainWindow
+from study_app.gui.home.new_session_dialog import NewSessionDialog
+from study_app.gui.home.rehearsal_dialog import RehearsalDialog
+from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.lab.view import LabPlace
 from study_app.gui.preflight import PreflightWindow
+from study_app.gui.preflight.window import LEAST as LEAST_PREFLIGHT
 from study_app.gui.results.view import ResultsPlace
 from study_app.gui.settings import view as settings_view
 from study_app.gui.settings.display_test import DisplayTest
@@ -28,8 +34,10 @@ from study_app.protocol.load import load
 from study_app.session.preflight import Facts, Screen, checks
 from study_app.store.workstation import DEFAULTS, MachineSettings
 from study_app.viewmodels.devices.list_view import devices_shown
+from study_app.viewmodels.home import study_facts
 from study_app.viewmodels.preflight import PreflightView, preflight_view
 from study_app.viewmodels.results import Opened
+from tests.gui.home.home_window import open_home
 from tests.gui.lab.sample import still_view
 from tests.gui.results.sample import LEFT_OUT, view
 
@@ -151,3 +159,31 @@ def help_pages(qtbot: Any) -> HelpPlace:
 def display_test(qtbot: Any, **clock: Any) -> DisplayTest:
     made: DisplayTest = shown(qtbot, DisplayTest("Screen 1", 60.0, least_s=0.05, **clock), (1366, 768))
     return made
+
+
+PLACES = ((928, 640), (1294, 768), (1848, 1080))
+MAIN = ((1024, 640), (1366, 768), (1920, 1080))
+PREFLIGHT = (LEAST_PREFLIGHT.toTuple(), (1366, 768))
+
+
+def dialog(kind: type[Any], qtbot: Any, folder: Any) -> QWidget:
+    made = kind(study_facts("rek2024"), folder)
+    qtbot.addWidget(made)
+    made.open()
+    return made  # type: ignore[no-any-return]
+
+
+WINDOWS: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
+    "home": (lambda qtbot, folder: open_home(qtbot, folder).main, MAIN),
+    "new session": (lambda qtbot, folder: dialog(NewSessionDialog, qtbot, folder), (None,)),
+    "rehearsal": (lambda qtbot, folder: dialog(RehearsalDialog, qtbot, folder), (None,)),
+    "opening": (lambda qtbot, _: shown(qtbot, OpeningWindow("Preparing demo", "P001"), (500, 300)), (None,)),
+    "preflight": (lambda qtbot, _: preflight(qtbot, SCALED), PREFLIGHT),
+    "preflight of a haptic device": (lambda qtbot, _: preflight(qtbot, SCALED, GOES_ON, asks_masking=True), PREFLIGHT),
+    "results": (lambda qtbot, _: opened_results(qtbot).main, MAIN),
+    "lab": (lambda qtbot, _: lab(qtbot), PLACES),
+    "devices": (lambda qtbot, _: devices(qtbot), PLACES),
+    "settings": (lambda qtbot, _: set_machine(qtbot), PLACES),
+    "display test": (lambda qtbot, _: display_test(qtbot), MAIN),
+    "help": (lambda qtbot, _: help_pages(qtbot), PLACES),
+}

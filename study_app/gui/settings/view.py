@@ -143,7 +143,8 @@ class MachinePlace(Place):
         self.test.forgotten.connect(lambda: self.changed.emit({"display_offset": None}))
         self.test.left.connect(self._test_left)
         self.test.show_offset(self.settings.display_offset, there.name)
-        self.test.open_on(QGuiApplication.screens()[there.number - 1])
+        left = QGuiApplication.screens()  # the screen may have been unplugged meanwhile
+        self.test.open_on(left[min(there.number, len(left)) - 1])
 
     def _test_left(self) -> None:
         test, self.test = self.test, None

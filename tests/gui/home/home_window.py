@@ -5,6 +5,7 @@ from PySide6.QtCore import Qt
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.home.study_cards import StudyCard
 from study_app.gui.home.view import HomePlace
+from study_app.gui.widgets.main_view import Place
 from study_app.protocol.load import load, source_bytes
 from study_app.store.sessions.begin import SessionStart, begin
 
@@ -22,7 +23,8 @@ def hold(folder, participant, *, simulated=False):
 
 
 def open_home(qtbot, results, size=None):
-    window = MainWindow({"home": lambda: HomePlace(results)})
+    others = dict.fromkeys(("designer", "lab", "results", "devices", "machine", "help"), Place)
+    window = MainWindow({"home": lambda: HomePlace(results), **others})
     qtbot.addWidget(window)
     if size is not None:
         window.resize(size)
