@@ -4,6 +4,7 @@ import gc
 import itertools
 import logging
 import os
+import re
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -52,6 +53,16 @@ def pytest_sessionstart() -> None:
     """Collect garbage between tests alone: a thread that collected would destroy widgets whose timers then crash Qt."""
     if QT_IS_HERE:
         gc.disable()
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Do not import modules of slow tests that `-m` leaves out."""
+    if "not slow" not in config.option.markexpr or collection_path.suffix != ".py":
+        return None
+    slow = re.search(
+        r"^pytestmark = (\[[^\]]*)?pytest\.mark\.slow\b", collection_path.read_text(encoding="utf-8"), re.M
+    )
+    return slow is not None or None
 
 
 @pytest.hookimpl(tryfirst=True)
