@@ -4,6 +4,7 @@ import csv
 import hashlib
 import io
 import json
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -15,12 +16,15 @@ from study_app.store.blinded.sealing import opened, sealed
 from study_app.store.folders import StudyFolder
 from study_app.store.tables.columns import TABLES
 
-RECORDED: dict[str, dict[str, str]] = json.loads((Path(__file__).parent / "format_1.json").read_text())
+RECORDED: dict[str, dict[str, Any]] = json.loads((Path(__file__).parent / "format_1.json").read_text())
 UNEQUAL = ("at", "previous", "version", "sha256", "frames_sha256")
 """Fields of the journal that differ from run to run or with the program's version."""
 
 ADDED = ("text_sha256", "study_version", "limiter_saturated")
 """Fields that later versions write besides: of the consent that the participant read, and a sealed count."""
+
+MEASURED = re.compile("path_length|mean_speed|force_|withheld|delivered|limiter_|delay_error")
+"""Fields computed from motion and force: their last digits depend on the vector instructions of the processor."""
 
 WALL_CLOCK = {column.name for columns in TABLES.values() for column in columns if column.kind == "time"}
 
@@ -32,12 +36,23 @@ def sha256(content: object) -> str:
 def journal(path: Path, key: Key) -> list[dict[str, Any]]:
     """Return the lines without what differs from run to run; the recorder writes its own lines whenever it is done."""
     lines = opened([json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()], key)
-    fields = ({name: value for name, value in line.items() if name not in UNEQUAL + ADDED} for line in lines)
+    fields = (
+        {name: value for name, value in line.items() if name not in UNEQUAL + ADDED and not MEASURED.match(name)}
+        for line in lines
+    )
     kept = [sealed(lines[0], one["event"], one, key) for one in fields]
     told = [line for line in kept if line["event"] != "recorded"]
-    recorded = [{**line, "t_s": None} for line in kept if line["event"] == "recorded"]
-    recorded.sort(key=lambda line: (line["trial"], line["attempt"]))
-    return [{**line, "n": number} for number, line in enumerate((*told, *recorded), start=1)]
+    saved = [{**line, "t_s": None} for line in kept if line["event"] == "recorded"]
+    saved.sort(key=lambda line: (line["trial"], line["attempt"]))
+    return [{**line, "n": number} for number, line in enumerate((*told, *saved), start=1)]
+
+
+def measured(path: Path, key: Key) -> list[float]:
+    """Return what was measured in each trial."""
+    lines = opened([json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()], key)
+    return [
+        value for line in lines for name, value in sorted(line.items()) if MEASURED.match(name) and value is not None
+    ]
 
 
 def table(path: Path) -> list[list[str]]:
@@ -46,21 +61,22 @@ def table(path: Path) -> list[list[str]]:
     return [header, *(["" if hidden else cell for hidden, cell in zip(blank, row, strict=True)] for row in rows)]
 
 
-def hashes(folder: StudyFolder) -> Iterator[tuple[str, str]]:
+def recorded(folder: StudyFolder) -> Iterator[tuple[str, Any]]:
     yield "key", hashlib.sha256(folder.key.read_bytes()).hexdigest()
     for path in sorted(folder.path.rglob("*_data.csv")):
         yield path.relative_to(folder.path).as_posix(), sha256(table(path))
     for session in folder.sessions():
         place = session.path.relative_to(folder.path).as_posix()
         yield f"{place}/journal", sha256(journal(session.journal, read_key(folder.path)))
+        yield f"{place}/measured", pytest.approx(measured(session.journal, read_key(folder.path)), rel=0.01, abs=0.001)
         yield f"{place}/protocol", sha256(json.loads(session.receipt.read_text(encoding="utf-8"))["protocol"])
 
 
 @pytest.mark.parametrize("name", sorted(RECORDED))
 @pytest.mark.slow
 def test_rehearsal_writes_the_bytes_recorded_for_format_1(name: str, rehearsal_of: Callable[[str], Path]) -> None:
-    assert dict(hashes(StudyFolder(rehearsal_of(name)))) == RECORDED[name]
+    assert dict(recorded(StudyFolder(rehearsal_of(name)))) == RECORDED[name]
 
 
 def test_hashes_of_format_1_cover_two_participants_of_each_shipped_study() -> None:
-    assert {name: len(found) for name, found in RECORDED.items()} == {"rek2024": 10, "demo": 10, "physical_liquids": 10}
+    assert {name: len(found) for name, found in RECORDED.items()} == {"rek2024": 12, "demo": 12, "physical_liquids": 12}
