@@ -15,7 +15,7 @@ import pytest
 from study_app.devices import scripted
 from study_app.devices.simulated.hand_commands import HandOrders
 from study_app.errors import SessionError
-from study_app.haptics.model.layout import STATUS_OK
+from study_app.haptics.model.layout import LIMITER_GLITCH, STATUS_OK
 from study_app.haptics.model.slope_limits import slew_limit_n
 from study_app.protocol.load import load
 from study_app.session.simulated import rehearsal
@@ -49,7 +49,9 @@ MAY_DIFFER = {
     "loop_delay_ticks",
     "force_peak_n",
     "delivered_error",
+    # a tied hand sets out within a tick: whether that exceeds the acceleration of a hand depends on the encoder's count
     "limiter_glitch",
+    "limiter_fade",
     "limiter_slope",
     "limiter_energy",
     "limiter_norm",
@@ -236,7 +238,10 @@ def emulated_falcon(**options: Any) -> Any:
 
 
 def test_in_a_thick_liquid_the_force_is_that_of_the_path_all_along(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Averaged over 10 ms, which no hand tells apart, within 5 % or 0.05 N of what the exact path is felt as."""
+    """Averaged over 10 ms, which no hand tells apart, within 5 % or 0.05 N of what the exact path is felt as.
+
+    Windows with a rejected sample do not count: the path sets out faster than a hand, and the exact device rejects that.
+    """
     tie_hand(monkeypatch)
     scene = load(STUDY).scene_for("honey")
     exact = felt(scripted.ScriptedDevice(quantum_m=0.0, tremor_m=0.0, workspace_m=HALF_M), scene, 20.0)
@@ -248,8 +253,11 @@ def test_in_a_thick_liquid_the_force_is_that_of_the_path_all_along(monkeypatch: 
         for rows in (exact, coarse)
     )
     off_n, size_n = np.linalg.norm(other - one, axis=1), np.linalg.norm(one, axis=1)
-    assert size_n.max() > 4.0
-    assert (off_n <= np.maximum(0.05 * size_n, 0.05)).all()
+    rejected = (exact["limiters"] | coarse["limiters"]) & LIMITER_GLITCH != 0
+    assert rejected.sum() <= 10
+    counted = np.convolve(rejected, window, "valid") == 0
+    assert size_n[counted].max() > 4.0
+    assert (off_n <= np.maximum(0.05 * size_n, 0.05))[counted].all()
 
 
 @pytest.mark.parametrize("condition", ["water", "honey"])
