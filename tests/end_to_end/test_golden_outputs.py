@@ -19,6 +19,7 @@ from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.sites.unblind_sites import unblind_folder
 from study_app.store.tables.formulas import unguarded
 from tests.analysis.levels.level_studies import levels_file, matching_file
+from tests.golden_text import alike
 from tests.protocol.forms.mixed import mixed_file
 from tests.studies import made_up, once, quick_pdfs
 
@@ -36,7 +37,6 @@ CHANGING = re.compile(
     r"|\b\d+\.\d+\.\d+\b|\b(?<!\.)[0-9a-f]{12,}\b"
 )
 """Dates, versions and hashes."""
-NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
 @pytest.fixture(scope="module", params=PEOPLE)
@@ -85,16 +85,6 @@ def test_parquet_has_the_cells_of_the_csv_file(outputs: Path) -> None:
                     assert cell == "n/a"
                 else:
                     assert float({"true": "1", "false": "0"}.get(cell, cell)) == value
-
-
-def alike(expected: str, found: str) -> bool:
-    """Return whether lines are equal but for the last digits of numbers, which depend on libraries and processors."""
-    if expected == found:
-        return True
-    if NUMBER.sub("", expected) != NUMBER.sub("", found):
-        return False
-    numbers = [[float(number) for number in NUMBER.findall(line)] for line in (expected, found)]
-    return numbers[0] == pytest.approx(numbers[1], rel=1e-5, abs=1e-9)
 
 
 def lines(folder: Path, name: str) -> Iterator[str]:

@@ -50,7 +50,7 @@ def lab_view(
     """
     reading = None if live is None else live.reading()
     fault = "" if reading is None else reading.fault
-    if fault or trouble:
+    if fault or (trouble and live is None):  # an edit or a file that was refused stops no device
         state = "stopped"
     else:
         state = "opening" if opening is not None else "ready" if live is not None else "closed"

@@ -10,7 +10,6 @@ from PySide6.QtWidgets import QMainWindow
 
 from study_app.app.lab.controller import LabController
 from study_app.errors import ServoFault
-from study_app.lab.presets import Choice
 from tests.app.lab.worlds import OPENS_MS, SOON_MS, Prices, Stays, force_n, is_let_go
 from tests.compiled import needs_servo
 
@@ -89,18 +88,6 @@ def test_what_is_edited_is_presented_and_what_is_refused_is_said(felt: LabContro
     felt.place.redo_asked.emit()
     assert felt.bench.a.scene.liquids[0].density_kg_m3 == 1200.0
     assert felt.live is not None
-
-
-def test_switching_choosing_and_copying(felt: LabController, qtbot: Any) -> None:
-    felt.place.switched.emit()
-    assert felt.view().felt == "B"
-    felt.place.liquid_chosen.emit("B", Choice("rek2024", "syrup", "Syrup"))
-    assert felt.bench.b.name == "Syrup"
-    felt.place.copied.emit()
-    assert felt.bench.a == felt.bench.b
-    felt.place.liquid_chosen.emit("B", Choice("rek2024", "treacle", "Treacle"))
-    assert "there is no liquid" in felt.view().trouble
-    assert felt.live is not None  # nothing was changed
 
 
 def test_the_force_stops_at_once_and_fades_in_again(felt: LabController, qtbot: Any) -> None:

@@ -10,56 +10,16 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from shiboken6 import isValid
 
-from study_app.errors import StoreError
 from study_app.gui.operator.strip import Strip
 from study_app.gui.widgets.dialogs import Notice
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_NORM, SAMPLE, records
-from study_app.session.pages import EndPage, PausePage, TaskPage, TextPage, TroublePage
+from study_app.session.pages import EndPage, PausePage, TaskPage, TroublePage
 from study_app.session.transitions.events import Continue, ForceStopped, ResumeAsked
 from tests.app.world import World, begin_trial, tick
 
 pytestmark = pytest.mark.slow
 
 LEFT = Qt.MouseButton.LeftButton
-
-
-def test_the_operators_buttons_become_events(bridge, world):
-    assert isinstance(bridge.participant.page, TextPage)
-    assert bridge.operator.rail.heading.text() == "A first look"
-    assert world.events() == ["page_shown"]
-    begin_trial(bridge, world)
-    bridge.operator.note_written.emit("left-handed")
-    bridge.operator.mark_set.emit()
-    bridge.operator.pause_asked.emit()
-    bridge.operator.resume_asked.emit()
-    bridge.operator.repeat_asked.emit("phone rang")
-    notes = [done[1] for done in world.done if done[0] == "note"]
-    assert notes == [{"kind": "note", "text": "left-handed"}, {"kind": "mark", "text": ""}]
-    assert ("paused", {"by": "operator"}) in world.done
-    assert any(done[0] == "repeat" and done[1]["reason"] == "phone rang" for done in world.done)
-    assert world.events().count("trial_started") == 3
-
-
-def test_leaving_out_is_kept_and_noted_and_a_refusal_is_told(make, world):
-    left_out = []
-
-    def exclude(trial, reason):
-        if reason == "again":
-            raise StoreError("trial 1 is already excluded")
-        left_out.append((trial, reason))
-
-    bridge = make(exclude=exclude)
-    begin_trial(bridge, world)
-    for trial, reason in ((1, "phone rang"), (None, "no consent"), (1, "again")):
-        bridge.operator.exclude_asked.emit(trial, reason)
-    assert left_out == [(1, "phone rang"), (None, "no consent")]
-    notes = [done[1]["text"] for done in world.done if done[0] == "note"]
-    assert notes == [
-        "excluded from the analysis: trial 1: phone rang",
-        "excluded from the analysis: the session: no consent",
-    ]
-    assert bridge.trouble == ""
-    assert isinstance(bridge.participant.page, TaskPage)
 
 
 def test_force_and_task_begin_when_the_tank_is_painted_and_not_while_a_page_asks_to_wait(bridge, world, qtbot):
@@ -181,29 +141,6 @@ def test_closing_the_operators_window_stops_the_force_and_asks_and_closing_it_ag
         bridge.operator.close()
     assert ("session_ended" in world.events()) == (answer == "end")
     assert not world.force_is_on
-
-
-def test_ending_from_outside_is_zero_force_no_end_and_gone_once(bridge, world):
-    begin_trial(bridge, world)
-    gone = []
-    bridge.done.connect(lambda: gone.append(True))
-    bridge.leave_now()
-    bridge.leave_now()
-    assert gone == [True]
-    assert not world.force_is_on
-    assert "session_ended" not in world.events()
-
-
-def test_an_end_that_cannot_be_written_still_lets_the_windows_go(bridge, world, qtbot, caplog):
-    begin_trial(bridge, world)
-    world.full = True
-    bridge.operator.end_asked.emit("aborted", "")
-    assert not world.force_is_on
-    assert bridge.runner.stalled
-    with qtbot.waitSignal(bridge.done):
-        bridge.operator.close()
-    assert "no space left" in caplog.text
-    caplog.clear()
 
 
 class SlowRecorder:

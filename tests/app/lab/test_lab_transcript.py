@@ -1,0 +1,224 @@
+"""All that the lab does at each signal of its place, with a servo that only records what it is asked."""
+
+import random
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from study_app.app.lab import device_opening, preset_saving
+from study_app.app.lab.controller import LabController
+from study_app.app.lab.initial_settings import InitialSettings
+from study_app.app.session.termination import Patience
+from study_app.errors import DeviceNotFound, ServoFault
+from study_app.lab.ab_comparison import Workbench
+from study_app.lab.presets import Choice
+from study_app.protocol.load import source_bytes
+from study_app.workers.messages import Crashed
+from tests.app.lab.worlds import COSTS, ERRORS, SOON_MS
+from tests.golden_text import changed, compare, flat
+
+GOLDEN = Path(__file__).parent / "golden" / "lab.txt"
+LEFT_OUT = ("view.liquids.", "view.device.choices.", "view.workbench.", "view.paths.", "view.estimate.sources.")
+
+
+class Recorded:
+    """A device's servo and an appraiser: each call is kept in ``done``."""
+
+    def __init__(self, done: list[str]) -> None:
+        self.done = done
+        self.device = SimpleNamespace(workspace_m=(0.05, 0.03, 0.02))
+        self.servo = SimpleNamespace(fault=None)
+        self.path: str | None = None
+        self.due_in_s: float | None = None
+        self.force_on, self.works, self.told, self.orders = True, True, list[Any](), 0
+
+    def __getattr__(self, name: str) -> Any:
+        def called(*values: Any, **named: Any) -> None:
+            self.done.append(" ".join([name, *map(short, values), *(f"{key}={one}" for key, one in named.items())]))
+            if name in ("stop_force", "fade_in"):
+                self.force_on = name == "fade_in"
+            if name == "play":
+                self.path = values[0]
+
+        return called
+
+    def reading(self) -> Any:
+        fault = "" if self.servo.fault is None else str(self.servo.fault)
+        return SimpleNamespace(
+            position_m=(0.01, 0.02, 0.03), force_n=(1.0, 2.0, 3.0), wake_mps=(0.1, 0.2, 0.3), force_on=self.force_on,
+            fault=fault,
+        )  # fmt: skip
+
+    def trace(self) -> None: ...
+
+    poll = trace
+
+    def tail(self, _side: str) -> None: ...
+
+    def limiters(self) -> tuple[Any, ...]:
+        return ()
+
+    def order(self, question: Any) -> int:
+        self.orders += 1
+        self.done.append(f"appraise {short(question.scene)}")
+        return self.orders
+
+    def answers(self) -> list[Any]:
+        told, self.told = self.told, []
+        return told
+
+
+def short(value: Any) -> str:
+    """Return what tells a workbench, a setting or a scene from another."""
+    if hasattr(value, "in_hand"):
+        first = f", blind of {value.first}" if value.blind else ""
+        return f"{value.felt}: {value.a.name} {short(value.a.scene)}, {value.b.name} {short(value.b.scene)}{first}"
+    return (
+        f"{value.liquids[0].density_kg_m3:g} cd {value.body.drag_coefficient:g}"
+        if hasattr(value, "liquids")
+        else f"{value}"
+    )
+
+
+def emit(name: str, *values: Any) -> Any:
+    return lambda lab, *_: getattr(lab.place, name).emit(*values)
+
+
+def raising(error: Exception) -> Any:
+    def fail() -> None:
+        raise error
+
+    return fail
+
+
+def files(name: str, *names: str) -> Any:
+    def ask(lab: LabController, _live: Recorded, folder: Path) -> None:
+        path = folder.joinpath(*names)
+        getattr(lab.place, name).emit(*([path] if name == "preset_opened" else [path, lab.bench.in_hand]))
+        lab._saving.wait()
+
+    return ask
+
+
+def lets(**values: Any) -> Any:
+    return lambda _lab, live, _folder: vars(live).update(values)
+
+
+STEPS: dict[str, Any] = {
+    "not entered: a knob": emit("changed", "liquid.density_kg_m3", 1100.0, False),
+    "not entered: stop": emit("stop_asked"),
+    "left before it was entered": emit("left"),
+    "entered": emit("entered"),
+    "entered twice": emit("entered"),
+    "said": lambda lab, *_: lab._opening.said.emit("switch it on"),
+    "a knob is held": emit("changed", "liquid.density_kg_m3", 1300.0, True),
+    "a knob is let go of": emit("changed", "liquid.density_kg_m3", 1200.0, False),
+    "a drag coefficient": emit("changed", "body.drag_coefficient", 0.6, False),
+    "out of range": emit("changed", "liquid.density_kg_m3", -5.0, False),
+    "undo": emit("undo_asked"),
+    "redo": emit("redo_asked"),
+    "due": lets(due_in_s=5.0),
+    "switch": emit("switched"),
+    "none due": lets(due_in_s=None),
+    "choose": emit("liquid_chosen", "B", Choice("rek2024", "syrup", "Syrup")),
+    "choose none": emit("liquid_chosen", "B", Choice("rek2024", "treacle", "Treacle")),
+    "copy": emit("copied"),
+    "costs are asked": lambda lab, *_: lab._cost_due.timeout.emit(),
+    "old costs": lets(told=[(0, COSTS)]),
+    "costs": lambda lab, live, _: live.told.extend([(live.orders, COSTS), (live.orders, ERRORS)]),
+    "costs again": lambda lab, *_: lab._cost_due.timeout.emit(),
+    "appraiser died": lets(works=False, told=[(3, Crashed(-9))]),
+    "path": emit("path_chosen", "circle"),
+    "no path": emit("path_chosen", None),
+    "point": emit("hand_moved", 0.01, 0.02, -0.01),
+    "press": emit("hand_pressed", 3),
+    "stop": emit("stop_asked"),
+    "fade in": emit("fade_in_asked"),
+    "blind": emit("blind_asked", True),
+    "switch while blind": emit("switched"),
+    "save while blind": files("save_asked", "told.toml"),
+    "reveal": emit("blind_asked", False),
+    "save": files("save_asked", "syrup.toml"),
+    "use": files("use_asked", "study.toml"),
+    "use in none": files("use_asked", "syrup.toml"),
+    "save nowhere": files("save_asked", "nowhere", "mine.toml"),
+    "open": files("preset_opened", "syrup.toml"),
+    "open none": files("preset_opened", "broken.toml"),
+    "of a study": lambda lab, *_: lab.feel_of_study(lab.bench.b, lab.bench.a, "demo"),
+    "source": emit("estimate_source_chosen", "off", None),
+    "parameters": emit("estimate_parameters_chosen", "wake"),
+    "apply": emit("estimate_apply_asked"),
+    "follow": emit("estimate_follow_asked", True),
+    "fault": lambda _lab, live, _folder: setattr(live.servo, "fault", ServoFault("no samples for 50 ms")),
+    "fade in after a fault": emit("fade_in_asked"),
+    "known error": lambda lab, *_: lab.fail(ServoFault("the loop ended")),
+    "open again": emit("fade_in_asked"),
+    "bug": lambda lab, *_: lab.fail(RuntimeError("out of ideas")),
+    "the same bug": lambda lab, *_: lab.fail(RuntimeError("out of ideas")),
+    "bug while opening": lambda lab, *_: lab._opening.failed.emit(KeyError("x")),
+    "device": emit("device_chosen", "mouse"),
+    "no device": emit("device_chosen", "falcon"),
+    "cancelled": emit("cancel_asked"),
+    "back": emit("device_chosen", "scripted"),
+    "cannot be closed": lambda _lab, live, _folder: setattr(live, "close", raising(ServoFault("the servo is stuck"))),
+    "stuck bug": lambda lab, *_: lab.fail(ValueError("second")),
+    "opened anew": emit("fade_in_asked"),
+    "stuck": lambda _lab, live, _folder: setattr(live, "close", raising(ServoFault("the servo is stuck"))),
+    "left": emit("left"),
+    "a knob after it": emit("changed", "liquid.density_kg_m3", 1000.0, False),
+}
+OPENING = ("entered", "fade in after a fault", "open again", "device", "no device", "back", "opened anew")
+
+
+def test_every_signal(qtbot: Any, tmp_path: Path, monkeypatch: Any, caplog: Any, pytestconfig: Any) -> None:
+    from study_app.gui.lab.view import LabPlace
+
+    monkeypatch.setattr(device_opening, "STARTS_AFTER_MS", 0)
+    monkeypatch.setattr(preset_saving, "liquids_at_hand", lambda saved: (Choice(saved[-1], "new", "New"),))
+    (tmp_path / "study.toml").write_bytes(source_bytes("demo"))
+    (tmp_path / "broken.toml").write_text("format = 1")
+    done: list[str] = []
+    lives = [Recorded(done)]
+
+    def open_live(name: str, *, progress: Any, cancelled: Any) -> Recorded:
+        progress(f"open {name}")
+        done.append(f"open {name} {cancelled()}")
+        if name == "falcon":
+            raise DeviceNotFound("none is plugged in")
+        lives.append(Recorded(done))
+        return lives[-1]
+
+    place = LabPlace()
+    qtbot.addWidget(place)
+    place.message.connect(lambda *words: done.append(f"message {words}"))
+    honey, syrup = (Choice("rek2024", name, name.title()) for name in ("honey", "syrup"))
+    lab = LabController(
+        place, device="scripted", open_live=open_live, chance=random.Random(1), make_appraiser=lambda: lives[0],  # noqa: S311
+        first=InitialSettings(Workbench(honey.setting(), syrup.setting()), (honey, syrup)),
+    )  # fmt: skip
+    lab._cost_due.setInterval(10**8)
+    lab.frames.setInterval(10**8)
+    lines, before = [], list[str]()
+    for name, step in STEPS.items():
+        done.clear()
+        caplog.clear()
+        live = lives[0] if name in ("old costs", "costs", "appraiser died") else lives[-1]
+        step(lab, live, tmp_path)
+        if name in OPENING:
+            qtbot.waitUntil(lambda: lab._opening.busy_with is None, timeout=SOON_MS)
+        timers = [lab.frames.isActive(), lab._due.isActive(), lab._cost_due.isActive()]
+        lab._frame()
+        found = (line.replace(str(tmp_path), "FOLDER") for line in flat("view", lab.view()))
+        after = [
+            f"timers: {timers}",
+            f"bench: {short(lab.bench)}",
+            *(line for line in found if not line.startswith(LEFT_OUT)),
+        ]
+        lines += [f"== {name}", *done, *(f"log {one.levelname} {one.getMessage()}" for one in caplog.records)]
+        lines += changed(before, after)
+        before = after
+    lab.end(Patience(1.0))
+    caplog.clear()
+    written = (tmp_path / "study.toml").read_bytes().splitlines()[-3:]
+    lines += [*map(str, sorted(path.name for path in tmp_path.iterdir())), *map(str, written)]
+    compare(GOLDEN, (line.replace(str(tmp_path), "FOLDER") for line in lines), pytestconfig)

@@ -1,0 +1,185 @@
+"""All that a session's bridge does at each signal of its windows: asked of servo and journal, paged, shown."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from shiboken6 import isValid
+
+from study_app.errors import DeviceNotFound, ServoFault, StoreError, VideoError
+from study_app.gui.operator.strip import Strip
+from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_NORM, SAMPLE, records
+from study_app.session.transitions.events import Continue, ForceStopped
+from tests.app.world import World
+from tests.golden_text import changed, compare, flat
+
+GOLDEN = Path(__file__).parent / "golden"
+
+
+class Recorded(World):
+    """A world with a serial servo that may fault, whose calls of parts are kept too."""
+
+    def call(self, name: str, result: Any = None) -> Any:
+        def called(*values: Any) -> Any:
+            self.done.append((name, values))
+            return result
+
+        return called
+
+
+def push(bridge: Any, world: World) -> None:
+    """Half a second of a force of 3 N, some limited."""
+    count = 500
+    samples = records(SAMPLE, count)
+    world.now_s += count / 1000
+    samples.tick = np.arange(count)
+    samples.time_ns = round(world.now_s * 1e9) - np.arange(count)[::-1] * 1_000_000
+    samples.scene, samples.fresh = world.serial, 1
+    samples.position_m = np.linspace((-0.03, 0.0, 0.0), (0.04, 0.02, -0.01), count)
+    samples.device_force_n, samples.wake_mps = (1.5, 0.0, 2.5), (0.3, 0.0, 0.4)
+    samples.permitted_n, samples.withheld_n, samples.limiters = 4.0, 0.25, LIMITER_FADE
+    samples.limiters[:7] |= LIMITER_NORM
+    world.samples = samples
+    bridge.draw_frame()
+    world.samples = records(SAMPLE, 0)
+
+
+def emit(name: str, *values: Any, window: str = "operator") -> Any:
+    return lambda bridge, _world: getattr(getattr(bridge, window), name).emit(*values)
+
+
+def event(kind: Any, *values: Any) -> Any:
+    return lambda bridge, world: bridge.participant.event.emit(kind(world.now_s, *values))
+
+
+def shown_at(bridge: Any, world: World) -> None:
+    bridge.runner.frame_shown(world.now_ns(), world.now_ns())
+
+
+def let(**values: Any) -> Any:
+    return lambda _bridge, world: vars(world).update(values)
+
+
+def waited(bridge: Any, world: World) -> None:
+    world.now_s += 2.0
+    bridge.draw_frame()
+    bridge.show_tiles()
+    bridge.show_traces()
+    bridge.show_forces()
+
+
+def fail(error: Exception) -> Any:
+    return lambda bridge, _world: bridge.fail(error)
+
+
+def reconnected(bridge: Any, world: World) -> None:
+    bridge.reconnection.wait()
+    world.fault = None
+    bridge.reconnection.connected.emit({"name": "mouse", "force_limit_n": 6.0})
+
+
+STEPS: dict[str, Any] = {
+    "wait": waited,
+    "go on": event(Continue),
+    "shown": shown_at,
+    "push": push,
+    "pointer": emit("pointer", 0.01, 0.02, 0.03, window="participant"),
+    "buttons": emit("buttons", 2, window="participant"),
+    "painted": emit("painted", 5_000_000, window="participant"),
+    "left": emit("left", window="participant"),
+    "note": emit("note_written", "left-handed"),
+    "mark": emit("mark_set"),
+    "pause": emit("pause_asked"),
+    "resume": emit("resume_asked"),
+    "repeat": emit("repeat_asked", "phone rang"),
+    "stop": emit("stop_asked"),
+    "fade in": emit("fade_in_asked"),
+    "exclude a trial": emit("exclude_asked", 1, "asleep"),
+    "exclude all": emit("exclude_asked", None, "no consent"),
+    "exclude again": emit("exclude_asked", 9, "again"),
+    "participant stops": event(ForceStopped, "participant"),
+    "panel fails": lambda bridge, _: bridge.operator.panels.failed.emit("forces", ValueError("no plot")),
+    "thread ends": lambda bridge, _: bridge._thread_exceptions.ended.emit("the writer ended"),
+    "diagnose": emit("diagnose_asked"),
+    "disk is full": let(full=True),
+    "disk has space": let(full=False),
+    "servo stops": let(fault="the servo stopped: no samples"),
+    "device error": fail(DeviceNotFound("no device is plugged in")),
+    "servo error": fail(ServoFault("the loop ended")),
+    "second error": fail(ValueError("second")),
+    "bug": fail(RuntimeError("out of ideas")),
+    "no clip": fail(VideoError("the clip ended")),
+    "reconnect": emit("reconnect_asked"),
+    "line": lambda bridge, _: bridge.tell_of_device("press the button"),
+    "reconnected": reconnected,
+    "not reconnected": lambda bridge, _: bridge.reconnection.failed.emit(DeviceNotFound("still none")),
+    "late": let(overruns=3, rate_hz=900.0, worst_gap_s=0.004),
+    "withdraw": emit("end_asked", "withdrawn", "felt unwell"),
+    "abort": emit("end_asked", "aborted", "broken"),
+    "close": emit("close_asked"),
+    "accept": lambda bridge, _: bridge.operator.question.accept(),
+    "leave": lambda bridge, _: bridge.leave_now(),
+}
+BEGUN = "wait, go on, shown, push"
+PLAYS = {
+    "requests": f"{BEGUN}, pointer, buttons, painted, left, note, mark, pause, resume, shown, repeat, shown, stop, "
+    "push, fade in, shown, exclude a trial, exclude all, exclude again, participant stops, fade in, shown, "
+    "panel fails, thread ends, diagnose, late, wait, withdraw, note, thread ends, wait, diagnose, close",
+    "full disk": f"{BEGUN}, disk is full, mark, note, stop, wait, diagnose, disk has space, wait, fade in, shown, "
+    "wait, disk is full, abort, close, close",
+    "lost device": f"{BEGUN}, line, reconnect, servo stops, wait, device error, second error, reconnect, line, "
+    "not reconnected, reconnect, reconnected, wait, fade in, shown, push, abort, close",
+    "bug": f"{BEGUN}, bug, second error, wait, reconnect, resume, push, abort, wait, close",
+    "video": f"{BEGUN}, no clip, wait, reconnect, reconnected, wait, resume, shown, close, accept, close",
+    "servo": f"{BEGUN}, servo error, wait, leave, leave",
+}
+
+
+def paged(page: Any) -> list[str]:
+    """Return a page's kind and values but for the page that follows, which comes in its turn."""
+    lines = (line for line in flat("page", page) if ".coming." not in line)
+    return [f"page: {type(page).__name__}", *lines]
+
+
+@pytest.mark.parametrize(("name", "blinding"), [*((name, "single") for name in PLAYS), ("requests", "double")])
+def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, caplog: Any, monkeypatch: Any) -> None:
+    world = Recorded()
+
+    def exclude(trial: int | None, reason: str) -> None:
+        if reason == "again":
+            raise StoreError("trial 9 is already excluded")
+        world.call("exclude")(trial, reason)
+
+    recorder = SimpleNamespace(
+        start=world.call("recorder.start"), append=lambda *_: None, frame=world.call("recorder.frame"),
+        stop=world.call("recorder.stop"), settled=lambda: True, lost=(), dropped=2,
+    )  # fmt: skip
+    bridge = make(
+        blinding, servo=world, journal=world, clock=world.seconds, point_to=world.call("point_to"), recorder=recorder,
+        press=world.call("press"), exclude=exclude, reconnect=world.call("reconnect", {"name": "mouse"}),
+        strip=Strip() if name == "bug" else None, force_limit_n=6.0 if blinding == "single" else None,
+    )  # fmt: skip
+    for signal in ("done", "diagnose_asked"):
+        getattr(bridge, signal).connect(world.call(signal))
+    monkeypatch.setattr(bridge.operator, "come_forward", world.call("operator.come_forward"))
+    monkeypatch.setattr(bridge.participant, "come_forward", world.call("participant.come_forward"))
+    monkeypatch.setattr(bridge.operator, "show_message", world.call("show_message"))
+    lines, before = [], list[str]()
+    for step in PLAYS[name].split(", "):
+        world.now_s += 0.25
+        world.done.clear()
+        caplog.clear()
+        STEPS[step](bridge, world)
+        lines += [
+            f"== {step}",
+            *map(str, world.done),
+            *(f"log {one.levelname} {one.getMessage()}" for one in caplog.records),
+        ]
+        if isValid(bridge) and not bridge._gone:
+            after = [*paged(bridge.participant.page), *flat("view", bridge.view()), f"trouble: {bridge.trouble}"]
+            lines += changed(before, after)
+            before = after
+    caplog.clear()
+    compare(GOLDEN / f"bridge_{name}_{blinding}.txt", lines, pytestconfig)
