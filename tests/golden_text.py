@@ -77,7 +77,14 @@ def plain(value: Any) -> str:
 
 
 def changed(before: list[str], after: list[str]) -> list[str]:
-    """Return the lines that are new, and the places of those that are gone."""
-    places = {line.partition(":")[0] for line in after}
-    gone = (place for line in before if (place := line.partition(":")[0]) not in places)
-    return [*(line for line in after if line not in before), *(f"- {place}" for place in gone)]
+    """Return the lines that are new, and the places under which nothing is left."""
+    known, left = set(before), set[str]()
+    for line in after:
+        parts = line.partition(":")[0].split(".")
+        left.update(".".join(parts[: 1 + k]) for k in range(len(parts)))
+    gone = dict[str, None]()
+    for line in before:
+        parts = line.partition(":")[0].split(".")
+        heads = (".".join(parts[: 1 + k]) for k in range(len(parts)))
+        gone.update(dict.fromkeys([head for head in heads if head not in left][:1]))
+    return [*(line for line in after if line not in known), *(f"- {place}" for place in gone)]

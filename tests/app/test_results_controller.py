@@ -261,47 +261,6 @@ def test_the_newest_study_is_shown_first_and_another_can_be_chosen(qtbot: QtBot,
     assert opened.controller.view.chosen == results / "demo-rehearsal-1", "one comes back to where one was"
 
 
-@pytest.mark.parametrize(
-    ("ends", "title"), [("stops", "Stopped"), ("crashes", "A bug in the program stopped the evaluation")]
-)
-def test_what_was_stopped_or_crashed_can_be_begun_again(qtbot: QtBot, results: Path, ends: str, title: str) -> None:
-    ending = [True]
-
-    class Ends(Here):
-        def order(self, order: Order) -> int:
-            self.stops = ending[0] and ends == "stops"
-            if self.stops or not ending[0]:
-                return super().order(order)
-            self.number += 1
-            self.told, self.works = [(self.number, Crashed(1))], False
-            return self.number
-
-    opened = Opened(qtbot, results, Ends)
-    assert opened.place.figures.trouble.title.text() == title
-    ending[0] = False
-    opened.click(opened.place.figures.trouble.button)
-    opened.wait()
-    assert len(opened.titles) == 2
-
-
-def test_leaving_ends_what_reads(shown: Opened) -> None:
-    reader: Any = shown.controller.reader
-    shown.window.go("home")
-    assert reader.closed
-    assert shown.controller.reader is None
-    shown.window.go("results")
-    shown.wait()
-    assert len(shown.titles) == 2
-
-
-def test_other_results_can_be_looked_at(shown: Opened, tmp_path: Path) -> None:
-    rehearsed(tmp_path / "others", people=1)
-    shown.controller.show_results(tmp_path / "others")
-    shown.wait()
-    assert shown.controller.view.chosen == tmp_path / "others" / "demo"
-    assert shown.place.sessions.head.text() == "1 of 1 session in the figures"
-
-
 def nobody_left() -> bool:
     return not any(child.name == "analysis" for child in multiprocessing.active_children())
 

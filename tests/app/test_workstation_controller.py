@@ -1,7 +1,6 @@
 """What is set for this machine: kept at once, taken back, told in the receipt; and devices looked for in a thread."""
 
 import threading
-from datetime import date
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -32,40 +31,6 @@ FALCON = Backend("falcon", "libusb 1.0", NONE, "felt, up to 8 N", "plug its cabl
 @pytest.fixture
 def desk(qapp):
     return WorkstationController()
-
-
-def test_what_is_set_is_kept_at_once_and_taken_back(desk, qtbot):
-    assert not settings_file().exists()
-    with qtbot.assertNotEmitted(desk.changed):
-        desk.change({"sound": DEFAULTS.sound})
-    with qtbot.waitSignal(desk.changed):
-        desk.change({"viewing_distance_mm": 620.0})
-    assert load().viewing_distance_mm == 620.0
-    desk.change({"screen": "DP-1", "screen_number": 2})
-    assert desk.undo_called == "participant's screen"
-    desk.undo()
-    assert load() == MachineSettings(viewing_distance_mm=620.0)
-    assert desk.undo_called == "viewing distance"
-    desk.undo()
-    assert load() == DEFAULTS
-    desk.undo()
-    assert desk.undo_called == ""
-    for name, value, called in (
-        ("photodiode", False, "photodiode square"),
-        ("lsl_markers", True, "LSL markers"),
-        ("lsl_samples", "always", "LSL samples"),
-        ("triggers", "serial:COM3", "trigger port"),
-        ("camera", "tcp://127.0.0.1:5000", "camera"),
-    ):
-        desk.change({name: value})
-        desk.remember_operator("AK")
-        assert (desk.undo_called, getattr(load(), name)) == (called, value)
-        desk.undo()
-        assert load() == MachineSettings(operator="AK"), "initials are remembered whatever is taken back"
-    desk.measured(23.5, 1.2, "photodiode", "DP-1")
-    assert load().display_offset == DisplayOffset(
-        mean_ms=23.5, spread_ms=1.2, measured=date.today().isoformat(), screen="DP-1"
-    )
 
 
 def test_settings_that_cannot_be_kept_are_told_and_count_all_the_same(desk, qtbot):
@@ -137,17 +102,6 @@ def test_devices_are_looked_for_beside_the_windows_one_look_at_a_time(desk, qtbo
     assert (load().device, devices.preferred.word) == ("falcon", "Not connected")
     place.option_chosen.emit("firmware", "/there/firmware.bin")
     assert load().firmware == "/there/firmware.bin"
-
-
-def test_a_look_that_fails_is_told(desk, qtbot):
-    def look():
-        raise OSError("no bus")
-
-    devices = DevicesController(desk, look)
-    with qtbot.waitSignal(devices.troubled) as told:
-        devices.look()
-    assert "no bus" in told.args[1]
-    devices.end()
 
 
 @pytest.fixture

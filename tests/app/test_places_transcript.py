@@ -1,0 +1,287 @@
+"""What the controllers of the main window's places show and do at each signal and answer."""
+
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QEvent, QObject, Signal
+from PySide6.QtWidgets import QApplication, QDialog, QLabel
+
+from study_app.analysis import worker_messages as of
+from study_app.app import devices_controller, main_controller
+from study_app.app.devices_controller import DevicesController
+from study_app.app.main_controller import MainController
+from study_app.app.results_controller import ResultsController
+from study_app.app.session.live_session import BUG
+from study_app.app.workstation_controller import WorkstationController
+from study_app.devices.descriptor import NONE, READY, Backend
+from study_app.errors import DeviceNotFound
+from study_app.gui.theme.theme import DARK
+from study_app.session.request import NewSession
+from study_app.store.exclusions import Exclusion
+from study_app.store.workstation import load
+from study_app.workers.messages import Crashed, Refused
+from tests.golden_text import changed, compare, flat
+
+GOLDEN = Path(__file__).parent / "golden"
+STUDY, OTHER = Path("results", "one"), Path("results", "two")
+AT = "2026-11-20T10:00:00+00:00"
+ROW = {
+    "participant": "P001", "session": 1, "study": "one", "status": "complete", "validity": "valid", "responses": 8,
+    "simulated": False, "pilot": False, "session_started_at": AT, "resumed": False, "lost": 1, "reconnected": 2,
+}  # fmt: skip
+
+
+class Worker:
+    """Keeps its orders and tells what it is given."""
+
+    def __init__(self, done: list[str]) -> None:
+        self.done, self.told, self.number, self.works = done, list[Any](), 0, True
+        done.append("worker starts")
+
+    def order(self, order: Any) -> int:
+        self.number += 1
+        self.done.append(f"{self.number} {order}")
+        return self.number
+
+    def answers(self) -> list[Any]:
+        told, self.told = self.told, []
+        return told
+
+    def stop(self) -> None:
+        self.done.append("worker is stopped")
+
+    def close(self) -> None:
+        self.done.append("worker is closed")
+
+
+def figure(name: str, title: str = "Agreement") -> Any:
+    return of.FigureDrawn(name, title, "n = 1", b"")
+
+
+FOUND = of.StudiesFound((of.StudyAt(STUDY, True, False, 5.0), of.StudyAt(OTHER, False, True, 3.0)))
+WHOLE = of.StudyFound("one", "One", 1, 2, False, {("P001", 1): ((1, "L1"),)}, ("a file",), {"L1": "#000000"})
+OUT = Exclusion("P001", 1, 2, "AK", "asleep", "2026-11-20T11:00:00+00:00")
+SESSIONS = of.SessionsFound(STUDY, (ROW, ROW | {"participant_id": "P002", "status": "unfinished"}), (OUT,), None)
+RESULTS: list[tuple[str, Any]] = [
+    ("entered", ()), ("answer", of.Progress("looking", 0.5)), ("answer", FOUND), ("late", of.Done()),
+    ("answer", SESSIONS), ("answer", figure("a")), ("answer", WHOLE), ("late", figure("z")),
+    ("slow", of.Progress("drawing", 0.25)), ("answer", figure("b")), ("slow", of.Progress("testing", 0.75)),
+    ("answer", figure("a", "Again")), ("answer", of.Done()), ("study_asked", (STUDY,)), ("study_asked", (OTHER,)),
+    ("answer", replace(SESSIONS, folder=OTHER, exclusions=(), reveal={"by": "AK", "reason": "closed",
+     "at": "2026-11-21T10:00:00+00:00"})), ("answer", replace(WHOLE, blocks=0, doubts=())), ("answer", of.Done()),
+    ("leave_out_asked", (("P001", 1, None, "AK", "asleep"),)), ("answer", Refused("it is excluded", stopped=False)),
+    ("take_back_asked", (("P001", 1, 2, "AK", "awake"),)), ("answer", of.Done()), ("unblind_asked", ("AK", "closed")),
+    ("answer", of.Done(warnings=("a table", "another"))), ("remedy_asked", ("stop",)),
+    ("answer", Refused("stopped", stopped=True)), ("remedy_asked", ("read",)), ("answer", WHOLE),
+    ("answer", figure("a")), ("answer", figure("b")), ("answer", Refused("stopped", stopped=True)),
+    ("remedy_asked", ("again",)), ("answer", Refused("no folder", stopped=False)), ("remedy_asked", ("again",)),
+    ("answer", FOUND), ("answer", Refused("cut", stopped=False)), ("remedy_asked", ("again",)), ("answer", FOUND),
+    ("answer", replace(SESSIONS, rows=())), ("answer", Refused("none", stopped=False)), ("answer", Crashed(-9)),
+    ("remedy_asked", ("again",)), ("answer", Crashed(1)), ("dead", None), ("remedy_asked", ("again",)),
+    ("answer", FOUND), ("tables_asked", (Path("to"), ("wide",))), ("written", of.Progress("writing", 0.5)),
+    ("stop_asked", ()), ("written", of.Done((Path("to", "a.csv"),))), ("report_asked", (Path("to"), ())),
+    ("written", Crashed(2)), ("report_asked", (Path("to"), ())), ("written", Refused("full", stopped=False)),
+    ("open_asked", (Path("to"),)), ("none", of.StudiesFound(())), ("choose", OTHER), ("left", ()), ("entered", ()),
+    ("answer", FOUND), ("others", Path("elsewhere")), ("left", ()),
+]  # fmt: skip
+
+
+def test_results(qtbot: Any, pytestconfig: pytest.Config) -> None:
+    done: list[str] = []
+    workers: list[Worker] = []
+
+    def start() -> Any:
+        workers.append(Worker(done))
+        return workers[-1]
+
+    controller = ResultsController(Path("results"), opener=lambda file: done.append(f"open {file}"), start_worker=start)
+    controller._listening.setInterval(10**8)
+    qtbot.addWidget(controller.place)
+    controller.place.message.connect(lambda *words: done.append(f"message {words}"))
+    lines, before = [], list[str]()
+    for name, given in RESULTS:
+        done.clear()
+        reader: Any = controller.reader
+        match name:
+            case "answer" | "slow" | "late" | "none":
+                if name == "none":
+                    controller.look()
+                reader.told = [(reader.number - (name == "late"), given)]
+                controller._since_s -= 10.0 * (name == "slow")
+                controller._listen()
+            case "written":
+                workers[-1].told = [(1, given)]
+                controller._listen()
+            case "dead":
+                reader.works = False
+            case "choose":
+                controller.choose(given)
+            case "others":
+                controller.show_results(given)
+            case _:
+                getattr(controller.place, name).emit(*given)
+        after = [f"busy: {controller.busy} {controller._listening.isActive()}", *flat("view", controller.view)]
+        lines += [f"== {name} {given}", *done, *changed(before, after)]
+        before = after
+    compare(GOLDEN / "results.txt", lines, pytestconfig)
+
+
+CHANGES: list[tuple[str, Any]] = [
+    ("change", {"screen": "HDMI-2"}), ("change", {"screen": "HDMI-2"}), ("change", {"viewing_distance_mm": 600.0}),
+    ("change", {"screen_width_mm": 500.0}), ("operator", "AK"), ("operator", ""), ("operator", "AK"),
+    ("protocol", Path("/studies/a.toml")), ("protocol", Path("/studies/a.toml")), ("protocol", Path("/studies/b.toml")),
+    ("change", {"device": "falcon"}), ("change", {"firmware": "/there/firmware.bin"}), ("change", {"theme": "dark"}),
+    ("change", {"sound": True}), ("change", {"photodiode": False}), ("measured", (23.5, 1.2, "photodiode", "DP-1")),
+    ("change", {"triggers": "serial:COM3"}), ("change", {"camera": "tcp://127.0.0.1:5000"}), ("change", {"lsl_markers": True}),
+    ("change", {"lsl_samples": "always"}), ("change", {"workspace": "/elsewhere"}), *[("undo", None)] * 15,
+]  # fmt: skip
+
+
+def test_settings(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: pytest.Config) -> None:
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path / "workspace"))
+    machine = WorkstationController()
+    qtbot.addWidget(machine.make_place())
+    heard: list[str] = []
+    machine.changed.connect(lambda settings: heard.append(f"changed, kept: {settings == load()}"))
+    machine.troubled.connect(lambda *words: heard.append(f"troubled {words[0]}"))
+    lines, before = [], list(flat("settings", machine.settings))
+    actions: dict[str, Any] = {"measured": lambda values: machine.measured(*values)}
+    actions |= {"operator": machine.remember_operator, "protocol": machine.remember_protocol, "change": machine.change}
+    for name, value in CHANGES:
+        heard.clear()
+        machine.undo() if name == "undo" else actions[name](value)
+        settings = (line.replace(date.today().isoformat(), "TODAY") for line in flat("settings", machine.settings))
+        after = [*settings, f"undo: {machine.undo_called}"]
+        lines += [f"== {name} {value}", *heard, *changed(before, after)]
+        before = after
+    compare(GOLDEN / "settings.txt", lines, pytestconfig)
+
+
+MOUSE, FALCON = Backend("mouse", "the program", READY, "moves the ball"), Backend("falcon", "libusb", NONE, "no")
+
+
+def test_devices(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: pytest.Config) -> None:
+    machine = WorkstationController()
+    heard: list[str] = []
+    found: list[Any] = [[MOUSE, FALCON], DeviceNotFound("no bus"), [MOUSE]]
+
+    def look() -> Any:
+        one = found.pop(0)
+        if isinstance(one, Exception):
+            raise one
+        return one
+
+    class Dialog:
+        def __init__(self, _parent: Any, _theme: Any, name: str, *, options: Any, note: str) -> None:
+            heard.append(f"diagnosis of {name} {dict(options)} {note}")
+
+        def __getattr__(self, name: str) -> Any:
+            return self if name in ("finished", "over", "deleteLater") else lambda *_: heard.append(f"dialog {name}")
+
+        def connect(self, _slot: Any) -> None: ...
+
+    monkeypatch.setattr(devices_controller, "DiagnosisDialog", Dialog)
+    devices = DevicesController(machine, look)
+    devices.looked.connect(lambda shown: heard.append(f"looked {len(shown)}"))
+    devices.troubled.connect(lambda *words: heard.append(f"troubled {words}"))
+    lines = [*flat("preferred", devices.preferred)]
+    place = devices.make_place()
+    qtbot.addWidget(place)
+    steps: list[tuple[str, Any]] = [
+        ("look_asked", ()), ("chosen", ("falcon",)), ("look_asked", ()), ("option_chosen", ("firmware", "/f.bin")),
+        ("chosen", ("falcon:FT1",)), ("diagnose_asked", ("falcon",)), ("diagnose_asked", ("mouse",)), ("left", ()),
+        ("look_asked", ()), ("look_asked", ()),
+    ]  # fmt: skip
+    for number, (name, given) in enumerate(steps):
+        heard.clear()
+        if number == len(steps) - 1:
+            devices.end()
+        getattr(place, name).emit(*given)
+        if devices.looking is not None:
+            heard.append(f"looking {place.refresh.isEnabled()}")
+            devices.looking.join()
+            QApplication.sendPostedEvents(devices)
+        lines += [f"== {name} {given}", *heard, f"refresh: {place.refresh.isEnabled()}"]
+        lines += [*flat("preferred", devices.preferred), *flat("shown", [one.word for one in devices.shown])]
+    compare(GOLDEN / "devices.txt", lines, pytestconfig)
+
+
+class Live(QObject):
+    """A session that records what it is asked and ends when told to."""
+
+    over = Signal()
+    done: list[str] = []  # noqa: RUF012 - shared on purpose
+    error: Exception | None = None
+    began, opening, code = False, True, 0
+
+    def __init__(self, chosen: NewSession, theme: Any, *, asks: bool) -> None:
+        super().__init__()
+        self.theme = theme
+        self.done.append(f"session of {chosen.participant} {theme.name} {asks}")
+
+    def open(self) -> None:
+        self.done.append("opens")
+
+    def end_by_signal(self, number: int) -> None:
+        self.done.append(f"ended by {number}")
+
+    def wait(self, _patience_s: float) -> None:
+        self.done.append("waited for")
+
+
+def ends(**values: Any) -> Any:
+    def end(visit: MainController) -> None:
+        live: Any = visit.live
+        vars(live).update(values)
+        live.over.emit()
+
+    return end
+
+
+def home(name: str, *values: Any) -> Any:
+    return lambda visit: getattr(visit.window.place("home"), name).emit(*values)
+
+
+def go(name: str) -> Any:
+    return lambda visit: visit.window.go(name)
+
+
+CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "mouse", True, None, Path("nowhere"))
+STAY: dict[str, Any] = {
+    "home": go("home"), "begin": home("session_asked", CHOSEN), "begin twice": home("session_asked", CHOSEN),
+    "bug meanwhile": lambda visit: visit.show_bug(ValueError("x")), "called off": ends(),
+    "begin again": home("session_asked", CHOSEN), "not found": ends(error=DeviceNotFound("no Falcon"), opening=False),
+    "begin a third": home("session_asked", CHOSEN), "lost": ends(error=DeviceNotFound("gone"), began=True, theme=DARK),
+    "begin a fourth": home("session_asked", CHOSEN), "bug of it": ends(code=BUG, theme=DARK),
+    "bug": lambda visit: visit.show_bug(ValueError("x")), "same bug": lambda visit: visit.show_bug(ValueError("x")),
+    "protocol": home("protocol_opened", Path("/studies/mine.toml")), "results": home("results_asked", STUDY),
+    "machine": go("machine"), "help": lambda visit: visit.show_help(), "help again": lambda visit: visit.show_help(),
+    "devices": go("devices"), "workspace": lambda visit: visit.machine.change({"workspace": "/elsewhere"}),
+    "device": lambda visit: visit.machine.change({"device": "scripted"}), "saved": lambda visit: visit._show_saved(),
+    "trouble": lambda visit: visit.machine.troubled.emit("a", "b"), "begin last": home("session_asked", CHOSEN),
+    "signal": lambda visit: visit.end_by_signal(15), "over": ends(), "end": lambda visit: visit.end(),
+}  # fmt: skip
+
+
+def test_the_stay(visit: MainController, monkeypatch: Any, pytestconfig: pytest.Config) -> None:
+    monkeypatch.setattr(main_controller, "LiveSession", Live)
+    monkeypatch.setattr(ResultsController, "look", lambda self: Live.done.append(f"look at {self.view.chosen}"))
+    monkeypatch.setattr(DevicesController, "look", lambda _self: Live.done.append("look for devices"))
+    lines: list[str] = []
+    visit.window.closed.connect(lambda: Live.done.append("closed"))
+    for name, step in STAY.items():
+        Live.done.clear()
+        step(visit)
+        notices = [one for one in visit.window.findChildren(QDialog) if one.isVisible()]
+        told = [f"{one.windowTitle()}: {one.findChildren(QLabel)[1].text()}" for one in notices]
+        for one in notices:
+            one.reject()
+        QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+        page = visit.help.reader.page if visit.help is not None else ""
+        state = f"{visit.window.here} {visit.window.isVisible()} {visit.window.theme.name} {visit.code} {page}"
+        lines += [f"== {name}", *Live.done, *told, f"{state} {visit.live is not None} {len(visit._called_off)}"]
+        lines += [f"operator {visit.machine.settings.operator} {visit.results.name}"]
+    compare(GOLDEN / "stay.txt", lines, pytestconfig)
