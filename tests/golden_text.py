@@ -46,8 +46,8 @@ def flat(place: str, value: Any) -> Iterator[str]:
             below = {name: getattr(value, name) for name in type(value).model_fields}
         case Mapping():
             below = value
-        case np.ndarray() if value.dtype.names:
-            below = {name: value[name] for name in value.dtype.names}
+        case np.ndarray() | np.void() if value.dtype.names and value.shape in ((), (1,)):
+            below = {name: value.reshape(())[name][()] for name in value.dtype.names}
         case np.ndarray() if value.size > 12:
             kept = np.nan_to_num(value.astype(float))
             span = f"{kept.min():.6g} {kept.max():.6g} {kept.sum():.6g}"
@@ -73,6 +73,8 @@ def plain(value: Any) -> str:
     """Return a value on one line; floats with six digits, no addresses."""
     if isinstance(value, float | np.floating):
         return f"{value:.6g}"
+    if isinstance(value, np.generic):
+        value = value.item()
     return re.sub(r" at 0x\w+", "", str(value) if isinstance(value, str) else repr(value)).replace("\n", " / ")
 
 

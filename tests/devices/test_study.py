@@ -240,7 +240,7 @@ def emulated_falcon(**options: Any) -> Any:
 def test_in_a_thick_liquid_the_force_is_that_of_the_path_all_along(monkeypatch: pytest.MonkeyPatch) -> None:
     """Averaged over 10 ms, which no hand tells apart, within 5 % or 0.05 N of what the exact path is felt as.
 
-    Windows with a rejected sample do not count: the path sets out faster than a hand, and the exact device rejects that.
+    Windows with a rejected sample do not count: the path sets out faster than a hand, so the exact device rejects it.
     """
     tie_hand(monkeypatch)
     scene = load(STUDY).scene_for("honey")

@@ -182,4 +182,4 @@ def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, ca
             lines += changed(before, after)
             before = after
     caplog.clear()
-    compare(GOLDEN / f"bridge_{name}_{blinding}.txt", lines, pytestconfig)
+    compare(GOLDEN / f"bridge_{name.replace(' ', '_')}_{blinding}.txt", lines, pytestconfig)

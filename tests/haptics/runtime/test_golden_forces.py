@@ -1,0 +1,79 @@
+"""All that the servo's tick computes in each kind of scene, with each estimator and device, along a motion with faults.
+
+The motion is a stroke in three dimensions with ticks without sample, repeated and damaged ones, jumps and late ticks.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.layout import SAMPLE
+from study_app.haptics.model.scene import Knee
+from study_app.lab.changes import changed
+from study_app.protocol.load import load_scenes
+from tests.golden_text import compare, flat
+from tests.haptics.scenes import EVERYTHING, THESIS, TICK_NS, UNBENT, Hand, stroke
+from tests.haptics.single_effects import EMPTY, ESTIMATOR_NAMES, NAMES, in_lab
+
+GOLDEN = Path(__file__).parent / "golden"
+TICKS = 150
+SEEN = (3, 30, 49, 62, 75, 88, 101, 120, 149)
+WATER = THESIS["water"]
+DEVICES = {
+    "light": Dynamics(mass_kg=0.05, delay_s=2e-3, count_m=20e-6),
+    "heavy": Dynamics(mass_kg=1.0, delay_s=5e-3, count_m=100e-6),
+}
+CASES: dict[str, tuple[Any, dict[str, Any]]] = {
+    **{f"effect {name}": (in_lab(name), {}) for name in NAMES},
+    **{f"velocity {name}": (changed(EMPTY, "velocity.kind", name), {}) for name in ESTIMATOR_NAMES},
+    **{f"several {name}": (scene, {}) for name, scene in EVERYTHING.items()},
+    **{f"slime {name}": (scene, {}) for name, scene in load_scenes("slime").items()},
+    **{f"device {name}": (EVERYTHING["tail"], {"dynamics": dynamics}) for name, dynamics in DEVICES.items()},
+    "thin": (WATER, {"faded_in": False}),
+    "no knee": (WATER.model_copy(update={"knee": UNBENT}), {}),
+    "square knee": (WATER.model_copy(update={"knee": Knee(law="square", threshold_mps=0.5)}), {}),
+    "low limit": (EVERYTHING["tail"].model_copy(update={"force_limit_n": 0.5}), {}),
+    "slow fade": (THESIS["honey"].model_copy(update={"fade_s": 0.2}), {"faded_in": False}),
+}
+VECTORS = [name for name in SAMPLE.names or () if SAMPLE[name].shape == (3,) and name != "position_m"]
+SCALARS = ("permitted_n", "withheld_n", "delay_ticks", "limiters", "status")
+
+
+def follow(hand: Hand) -> Any:
+    """Return the samples along the stroke, with what goes wrong on the way."""
+    places, samples = 1.3 * stroke(4 * TICKS)[3 * TICKS :], []
+    for number, place_m in enumerate(places[:TICKS]):
+        given: Any = place_m
+        late_ns = 0
+        if number in range(44, 53) or number in (60, 61):
+            given = None  # no new sample: the force fades, then none for two ticks
+        elif number == 72:
+            given = place_m + np.array([0.0, 0.05, 0.0])
+        elif number == 74:
+            given = np.array([0.0, np.nan, 0.0])
+        elif number in range(84, 92):
+            given = places[84]  # a rest
+        elif number in (97, 98):
+            late_ns = (2 + 9 * (number == 98)) * TICK_NS
+        elif number > 130:
+            given = place_m + np.array([0.03, 0.0, 0.0])  # the device's zero is another one
+        samples.append(hand.tick(given, after_ns=TICK_NS + late_ns).copy())
+    return np.array(samples)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_forces(name: str, pytestconfig: pytest.Config) -> None:
+    scene, given = CASES[name]
+    hand = Hand(scene, **given)
+    lines = [*flat("parameters", hand.model.parameters[0])]
+    for number in range(hand.model.parameters[0].liquids):
+        lines += flat(f"liquid {number}", hand.model.liquids[number])
+    samples = follow(hand)
+    for column in (*VECTORS, *SCALARS):
+        values = samples[column].reshape(TICKS, -1).astype(float)
+        shown = "  ".join(" ".join(f"{one:.6g}" for one in values[tick]) for tick in SEEN)
+        lines.append(f"{column}: {shown}  sums {' '.join(f'{one:.6g}' for one in np.abs(values).sum(axis=0))}")
+    compare(GOLDEN / f"{name.replace(' ', '_')}.txt", lines, pytestconfig, rel=2e-5, abs_=1e-7)
