@@ -64,6 +64,7 @@ def studies() -> None:
 @RESULTS
 def sessions(named: str | None, results: Path | None) -> None:
     """List the sessions of a study, or of every study in the workspace, with the names that commands accept."""
+    from study_app.errors import StoreError
     from study_app.store.sites.merged import all_exclusions, session_in
     from study_app.store.sites.merged_rows import participants_of
     from study_app.workspace import workspace as workspace_here
@@ -71,6 +72,8 @@ def sessions(named: str | None, results: Path | None) -> None:
     at = workspace_here().results
     folders = list(_studies(at)) if named is None and results is None else [study_at(named, results)]
     for folder in folders:
+        if not folder.is_dir():
+            raise StoreError(f"{folder} is not a folder: name one that liquid-study studies lists, or its path")
         left_out = {row.what for row in all_exclusions(folder)}
         inside = folder.parent.resolve() == at.resolve()
         for row in participants_of(folder):

@@ -136,7 +136,8 @@ CHANGES: list[tuple[str, Any]] = [
     ("change", {"device": "falcon"}), ("change", {"firmware": "/there/firmware.bin"}), ("change", {"theme": "dark"}),
     ("change", {"sound": True}), ("change", {"photodiode": False}), ("measured", (23.5, 1.2, "photodiode", "DP-1")),
     ("change", {"triggers": "serial:COM3"}), ("change", {"camera": "tcp://127.0.0.1:5000"}),
-    ("change", {"lsl_markers": True}), ("change", {"lsl_samples": "always"}), ("change", {"workspace": "/elsewhere"}), *[("undo", None)] * 15,
+    ("change", {"lsl_markers": True}), ("change", {"lsl_samples": "always"}),
+    ("change", {"workspace": "/elsewhere"}), *[("undo", None)] * 15,
 ]  # fmt: skip
 
 

@@ -15,7 +15,6 @@ from study_app.cli import commands, main
 from study_app.cli.options import GROUPS
 from study_app.evaluation import replay
 from study_app.protocol.load import load, source_bytes
-from study_app.store.exclusions import exclusions
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.workstation import load as load_settings
 
@@ -60,20 +59,6 @@ def test_check_notes_how_many_texts_are_still_to_translate(tmp_path: Path, liqui
     noted = liquid_study("check", "own.toml")
     assert noted.returncode == 0
     assert noted.stdout.endswith("\nNote: study.languages: 1 text to translate to Dutch, as in English so far.\n")
-
-
-def test_check_takes_a_file_of_liquids_without_a_study(tmp_path: Path, liquid_study: Run) -> None:
-    """One that has a part of a study needs all of it."""
-    liquids = "format = 1\n[liquids.tar]\ndensity_kg_m3 = 1153\n"
-    (tmp_path / "liquids.toml").write_text(liquids)
-    (tmp_path / "half.toml").write_text(liquids + '[study]\nname = "half"\n')
-    finished = liquid_study("check", "liquids.toml")
-    assert finished.returncode == 0, finished.stderr
-    assert "Force limit  8 N" in finished.stdout
-    assert "tar: effects named" in finished.stdout
-    half = liquid_study("check", "half.toml")
-    assert (half.returncode, half.stdout) == (2, "")
-    assert "sequence" in half.stderr
 
 
 def test_a_letter_that_the_console_lacks_stops_no_command(tmp_path: Path) -> None:
@@ -171,14 +156,6 @@ def test_help_lists_every_command_once_under_its_heading_with_its_whole_sentence
         assert "..." not in part, "a command's first sentence is cut off"
 
 
-def test_a_study_goes_by_path_name_and_option(study: Path) -> None:
-    by_name = said("verify", "demo", code=0)
-    assert said("verify", str(study)) == said("verify", "--results", str(study)) == by_name
-    assert "2 sessions" in by_name
-    assert "RESULTS, or --results DIR" in said("verify", code=2)
-    assert "RESULTS, or --results DIR" in said("verify", "demo", "--results", str(study), code=2)
-
-
 def test_a_session_goes_by_the_name_that_sessions_lists(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     listed = said("sessions")
     assert [line.split()[0] for line in listed.splitlines()] == ["demo/P007/1", "demo/P008/1"]
@@ -201,16 +178,6 @@ def test_studies_lists_protocols_and_results(study: Path) -> None:
     assert "  mine  A first look\n" in shown
     assert "  bad  cannot be used: " in shown
     assert "  demo  2 sessions\n" in shown
-
-
-def test_an_exclusion_is_made_listed_and_taken_back(study: Path) -> None:
-    said("exclude", "demo", "--participant", "P007", "--by", "AK", "--reason", "asleep")
-    assert "demo/P007/1" in said("sessions").splitlines()[0]
-    assert said("sessions").splitlines()[0].endswith("excluded")
-    shown = said("include", "demo", "--participant", "P007", "--by", "CD", "--reason", "awake")
-    assert shown == "counts again: participant P007, session 1\n"
-    assert exclusions(study) == ()
-    assert "excluded" not in said("sessions")
 
 
 def test_the_workspace_is_shown_and_changed(study: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
