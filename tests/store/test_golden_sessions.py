@@ -1,0 +1,113 @@
+"""Every file that a session of each shipped study leaves, and what changes in them as the study is handled."""
+
+import base64
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.protocol.load import load, source_bytes
+from study_app.session.simulated.answers_only import rehearse_answers
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.exclusions import exclude, include
+from study_app.store.progress import Progress
+from study_app.store.sessions.begin import SessionStart, begin
+from study_app.store.verification.verify_study import verify
+from tests.golden_text import changed, compare, flat
+from tests.studies import made_up, once
+
+GOLDEN = Path(__file__).parent / "golden"
+QUICK = ("demo", "physical2", "rek2024", "thickness")
+STUDIES = ("delayjnd", "demo", "forcedelay", "physical2", "thickness", "viscosityjnd", "delaydetect", "rek2024")
+CHANGING = re.compile(
+    r"\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d(?:\.\d+)?)?(?:Z|[+-]\d\d:\d\d)?)?|\b\d+\.\d+\.\d+\b"
+    r"|\b(?<!\.)[0-9a-f]{12,}\b|\b(?:[a-z0-9]{4}-){2}[a-z0-9]{4}\b|(?<=session_ended\",\"t_s\":)[0-9.]+"
+)
+"""Dates, versions, hashes, fingerprints and when a session that nobody simulates ended."""
+OF_THE_MACHINE = (".versions", ".machine", ".clock", ".git")
+MOST = 40
+"""Most lines of a file that are compared, evenly spread."""
+
+
+def lines_of(folder: Path) -> Iterator[str]:
+    for path in sorted(folder.rglob("*")):
+        if not path.is_file() or path.suffix in (".sha256", ".toml") or path.name.startswith("."):
+            continue
+        text = path.read_text(encoding="utf-8")
+        if path.suffix == ".sealed":
+            text = base64.b64decode(text).decode()
+        if path.suffix in (".json", ".sealed"):
+            text = "\n".join(line for line in flat("", json.loads(text)) if not line.startswith(OF_THE_MACHINE))
+        found = text.splitlines()
+        step = max(1, len(found) // MOST)
+        yield f"== {path.relative_to(folder).as_posix()}: {len(found)} lines"
+        yield from (CHANGING.sub("*", line) for line in found[: MOST // 2] + found[MOST // 2 :: step])
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in QUICK else [pytest.mark.slow]) for name in STUDIES]
+)
+def test_files(name: str, tmp_path_factory: pytest.TempPathFactory, pytestconfig: pytest.Config) -> None:
+    def make(folder: Path) -> None:
+        rehearse_answers(name, participants=1, seed=11, results=folder / name, felt=made_up(name))
+
+    study = once(tmp_path_factory, f"golden-session-{name}", make) / name
+    compare(GOLDEN / f"{name}.txt", lines_of(study), pytestconfig)
+
+
+def test_handling(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, pytestconfig: pytest.Config) -> None:
+    def make(folder: Path) -> None:
+        rehearse_answers("demo", participants=2, seed=7, results=folder / "demo", felt=made_up("demo"))
+
+    study = Path(shutil.copytree(once(tmp_path_factory, "handled-demo", make) / "demo", tmp_path / "demo"))
+    steps: dict[str, Any] = {
+        "exclude": lambda: exclude(study, "P001", 1, by="AK", reason="asleep"),
+        "exclude a trial": lambda: exclude(study, "P002", 1, trial=2, by="AK", reason="phone"),
+        "include": lambda: include(study, "P001", 1, by="CD", reason="awake"),
+        "unblind": lambda: unblind(study, "AK", "closed"),
+    }
+    before, told = list(lines_of(study)), list[str]()
+    for name, step in steps.items():
+        result = step()
+        after = list(lines_of(study))
+        told += [
+            f"== {name}: {CHANGING.sub('*', str(result)).replace(str(tmp_path), 'FOLDER')}",
+            *changed(before, after),
+        ]
+        before = after
+    text = CHANGING.sub("*", "\n".join(told).replace(str(tmp_path), "FOLDER"))
+    compare(GOLDEN / "handling.txt", text.split("\n"), pytestconfig)
+
+
+EVENTS: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("page_shown", {"page": "welcome"}), ("page_left", {"page": "welcome"}),
+    ("trial_started", {"trial": 1, "attempt": 1, "block": "liquids", "phase": "main", "part": 1, "index": 1, "of": 2,
+                       "code": "L1"}),
+    ("note", {"kind": "note", "text": "=left-handed, \"quoted\"\nsecond"}), ("note", {"kind": "mark", "text": ""}),
+    ("force_stopped", {"by": "operator"}), ("force_restored", {"by": "operator"}), ("paused", {"by": "operator"}),
+    ("resumed", {"by": "operator"}), ("repeat", {"trial": 1, "reason": "phone rang"}),
+    ("recording_lost", {"trial": 1, "attempt": 1, "reason": "the disk was full"}),
+)  # fmt: skip
+
+
+def test_a_journal(tmp_path: Path, pytestconfig: pytest.Config) -> None:
+    study = tmp_path / "demo"
+    start = SessionStart(
+        "P003", seed=5, operator="AK", language="en", device={"name": "mouse"}, screens={}, simulated=True
+    )
+    progress, told, before = Progress(), list[str](), list[str]()
+    with begin(study, load("demo"), source_bytes("demo"), start) as session:
+        for number, (event, fields) in enumerate(EVENTS):
+            session.append(event, t_s=float(number), **fields)
+            session.write_tables()
+            after = [*lines_of(study), *flat("progress", progress)]
+            told += [f"== {event}", *changed(before, after)]
+            before = after
+        session.finish("withdrawn", "felt unwell")
+    told += ["== finished", *changed(before, list(lines_of(study)))]
+    told += [CHANGING.sub("*", line).replace(str(tmp_path), "FOLDER") for line in flat("verify", verify(study))]
+    compare(GOLDEN / "journal.txt", "\n".join(told).split("\n"), pytestconfig)
