@@ -109,5 +109,6 @@ def test_a_journal(tmp_path: Path, pytestconfig: pytest.Config) -> None:
             before = after
         session.finish("withdrawn", "felt unwell")
     told += ["== finished", *changed(before, list(lines_of(study)))]
+    told += sorted(f"left open: {path.name}" for path in study.rglob(".open-*"))
     told += [CHANGING.sub("*", line).replace(str(tmp_path), "FOLDER") for line in flat("verify", verify(study))]
     compare(GOLDEN / "journal.txt", "\n".join(told).split("\n"), pytestconfig)

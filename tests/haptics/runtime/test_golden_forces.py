@@ -11,7 +11,8 @@ import pytest
 
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import SAMPLE
-from study_app.haptics.model.scene import Knee
+from study_app.haptics.model.scene import Box, Knee
+from study_app.haptics.runtime.pack import built_alike
 from study_app.lab.changes import changed
 from study_app.protocol.load import load_scenes
 from tests.golden_text import compare, flat
@@ -77,3 +78,30 @@ def test_forces(name: str, pytestconfig: pytest.Config) -> None:
         shown = "  ".join(" ".join(f"{one:.6g}" for one in values[tick]) for tick in SEEN)
         lines.append(f"{column}: {shown}  sums {' '.join(f'{one:.6g}' for one in np.abs(values).sum(axis=0))}")
     compare(GOLDEN / f"{name.replace(' ', '_')}.txt", lines, pytestconfig, rel=2e-5, abs_=1e-7)
+
+
+def variants(scene: Any) -> dict[str, Any]:
+    """Return scenes that differ in one parameter."""
+    (liquid, *others) = scene.liquids
+    heavier = liquid.model_copy(update={"density_kg_m3": 1.1 * liquid.density_kg_m3})
+    moved = liquid.model_copy(update={"region": Box(centre_m=(0.0, 0.1, 0.0), size_m=(1.0, 1.0, 1.0))})
+    changes: dict[str, dict[str, Any]] = {
+        "same": {}, "density": {"liquids": (heavier, *others)}, "region": {"liquids": (moved, *others)},
+        "drag only": {"liquids": (liquid.model_copy(update={"effects": ("drag",)}), *others)},
+        "two": {"liquids": (liquid, heavier)}, "scale": {"scale": 5.0}, "origin": {"origin_m": (0.0, 0.01, 0.0)},
+        "body": {"body": scene.body.model_copy(update={"diameter_m": 0.05, "drag_coefficient": 0.6})},
+        "knee": {"knee": UNBENT}, "threshold": {"knee": Knee(threshold_mps=1.0)}, "limit": {"force_limit_n": 2.0},
+        "fade": {"fade_s": 0.1}, "rate": {"rate_hz": 500.0},
+    }  # fmt: skip
+    return {name: scene.model_copy(update=change) for name, change in changes.items()}
+
+
+def test_which_scenes_keep_their_state(pytestconfig: pytest.Config) -> None:
+    bases = {name: CASES[name][0] for name in ("effect drag", "effect history", "several tail", "no knee")}
+    lines = []
+    for name, scene in bases.items():
+        kept = [what for what, other in variants(scene).items() if built_alike(scene, other)]
+        estimators = [one for one in ESTIMATOR_NAMES if built_alike(scene, changed(scene, "velocity.kind", one))]
+        others = [what for what, other in bases.items() if what != name and built_alike(scene, other)]
+        lines.append(f"{name}: {', '.join(kept)} | {', '.join(estimators)} | {', '.join(others)}")
+    compare(GOLDEN / "kept_state.txt", lines, pytestconfig)
