@@ -12,8 +12,7 @@ from study_app.authoring.writer.refused import Refused
 from study_app.cli import commands, main
 from study_app.cli.devices import _ask_operator
 from study_app.errors import OutletError, ProtocolError, StudyError
-from study_app.store.workstation import DEFAULTS, MachineSettings, load, save
-from study_app.user_folder import settings_file
+from study_app.store.workstation import DEFAULTS, load
 from study_app.validation.accuracy import liquid_survey
 from tests.compiled import needs_servo
 
@@ -67,33 +66,6 @@ def test_what_cannot_be_is_refused_before_a_window_opens(
 ) -> None:
     assert isinstance(CliRunner().invoke(commands, words).exception, error)
     assert visit.asked == []
-
-
-OFF = ["markers over LSL: off", "samples over LSL: off", "triggers: off"]
-
-
-def outlets(*words: str) -> list[str]:
-    found = CliRunner().invoke(commands, ["outlets", *words], catch_exceptions=False)
-    assert found.exit_code == 0
-    return found.output.splitlines()
-
-
-def test_outlets_are_printed_and_options_are_kept_and_others_stay() -> None:
-    assert outlets() == OFF
-    assert not settings_file().exists()
-    save(MachineSettings(viewing_distance_mm=600))
-    assert outlets("--markers", "on", "--triggers", "serial:/dev/ttyUSB0") == [
-        "markers over LSL: on",
-        "samples over LSL: off",
-        "triggers: serial:/dev/ttyUSB0",
-    ]
-    assert outlets("--samples", "single-blind")[1] == "samples over LSL: single-blind"
-    assert load() == MachineSettings(
-        viewing_distance_mm=600, lsl_markers=True, lsl_samples="single-blind", triggers="serial:/dev/ttyUSB0"
-    )
-    assert load().marker_addresses == ("lsl", "serial:/dev/ttyUSB0")
-    assert outlets("--markers", "off", "--samples", "off", "--triggers", "off") == OFF
-    assert load().marker_addresses == ()
 
 
 @pytest.mark.parametrize("port", ["COM3", "usb:1", "serial:", "lsl", "", "serial:/dev/\x00"])

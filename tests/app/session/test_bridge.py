@@ -6,15 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, Qt
-from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
-from shiboken6 import isValid
 
 from study_app.gui.operator.strip import Strip
 from study_app.gui.widgets.dialogs import Notice
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_NORM, SAMPLE, records
 from study_app.session.pages import EndPage, PausePage, TaskPage, TroublePage
-from study_app.session.transitions.events import Continue, ForceStopped, ResumeAsked
+from study_app.session.transitions.events import Continue
 from tests.app.world import World, begin_trial, tick
 
 pytestmark = pytest.mark.slow
@@ -44,50 +42,6 @@ def test_force_and_task_begin_when_the_tank_is_painted_and_not_while_a_page_asks
     assert bridge.runner.task.elapsed_s == 0.75
 
 
-def test_a_diagnosis_is_begun_with_the_force_off_and_a_pause_even_with_a_full_disk(bridge, world, qtbot, caplog):
-    begin_trial(bridge, world)
-    seen = []
-    bridge.diagnose_asked.connect(lambda: seen.append((world.force_is_on, bridge.participant.page)))
-    qtbot.mouseClick(bridge.operator.device.diagnose, LEFT)
-    assert seen == [(False, PausePage(force_off=True, held="force"))]
-    bridge.operator.fade_in_asked.emit()
-    world.full = True
-    bridge.operator.diagnose_asked.emit()
-    assert [force for force, _ in seen] == [False, False]
-    assert "no space left" in caplog.text
-    world.full = False
-    world.now_s += 2.0
-    bridge.draw_frame()
-    caplog.clear()
-    bridge.operator.end_asked.emit("aborted", "the device is broken")
-    before = len(world.done)
-    bridge.operator.diagnose_asked.emit()
-    assert world.done[before:] == ["stop_force"]
-    assert len(seen) == 3
-
-
-def test_a_stop_reaches_the_servo_before_the_disk_and_only_the_operator_takes_it_back(bridge, world):
-    begin_trial(bridge, world)
-    before = len(world.done)
-    bridge.operator.stop_asked.emit()
-    assert world.done[before] == "stop_force"
-    assert "force_stopped" in world.events()
-    assert bridge.participant.page == PausePage(force_off=True, held="force")
-    assert bridge.operator.stop.word.text() == "Force is off"
-    done = list(world.done)
-    QTest.keyClick(bridge.participant.widget, Qt.Key.Key_Return)
-    bridge.participant.event.emit(ResumeAsked(world.now_s, "participant"))
-    assert (world.force_is_on, world.done) == (False, done)
-    bridge.operator.fade_in_asked.emit()
-    assert world.force_is_on
-    assert ("force_restored", {"by": "operator"}) in world.done
-    assert isinstance(bridge.participant.page, TaskPage)
-    assert world.events().count("trial_started") == 2
-    bridge.participant.event.emit(ForceStopped(world.now_s, "participant"))
-    assert not world.force_is_on
-    assert ("force_stopped", {"by": "participant"}) in world.done
-
-
 def test_with_a_full_disk_the_force_stops_and_the_session_waits_and_loses_nothing(bridge, world, caplog):
     begin_trial(bridge, world)
     world.full = True
@@ -113,16 +67,6 @@ def test_with_a_full_disk_the_force_stops_and_the_session_waits_and_loses_nothin
     assert world.force_is_on
     assert "accepts data again" in caplog.text
     caplog.clear()
-
-
-def test_ending_closes_the_journal_with_status_and_reason_and_waits_to_be_closed(bridge, world, qtbot):
-    begin_trial(bridge, world)
-    bridge.operator.end_asked.emit("withdrawn", "felt unwell")
-    assert world.done[-1] == ("session_ended", {"status": "withdrawn", "reason": "felt unwell"})
-    assert isinstance(bridge.participant.page, EndPage)
-    with qtbot.waitSignal(bridge.done):
-        qtbot.mouseClick(bridge.operator.buttons.close_session, LEFT)
-    assert not any(window.isVisible() for window in (bridge.operator, bridge.participant) if isValid(window))
 
 
 @pytest.mark.parametrize("answer", ["end", "close again"])

@@ -1,7 +1,5 @@
 """A Falcon's modes of failure: the facts that show them, refusals of a faulty emulator, and what a doctor finds."""
 
-import pickle
-import re
 import sys
 
 import numba
@@ -10,14 +8,11 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
-from study_app.devices.doctor_report import NOTHING_WRONG, Report, lines
 from study_app.devices.falcon.doctor.examine import examine, ftdi_sees
-from study_app.devices.falcon.doctor.failure_report import findings_of
 from study_app.devices.falcon.emulated import EmulatedFalcon
 from study_app.devices.falcon.emulator.emulator import Emulator
 from study_app.devices.falcon.emulator.faults import CHANCES, SWITCHES
-from study_app.devices.falcon.facts import OPEN, Facts
-from study_app.devices.falcon.failure_modes import BY_ID, MODES, UDEV_RULE, diagnose, sentence
+from study_app.devices.falcon.failure_modes import BY_ID, diagnose
 from study_app.devices.falcon.failures import FalconFailure
 from study_app.devices.falcon.homing import PULL_OUT
 from study_app.haptics.runtime.clocks.clock import VirtualClock
@@ -27,103 +22,9 @@ from tests.devices.falcon.support.firmware_stream import stream
 
 pytestmark = pytest.mark.slow
 
-WELL = Facts(
-    platform="linux",
-    usb=OPEN,
-    listed=True,
-    ftdi_sees=True,
-    program="running",
-    replies=True,
-    homed=0b111,
-    moved=True,
-    pulled_out=True,
-    round_trip_s=0.0007,
-    broken_share=0.0,
-    rate_hz=1000.0,
-    step_n=0.01,
-)
-
 
 def shown(facts):
     return [mode.id for mode in diagnose(facts)]
-
-
-class TestModes:
-    @pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.id)
-    def test_each_has_a_cure_on_some_system_and_is_a_line(self, mode):
-        assert any(mode.cure(platform) for platform in ("linux", "win32", "darwin"))
-        assert "\n" not in mode.symptom + mode.cause + "".join(mode.cures.values())
-
-    def test_all_that_is_in_order_shows_nothing_and_what_was_not_looked_at_is_left_open(self):
-        assert shown(WELL) == []
-        assert all(mode.shown_by(WELL) is False for mode in MODES)
-        assert sentence(WELL) == ""
-        nothing = Facts(platform="linux")
-        assert shown(nothing) == []
-        assert {mode.id for mode in MODES if mode.shown_by(nothing) is False} == {"two-drivers"}
-
-    @pytest.mark.parametrize(
-        ("facts", "modes"),
-        [
-            ({"usb": "access", "platform": "linux"}, ["permission"]),
-            ({"usb": "access", "platform": "darwin"}, ["mac-driver"]),
-            ({"usb": "access", "platform": "win32"}, ["busy"]),
-            ({"usb": "not-supported", "platform": "win32"}, ["windows-driver"]),
-            ({"usb": "not-supported", "platform": "win32", "listed": True, "ftdi_sees": False}, ["two-drivers"]),
-            ({"usb": "busy", "platform": "win32", "listed": True, "ftdi_sees": False}, ["busy"]),
-            ({"usb": "busy", "platform": "linux"}, ["busy"]),
-            ({"usb": "no-backend"}, ["no-libusb"]),
-            ({"usb": "no-ftd2xx"}, ["no-ftd2xx"]),
-            ({"usb": "pipe"}, ["transfer"]),
-            ({"usb": OPEN, "boot_step": "ping", "replies": False}, ["upload", "power"]),
-            ({"usb": OPEN, "boot_step": "echo"}, ["upload"]),
-            ({"replies": True, "homed": 0b011, "moved": True}, ["stroke-in"]),
-            ({"replies": True, "homed": 0b111, "moved": True, "pulled_out": False}, ["stroke-out"]),
-            ({"replies": True, "homed": 0b111, "moved": False, "pulled_out": True}, ["frozen"]),
-            ({"replies": False}, ["power"]),
-            ({"broken_share": 0.006}, ["broken-packets"]),
-            ({"broken_share": 0.005}, []),
-            ({"rate_hz": 799.0}, ["shaking"]),
-            ({"rate_hz": 1000.0, "step_n": 0.6}, ["shaking"]),
-            ({"round_trip_s": 0.016}, ["slow"]),
-            ({"round_trip_s": 0.002}, ["slow"]),
-            ({"round_trip_s": 0.001}, []),
-        ],
-    )
-    def test_facts_name_their_mode(self, facts, modes):
-        assert shown(Facts(**facts)) == modes
-
-    def test_the_rule_to_paste_is_whole(self):
-        assert UDEV_RULE == 'SUBSYSTEM=="usb", ATTR{idVendor}=="0403", ATTR{idProduct}=="cb48", TAG+="uaccess"'
-        assert UDEV_RULE in BY_ID["permission"].cure("linux")
-        assert re.search(r"rules\.d/[0-6]\d-", BY_ID["permission"].cure("linux"))  # before 73, where uaccess is read
-
-
-class TestReport:
-    def test_every_mode_is_found_ok_or_not_checked_and_what_is_wrong_stands_first(self):
-        nothing = Report((), findings_of(Facts(platform="linux")), None)
-        assert [finding.id for finding in nothing.findings] == [mode.id for mode in MODES]
-        assert nothing.conclusion.startswith("Nothing wrong was found. Not checked: ")
-        well = Report((), findings_of(WELL), None)
-        assert (well.well, {one.state for one in well.findings}) == (True, {"ok"})
-        assert well.conclusion == NOTHING_WRONG
-        in_order = lines(well)
-        assert any(line.split() == ["5", "ok", "its", "firmware", "is", "available"] for line in in_order)
-        assert not any("there is no firmware" in line for line in in_order)
-        found = Report(("opened",), findings_of(Facts(platform="linux", usb="access")), "the Falcon cannot be used")
-        assert (found.well, found.conclusion) == (False, "Found: 1.")
-        numbered = [line for line in lines(found) if line[:2].strip().isdigit()]
-        states = [line[4:17].strip() for line in numbered]
-        assert states == sorted(states, key=("FOUND", "not checked", "ok").index)
-        assert numbered[0].endswith("only the administrator can open it")
-        assert pickle.loads(pickle.dumps(found)) == found  # noqa: S301 - our own: from the worker process
-        (one,) = (one for one in findings_of(Facts(usb=OPEN, program="refused")) if one.id == "firmware-file")
-        assert one.says_itself
-
-    @pytest.mark.parametrize(("platform", "pastes"), [("linux", True), ("win32", False)])
-    def test_a_command_to_paste_is_one_of_this_system(self, platform, pastes):
-        findings = findings_of(Facts(platform=platform, usb="access"))
-        assert any(one.paste for one in findings if one.state == "found") is pastes
 
 
 @pytest.fixture
