@@ -5,7 +5,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from study_app.app.lab import device_opening, preset_saving
+from study_app.app.lab import device_opening
 from study_app.app.lab.controller import LabController
 from study_app.app.lab.initial_settings import InitialSettings
 from study_app.app.session.termination import Patience
@@ -174,7 +174,8 @@ def test_every_signal(qtbot: Any, tmp_path: Path, monkeypatch: Any, caplog: Any,
     from study_app.gui.lab.view import LabPlace
 
     monkeypatch.setattr(device_opening, "STARTS_AFTER_MS", 0)
-    monkeypatch.setattr(preset_saving, "liquids_at_hand", lambda saved: (Choice(saved[-1], "new", "New"),))
+    at_hand = "study_app.app.lab.preset_saving.liquids_at_hand"
+    monkeypatch.setattr(at_hand, lambda saved: (Choice(saved[-1], "new", "New"),))
     (tmp_path / "study.toml").write_bytes(source_bytes("demo"))
     (tmp_path / "broken.toml").write_text("format = 1")
     done: list[str] = []
