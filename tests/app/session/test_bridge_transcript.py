@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PySide6.QtWidgets import QApplication
 from shiboken6 import isValid
 
 from study_app.errors import DeviceNotFound, ServoFault, StoreError, VideoError
@@ -75,9 +76,9 @@ def fail(error: Exception) -> Any:
 
 
 def reconnected(bridge: Any, world: World) -> None:
-    bridge.reconnection.wait()
     world.fault = None
-    bridge.reconnection.connected.emit({"name": "mouse", "force_limit_n": 6.0})
+    assert bridge.reconnection.wait()
+    QApplication.sendPostedEvents(bridge.reconnection)
 
 
 STEPS: dict[str, Any] = {
@@ -130,7 +131,7 @@ PLAYS = {
     "full disk": f"{BEGUN}, disk is full, mark, note, stop, wait, diagnose, disk has space, wait, fade in, shown, "
     "wait, disk is full, abort, close, close",
     "lost device": f"{BEGUN}, line, reconnect, servo stops, wait, device error, second error, reconnect, line, "
-    "not reconnected, reconnect, reconnected, wait, fade in, shown, push, abort, close",
+    "not reconnected, reconnect, reconnected, wait, fade in, shown, push, servo stops, wait, abort, close",
     "bug": f"{BEGUN}, bug, second error, wait, reconnect, resume, push, abort, wait, close",
     "video": f"{BEGUN}, no clip, wait, reconnect, reconnected, wait, resume, shown, close, accept, close",
     "servo": f"{BEGUN}, servo error, wait, leave, leave",

@@ -9,7 +9,7 @@ from PySide6.QtCore import QEvent, Qt, QTimer
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication
 
-from study_app.errors import DeviceNotFound, StoreError
+from study_app.errors import DeviceNotFound
 from study_app.gui.widgets.dialogs import Notice
 from study_app.gui.widgets.escape_key import EscapeHold
 from study_app.session.pages import PausePage, TaskPage, TroublePage
@@ -37,42 +37,12 @@ def test_what_breaks_in_a_slot_is_zero_force_and_told_and_written_once(bridge, w
     assert "the clock fell off the wall" in bridge.operator.banner.what.text()
 
 
-def test_what_fails_in_the_program_is_no_fault_of_the_device_and_offers_no_reconnection(make, world, caplog):
-    asked = []
-    bridge = make(reconnect=lambda: asked.append(True))
-    begin_trial(bridge, world)
-    bridge.fail(StoreError("the sealed key is gone"))
-    caplog.clear()
-    view = bridge.view()
-    assert (view.state, view.device.ready) == ("trouble", True)
-    assert dict(view.device.rows)["Safety faults"] == "0"
-    assert not bridge.operator.banner.reconnect.isVisible()
-    bridge.operator.reconnect_asked.emit()
-    assert asked == []
-
-
 def test_an_event_that_comes_too_late_changes_nothing(bridge, world):
     before = list(world.done)
     bridge.participant.event.emit(Submitted(world.now_s))
     assert world.done == before
     assert bridge.trouble == ""
     assert world.force_is_on
-
-
-def test_a_servo_fault_calls_the_operator(bridge, world):
-    begin_trial(bridge, world)
-    world.fault = "the device 'mouse' stopped responding; plug it in again and start anew"
-    bridge.draw_frame()
-    assert isinstance(bridge.participant.page, TroublePage)
-    assert "stopped responding" in bridge.operator.banner.what.text()
-    assert "stopped responding" not in bridge.participant.page.paragraph
-    assert bridge.operator.device.chip.word == "Fault"
-    bridge.draw_frame()
-    assert dict(bridge.view().device.rows)["Safety faults"] == "1"
-    world.fault = None
-    bridge.draw_frame()
-    world.fault = "the device 'mouse' stopped responding again"
-    assert dict(bridge.view().device.rows)["Safety faults"] == "2"
 
 
 BROKEN = "no such colour"
