@@ -144,7 +144,13 @@ def paged(page: Any) -> list[str]:
     return [f"page: {type(page).__name__}", *lines]
 
 
-@pytest.mark.parametrize(("name", "blinding"), [*((name, "single") for name in PLAYS), ("requests", "double")])
+@pytest.mark.parametrize(
+    ("name", "blinding"),
+    [
+        *(pytest.param(name, "single", marks=[pytest.mark.slow] if name == "servo" else []) for name in PLAYS),
+        pytest.param("requests", "double", marks=pytest.mark.slow),
+    ],
+)
 def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, caplog: Any, monkeypatch: Any) -> None:
     world = Recorded()
 
