@@ -147,7 +147,10 @@ def paged(page: Any) -> list[str]:
 @pytest.mark.parametrize(
     ("name", "blinding"),
     [
-        *(pytest.param(name, "single", marks=[pytest.mark.slow] if name == "servo" else []) for name in PLAYS),
+        *(
+            pytest.param(name, "single", marks=[pytest.mark.slow] if name in ("servo", "video") else [])
+            for name in PLAYS
+        ),
         pytest.param("requests", "double", marks=pytest.mark.slow),
     ],
 )
