@@ -116,6 +116,7 @@ class WriteDialog(QDialog):
         warned = "".join(f"\n{line}" for line in warnings[:WARNED])
         self.said.setText(f"{counted(len(files), 'file')} in {files[0].parent}.{warned}{more}")
         self.cancel.show_action("", "Close")
+        self.cancel.setEnabled(True)  # it may have been written although one asked to stop
         self.go_on.show_action("", self._opens)
         self.go_on.show()
         self.go_on.setFocus()
