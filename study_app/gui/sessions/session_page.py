@@ -87,7 +87,7 @@ def trial_words(trial: TrialRecord) -> str:
     """Return a line on a trial's limits."""
     said = f"Trial {trial.number}: "
     if trial.excluded is not None:
-        said += f"excluded from the analysis ({trial.excluded}). "
+        said += f"excluded from the analysis ({trial.excluded}); "
     if trial.broken:
         said += "; ".join(trial.broken) + "."
     else:
