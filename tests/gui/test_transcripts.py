@@ -1,49 +1,90 @@
-"""Every window, compared with a reviewed text: what it paints and tells, and what each control does."""
+"""Every window, compared with a reviewed text: what it paints and tells in each state, and what each control does."""
 
+import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.gui.home import new_session_dialog
-from study_app.gui.widgets.background import wait_for_jobs
+from study_app.gui.sessions import session_page
+from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.main_view import Place
-from tests.gui.transcript import compare, lines_of, steps
+from tests.gui.states import READ, RECORD, STATES, FixedTime, read, waves
+from tests.gui.transcript import compare, states, steps
 from tests.gui.walk import settle
 from tests.gui.windows import WINDOWS, two_screens
 
 SEED = 1234
+CLOCKS = ("results.sidebar", "home.view", "home.sessions_card", "sessions.sessions_table")
 
 
 @pytest.fixture(autouse=True)
-def alike_every_time(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def alike_every_time(qapp: QApplication, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
     two_screens(monkeypatch)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(new_session_dialog, "draw_seed", lambda: SEED)
+    READ.update(record=RECORD, motion=waves())
+    monkeypatch.setattr(session_page, "read_record", lambda _folder: read("record"))
+    monkeypatch.setattr(session_page, "motion", lambda _recording: read("motion"))
+    for module in CLOCKS:
+        monkeypatch.setattr(f"study_app.gui.{module}.datetime", FixedTime)
+    flashes_ms = qapp.cursorFlashTime()
+    qapp.setCursorFlashTime(0)
+    yield
+    qapp.setCursorFlashTime(flashes_ms)
 
 
-def at_rest(window: Any) -> None:
-    wait_for_jobs(60)
+def works(window: QWidget) -> bool:
+    """Whether a job goes on, or a figure is not drawn yet."""
+    parts = (part for part in window.findChildren(QWidget) if part.isVisible())
+    return any(job.busy for job in window.findChildren(Background)) or not all(
+        getattr(part, "settled", True) for part in parts
+    )
+
+
+def at_rest(window: QWidget) -> None:
+    settle(window)
+    until_s = time.monotonic() + 10
+    while works(window.window()) and time.monotonic() < until_s:
+        QTest.qWait(1)
     settle(window)
 
 
-@pytest.fixture(params=WINDOWS)
-def named_window(qtbot: Any, request: pytest.FixtureRequest) -> tuple[str, Any]:
-    make, sizes = WINDOWS[request.param]
+def opened(qtbot: Any, name: str) -> Any:
+    make, sizes = WINDOWS[name]
     window = make(qtbot, Path())
     settle(window, sizes[-1])
-    return request.param, window
+    return window
 
 
-def test_what_a_window_paints_and_tells(named_window: tuple[str, Any], pytestconfig: pytest.Config) -> None:
-    name, window = named_window
-    compare(f"{name}, shown", lines_of(window), pytestconfig)
+@pytest.mark.parametrize("name", [name for name in WINDOWS if name not in STATES])
+def test_what_a_window_paints_and_tells(qtbot: Any, name: str, pytestconfig: pytest.Config) -> None:
+    window = opened(qtbot, name)
+    compare(f"{name}, shown", list(states(window, {}, lambda: at_rest(window))), pytestconfig)
     window.window().close()
+    window.window().hide()
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_what_each_state_paints_and_tells(qtbot: Any, name: str, pytestconfig: pytest.Config) -> None:
+    make, actions = STATES[name]
+    window = make(qtbot)
+    at_rest(window)
+    compare(f"{name}, states", list(states(window, actions, lambda: at_rest(window))), pytestconfig)
+    window.window().close()
+    window.window().hide()
 
 
 @pytest.mark.slow
-def test_what_each_control_does(named_window: tuple[str, Any], pytestconfig: pytest.Config) -> None:
-    name, window = named_window
+@pytest.mark.parametrize("name", dict.fromkeys((*WINDOWS, *STATES)))
+def test_what_each_control_does(qtbot: Any, name: str, pytestconfig: pytest.Config) -> None:
+    window = opened(qtbot, name) if name in WINDOWS else STATES[name][0](qtbot)
+    at_rest(window)
     place = next((one for one in window.findChildren(Place) if one.isVisible()), window)
     compare(f"{name}, used", list(steps(place, lambda: at_rest(window))), pytestconfig)
     window.window().close()
+    window.window().hide()

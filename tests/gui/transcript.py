@@ -5,15 +5,33 @@
 
 import difflib
 import re
-from collections.abc import Callable, Iterator
+from base64 import b64decode
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import pytest
-from PySide6.QtCore import QBuffer, QByteArray, QEvent, QMetaMethod, QPointF, Qt, QTimer, qVersion
-from PySide6.QtGui import QAccessible, QEnterEvent
+from PySide6.QtCore import (
+    QAbstractAnimation,
+    QAbstractItemModel,
+    QAbstractListModel,
+    QBuffer,
+    QByteArray,
+    QEvent,
+    QMetaMethod,
+    QPoint,
+    QPointF,
+    QRectF,
+    QSizeF,
+    Qt,
+    QTimer,
+    qVersion,
+)
+from PySide6.QtGui import QAccessible, QEnterEvent, QImage, QPainter, QShortcut, QWheelEvent
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
@@ -37,6 +55,10 @@ STATES = ("disabled", "checked", "readOnly", "expanded", "selected", "focused", 
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 SVG = "{http://www.w3.org/2000/svg}"
 PLACES = ("d", "points", "x", "y", "width", "height", "x1", "x2", "y1", "y2", "cx", "cy", "r", "rx", "ry")
+HREF = "{http://www.w3.org/1999/xlink}href"
+SMALL_PX = 4096
+ALIKE = 4
+"""Most controls of one kind in parts of one kind, such as cards of studies, that are used."""
 LONGEST = 12
 """Most numbers of a shape that are listed; of a longer one the count, the bounds and the sum are."""
 
@@ -50,12 +72,59 @@ def painted(window: QWidget) -> list[str]:
     generator.setOutputDevice(buffer)
     generator.setSize(window.size())
     generator.setViewBox(window.rect())
-    window.render(generator)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(QPainter, "drawImage", _draw_small)
+        window.render(generator)
     return list(_shapes(ElementTree.fromstring(bytes(content.data()))))  # noqa: S314
+
+
+def _draw_small(painter: QPainter, *arguments: Any, draw: Any = QPainter.drawImage) -> None:
+    """Draw a large image with few pixels: the generator encodes each image, of which only colours are compared."""
+    *at, image = arguments
+    if image.width() * image.height() <= SMALL_PX:
+        draw(painter, *arguments)
+        return
+    corner = at[0] if len(at) == 1 else QPointF(*at)
+    target = corner if isinstance(corner, QRectF) else QRectF(corner, QSizeF(image.deviceIndependentSize()))
+    small = image.scaled(8, 8, Qt.AspectRatioMode.IgnoreAspectRatio, Qt.TransformationMode.SmoothTransformation)
+    small.setDevicePixelRatio(1.0)
+    draw(painter, target, small)
+
+
+@cache
+def _colours_of(image: str) -> str:
+    """Return red, green, blue and opacity (0 to 7) of the four quarters of an encoded image."""
+    decoded = QImage.fromData(b64decode(image.partition(",")[2]))
+    few = decoded.scaled(2, 2, Qt.AspectRatioMode.IgnoreAspectRatio, Qt.TransformationMode.SmoothTransformation)
+    pixels = [few.pixelColor(x, y).getRgb() for y in range(2) for x in range(2)]
+    return " ".join("".join(str(part // 32) for part in pixel) for pixel in pixels)  # type: ignore[attr-defined]
+
+
+@cache
+def _ink(name: str, value: str, opacity: str, width: str, dashes: str) -> str:
+    """Return a colour with its opacity and, of a stroke, its width and dashes, or "" where nothing is painted."""
+    if value == "none" or float(opacity) == 0:
+        return ""
+    said = f"{name}={value}" + (f"/{float(opacity):.2g}" if float(opacity) < 1 else "")
+    if name == "stroke":
+        said += (f" {float(width):.2g} px" if width != "1" else "") + (f" dashes {dashes}" if dashes != "none" else "")
+    return said
+
+
+def _inks(group: ElementTree.Element, gradients: Mapping[str, str]) -> list[str]:
+    """Return what a group fills and strokes its shapes with."""
+    line = group.get("stroke-width", "1"), group.get("stroke-dasharray", "none")
+    values = ((name, group.get(name, "none"), group.get(f"{name}-opacity", "1")) for name in ("fill", "stroke"))
+    return [ink for name, value, opacity in values if (ink := _ink(name, gradients.get(value, value), opacity, *line))]
 
 
 def _shapes(root: ElementTree.Element) -> Iterator[str]:
     """Yield the texts, and between them the shapes of one place together: a frame is a dozen lines and curves."""
+    gradients = {
+        f"url(#{one.get('id')})": "-".join(stop.get("stop-color", "") for stop in one)
+        for kind in ("linearGradient", "radialGradient")
+        for one in root.iter(f"{SVG}{kind}")
+    }
     drawn = (
         (shape.tag.removeprefix(SVG), group, shape)
         for group in root.iter(f"{SVG}g")
@@ -66,12 +135,10 @@ def _shapes(root: ElementTree.Element) -> Iterator[str]:
         looks: list[str] = []
         places = ""
         for kind, group, shape in shapes:
-            colours = [
-                f"{name}={value}"
-                for name in ("fill", "stroke")
-                if (value := group.get(name, "none")) != "none" and group.get(f"{name}-opacity") != "0"
-            ]
-            if not colours and kind != "image":
+            colours = _inks(group, gradients)
+            if kind == "image":
+                colours = [_colours_of(shape.get(HREF, ""))]
+            elif not colours:
                 continue
             looks.append(" ".join([kind, *colours]))
             place = " ".join(value for name, value in shape.items() if name in PLACES)
@@ -83,6 +150,7 @@ def _shapes(root: ElementTree.Element) -> Iterator[str]:
             yield f"{', '.join(dict.fromkeys(looks))} @{_rounded(at)} {_rounded(places)}"
 
 
+@cache
 def _rounded(text: str) -> str:
     numbers = [round(float(each)) for each in NUMBER.findall(text)]
     if len(numbers) <= LONGEST:
@@ -106,11 +174,25 @@ def told(window: QWidget) -> list[str]:
         if any(words):
             shown = " | ".join(words).rstrip(" |")
             lines.append(" ".join([interface.role().name, *on, shown]))
+        if isinstance(part, QAbstractItemView) and part.model() is not None:
+            lines += _cells(part.model())
     return lines
 
 
+def _cells(model: QAbstractItemModel) -> Iterator[str]:
+    """Yield a line for each row of a table or list: of its cells what is shown, told and in the tip."""
+    roles = (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.AccessibleTextRole, Qt.ItemDataRole.ToolTipRole)
+    across = range(1 if isinstance(model, QAbstractListModel) else model.columnCount())
+    yield "columns " + " | ".join(str(model.headerData(at, Qt.Orientation.Horizontal)) for at in across)
+    for row in range(model.rowCount()):
+        cells = (dict.fromkeys(str(model.index(row, at).data(role) or "") for role in roles) for at in across)
+        yield "row " + " | ".join(" / ".join(cell).replace("\n", " / ") for cell in cells)
+
+
 def lines_of(window: QWidget) -> list[str]:
-    """Return what a window tells and paints."""
+    """Return what a window tells and paints once its animations have ended."""
+    for animation in window.findChildren(QAbstractAnimation):
+        animation.setCurrentTime(animation.totalDuration())
     return [*told(window), *painted(window)]
 
 
@@ -137,7 +219,13 @@ def _name(control: QWidget) -> str:
 
 
 def _act(control: QWidget) -> None:
-    """Use a control as a person would: click, choose the next entry, step, type."""
+    """Use a control as a person would: turn the wheel over it, click, choose the next entry, step, drag, type."""
+    middle = QPointF(control.rect().center())
+    control.clearFocus()
+    if isinstance(control, QAbstractSlider | QAbstractSpinBox | QComboBox):
+        no = Qt.MouseButton.NoButton, Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase, False
+        turned = QWheelEvent(middle, control.mapToGlobal(middle), QPoint(), QPoint(0, 120), *no)
+        QApplication.sendEvent(control, turned)
     control.setFocus()
     match control:
         case QAbstractButton():
@@ -146,55 +234,114 @@ def _act(control: QWidget) -> None:
         case QComboBox() | QAbstractItemView():
             QTest.keyClick(control, Qt.Key.Key_Down)
         case QAbstractSlider():
-            QTest.keyClick(control, Qt.Key.Key_Right)
+            for key in (Qt.Key.Key_Right, Qt.Key.Key_PageUp, Qt.Key.Key_Left):
+                QTest.keyClick(control, key)
+            start = QPoint(control.width() // 4, control.height() // 2)
+            QTest.mousePress(control, Qt.MouseButton.LeftButton, pos=start)
+            QTest.mouseMove(control, start + QPoint(control.width() // 3, 0))
+            QTest.mouseRelease(control, Qt.MouseButton.LeftButton, pos=start + QPoint(control.width() // 3, 0))
         case QAbstractSpinBox():
             QTest.keyClick(control, Qt.Key.Key_Up)
         case QLineEdit() | QPlainTextEdit():
+            QTest.keyClick(control, Qt.Key.Key_Up)
             QTest.keyClicks(control, "7")
             QTest.keyClick(control, Qt.Key.Key_Return)
 
 
-def _close_dialogs(seen: list[str], base: QWidget) -> None:
+def _close_dialogs(seen: list[str], kept: set[QWidget]) -> None:
     for other in QApplication.topLevelWidgets():
-        if other.isVisible() and other is not base:
+        if other.isVisible() and other not in kept:
             seen.append(f"opened {type(other).__name__} {other.windowTitle()!r}")
             if not isinstance(other, QFileDialog):
-                seen += told(other)
+                other.activateWindow()
+                for _ in range(300):
+                    if QApplication.focusWindow() is other.windowHandle():
+                        break
+                    QTest.qWait(1)
+                seen += lines_of(other)
             other.close()
 
 
-def steps(window: QWidget, settled: Callable[[], None]) -> Iterator[str]:
-    """Yield what each control does: the signals, the dialogs and the lines that change."""
-    heard = listen(window)
-    base = window.window()
-    used: set[str | QWidget] = set()
-    before = lines_of(window)
-    while True:
-        free = (one for one in window.findChildren(QWidget) if isinstance(one, CONTROLS) and _usable(one))
-        named = ((f"{type(one).__name__} {_name(one)!r}", one) for one in free)
-        chosen = next(((key, one) for key, one in named if key not in used and one not in used), None)
-        if chosen is None:
-            return
-        key, control = chosen
-        used |= {key, control}
-        heard.clear()
+class Recorder:
+    """What actions on a window do, each compared with what was there before it."""
+
+    def __init__(self, window: QWidget, settled: Callable[[], None]) -> None:
+        self.window, self.base, self._settled = window, window.window(), settled
+        self._kept = {one for one in QApplication.topLevelWidgets() if one.isVisible()}
+        self.heard = listen(window)
+        self.lines = lines_of(window)
+
+    def _rest(self) -> None:
+        """Let the window come to rest; it is painted for the comparison alone."""
+        self.base.setUpdatesEnabled(False)
+        self._settled()
+        self.base.setUpdatesEnabled(True)
+
+    def record(self, name: str, act: Callable[[], object]) -> Iterator[str]:
+        """Yield the signals, the dialogs and the lines that change while and after ``act`` runs."""
+        self.heard.clear()
         seen: list[str] = []
         blocked = QTimer(interval=200)
-        blocked.timeout.connect(lambda seen=seen: _close_dialogs(seen, base))
+        blocked.timeout.connect(lambda: _close_dialogs(seen, self._kept))
         blocked.start()
-        _act(control)
-        settled()
+        act()
         blocked.stop()
-        _close_dialogs(seen, base)
-        settled()
+        self._rest()
+        dialogs = len(seen)
+        _close_dialogs(seen, self._kept)
+        if len(seen) > dialogs:
+            self._rest()
         QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
-        after = lines_of(window)
-        changed = [line for line in difflib.unified_diff(before, after, n=0, lineterm="") if line[0] in "+-"][2:]
-        before = after
-        yield f"== {key}"
-        yield from heard
+        if not self.base.isVisible():
+            seen.append("closed")
+        before, self.lines = self.lines, lines_of(self.window)
+        yield f"== {name}"
+        yield from self.heard
         yield from seen
-        yield from changed
+        yield from [line for line in difflib.unified_diff(before, self.lines, n=0, lineterm="") if line[0] in "+-"][2:]
+
+
+def steps(window: QWidget, settled: Callable[[], None]) -> Iterator[str]:
+    """Yield what each control and then each shortcut does, after the order in which the Tab key reaches controls."""
+    recorder = Recorder(window, settled)
+    used: set[str | QWidget] = set()
+    yield "== Tab"
+    yield from _tab_order(window)
+    alike: Counter[tuple[type, type]] = Counter()
+    while (chosen := next(_unused(window, used), None)) is not None:
+        used |= set(chosen)
+        kinds = type(chosen[1]), type(chosen[1].parent())
+        alike[kinds] += 1
+        if alike[kinds] <= ALIKE:
+            yield from recorder.record(chosen[0], lambda control=chosen[1]: _act(control))
+    for shortcut in window.findChildren(QShortcut):
+        yield from recorder.record(shortcut.key().toString(), shortcut.activated.emit)
+    yield from recorder.record("Esc", lambda: QTest.keyClick(recorder.base, Qt.Key.Key_Escape))
+
+
+def _unused(window: QWidget, used: set[str | QWidget]) -> Iterator[tuple[str, QWidget]]:
+    for one in window.findChildren(QWidget):
+        if isinstance(one, CONTROLS) and _usable(one) and one not in used:
+            key = f"{type(one).__name__} {_name(one)!r}"
+            if key not in used:
+                yield key, one
+
+
+def states(window: Any, shown: Mapping[str, Callable[[Any], object]], settled: Callable[[], None]) -> Iterator[str]:
+    """Yield what a window tells and paints, then what changes with each of the states it is brought into in turn."""
+    recorder = Recorder(window, settled)
+    yield from recorder.lines
+    for name, bring in shown.items():
+        yield from recorder.record(name, lambda bring=bring: bring(window))
+
+
+def _tab_order(window: QWidget) -> Iterator[str]:
+    part = window.nextInFocusChain()
+    while part is not window and part is not None:
+        inside = window.isAncestorOf(part) and part.isVisible() and part.isEnabled()
+        if inside and part.focusPolicy() & Qt.FocusPolicy.TabFocus and part.focusProxy() is None:
+            yield f"{type(part).__name__} {_name(part)!r}"
+        part = part.nextInFocusChain()
 
 
 def _usable(control: QWidget) -> bool:
@@ -217,5 +364,5 @@ def compare(name: str, lines: list[str], config: pytest.Config) -> None:
     if (recorded := QT_VERSION.read_text().strip()) != version:
         pytest.skip(f"recorded with Qt {recorded}, here is Qt {version}: styles paint otherwise")
     expected = kept.read_text(encoding="utf-8").splitlines()
-    different = list(difflib.unified_diff(expected, lines, n=0, lineterm=""))[2:]
+    different = [] if lines == expected else list(difflib.unified_diff(expected, lines, n=0, lineterm=""))[2:]
     assert not different, "\n".join([f"{kept}: review, then --regenerate", *different[:40]])
