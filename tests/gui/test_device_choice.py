@@ -5,12 +5,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QProgressBar
 
 from study_app.errors import DeviceError, DeviceNotFound
-from study_app.gui.home.startup_window import FIRST_TIME, OpeningWindow
+from study_app.gui.home.startup_window import OpeningWindow
 from study_app.protocol.load import load
 from study_app.session.request import NewSession, study_results
 from study_app.session.start import check
@@ -43,22 +42,6 @@ def test_firmware_is_for_falcons_alone(tmp_path):
         check(replace(chosen, device="falcon-socket"), study)
 
 
-def test_the_note_says_what_the_device_asks_for_and_goes_on_saying_it(qtbot):
-    now = [0.0]
-    note = OpeningWindow("Preparing demo", "Participant P001", now_s=lambda: now[0])
-    qtbot.addWidget(note)
-    note.say("Pull the grip out.")
-    assert note.step.text() == "Pull the grip out."
-    now[0] = 60.0
-    note.findChild(QTimer).timeout.emit()
-    assert note.step.text() == "Pull the grip out."
-    other = OpeningWindow("Preparing demo", "Participant P001", now_s=lambda: now[0])
-    qtbot.addWidget(other)
-    now[0] = 120.0
-    other.findChild(QTimer).timeout.emit()
-    assert other.step.text() == FIRST_TIME
-
-
 @pytest.fixture
 def opening(qtbot: Any) -> OpeningWindow:
     made = OpeningWindow("A first look", "Participant P001")
@@ -66,17 +49,6 @@ def opening(qtbot: Any) -> OpeningWindow:
     made.show()
     qtbot.waitExposed(made)
     return made
-
-
-def test_the_share_that_is_compiled_fills_the_bar_and_says_why_it_takes_long(opening: OpeningWindow) -> None:
-    (bar,) = opening.findChildren(QProgressBar)
-    assert (bar.minimum(), bar.maximum()) == (0, 0)
-    opening.show_compiled(0.4)
-    assert (bar.value(), bar.maximum()) == (40, 100)
-    assert opening.step.text() == FIRST_TIME
-    opening.say("Push the lever.")
-    opening.show_compiled(0.5)
-    assert opening.step.text() == "Push the lever."
 
 
 @pytest.mark.parametrize("ready", [False, True])

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,22 @@ from study_app.gui.home import new_session_dialog
 from study_app.gui.sessions import session_page
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.main_view import Place
-from tests.gui.states import READ, RECORD, STATES, FixedTime, read, waves
+from tests.gui.results.states import NOW, READ, RECORD, read, waves
+from tests.gui.states import STATES
 from tests.gui.transcript import compare, states, steps
 from tests.gui.walk import settle
 from tests.gui.windows import WINDOWS, two_screens
 
 SEED = 1234
 CLOCKS = ("results.sidebar", "home.view", "home.sessions_card", "sessions.sessions_table")
+
+
+class FixedTime(datetime):
+    """A clock that stands still."""
+
+    @classmethod
+    def now(cls, tz: Any = None) -> datetime:  # type: ignore[override]
+        return NOW if tz is None else NOW.astimezone(tz)
 
 
 @pytest.fixture(autouse=True)

@@ -48,6 +48,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from study_app.gui.widgets.main_view import Place
+
+Actions = Mapping[str, Callable[[Any], object]]
+"""What brings a window into each of its states, by the state's name."""
 GOLDEN = Path(__file__).parent / "golden"
 QT_VERSION = GOLDEN / "qt_version"
 CONTROLS = (QAbstractButton, QAbstractItemView, QAbstractSlider, QAbstractSpinBox, QComboBox, QLineEdit, QPlainTextEdit)
@@ -197,19 +201,20 @@ def lines_of(window: QWidget) -> list[str]:
 
 
 def listen(window: QWidget) -> list[str]:
-    """Return a list that gets each signal that the window's own classes declare, with its arguments."""
+    """Return a list that gets each signal that a window's, or its places', own classes declare, with its arguments."""
     heard: list[str] = []
-    meta = window.metaObject()
-    for number in range(meta.methodCount()):
-        method = meta.method(number)
-        name = bytes(method.name().data()).decode()
-        declared = any(name in vars(kind) for kind in type(window).__mro__ if kind.__module__.startswith("study_app"))
-        if method.methodType() == QMetaMethod.MethodType.Signal and declared:
+    for part in [window, *window.findChildren(Place)]:
+        meta = part.metaObject()
+        for number in range(meta.methodCount()):
+            method = meta.method(number)
+            name = bytes(method.name().data()).decode()
+            declared = any(name in vars(kind) for kind in type(part).__mro__ if kind.__module__.startswith("study_app"))
+            if method.methodType() == QMetaMethod.MethodType.Signal and declared:
 
-            def hear(*values: Any, name: str = name) -> None:
-                heard.append(f"{name}({', '.join(repr(value)[:200] for value in values)})")
+                def hear(*values: Any, name: str = name) -> None:
+                    heard.append(f"{name}({', '.join(repr(value)[:200] for value in values)})")
 
-            getattr(window, name).connect(hear)
+                getattr(part, name).connect(hear)
     return heard
 
 
@@ -327,12 +332,53 @@ def _unused(window: QWidget, used: set[str | QWidget]) -> Iterator[tuple[str, QW
                 yield key, one
 
 
-def states(window: Any, shown: Mapping[str, Callable[[Any], object]], settled: Callable[[], None]) -> Iterator[str]:
+def states(window: Any, shown: Actions, settled: Callable[[], None]) -> Iterator[str]:
     """Yield what a window tells and paints, then what changes with each of the states it is brought into in turn."""
     recorder = Recorder(window, settled)
     yield from recorder.lines
     for name, bring in shown.items():
         yield from recorder.record(name, lambda bring=bring: bring(window))
+
+
+def part_of(window: Any, path: str) -> Any:
+    """Return a part of a window by its attributes: "stop.fade_in"; also an element by its number or key."""
+    for name in path.split("."):
+        held = window[int(name)] if name.isdigit() else getattr(window, name, None)
+        window = window[name] if held is None else held
+    return window
+
+
+def clicked(*paths: str) -> Callable[[Any], None]:
+    """Return an action that clicks buttons."""
+
+    def act(window: Any) -> None:
+        for path in paths:
+            QTest.mouseClick(part_of(window, path), Qt.MouseButton.LeftButton)
+
+    return act
+
+
+def typed(path: str, text: str) -> Callable[[Any], None]:
+    """Return an action that types into a field and presses Enter."""
+
+    def act(window: Any) -> None:
+        field = part_of(window, path)
+        field.setFocus()
+        field.selectAll()
+        QTest.keyClicks(field, text)
+        QTest.keyClick(field, Qt.Key.Key_Return)
+
+    return act
+
+
+def in_turn(*acts: Callable[[Any], object]) -> Callable[[Any], None]:
+    """Return an action of several, of which the last shows what is compared."""
+
+    def act(window: Any) -> None:
+        for one in acts:
+            one(window)
+
+    return act
 
 
 def _tab_order(window: QWidget) -> Iterator[str]:

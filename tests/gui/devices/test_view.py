@@ -8,7 +8,6 @@ from PySide6.QtWidgets import QAbstractButton, QFileDialog
 
 from study_app.devices.descriptor import Backend
 from study_app.gui.devices.view import NO_FILE
-from study_app.viewmodels.devices.bench import BenchShown
 from study_app.viewmodels.devices.list_view import devices_shown
 from tests.gui import windows
 
@@ -27,16 +26,6 @@ def marked(place):
     return [name for name, title in titles.items() if isinstance(title, QAbstractButton) and title.isChecked()]
 
 
-def test_every_device_has_a_row_with_its_state(place):
-    assert list(place.people.rows) == ["mouse", "falcon"]
-    assert list(place.simulated.rows) == ["falcon-emulated", "falcon-socket:PATH"]
-    assert rows(place)["mouse"].chip.word == "Ready"
-    falcon = rows(place)["falcon"]
-    assert (falcon.chip.word, falcon.why.text()) == ("Not connected", "Plug it in.")
-    assert "ftd2xx: not available" in falcon.by.text()
-    assert "Not connected" in falcon.title.accessibleName()
-
-
 def test_one_is_marked_and_another_can_be_chosen_by_the_keyboard(place, qtbot):
     assert rows(place)["mouse"].title.isChecked()
     with qtbot.waitSignal(place.chosen) as chosen:
@@ -46,13 +35,6 @@ def test_one_is_marked_and_another_can_be_chosen_by_the_keyboard(place, qtbot):
     assert marked(place) == ["falcon-emulated"]
     place.show_devices(devices_shown(windows.FOUND), "falcon-socket:/run/falcon")
     assert marked(place) == []
-
-
-def test_falcons_can_be_diagnosed_and_nothing_else(place, qtbot):
-    assert [name for name, row in rows(place).items() if row.diagnose.isVisible()] == ["falcon", "falcon-emulated"]
-    with qtbot.waitSignal(place.diagnose_asked) as asked:
-        qtbot.mouseClick(rows(place)["falcon"].diagnose, Qt.MouseButton.LeftButton)
-    assert asked.args == ["falcon"]
 
 
 def test_entering_and_refresh_look_again_and_rows_stay(place, qtbot):
@@ -85,21 +67,3 @@ def test_a_falcons_firmware_is_chosen_and_forgotten(place, qtbot, monkeypatch):
     with qtbot.waitSignal(place.option_chosen) as chosen:
         qtbot.mouseClick(firmware.forget, Qt.MouseButton.LeftButton)
     assert chosen.args == ["firmware", None]
-
-
-def test_the_last_bench_is_shown_and_its_report_is_asked_for(place, qtbot, tmp_path):
-    report = tmp_path / "bench.md"
-    place.show_benches({"falcon": BenchShown("Measured 2026-11-21: mass 0.20 kg.", report)})
-    falcon, mouse = rows(place)["falcon"], rows(place)["mouse"]
-    assert (falcon.bench.text(), falcon.bench.isVisible()) == ("Measured 2026-11-21: mass 0.20 kg.", True)
-    assert not mouse.bench.isVisible()
-    assert not mouse.report.isVisible()
-    with qtbot.waitSignal(place.report_asked) as asked:
-        qtbot.mouseClick(falcon.report, Qt.MouseButton.LeftButton)
-    assert asked.args == [report]
-    place.show_devices(devices_shown(windows.FOUND), "mouse")
-    assert falcon.bench.isVisible()
-    place.show_benches({"falcon": BenchShown("Measured. The report is missing: /gone.", None)})
-    assert (falcon.bench.isVisible(), falcon.report.isVisible()) == (True, False)
-    place.show_benches({})
-    assert not falcon.bench.isVisible()

@@ -12,7 +12,6 @@ from study_app.gui.theme.theme import font
 from study_app.gui.widgets.row_table import GAP
 from study_app.protocol.load import source_bytes
 from study_app.protocol.source.files import shipped_file
-from study_app.store.exclusions import exclude
 from study_app.store.workstation import MachineSettings
 from study_app.viewmodels.devices.list_view import devices_shown
 from tests.gui.home.home_window import cell, hold, open_home, study_cards
@@ -95,16 +94,6 @@ def test_a_simulated_session_says_so_in_full_in_the_smallest_window(qtbot, tmp_p
         assert sum(table.columnWidth(at) for at in range(6)) <= table.viewport().width()
 
     qtbot.waitUntil(whole)
-
-
-def test_an_excluded_session_is_not_called_valid(qtbot, tmp_path):
-    hold(tmp_path / "demo", "P001")
-    hold(tmp_path / "demo", "P002")
-    exclude(tmp_path / "demo", "P001", 1, by="AB", reason="fell asleep")
-    home = open_home(qtbot, tmp_path)
-    rows = {one.participant: row for row, one in enumerate(home.sessions.shown)}
-    assert (cell(home, rows["P001"], "Validity"), cell(home, rows["P002"], "Validity")) == ("Excluded", "Open")
-    assert "fell asleep" in cell(home, rows["P001"], "Validity", Qt.ItemDataRole.ToolTipRole)
 
 
 def test_new_session_opens_the_questions_and_passes_the_answers_on(home, qtbot):

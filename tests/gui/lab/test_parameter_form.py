@@ -8,10 +8,9 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 
-from study_app.gui.lab.parameter_rows import ChoiceRow, NumberRow, SwitchRow
+from study_app.gui.lab.parameter_rows import NumberRow, SwitchRow
 from study_app.gui.widgets.escape_key import HOLD_MS, EscapeAnywhere
-from study_app.lab.parameters import sections
-from study_app.viewmodels.lab import LabView, form
+from study_app.viewmodels.lab import LabView
 from tests.gui.lab.sample import blind, heard, still_view, workbench
 from tests.gui.walk import settle
 
@@ -34,25 +33,6 @@ def enter(field: Any, text: str) -> None:
     field.selectAll()
     QTest.keyClicks(field, text)
     QTest.keyClick(field, Qt.Key.Key_Return)
-
-
-def test_every_parameter_has_a_row_in_units_people_read_and_changed_ones_are_marked(
-    place: Any, told: Any, still: LabView
-) -> None:
-    wanted = [it for section in sections(still.workbench.a.scene) for it in section.parameters]
-    assert list(place.form.rows) == [it.name for it in wanted]
-    assert {type(row) for row in place.form.rows.values()} == {NumberRow, ChoiceRow, SwitchRow}
-    assert list(place.form.blocks) == [section.title for section in form(still.workbench.a)]
-    rows = fields(place)
-    texts = {"wake.breaking_span_m": "68", "wake.decay": "0.999975", "liquid.viscosity_pa_s": ""}
-    assert {name: rows[name].field.text() for name in texts} == texts
-    assert rows["wake.breaking_span_m"].slider.number == pytest.approx(68)
-    assert rows["body.diameter_m"].field.accessibleName() == "Diameter, mm"
-    changed = {name for name, row in rows.items() if row.field.state == "changed"}
-    assert changed == {"wake.scaling", "wake.exponent", "wake.breaking_angle_deg"}
-    assert all((row.name.font().weight() == 600) == (name in changed) for name, row in rows.items())
-    assert rows["wake.scaling"].slider.tick == 1700
-    assert [place.form.blocks[title].count.text() for title in ("Wake", "Body")] == ["3 of 8 changed", ""]
 
 
 def test_every_number_says_exactly_what_it_shows_when_entered_again(place: Any, told: Any, still: LabView) -> None:

@@ -63,31 +63,6 @@ def test_the_felt_side_is_seen_and_buttons_and_keys_ask_also_from_within_a_field
     assert not place.header.undo.isEnabled()
 
 
-def test_device_and_path_are_chosen(place: Any, still: LabView) -> None:
-    devices, paths = heard(place, "device_chosen"), heard(place, "path_chosen")
-    place.show_view(still)
-    place.header.device.activated.emit(1)
-    place.header.path.activated.emit(2)
-    place.header.path.activated.emit(0)
-    assert devices == [("falcon",)]
-    assert paths == [("zigzag",), (None,)]
-    place.show_view(dataclasses.replace(still, path="zigzag"))
-    assert place.header.path.currentText() == "Turns of 90°"
-
-
-def test_after_a_stop_the_force_can_be_faded_in_again(place: Any, still: LabView) -> None:
-    said = heard(place, "fade_in_asked")
-    place.show_view(still)
-    assert not place.note.isVisible()
-    place.show_view(dataclasses.replace(still, force_on=False))
-    assert place.note.words.text() == "Force is off"
-    assert place.tank.rect().contains(place.note.geometry())
-    place.note.fade_in.click()
-    assert said == [()]
-    place.show_view(still)
-    assert not place.note.isVisible()
-
-
 def test_waiting_is_told_after_300_ms_and_can_be_cancelled(place: Any, still: LabView, qtbot: Any) -> None:
     said = heard(place, "cancel_asked")
     busy = dataclasses.replace(still, busy="Opening the Falcon")

@@ -1,19 +1,17 @@
 """The window before a session: every check with its value, warnings accepted by name, failures refused."""
 
 from dataclasses import replace
-from datetime import datetime
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QLabel
+from PySide6.QtWidgets import QApplication
 
 from study_app.gui.preflight import PreflightWindow
 from study_app.gui.preflight.window import LEAST
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.masking import Masking
-from study_app.session.preflight import checks
-from study_app.viewmodels.preflight import WAITING, resumed_rows
+from study_app.viewmodels.preflight import resumed_rows
 from tests.gui.windows import SCALED, WELL, checked, preflight
 
 pytestmark = pytest.mark.slow
@@ -30,17 +28,6 @@ def begun(window):
     said = []
     window.start_asked.connect(lambda: said.append("begun"))
     return said
-
-
-def test_every_check_has_a_row_with_its_value_and_a_warning_says_what_to_do(window):
-    said = {row.check.name: row.accessibleName() for row in window.rows}
-    assert said["Servo rate"].startswith("Servo rate, passed, 1000.0 Hz")
-    assert "146 ns per tick" in said["Cost of the scenes"]
-    assert len(said) == len(checks(WELL, load("rek2024")))
-    assert window.plot.p99_name.textItem.toPlainText() == "p99 61"
-    window.show_view(checked(SCALED))
-    row = next(row for row in window.rows if row.check.name == "Screen")
-    assert any("100 % scaling" in part.text() for part in row.findChildren(QLabel))
 
 
 @pytest.mark.parametrize(
@@ -88,16 +75,6 @@ def test_one_goes_back_without_a_trace_and_finishing_is_not_going_back(window, q
         getattr(window, how)()
     assert cancelled == ([] if how == "finish" else [how])
     assert not window.isVisible()
-
-
-def test_what_will_run_and_how_true_it_is(window):
-    rows = dict(checked(WELL).rows)
-    assert rows["Answers"] == "62"
-    assert rows["Expected force error"] == WAITING
-    assert dict(checked(WELL, error_n=0.004).rows)["Expected force error"] == "< 0.01 N"
-    assert dict(checked(WELL, error_n=0.031).rows)["Expected force error"] == "0.03 N"
-    assert "Expected force error" not in dict(checked(WELL, asked_error=False).rows)
-    assert datetime.strptime(rows["Ends about"], "%H:%M").hour == 14
 
 
 def test_every_check_can_be_looked_at_by_the_keyboard_in_the_smallest_window(window, qtbot):

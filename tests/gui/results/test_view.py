@@ -1,7 +1,6 @@
 """The results window draws a view and says what is asked for; it knows no file and computes nothing."""
 
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -11,8 +10,8 @@ from PySide6.QtWidgets import QLabel
 from study_app.gui.results.view import ResultsPlace
 from study_app.gui.theme.theme import DARK
 from study_app.gui.widgets.controls import ActionButton
-from study_app.viewmodels.results import FigureShown, Going, Opened, Trouble
-from tests.gui.results.sample import LEFT_OUT, STUDY, SVG, facts, view
+from study_app.viewmodels.results import FigureShown
+from tests.gui.results.sample import LEFT_OUT, SVG, facts, view
 from tests.gui.windows import results
 
 pytestmark = pytest.mark.slow
@@ -39,17 +38,6 @@ def decided(qtbot, asked, dialog, by, reason):
     with qtbot.waitSignal(asked) as heard:
         click(qtbot, dialog.go_on)
     return heard.args
-
-
-def test_what_needs_care_is_first_and_an_open_study_says_by_whom_and_why(place):
-    assert place.sessions.rows.shown[0].participant == "P007"
-    assert place.sessions.head.text() == "6 of 7 sessions in the figures"
-    assert place.sessions.why.text() == "P007 is not complete."
-    by = Opened(datetime(2026, 11, 19, tzinfo=UTC), "AK", "collection closed, " + "and so on " * 20)
-    place.show_view(replace(view(), sealed=False, opened=by))
-    assert place.chips[1].word.startswith("Unblinded 19 Nov by AK: collection closed")
-    assert place.chips[1].toolTip() == by.words
-    assert not place.unblind.isVisible()
 
 
 @pytest.mark.parametrize(("width", "stacked"), [(1024, True), (1920, False)])
@@ -125,18 +113,6 @@ def test_unblinding_warns_of_sessions_that_go_on(place, qtbot):
     assert decided(qtbot, place.unblind_asked, dialog, "AK", "closed") == ["AK", "closed"]
 
 
-def test_what_is_left_out_is_listed_the_last_first_with_its_reason(place, qtbot):
-    assert place.exclusions.none.isVisible()
-    place.show_view(replace(view(), left_out=(LEFT_OUT, replace(LEFT_OUT, what="P005", reason="asleep"))))
-    assert [line.accessibleName().split(" (")[0] for line in place.exclusions.lines] == [
-        "P005: asleep",
-        "P003, trial 4: phone rang",
-    ]
-    with qtbot.waitSignal(place.open_asked) as asked:
-        click(qtbot, place.exclusions.open)
-    assert asked.args[0] == STUDY / "exclusions.csv"
-
-
 def test_what_is_left_out_is_taken_back_with_a_name_and_a_reason(place, qtbot):
     place.show_view(replace(view(), left_out=(LEFT_OUT,)))
     back = place.exclusions.lines[0].findChild(ActionButton)
@@ -147,16 +123,6 @@ def test_what_is_left_out_is_taken_back_with_a_name_and_a_reason(place, qtbot):
     back.setFocus()
     place.show_view(view())
     assert place.window().focusWidget() is place.exclusions.leave_out
-
-
-def test_choosing_a_study_asks_for_it_and_showing_one_does_not(place, qtbot):
-    asked = []
-    place.study_asked.connect(asked.append)
-    place.show_view(replace(view(), chosen=Path("results/demo")))
-    assert asked == []
-    place.study.setFocus()
-    qtbot.keyClick(place.study, Qt.Key.Key_Up)
-    assert asked == [STUDY]
 
 
 @pytest.mark.parametrize("sealed", [True, False])
@@ -176,26 +142,6 @@ def test_outputs_say_that_settings_appear_as_codes_while_the_key_is_sealed_and_w
         place.writing.reject()
 
 
-def test_exporting_asks_for_what_the_command_has(place, qtbot):
-    click(qtbot, place.export)
-    dialog = place.writing
-    assert set(dialog.extras) == {"wide", "parquet", "sav", "psych-ds"}
-    dialog.extras["wide"].click()
-    dialog.to.setText("/elsewhere/tables")
-    with qtbot.waitSignal(place.tables_asked) as asked:
-        click(qtbot, dialog.go_on)
-    assert asked.args == [Path("/elsewhere/tables"), ("wide",)]
-    dialog.show_progress("making the tables", 0.3)
-    assert dialog.said.text() == "Making the tables …"
-    dialog.show_written([Path("/elsewhere/tables/a.csv")], Path("/elsewhere/tables"), [])
-    assert dialog.said.text() == "1 file in /elsewhere/tables."
-    with qtbot.waitSignal(place.open_asked) as asked:
-        click(qtbot, dialog.go_on)
-    assert asked.args[0] == Path("/elsewhere/tables")
-    click(qtbot, dialog.cancel)
-    assert place.writing is None
-
-
 def test_a_report_can_be_given_up_and_a_refusal_lets_one_try_again(place, qtbot):
     click(qtbot, place.report)
     dialog = place.writing
@@ -208,35 +154,6 @@ def test_a_report_can_be_given_up_and_a_refusal_lets_one_try_again(place, qtbot)
     assert dialog.isVisible(), "until it is known that nothing was written"
     dialog.stopped()
     assert place.writing is None
-
-
-@pytest.mark.parametrize("remedy", ["again", "read", "stop"])
-def test_trouble_is_one_sentence_and_one_button(place, qtbot, remedy):
-    place.show_view(
-        replace(view(), figures=(), trouble=Trouble("It cannot be read", "P002 is damaged.", "Look", remedy))
-    )
-    trouble = place.figures.trouble
-    assert (trouble.title.text(), trouble.sentence.text()) == ("It cannot be read", "P002 is damaged.")
-    with qtbot.waitSignal(place.remedy_asked) as asked:
-        click(qtbot, trouble.button)
-    assert asked.args == [remedy]
-    place.show_view(view())
-    assert not trouble.isVisible()
-
-
-def test_reading_says_how_far_it_is_and_can_be_stopped(place, qtbot):
-    place.show_view(replace(view(), figures=(), drawing=Going("drawing", 0.4)))
-    assert place.figures.trouble.title.text() == "Drawing …"
-    with qtbot.waitSignal(place.remedy_asked) as asked:
-        click(qtbot, place.figures.trouble.button)
-    assert asked.args == ["stop"]
-    place.show_view(replace(view(), testing=Going("testing: Unusable", 0.4)))
-    assert place.figures.work.isVisible()
-    assert not place.figures.trouble.isVisible()
-    place.show_view(replace(view(), untested=True))
-    with qtbot.waitSignal(place.remedy_asked) as asked:
-        click(qtbot, place.figures.work.again)
-    assert asked.args == ["read"]
 
 
 def test_a_figure_drawn_again_keeps_its_card_and_its_caption_can_be_read(place, qtbot):
@@ -262,16 +179,3 @@ def test_figures_take_the_colours_of_the_theme(place, qtbot):
     qtbot.waitUntil(
         lambda: drawing.settled and drawing.grab().toImage().pixelColor(3, 3).name() == DARK.surface.lower()
     )
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({}, "Reading the sessions …"),
-        ({"trouble": Trouble("The study cannot be read", "It is damaged.", "Refresh", "again")}, ""),
-        ({"listed": True}, "No sessions."),
-    ],
-)
-def test_sessions_are_said_to_be_none_only_where_they_were_read(place, changes, words):
-    place.show_view(view(sessions=(), **changes))
-    assert (place.sessions.rows.none.text(), place.sessions.head.text()) == (words, "")

@@ -8,7 +8,7 @@ from PySide6.QtGui import QColor
 
 from study_app.gui.participant.tank.photodiode_patch import PATCH
 from study_app.gui.participant.tank_widget import TankWidget
-from study_app.gui.settings.display_test import FIRST_MS, figures_words
+from study_app.gui.settings.display_test import FIRST_MS
 from study_app.gui.settings.pixel_patterns import GREYS, GreyRamp, LineField, lines
 from study_app.protocol.wording.languages import words
 from tests.gui.small import task_page
@@ -53,19 +53,6 @@ def test_the_patch_is_where_and_as_large_as_in_the_tank(test_page, qtbot):
     assert test_page.grab().toImage().copy(*area) == tank.grab().toImage().copy(*area)
 
 
-def test_frames_are_counted_when_they_are_painted(test_page, clock):
-    for _ in range(10):
-        clock.now += 16_666_667
-        test_page.frame()
-        test_page.repaint()
-    assert test_page.times.figures().painted == 10
-    test_page.repaint()  # that nobody asked for
-    assert test_page.times.figures().painted == 10
-    test_page.show_figures()
-    assert [value.text() for value in test_page.values] == ["60.0 of 60.0 Hz", "16.67 ms", "16.67 ms", "0"]
-    assert figures_words(None, 60.0) == ("–",) * 4
-
-
 @pytest.mark.slow
 def test_frames_are_asked_for_while_it_is_shown_and_no_longer(qtbot):
     made = display_test(qtbot)
@@ -75,17 +62,6 @@ def test_frames_are_asked_for_while_it_is_shown_and_no_longer(qtbot):
         qtbot.keyClick(made, Qt.Key.Key_Escape)
     assert not made.frames.findChild(QTimer).isActive()
     assert not made.report_timer.isActive()
-
-
-def test_the_interval_is_typed_and_one_out_of_range_is_refused(test_page, qtbot):
-    field = test_page.interval
-    for typed, state in (("200", ""), ("9", "refused")):
-        field.setFocus()
-        field.selectAll()
-        qtbot.keyClicks(field, typed)
-        qtbot.keyClick(field, Qt.Key.Key_Return)
-        assert (test_page.interval_ms, field.state) == (200, state)
-    assert "50 to 5000" in test_page.why.text()
 
 
 @pytest.mark.parametrize(("mean", "spread"), [("", "1"), ("900", "1"), ("20", "400")])

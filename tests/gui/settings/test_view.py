@@ -3,10 +3,10 @@
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontMetricsF
-from PySide6.QtWidgets import QFileDialog, QLabel
+from PySide6.QtWidgets import QFileDialog
 
 from study_app.gui.theme.theme import font
-from study_app.store.workstation import CAMERA_LENGTH, STATEMENT_X_HEIGHT_PX, DisplayOffset, MachineSettings
+from study_app.store.workstation import CAMERA_LENGTH, STATEMENT_X_HEIGHT_PX, MachineSettings
 from tests.gui.windows import SCREENS, machine, two_screens
 from tests.gui.windows import show_settings as show
 
@@ -24,22 +24,6 @@ def type_into(qtbot, field, text):
     field.selectAll()
     qtbot.keyClicks(field, text)
     qtbot.keyClick(field, Qt.Key.Key_Return)
-
-
-def test_screens_are_listed_and_another_is_chosen_by_name_and_number_and_one_that_is_gone_is_named(place, qtbot):
-    assert [radio.isChecked() for radio in place.screens.radios] == [False, True]
-    said = [one.text() for one in place.screens.findChildren(QLabel)]
-    assert any("1920 × 1080, 144 Hz, 100\u202f%" in words and "527 × 296 mm" in words for words in said)
-    assert not place.screens.note.isVisible()
-    with qtbot.waitSignal(place.changed) as changed:
-        qtbot.keyClick(place.screens.radios[0], Qt.Key.Key_Space)
-    assert changed.args == [{"screen": "eDP-1", "screen_number": 1}]
-    show(place, MachineSettings(screen="eDP-1", screen_number=1))
-    assert [radio.isChecked() for radio in place.screens.radios] == [True, False]
-    assert place.participants is ONE
-    show(place, MachineSettings(screen="HDMI-7", screen_number=2))
-    assert "HDMI-7 is not connected" in place.screens.note.text()
-    assert place.participants is TWO
 
 
 def test_the_distance_is_typed_and_the_words_grow(place, qtbot):
@@ -68,20 +52,6 @@ def test_a_distance_out_of_range_is_refused_and_an_empty_one_forgotten(place, qt
     assert field.state == ""
 
 
-def test_an_offset_is_that_of_the_participants_screen(place, qtbot):
-    form = place.offset.form
-    qtbot.keyClicks(form.mean, "23.5")
-    with qtbot.waitSignal(place.offset_measured) as measured:
-        qtbot.mouseClick(form.keep, Qt.MouseButton.LeftButton)
-    assert measured.args == [23.5, 0.0, "photodiode", "DP-1"]
-    show(place, MachineSettings(display_offset=DisplayOffset(mean_ms=23.5, screen="DP-1")))
-    with qtbot.waitSignal(place.changed) as changed:
-        qtbot.mouseClick(form.forget, Qt.MouseButton.LeftButton)
-    assert changed.args == [{"display_offset": None}]
-    show(place, MachineSettings(display_offset=DisplayOffset(mean_ms=23.5, screen="HDMI-1")))
-    assert form.said.text() == "23.5 ± 0 ms by photodiode for another screen (HDMI-1): not used here."
-
-
 def test_device_folder_theme_and_sound_are_chosen(place, qtbot, monkeypatch, tmp_path):
     assert not place.windows.sound.isChecked()
     with qtbot.waitSignal(place.changed) as changed:
@@ -106,14 +76,6 @@ def test_device_folder_theme_and_sound_are_chosen(place, qtbot, monkeypatch, tmp
     with qtbot.waitSignal(place.go_asked) as going:
         qtbot.mouseClick(place.sessions.devices, Qt.MouseButton.LeftButton)
     assert going.args == ["devices"]
-
-
-def test_undo_names_what_it_takes_back(place, qtbot):
-    assert not place.undo.isEnabled()
-    show(place, MachineSettings(sound=True), undo="sound")
-    assert place.undo.text() == "Undo sound"
-    with qtbot.waitSignal(place.undo_asked):
-        qtbot.keyClick(place, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
 
 
 @pytest.fixture
@@ -146,22 +108,6 @@ def test_the_display_test_is_opened_once_and_left_by_esc(real_place, qtbot):
     with qtbot.waitSignal(test.left):
         qtbot.keyClick(test, Qt.Key.Key_Escape)
     assert real_place.test is None
-
-
-def test_markers_and_samples_are_switched(place, qtbot):
-    with qtbot.waitSignal(place.changed) as changed:
-        qtbot.keyClick(place.outlets.markers, Qt.Key.Key_Space)
-    assert changed.args == [{"lsl_markers": True}]
-    samples = place.outlets.samples
-    assert samples.currentText() == "Off"
-    samples.setCurrentIndex(1)
-    with qtbot.waitSignal(place.changed) as changed:
-        samples.activated.emit(1)
-    assert changed.args == [{"lsl_samples": "single-blind"}]
-    show(place, MachineSettings(lsl_markers=True, lsl_samples="always", triggers="serial:COM3"))
-    assert place.outlets.markers.isChecked()
-    assert samples.currentText() == "On, also in double-blind studies"
-    assert place.outlets.triggers.text() == "serial:COM3"
 
 
 def test_a_trigger_port_is_typed_and_what_is_none_is_refused(place, qtbot):

@@ -1,0 +1,113 @@
+"""The liquid lab in its states: moved, blind, measuring, refused, estimating."""
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from PySide6.QtCore import QTimer
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QWidget
+
+from study_app.gui.theme.theme import DARK
+from study_app.gui.theme.themed import apply_theme
+from study_app.lab.ab_comparison import Setting, Workbench
+from study_app.lab.presets import spoken
+from study_app.lab.shadow import Trace
+from study_app.protocol.load import load_scene
+from study_app.viewmodels.estimation import LSL, SOURCES, EstimateRow, EstimateShown
+from study_app.viewmodels.lab import Now
+from tests.gui.lab.sample import blind, still_view, workbench
+from tests.gui.transcript import Actions, clicked, in_turn
+
+
+def flowing() -> dict[str, Any]:
+    """Return a motion of both sides, made up: a zigzag with three segments and two oscillating forces."""
+    count = 300
+    share = np.linspace(0.0, 1.0, count)
+    places = np.column_stack((0.04 * np.sin(9 * share), 0.02 * np.cos(7 * share), 0.025 * share - 0.01))
+    breaks = np.isin(np.arange(count), (0, 120, 230))
+    tail = SimpleNamespace(positions_m=places, breaks=breaks, ages=1 - share, elements=1700, alive=1210, segments=3)
+    t_s = np.linspace(-2.5, 0.0, 2500)
+    wave = np.column_stack((np.sin(5 * t_s), np.cos(3 * t_s), 0.2 * t_s))
+    speeds = (0.2 + 0.1 * np.sin(k * t_s) for k in (2, 3, 4))
+    acting = still_view().limiters
+    return {
+        "trace": Trace(t_s, 3 * wave, 2 * wave[::-1], *speeds, felt_a=t_s < -1.0),
+        "tail_a": tail,
+        "tail_b": replace_fields(tail, positions_m=-places, segments=1, breaks=breaks & (share < 0.1)),
+        "now": Now((0.01, 0.005, 0.004), (2.0, 1.0, 0.5), (0.3, -0.2, 0.1)),
+        "limiters": (
+            dataclasses.replace(acting[0], ticks=14, acting=True),
+            dataclasses.replace(acting[1], ticks=1500),
+            *acting[2:],
+        ),
+    }
+
+
+def replace_fields(kept: SimpleNamespace, **changed: Any) -> SimpleNamespace:
+    return SimpleNamespace(**(vars(kept) | changed))
+
+
+def slime(a: str, b: str) -> Workbench:
+    scenes = {name: load_scene("slime", name) for name in (a, b)}
+    return Workbench(*(Setting(spoken(name), scenes[name], scenes[name]) for name in (a, b)))
+
+
+def of_lab(**fields: Any) -> Callable[[Any], None]:
+    return lambda place: place.show_view(still_view(**fields))
+
+
+def shown_now(place: QWidget) -> None:
+    """Let what waits for a single timer come at once."""
+    for timer in place.findChildren(QTimer):
+        if timer.isSingleShot() and timer.isActive():
+            timer.start(0)
+
+
+def refused(place: Any) -> None:
+    """Type what is no number, and a length that the model refuses."""
+    for name, text in (("wake.exponent", "0.5.5"), ("wake.length", "9000")):
+        field = place.form.rows[name].field
+        field.selectAll()
+        QTest.keyClicks(field, text)
+        QTest.keyClick(field, "\r")
+    place.show_view(still_view(refused=("wake.length", "length 9000 exceeds scaling 2600: lower length")))
+
+
+FOUND_VALUES = EstimateShown(
+    source="other",
+    sources=(*SOURCES, *LSL),
+    rows=(EstimateRow("Drag coefficient", "0.4203", "0.419 … 0.422"), EstimateRow("Decay", "0.99", "0.98 … 1")),
+    message="Residual 0.052 N, 12 % of the force; 10 s measured",
+    sound=True,
+    may_apply=True,
+    may_follow=True,
+)
+LAB: Actions = {
+    "moved": lambda place: place.show_view(still_view(**flowing())),
+    "B felt": lambda place: place.show_view(still_view(workbench().switch(), **flowing())),
+    "blind": lambda place: place.show_view(still_view(blind(workbench(), first="B"), **flowing())),
+    "measuring": of_lab(cost=(), errors=(), tick_ns=None, measuring=True),
+    "not measured": of_lab(cost=(), errors=()),
+    "refused": refused,
+    "flow curves, blind": lambda place: place.show_view(still_view(blind(slime("ketchup", "honey")))),
+    "flow curves": lambda place: place.show_view(still_view(slime("ketchup", "honey"), estimate=FOUND_VALUES)),
+    "other force limit": lambda place: (
+        clicked("estimate.apply", "estimate.follow")(place),
+        place.show_view(still_view(slime("ketchup", "honey").change("scene.force_limit_n", 4.0), study="own")),
+    ),
+    "estimate fails": of_lab(
+        estimate=replace(FOUND_VALUES, sound=False, may_apply=False, follows=True, message="Too little motion.")
+    ),
+    "busy": lambda place: (of_lab(busy="Opening the Falcon")(place), shown_now(place)),
+    "trouble": in_turn(clicked("note.cancel"), of_lab(trouble="No Falcon answers: check its cable.")),
+    "put away": clicked("note.dismiss"),
+    "force off": of_lab(force_on=False, said="Saved as syrup.toml"),
+    "path": in_turn(clicked("note.fade_in"), of_lab(path="zigzag", study="own.toml")),
+    "undone": lambda place: place.show_view(still_view(workbench().undo())),
+    "narrow": lambda place: place.resize(928, 640),
+    "dark": lambda place: apply_theme(place, DARK),
+}

@@ -1,0 +1,171 @@
+"""The operator's window and strip in their states."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from study_app.gui.operator import OperatorWindow
+from study_app.gui.operator.strip import Strip
+from study_app.haptics.model.layout import LIMITER_NORM, SAMPLE, records
+from study_app.viewmodels.force_traces import Forces
+from tests.gui.operator.session import measured_health, new_session
+from tests.gui.transcript import Actions, clicked, in_turn, typed
+from tests.gui.windows import shown
+
+
+def pushes(limiters: int) -> Any:
+    """Return samples of a hand that is pushed to and fro by at most 2 N."""
+    samples = records(SAMPLE, 4000)
+    samples.tick = np.arange(4000)
+    samples.time_ns = samples.tick * 1_000_000
+    samples.scene = 1
+    turn = samples.tick / 300
+    samples.device_force_n = np.column_stack((2 * np.sin(turn), -np.cos(turn), 0.5 * np.sin(2 * turn)))
+    samples.wake_mps = np.column_stack((0.2 * np.cos(turn), 0 * turn, 0.1 + 0 * turn))
+    samples.limiters = np.where(samples.tick < 1500, limiters, 0)
+    samples.permitted_n, samples.withheld_n = 2.0, 0.1
+    return samples
+
+
+def operator(qtbot: Any, **more: Any) -> OperatorWindow:
+    made: Any = OperatorWindow("demo", lateness_limit_s=0.002, reach_m=0.05, pointer=True, **more)
+    qtbot.addWidget(made, before_close_func=lambda window: setattr(window, "may_close", True))
+    made.told, made.health, made.forces = new_session(), measured_health(), Forces(6.0)
+    made.force_limited = "force_limit_n" in more
+    if made.force_limited:
+        made.told.make_single_blind()
+        made.forces.take(pushes(LIMITER_NORM))
+    shown(qtbot, made, (1366, 768))
+    told()(made)
+    return made  # type: ignore[no-any-return]
+
+
+def told(*happened: Any, beyond: Mapping[str, Any] | None = None, **said: Any) -> Callable[[Any], None]:
+    """Return an action: the session tells what happened, then the window shows it; ``beyond`` changes the view."""
+
+    def act(window: Any) -> None:
+        for one in happened:
+            if callable(one):
+                one(window.told)
+            else:
+                event, fields = one
+                window.told.tell(event, 5.0, **fields)
+        figures = {"forces": window.forces.figures()} if window.force_limited else {}
+        window.show_view(replace(window.told.view(window.health, **figures, **said), **beyond or {}))
+        window.show_traces(window.health, 4.0)
+        window.show_lateness(window.health)
+        window.show_forces(window.forces, 4_000_000_000)
+
+    return act
+
+
+def reasoned(ask: str) -> Callable[[Any], None]:
+    """Return an action that gives a question a blank reason, then one, and goes on."""
+
+    def act(window: Any) -> None:
+        getattr(window, ask)()
+        for reason in ("  ", "phone rang"):
+            window.question.reason.setText(reason)
+            if reason.strip() or ask != "ask_to_end":  # an end needs none
+                window.question.go_on.click()
+
+    return act
+
+
+def slowed(window: Any) -> None:
+    """Let ticks come late and frames miss, a hand leave the tank and the device answer later."""
+    samples = records(SAMPLE, 3000)
+    samples.tick = np.arange(3000, 6000)
+    samples.time_ns = samples.tick * 1_250_000
+    samples.lateness_ns, samples.delay_ticks = 9_000_000, 4
+    window.health.take(samples)
+    window.health.overruns = 17
+    window.health.frame(4_000_000_000)
+    window.health.hand(100.0, (0.09, 0.0, 0.0))
+    told(("note", {"kind": "mark", "text": ""}), dropped=1200, outlets_lost={"Serial port": "it was unplugged"})(window)
+    window.show_traces(window.health, 100.0)
+
+
+def pushed(peak_n: float) -> Callable[[Any], None]:
+    """Return an action: the plots show only a push of so many newtons."""
+
+    def act(window: Any) -> None:
+        window.forces = Forces(6.0)
+        samples = pushes(0)
+        samples.device_force_n = samples.device_force_n * (peak_n / 2)
+        window.forces.take(samples)
+        told()(window)
+
+    return act
+
+
+PAUSED = ("paused", {"by": "operator"})
+RECONNECTS = {"may_reconnect": True, "reconnects": True, "reconnection": "Opening"}
+RUNNING: Actions = {
+    "trial 1": told(lambda it: it.welcome(), lambda it: it.start(1)),
+    "two notes": told(*(("note", {"kind": "note", "text": text}) for text in ("Left-handed", "A long note " * 9))),
+    "answering": told(lambda it: it.end(1, worst_gap_ms=31.0, lateness_p99_ms=9.5)),
+    "trial 2": told(lambda it: it.answer(1), lambda it: it.start(2)),
+    "pressed": in_turn(
+        clicked("buttons.pause", "notes.mark", "notes.add", "device.diagnose", "stop.stop", "header.page"),
+        typed("notes.field", "left-handed"),
+        *(reasoned(f"ask_to_{what}") for what in ("repeat", "exclude", "end")),
+    ),
+    "paused": told(PAUSED),
+    "resumed": in_turn(
+        clicked("buttons.pause"), told(("resumed", {"by": "operator"}), ("note", {"kind": "mark", "text": ""}))
+    ),
+    "force off": told(("force_stopped", {"by": "operator"}), PAUSED, force_on=False),
+    "device lost": in_turn(
+        clicked("stop.fade_in"),
+        told(
+            ("broke", {"what": "the device 'falcon' stopped responding"}),
+            beyond={"may_reconnect": True, "reconnection": "Not connected: no arm found its index"},
+            force_on=False,
+            device_ready=False,
+            faults=2,
+        ),
+    ),
+    "reconnecting": in_turn(clicked("banner.reconnect"), told(beyond=RECONNECTS, force_on=False)),
+    "in the dark theme": lambda window: window.header.theme_button.click(),
+    "panel failed": lambda window: window.panels.draw(window.tiles, lambda: 1 / 0),
+}
+DISK: Actions = {
+    "a form": told(lambda it: it.welcome()),
+    "late": lambda window: (told(lambda it: it.start(3))(window), slowed(window)),
+    "targets": told(*(("target_reached", {"trial": 3, "target": target, "t_task_s": 1.0}) for target in (0, 1))),
+    "pushed to the limit": pushed(5.8),
+    "hardly pushed": pushed(0.02),
+    "track": told(beyond={"track": ("Track V1: 9 of at most 24 answered", "longest run 8: check")}),
+    "waiting for the disk": told(force_on=False, trouble="no space left on the disk: free some", waits=True),
+    "recording lost": told(("recording_lost", {"trial": 3, "attempt": 1, "reason": "No space left on device"})),
+    "asks to repeat": lambda window: window.ask_to_repeat(),
+    "asks to exclude": lambda window: window.ask_to_exclude(),
+    "asks to end": lambda window: window.ask_to_end(),
+    "says something": lambda window: window.show_message("It cannot be", "The disk is full."),
+    "small": lambda window: window.resize(window.minimumSize()),
+    "large": lambda window: window.resize(1920, 1080),
+    "complete": told(("session_ended", {"status": "completed", "reason": "", "fingerprint": "wwww-mmmm"})),
+    "may be closed": lambda window: window.close(),
+}
+
+
+def strip(qtbot: Any) -> Strip:
+    made: Any = shown(qtbot, Strip(), (900, 52))
+    made.told = new_session()
+    return made  # type: ignore[no-any-return]
+
+
+def of_strip(**told: Any) -> Callable[[Any], None]:
+    return lambda made: made.show_view(made.told.view(**told))
+
+
+STRIP: Actions = {
+    "preparing": of_strip(),
+    "running": lambda made: (made.told.welcome(), made.told.start(1), of_strip()(made)),
+    "force off": of_strip(force_on=False),
+    "trouble": of_strip(trouble="The disk is full"),
+    "narrow": lambda made: made.resize(420, 52),
+}

@@ -1,0 +1,158 @@
+"""Results, the export and a session's page in their states."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PySide6.QtWidgets import QWidget
+
+from study_app.errors import StoreError
+from study_app.gui.sessions.session_page import SessionPage
+from study_app.gui.theme.theme import DARK, LIGHT
+from study_app.gui.theme.themed import apply_theme
+from study_app.store.exclusions import Exclusion
+from study_app.viewmodels.results import FigureShown, Going, Opened, Trouble
+from study_app.viewmodels.session.record import MOTION_HIDDEN, SessionRecord, TrialRecord
+from tests.gui.results.sample import LEFT_OUT, SVG, facts, view
+from tests.gui.transcript import Actions, clicked, in_turn
+from tests.gui.windows import results, shown
+
+NOW = datetime(2026, 11, 24, 12, tzinfo=UTC)
+STARTED = NOW - timedelta(days=1)
+
+
+def of_results(**changes: Any) -> Callable[[Any], None]:
+    return lambda window: window.place("results").show_view(view(**changes))
+
+
+def then(button: str, **changes: Any) -> Callable[[Any], None]:
+    """Return an action that presses a button of the figures, then shows other results."""
+    return in_turn(lambda window: clicked(f"figures.{button}")(window.place("results")), of_results(**changes))
+
+
+FIGURES = view().figures
+PEOPLE = (
+    facts("P001", status="damaged", validity=None),
+    facts("P002", status="withdrawn", validity="invalid", answers=3, answers_of=62),
+    facts("P003", excluded="fell asleep"),
+    facts("P004", status="running", validity=None, session=2),
+    facts("P005", status="aborted", reconnected=2, started=STARTED),
+    facts("P006", simulated=False, pilot=True, outlets_lost=1, lost=3, started=NOW),
+    facts("P007", simulated=False, status="broken", started=datetime(2025, 1, 2, 3, 4, tzinfo=UTC)),
+)
+RESULTS: Actions = {
+    "all states": of_results(sessions=PEOPLE, left_out=(LEFT_OUT, replace(LEFT_OUT, what="P005", at=None))),
+    "unblinded": of_results(sealed=False, opened=Opened(STARTED, "AK", "closed, " + "and so on " * 20)),
+    "doubts": of_results(doubts=("P001/journal.jsonl", "P002/trials.csv"), chosen=Path("results/demo")),
+    "pilot": of_results(studies=(replace(view().studies[0], kind="pilot"),)),
+    "empty figure": of_results(figures=(replace(FIGURES[1], svg=b"", caption="No completed session."),)),
+    "three figures": of_results(figures=(*FIGURES, FigureShown("third", "Third", "Caption.", SVG))),
+    "drawing": of_results(figures=(), drawing=Going("drawing", 0.4)),
+    "testing": of_results(testing=Going("testing: Unusable", 0.7)),
+    "untested": then("work.stop", untested=True),
+    "trouble": then("work.again", figures=(), trouble=Trouble("It cannot be", "P002 is damaged.", "Look", "again")),
+    "reading": then("trouble.button", sessions=(), figures=()),
+    "no sessions": of_results(sessions=(), figures=(), listed=True),
+    "no study": of_results(studies=(), chosen=None, sessions=(), figures=()),
+    "stacked": lambda window: (window.resize(1024, 640), of_results()(window)),
+}
+
+
+def writing(qtbot: Any) -> QWidget:
+    """Return the dialog that exports tables, over results in which SPSS files cannot be written."""
+    window = results(qtbot).main
+    window.place("results").export.click()
+    made: QWidget = window.place("results").writing
+    made.over = window  # type: ignore[attr-defined]  # or it would be collected here
+    return made
+
+
+WRITING: Actions = {
+    "begun": lambda dialog: (dialog.extras["wide"].click(), dialog.go_on.click()),
+    "progress": lambda dialog: dialog.show_progress("making the tables", 0.3),
+    "refused": lambda dialog: dialog.show_refused("/somewhere cannot be written"),
+    "again": lambda dialog: dialog.go_on.click(),
+    "stopping": lambda dialog: dialog.cancel.click(),
+    "written": lambda dialog: dialog.show_written(
+        [Path("/there/a.csv"), Path("/there/b.csv")], Path("/there"), [f"P00{n} is damaged" for n in range(5)]
+    ),
+    "opened": lambda dialog: dialog.go_on.click(),
+}
+
+TRIAL = TrialRecord(1, 1, "Part 1, L2", "complete", True, (), 9, (), "", Path("trial.parquet"), "", None)
+BROKEN = replace(
+    TRIAL,
+    number=2,
+    words="Part 1, L1",
+    outcome="timeout",
+    valid=False,
+    broken=("longest time between two ticks: 41.3 ms, limit 20 ms", "lateness of ticks: 2.5 ms, limit 2 ms"),
+    unconfirmed=("feels_liquid: 5",),
+    notes="phone rang",
+)
+RECORD = SessionRecord(
+    facts=facts("P007", simulated=False),
+    about="Device mouse  ·  language en",
+    limits="Out of limits: 1 of 2 measured trials exceeded a limit of the study.",
+    trials=(
+        TRIAL,
+        BROKEN,
+        replace(TRIAL, number=3, valid=None, outcome="running", answers=0, recording=None, lost="its thread ended"),
+        replace(TRIAL, number=4, excluded="phone rang", attempt=2),
+    ),
+    notes=("09:31, trial 2: phone rang",),
+    files=(("journal.jsonl", 1_234_567), ("receipt.json", 90), ("trials.csv", 5400)),
+    left_out=(Exclusion("P007", 1, 4, "AK", "phone rang", STARTED.isoformat()),),
+    motion_hidden="",
+)
+READ: dict[str, Any] = {}
+"""What the page of a session reads: its record and its motion, or an error."""
+
+
+def read(what: str) -> Any:
+    """Return what is to be read, or raise it."""
+    if isinstance(READ[what], Exception):
+        raise READ[what]
+    return READ[what]
+
+
+def waves() -> tuple[Any, Any]:
+    times_s = np.linspace(0.0, 30.0, 600)
+    return times_s, np.column_stack([0.03 * np.sin(times_s * k + k) for k in (1.0, 1.7, 0.4)])
+
+
+def page(qtbot: Any) -> SessionPage:
+    below = QWidget()
+    qtbot.addWidget(below)
+    made: Any = SessionPage(below, LIGHT, RECORD.facts, lambda _path: None)
+    made.below = below
+    return shown(qtbot, made, (1040, 700))  # type: ignore[no-any-return]
+
+
+def read_again(**changed: Any) -> Callable[[Any], None]:
+    def act(made: Any) -> None:
+        READ.update(changed)
+        made.read()
+
+    return act
+
+
+PAGE: Actions = {
+    **{f"trial {row + 1}": lambda made, row=row: made.trials.selectRow(row) for row in (1, 2, 3)},  # type: ignore[misc]
+    "motion unread": lambda made: (READ.update(motion=StoreError("it is cut")), made.trials.selectRow(0)),
+    "excluding": lambda made: made.leave_out.click(),
+    "sealed": read_again(record=replace(RECORD, motion_hidden=MOTION_HIDDEN, left_out=(), notes=())),
+    "session excluded": read_again(
+        record=replace(
+            RECORD,
+            facts=facts("P007", status="withdrawn", validity="invalid", excluded="asleep"),
+            left_out=(Exclusion("P007", 1, None, "AK", "asleep", STARTED.isoformat()),),
+        )
+    ),
+    "empty": read_again(record=replace(RECORD, trials=(), files=())),
+    "unreadable": read_again(record=StoreError("the journal cannot be read")),
+    "dark": lambda made: apply_theme(made, DARK),
+}
