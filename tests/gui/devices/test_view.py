@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QAbstractButton, QFileDialog
+from PySide6.QtWidgets import QFileDialog
 
 from study_app.devices.descriptor import Backend
 from study_app.gui.devices.view import NO_FILE
@@ -19,22 +19,6 @@ def place(qtbot):
 
 def rows(place):
     return place.people.rows | place.simulated.rows
-
-
-def marked(place):
-    titles = {name: row.title for name, row in rows(place).items()}
-    return [name for name, title in titles.items() if isinstance(title, QAbstractButton) and title.isChecked()]
-
-
-def test_one_is_marked_and_another_can_be_chosen_by_the_keyboard(place, qtbot):
-    assert rows(place)["mouse"].title.isChecked()
-    with qtbot.waitSignal(place.chosen) as chosen:
-        qtbot.keyClick(rows(place)["falcon"].title, Qt.Key.Key_Space)
-    assert chosen.args == ["falcon"]
-    place.show_devices(devices_shown(windows.FOUND), "falcon-emulated")
-    assert marked(place) == ["falcon-emulated"]
-    place.show_devices(devices_shown(windows.FOUND), "falcon-socket:/run/falcon")
-    assert marked(place) == []
 
 
 def test_entering_and_refresh_look_again_and_rows_stay(place, qtbot):

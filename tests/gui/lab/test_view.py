@@ -126,19 +126,6 @@ def test_while_blind_both_sides_look_alike_but_for_which_is_felt(place: Any, mov
     assert pictures[0] == pictures[1]
 
 
-def test_blinding_moves_nothing_and_what_was_hidden_is_back_after_it(place: Any, moved: LabView) -> None:
-    cards = (place.form, place.tank, place.force, place.speed, place.cost, place.error, place.limiters)
-    at = []
-    for bench in (moved.workbench, blind(moved.workbench), moved.workbench):
-        place.show_view(dataclasses.replace(moved, workbench=bench))
-        settle(place)
-        at.append([(card.mapTo(place, QPoint()), card.size()) for card in cards])
-        assert place.header.save.isEnabled() is (bench is moved.workbench)
-    assert at[0] == at[1] == at[2]
-    for name in ("Water, edited", "Light oil", "segments", "84 ns"):
-        assert name in words_of(place)
-
-
 def chosen(place: Any, button: Any, file: Path) -> str:
     """Press a button and choose a file in its dialog; return the dialog's title and the name that it suggests."""
     button.click()

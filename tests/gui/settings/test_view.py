@@ -2,11 +2,9 @@
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QFontMetricsF
 from PySide6.QtWidgets import QFileDialog
 
-from study_app.gui.theme.theme import font
-from study_app.store.workstation import CAMERA_LENGTH, STATEMENT_X_HEIGHT_PX, MachineSettings
+from study_app.store.workstation import CAMERA_LENGTH, MachineSettings
 from tests.gui.windows import SCREENS, machine, two_screens
 from tests.gui.windows import show_settings as show
 
@@ -24,17 +22,6 @@ def type_into(qtbot, field, text):
     field.selectAll()
     qtbot.keyClicks(field, text)
     qtbot.keyClick(field, Qt.Key.Key_Return)
-
-
-def test_the_distance_is_typed_and_the_words_grow(place, qtbot):
-    with qtbot.waitSignal(place.changed) as changed:
-        type_into(qtbot, place.seen.distance.field, "600")
-    assert changed.args == [{"viewing_distance_mm": 600.0}]
-    assert place.seen.sample.scale == 1.0
-    assert QFontMetricsF(font("statement")).xHeight() == pytest.approx(STATEMENT_X_HEIGHT_PX, abs=0.3)  # px: rounding
-    show(place, MachineSettings(viewing_distance_mm=600))
-    assert place.seen.sample.scale == pytest.approx(1.747, abs=0.001)
-    assert "1.75 times the default size" in place.seen.said.text()
 
 
 def test_a_distance_out_of_range_is_refused_and_an_empty_one_forgotten(place, qtbot):
