@@ -295,7 +295,8 @@ class NewSessionDialog(QDialog):
         new.show_action("", f"New participant {self._free[1]}")
 
     def _say(self, words: str, *, good: bool) -> None:
-        self.verdict.setText(words[:1].upper() + words[1:])
+        by_id = words.startswith(f"{self.participant.text().strip()} ")  # an id stands as it was typed
+        self.verdict.setText(words if by_id else words[:1].upper() + words[1:])
         set_ink(self.verdict, "ok" if good else "bad")
         self.verdict_icon.show_icon(*(("check", "ok") if good else ("warning", "bad")))
         self.begin.setEnabled(good)
