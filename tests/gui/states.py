@@ -6,7 +6,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import Qt, QTimer, QUrl
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
 from study_app.app.computer_check import ComputerCheck
@@ -16,6 +17,7 @@ from study_app.devices.falcon.doctor.failure_report import findings_of
 from study_app.devices.falcon.facts import OPEN
 from study_app.devices.falcon.facts import Facts as FalconFacts
 from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
+from study_app.gui.home.new_session_dialog import NewSessionDialog
 from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import apply_theme
@@ -33,7 +35,7 @@ from tests.gui.lab.states import LAB
 from tests.gui.operator.states import DISK, RUNNING, STRIP, operator, strip
 from tests.gui.results.sample import STUDY
 from tests.gui.results.states import NOW, PAGE, PEOPLE, RESULTS, WRITING, page, writing
-from tests.gui.transcript import Actions, clicked, in_turn, typed
+from tests.gui.transcript import Actions, clicked, in_turn, part_of, typed
 from tests.gui.windows import FOUND, WELL, checked, preflight, results, show_settings, shown
 
 
@@ -249,6 +251,41 @@ HOME: Actions = {
     "dark": lambda window: window.rail.theme_asked.emit(),
 }
 
+
+def text(path: str, words: str) -> Callable[[Any], None]:
+    return lambda window: part_of(window, path).setText(words)
+
+
+def chosen(path: str, value: str) -> Callable[[Any], None]:
+    return lambda window: part_of(window, path).setCurrentIndex(part_of(window, path).findData(value))
+
+
+def new_session(qtbot: Any) -> Any:
+    return windows.dialog(NewSessionDialog, qtbot, Path())
+
+
+NEW_SESSION: Actions = {
+    "no id": text("participant", "P-7"),
+    "an id of pilots": text("participant", "test"),
+    "pilot": clicked("pilot"),
+    "no pilot, no seed": in_turn(clicked("pilot"), text("participant", "P009"), text("seed", "")),
+    "another seed, Dutch": in_turn(text("seed", "4711"), chosen("language", "nl")),
+    "session 2": lambda dialog: dialog.session.setValue(2),
+    "simulated hand": chosen("device", "scripted"),
+    "Falcon": in_turn(chosen("device", "falcon"), clicked("windowed")),
+    "firmware gone": text("device_options.fields.firmware", "gone.bin"),
+    "own folder": in_turn(text("device_options.fields.firmware", ""), text("results", "mine")),
+}
+HELP: Actions = {
+    "search": lambda place: QTest.keyClicks(place.words, "photodiode"),
+    "a result": lambda place: QTest.keyClick(place.words, Qt.Key.Key_Down),
+    "nothing found": lambda place: QTest.keyClicks(place.words, " zebra"),
+    "narrow": lambda place: (place.words.clear(), place.resize(928, 640)),
+    "back": clicked("back"),
+    "no such page": lambda place: place.reader.anchorClicked.emit(QUrl("no-such-page.md")),
+    "dark": lambda place: apply_theme(place, DARK),
+}
+
 STATES: dict[str, tuple[Callable[[Any], Any], Actions]] = {
     "operator": (operator, RUNNING),
     "operator, single-blind": (lambda qtbot: operator(qtbot, force_limit_n=6.0, felt=False), DISK),
@@ -264,5 +301,7 @@ STATES: dict[str, tuple[Callable[[Any], Any], Actions]] = {
     "computer": (computer, COMPUTER),
     "preflight": (preflight, PREFLIGHT),
     "opening": (opening, OPENING),
+    "new session": (new_session, NEW_SESSION),
+    "help": (windows.help_pages, HELP),
     "home": (lambda qtbot: open_home(qtbot, Path()).main, HOME),
 }

@@ -138,7 +138,12 @@ DISK: Actions = {
     "targets": told(*(("target_reached", {"trial": 3, "target": target, "t_task_s": 1.0}) for target in (0, 1))),
     "pushed to the limit": pushed(5.8),
     "hardly pushed": pushed(0.02),
-    "track": told(beyond={"track": ("Track V1: 9 of at most 24 answered", "longest run 8: check")}),
+    "track": told(
+        beyond={
+            "main_trials": ((2, 2), (1, 4), (0, 3)),
+            "track": ("Track V1: 9 of at most 24 answered", "longest run 8: check"),
+        }
+    ),
     "waiting for the disk": told(force_on=False, trouble="no space left on the disk: free some", waits=True),
     "recording lost": told(("recording_lost", {"trial": 3, "attempt": 1, "reason": "No space left on device"})),
     "asks to repeat": lambda window: window.ask_to_repeat(),
