@@ -142,7 +142,8 @@ def _scores(study: Study) -> list[dict[str, Any]]:
 def _presentations(study: Study, block: Block) -> dict[str, Any]:
     """Return how many answers a participant gave to a statement on one setting, and in which sessions."""
     answers = study.answers(block)
-    given = answers[answers["response"].notna()].assign(column=answers["code"].map(block.columns))
+    given = answers[answers["response"].notna()]
+    given = given.assign(column=given["code"].map(block.columns))
     counts = given.groupby(["participant", "column", "item"]).size()
     return {
         "answers_per_participant_setting_and_item": [int(counts.min()), int(counts.max())] if len(counts) else [0, 0],
