@@ -25,7 +25,7 @@ Presented = tuple[str, int, str, Sequence[int | None]]
 
 def delays(delays_ms: Sequence[float]) -> tuple[Setting, ...]:
     """Return settings of one liquid, D1, D2 …, sorted as a study has them."""
-    made = [Setting(f"D{place}", f"delay_{place}", "water", ms) for place, ms in enumerate(delays_ms, start=1)]
+    made = [Setting(f"D{place}", f"delay_{place}", "water", float(ms)) for place, ms in enumerate(delays_ms, start=1)]
     return tuple(sorted(made, key=lambda setting: setting.delay_ms or 0.0))
 
 
@@ -57,6 +57,7 @@ def study(settings: Sequence[Setting], trials: Sequence[Presented], decided: Dec
             "block": "b",
             "phase": "main",
             "index": number,
+            "of": len(trials),
             "code": code,
         }
         presented.append(place)
@@ -64,6 +65,7 @@ def study(settings: Sequence[Setting], trials: Sequence[Presented], decided: Dec
             {**place, "item": item, "response": value, "cannot_judge": False}
             for item, value in zip(ITEMS, given, strict=True)
         ]
+    given_answers = table(RESPONSES, answers)
     visits = sorted({(participant, session) for participant, session, _, _ in trials})
     return Study(
         folder=Path("nowhere"),
@@ -72,7 +74,8 @@ def study(settings: Sequence[Setting], trials: Sequence[Presented], decided: Dec
         version="1",
         blocks=(block,),
         settings={("b", setting.code): setting for setting in settings},
-        responses=table(RESPONSES, answers),
+        responses=given_answers,
+        answered=given_answers,
         trials=table(TRIALS, presented),
         participants=pd.DataFrame([_visit(*visit) for visit in visits], columns=list(_visit("", 1))),
         exclusions=(),
@@ -92,7 +95,10 @@ def table(columns: Sequence[Column], rows: Sequence[dict[str, Any]]) -> pd.DataF
 
 
 def _visit(participant: str, session: int) -> dict[str, Any]:
+    unknown = ("language", "ended_at", "device", "key_hash", "seed", "protocol_hash", "version", "exclusion_reason")
     return {
+        **dict.fromkeys((*unknown, "motors_masked")),
+        "started_at": f"2026-01-{session:02d}",
         "participant": participant,
         "session": session,
         "simulated": True,

@@ -1,0 +1,43 @@
+"""All outputs of a study as lines: its report and its exported tables, each figure by what it shows."""
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from study_app import figure_style
+from study_app.analysis.figures.levels.level_pictures import level_pictures
+from study_app.analysis.figures.question_figures import question_pictures
+from study_app.analysis.figures.report_figures import pictures
+from study_app.analysis.report import write_report
+from study_app.analysis.tables.study_tables import Study
+from tests.golden import figure_of, file_lines, stub_png
+
+GOLDEN = Path(__file__).parent / "golden"
+ELSEWHERE = frozenset({"codebook.json", "methods.txt"})
+"""Files of which others hold everything."""
+
+
+def report_lines(study: Study, without: frozenset[str] = ELSEWHERE) -> Iterator[str]:
+    """Yield the lines of every file of a study's report; the first page's pictures come first."""
+    first: list[str] = []
+
+    def kept(figure: object, *form: object) -> bytes:
+        first.append("\n".join(figure_of(stub_png(figure))))
+        return stub_png(figure, *form)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(figure_style, "file_bytes", kept)
+        patched.setattr(write_report, "font_faces", str)
+        for drawn in (pictures, level_pictures, question_pictures):
+            patched.setattr(write_report, drawn.__name__, partial(drawn, forms=("png",)))
+        files, failed = write_report.report_files(study)
+    assert not failed, "; ".join(map(str, failed))
+    of_files = {"\n".join(figure_of(content)) for name, content in files.items() if name.endswith(".png")}
+    for number, lines in enumerate(one for one in first if one not in of_files):
+        yield from (f"##### first page, picture {number + 1}", lines)
+    for name, content in sorted(files.items()):
+        if name not in without:
+            yield f"##### {name}"
+            yield from figure_of(content) if name.endswith(".png") else file_lines(name, content)
