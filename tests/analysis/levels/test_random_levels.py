@@ -1,0 +1,205 @@
+"""Everything said and drawn of blocks of levels of which any number is missing, compared with reviewed files."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app import figure_style
+from study_app.analysis.figures.levels.level_pictures import level_pictures
+from study_app.analysis.report.answers import level_section
+from study_app.analysis.report.answers.level_limits import level_limits
+from study_app.analysis.report.answers.level_methods import level_methods
+from study_app.analysis.report.answers.level_r_script import level_lines
+from study_app.analysis.report.findings_summary import level_findings
+from study_app.analysis.results.level_results import (
+    CatchAnswers,
+    ExponentFound,
+    LevelAnswers,
+    LevelConduct,
+    LevelsFound,
+    LevelTimes,
+    OwnDynamics,
+    PublishedValue,
+    SensitivityFound,
+    SettingFound,
+    ThresholdFound,
+    WithheldForce,
+)
+from study_app.analysis.results.question_answers import GroupAnswers
+from study_app.analysis.results.section_failures import Failures
+from study_app.analysis.tables.level_blocks import LevelBlock
+from study_app.protocol.trials.designs import Rated
+from study_app.protocol.trials.kinds import default_design
+from study_app.protocol.trials.methods.constant import Constant
+from study_app.protocol.trials.methods.questplus import QuestPlus
+from study_app.protocol.trials.methods.updown import UpDown
+from study_app.protocol.trials.stimuli import Stimulus
+from tests.analysis.made_up import delays, everybody, study
+from tests.analysis.outputs import GOLDEN
+from tests.golden import compare, figure_of, page_lines, stub_png
+
+VARIED = {
+    "damping_nspm": ("damping", "N·s/m", (0.02, 0.6), 8.0),
+    "delay_ms": ("delay", "ms", (10.0, 160.0), 50.0),
+    "viscosity_pa_s": ("viscosity", "Pa·s", (0.1, 3.0), 2.0),
+}
+DESIGNS = {
+    "share": ("2ifc", "3ifc", "yesno", "samedifferent", "abx", "oddity"),
+    "mean": ("rating",), "geometric mean": ("estimation",), "settings": ("adjustment",),
+}  # fmt: skip
+
+
+def filled(number: int) -> tuple[LevelBlock, LevelsFound]:
+    """Return a block and what was found in it; each number that may be missing is so in a quarter of cases."""
+    rng = np.random.default_rng(number)
+
+    def some(value: Any, share: float = 0.75) -> Any:
+        return value if rng.random() < share else None
+
+    def around(value: float) -> float:
+        return float(value * np.exp(rng.normal(0, 0.4)))
+
+    summary = ("share", "share", "settings", "geometric mean", "mean", "share")[number % 6]
+    design = str(rng.choice(DESIGNS[summary]))
+    vary = str(rng.choice(list(VARIED)))
+    quantity, unit, ends, base = VARIED[vary]
+    kind = str(rng.choice(["weber", "difference", "value"]))
+    people = [f"P{one:03d}" for one in range(1, int(rng.choice([1, 2, 2, 3] if number < 18 else [2, 5, 15])) + 1)]
+    standards = [None] if rng.random() < 0.2 else [base, 2 * base, 0.0][: int(rng.integers(2, 4))]
+    levels = np.geomspace(*ends, int(rng.integers(1, 5))).round(3).tolist()
+    catches, percent = bool(rng.random() < 0.3), some(75.0, 0.5)
+    share = summary == "share"
+
+    def answered(person: str | None, standard: float | None, level: float, catch: bool = False) -> LevelAnswers:
+        n, value = int(rng.integers(1, 30)), float(rng.random()) if share else around(5)
+        low, high = some((max(0.0, value - 0.2), min(1.0, value + 0.2) if share else value + 1), 0.8) or (None, None)
+        count = round(value * n) if share else None
+        return LevelAnswers(person, standard, level, level, n, len(people) if person is None else 1, count, value,
+                            low, high, catch)  # fmt: skip
+
+    def threshold(person: str | None, standard: float | None) -> ThresholdFound:
+        value = around(ends[1] / 3)
+        own: dict[str, Any] = {}
+        if percent:
+            own = {"compared": some(value * 1.2), "compared_low": some(value), "compared_high": value * 1.6}
+        if person is not None:
+            own |= {
+                "width": some(around(1.0)), "lapse": some(0.02), "guess": some(0.5), "flat_width": some(around(value)),
+                "beyond": rng.choice([None, None, "above", "below"]), "variance": 0.01,
+                "fit_p": some(float(rng.random() ** 2)), "drift": some(float(rng.normal(0, 0.2))),
+                "reversal_mean": some(around(value)), "target_percent": 70.7,
+            }  # fmt: skip
+        low, high = some((value * 0.7, value * 1.5)) or (None, None)
+        return ThresholdFound(person, standard, int(rng.integers(2, 120)), value, low, high, **own)
+
+    def set_by(person: str | None, standard: float | None) -> SettingFound:
+        n, value = int(rng.integers(1, 6)), around(ends[0] * 5)
+        ends_ = (value * 0.8, value * 1.3)
+        levels_ = tuple(around(value) for _ in range(n)) if person else ()
+        high = tuple(bool(one) for one in rng.integers(0, 2, n)) if person else ()
+        error = None if standard is None else float(rng.normal(0, 0.1))
+        return SettingFound(person, standard, n, value, *(some(ends_) or (None, None)), some(around(0.1)), error,
+                            some(float(rng.normal(0, 0.1))), levels_, high)  # fmt: skip
+
+    def sensed(person: str | None, standard: float | None) -> SensitivityFound:
+        d, n = some(around(1.3)), len(people) if person is None else 20
+        shares = {"first": float(rng.random()), "second": float(rng.random())}
+        interval = (some(d - 0.5), d + 0.5) if d else (None, None)
+        return SensitivityFound(
+            person, n, shares, standard, some("oil", 0.2), some(levels[0], 0.3), d, *interval,
+            some(float(rng.normal())), some("differencing"), some(around(1.0)),
+        )  # fmt: skip
+
+    def exponent(person: str | None) -> ExponentFound:
+        low, high = some((0.4, 1.2)) or (None, None)
+        return ExponentFound(person, int(rng.integers(2, 6)), around(0.8), low, high)
+
+    whom = [None, *people]
+    revealed = rng.random() < 0.9
+    found = LevelsFound(
+        "b", "Block", design, revealed,
+        tuple(GroupAnswers(f"V{one}", f"standard {one}", {"n": one, "median": some(1.5), "q1": some(1.0), "q3": 2.0})
+              for one in range(2)),
+        summary, "correct" if design != "yesno" else "yes",
+    )  # fmt: skip
+    if not revealed:
+        return _block(design, vary, ends, standards, number), found
+    estimated = share and rng.random() < 0.8
+    published = PublishedValue(
+        "exponent" if summary == "geometric mean" else "weber", 0.2, some(base), some(0.1), 0.3, percent, some(10),
+        some("Jones 1997") or "",
+    )  # fmt: skip
+    where = [(person, standard) for person in whom for standard in standards]
+    more: dict[str, Any] = {
+        "vary": vary, "quantity": quantity, "unit": unit, "level_kind": kind, "spacing": rng.choice(["log", "linear"]),
+        "guess_rate": some(0.5) if share else None, "bounds": (1.0, 7.0) if summary == "mean" else None,
+        "own_units": summary == "geometric mean" and bool(rng.random() < 0.5),
+        "thresholds": tuple(threshold(*one) for one in where) if estimated else (),
+        "exponents": tuple(map(exponent, whom)) if estimated or summary == "geometric mean" else (),
+        "sensitivities": tuple(sensed(*one) for one in where) if share and rng.random() < 0.7 else (),
+        "level_times": tuple(
+            LevelTimes(standard, level, level * 1.2, int(rng.integers(0, 9)), some(around(1.0)), 3, some(around(2.0)))
+            for standard in standards for level in levels
+        ),
+        "withheld": tuple(
+            WithheldForce(standard, level, level, 4, float(most) / 3, float(most))
+            for standard in standards for level, most in zip(levels, rng.choice([0, 2, 9.0], len(levels)), strict=True)
+        ) if vary == "delay_ms" else (),
+        "conduct": tuple(
+            LevelConduct(standard, int(rng.integers(1, 99)), int(rng.integers(0, 9)), {"pace_error_percent": 2, "slip": 1}
+                         if rng.random() < 0.5 else {}, int(rng.integers(0, 3)), some(-0.01), some(0.03), some(0.1),
+                         some(0.02))
+            for standard in standards
+        ) if rng.random() < 0.8 else (),
+        "catches": tuple(CatchAnswers(one, 1, 8, int(rng.integers(0, 9)), 0.5) for one in people) if catches else (),
+        "family": some(str(rng.choice(["weibull", "normal", "logistic"])), 0.99) if estimated else None,
+        "adaptive": bool(estimated and rng.random() < 0.3),
+        "published": (published,) if percent or rng.random() < 0.4 else (),
+        "device": some(OwnDynamics(2.0, 0.1, 0.25, 3, int(rng.integers(3, 5))), 0.6),
+    }  # fmt: skip
+    if summary == "settings":
+        more["settings"] = tuple(set_by(*one) for one in where)
+    else:
+        more["answers"] = tuple(
+            answered(person, standard, level, catch)
+            for standard in standards for level in levels for catch in ((False, True) if catches else (False,))
+            for person in whom if person is None or rng.random() < 0.9
+        )  # fmt: skip
+    return _block(design, vary, ends, standards, number), replace(found, **more)
+
+
+def _block(design: str, vary: str, ends: Any, standards: list[Any], number: int) -> LevelBlock:
+    stimulus = Stimulus(vary=vary, levels=ends, standards=tuple(one for one in standards if one))
+    method = (Constant(), QuestPlus(), UpDown(rule="3down1up"), QuestPlus(learn="all"))[number % 4]
+    kind = Rated(kind="rating", scale="s") if design == "rating" else default_design(design)
+    return LevelBlock("b", "Block", "main", kind, stimulus, (), method)
+
+
+def lines_of(number: int) -> Iterator[str]:
+    made, found = filled(number)
+    failures = Failures()
+    around = study(delays([0, 50]), list(everybody(delays([0, 50]), 3, lambda *_: 4)))
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(figure_style, "file_bytes", stub_png)
+        drawable = not found.own_thresholds or (len({one.standard for one in found.answers}) > 1 and not found.adaptive)
+        pictures = list(level_pictures(around, [found], ("png",), failures)) if drawable else []
+    assert not failures.found, str(failures.found)
+    for picture in pictures:
+        yield from (picture.name, picture.caption, *figure_of(picture.files["png"]))
+    yield from page_lines("".join(level_section.section(found, pictures, ("kalman", None)[number % 2])))
+    yield from level_findings(found)
+    yield from level_limits(found)
+    yield from level_methods([made], [found])
+    script, compared = level_lines(replace(around, levels=(made,)), [found])
+    yield from (*script[1:], f"numbers compared: {compared}")
+
+
+@pytest.mark.parametrize("part", [0, 1, 2, *(pytest.param(part, marks=pytest.mark.slow) for part in (3, 4))])
+def test_a_block_with_missing_numbers(part: int, pytestconfig: pytest.Config) -> None:
+    kept = GOLDEN / Path(f"levels-{part}.txt")
+    found = (line for number in range(6 * part, 6 * part + 6) for line in (f"##### {number}", *lines_of(number)))
+    compare(kept, found, pytestconfig)
