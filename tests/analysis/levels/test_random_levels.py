@@ -114,6 +114,11 @@ def filled(number: int) -> tuple[LevelBlock, LevelsFound]:
             some(float(rng.normal())), some("differencing"), some(around(1.0)),
         )  # fmt: skip
 
+    def run(standard: float | None) -> LevelConduct:
+        reasons = {"pace_error_percent": 2, "slip": 1} if rng.random() < 0.5 else {}
+        numbers = int(rng.integers(1, 99)), int(rng.integers(0, 9)), reasons, int(rng.integers(0, 3))
+        return LevelConduct(standard, *numbers, some(-0.01), some(0.03), some(0.1), some(0.02))
+
     def exponent(person: str | None) -> ExponentFound:
         low, high = some((0.4, 1.2)) or (None, None)
         return ExponentFound(person, int(rng.integers(2, 6)), around(0.8), low, high)
@@ -149,12 +154,7 @@ def filled(number: int) -> tuple[LevelBlock, LevelsFound]:
             WithheldForce(standard, level, level, 4, float(most) / 3, float(most))
             for standard in standards for level, most in zip(levels, rng.choice([0, 2, 9.0], len(levels)), strict=True)
         ) if vary == "delay_ms" else (),
-        "conduct": tuple(
-            LevelConduct(standard, int(rng.integers(1, 99)), int(rng.integers(0, 9)), {"pace_error_percent": 2, "slip": 1}
-                         if rng.random() < 0.5 else {}, int(rng.integers(0, 3)), some(-0.01), some(0.03), some(0.1),
-                         some(0.02))
-            for standard in standards
-        ) if rng.random() < 0.8 else (),
+        "conduct": tuple(map(run, standards)) if rng.random() < 0.8 else (),
         "catches": tuple(CatchAnswers(one, 1, 8, int(rng.integers(0, 9)), 0.5) for one in people) if catches else (),
         "family": some(str(rng.choice(["weibull", "normal", "logistic"])), 0.99) if estimated else None,
         "adaptive": bool(estimated and rng.random() < 0.3),

@@ -1,0 +1,206 @@
+"""Every statistic of a table of small and unusual samples, compared with reviewed files."""
+
+from collections.abc import Callable, Iterator
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app.analysis.statistics import (
+    agreement,
+    exact_distributions,
+    friedman,
+    global_permutation,
+    independent_groups,
+    multiple_comparisons,
+    ordinal,
+    outcome,
+    paired,
+    random_effects,
+    recognition,
+    skillings_mack,
+    student_interval,
+    trend,
+)
+from study_app.analysis.statistics.equivalence import bootstrap_t, power, tost
+from study_app.analysis.statistics.psychometrics import goodness, posterior, settings, threshold
+from study_app.errors import AnalysisError
+from study_app.protocol.trials.kinds import default_design
+from study_app.protocol.trials.psychometric import analysis_grid, assumed_for
+from tests.analysis.levels.level_studies import STIMULUS
+from tests.analysis.outputs import GOLDEN
+from tests.golden import compare, told
+
+NAN = np.nan
+LEVELS = (0.0, 50.0, 100.0, 200.0)
+
+
+def answers(people: int, columns: int, seed: int, slope: float = 0.0, missing: float = 0.0) -> Any:
+    """Return answers from 1 to 7 that rise with the column."""
+    rng = np.random.default_rng(seed)
+    found = np.clip(np.round(rng.normal(4 + slope * (np.arange(columns) - columns / 2), 1.2, (people, columns))), 1, 7)
+    return np.where(rng.random(found.shape) < missing, NAN, found)
+
+
+SAMPLES = {
+    "none": np.zeros((0, 3)), "one": answers(1, 3, 0), "two": answers(2, 3, 1), "ties": np.full((5, 3), 4.0),
+    "few": answers(4, 3, 2, 1.5), "rise": answers(8, 4, 3, 1.2), "fall": answers(8, 4, 4, -1.2),
+    "missing": answers(9, 4, 5, 0.8, 0.15), "all missing": np.full((3, 3), NAN), "many": answers(40, 3, 6, 0.3),
+    "pair": answers(7, 2, 7, 2.0), "one setting": answers(6, 1, 8), "seven": answers(5, 7, 9, 0.6),
+    "ends": np.tile([1.0, 7.0, 7.0], (6, 1)), "half": answers(12, 4, 10, 0.5, 0.5),
+}  # fmt: skip
+"""(participants, settings) arrays."""
+DIFFERENCES = {
+    "none": [], "one": [1.0], "two": [0.0, 1.0], "equal": [0.0] * 8, "ones": [1.0] * 8,
+    "small": [0, 0, 1, 0, -1, 0, 0, 1], "large": [2, 3, 2, 4, 3, 2], "wide": [-3, 3, -2, 2, 0, 1],
+    "many": np.random.default_rng(3).integers(-1, 2, 30), "missing": [0, NAN, 1, 0, -1, NAN, 0],
+    "outlier": [0, 0, 0, 0, 0, 0, 6], "halves": [0.5, 0, -0.5, 0, 0.5, 0, 0, 0, 1, -1, 0.5, 0],
+}  # fmt: skip
+PS = ((), (0.04,), (0.01, 0.04, None), (0.5, 0.02, 0.02, 1.0), (None, None), (0.03, 0.01, 0.2, 0.04, 0.001))
+GRID = analysis_grid(STIMULUS, default_design("2ifc"), assumed_for(STIMULUS, default_design("2ifc")))
+U = np.log10([0.03, 0.1, 0.2, 0.4])
+COUNTS = (([0, 0, 0, 0], [0, 0, 0, 0]), ([5, 6, 9, 10], [5, 4, 1, 0]), ([10] * 4, [0] * 4), ([0] * 4, [9] * 4))
+
+
+def over(function: Callable[..., Any], cases: dict[str, Any], *more: Any, **named: Any) -> Iterator[tuple[str, Any]]:
+    for name, case in cases.items():
+        yield f"{function.__name__}({name}{''.join(f', {one}' for one in (*more, *named.items()))})", case
+
+
+def results(function: Callable[..., Any], cases: dict[str, Any], *more: Any, **named: Any) -> Iterator[str]:
+    """Yield what a function returns, or the error that it raises, for each case."""
+    for name, case in over(function, cases, *more, **named):
+        given = case if isinstance(case, tuple) else (case,)
+        try:
+            found = told(function(*given, *more, **named))
+        except (AnalysisError, ValueError) as error:
+            found = f"{type(error).__name__}: {error}"
+        yield f"{name}: {found}"
+
+
+def named_(number: int, count: int) -> dict[str, Any]:
+    rng = np.random.default_rng(number)
+    return {
+        f"{people} people": np.where(rng.random((people, count, 4)) < 0.1, NAN, rng.integers(1, 8, (people, count, 4)))
+        for people in (0, 1, 2, 5, 12)
+    }
+
+
+def of_settings() -> Iterator[str]:
+    yield from results(friedman.friedman, SAMPLES)
+    yield from results(friedman.friedman, {"long": answers(60, 5, 1, 0.2)}, draws=500, seed=2)
+    yield from results(skillings_mack.skillings_mack, SAMPLES)
+    yield from results(trend.page, SAMPLES)
+    yield from results(trend.page, SAMPLES, "decreasing")
+    yield from results(trend.page, {"long": answers(210, 3, 2, 0.1)}, seed=None)
+    wide = {name: (one, LEVELS[: one.shape[1]]) for name, one in SAMPLES.items() if one.shape[1] <= 4}
+    yield from results(trend.step_down, wide)
+    yield from results(trend.step_down, wide, "decreasing", alpha=0.2)
+    stacked = {name: np.stack([one, one[::-1], 8 - one]) for name, one in SAMPLES.items() if name != "half"}
+    yield from results(global_permutation.global_permutation, stacked, draws=300)
+
+
+def of_pairs() -> Iterator[str]:
+    pairs = {name: (one[:, 0], one[:, -1]) for name, one in SAMPLES.items()}
+    yield from results(paired.paired, pairs)
+    yield from results(paired.paired, {"few": pairs["few"]}, alpha=0.2)
+    yield from results(paired.paired, {"lengths": ([1.0], [1.0, 2.0])})
+    groups = {name: (one, ["A", "B", "C"][: len(one)] * len(one)) for name, one in SAMPLES.items()}
+    groups = {name: (values, sites[: len(values)]) for name, (values, sites) in groups.items()}
+    yield from results(independent_groups.groups_differ, groups)
+    yield from results(multiple_comparisons.holm, {str(ps): (ps,) for ps in PS})
+    yield from results(multiple_comparisons.false_discovery, {str(ps): (ps,) for ps in (*PS, (1.2,))})
+    tables = {"2": [[5, 1], [2, 7]], "0": [[0, 0], [0, 0]], "3": [[3, 0, 1], [0, 4, 0], [2, 0, 5]], "wide": [[1, 2]]}
+    yield from results(agreement.kappa, tables)
+    yield from results(recognition.named, named_(1, 3))
+    names = {name: (recognition.named(one), (0, 1, None)) for name, one in named_(2, 3).items()}
+    yield from results(recognition.recognition, names, labels=4)
+    yield from results(
+        student_interval.student_interval, {name: np.asarray(one, float) for name, one in DIFFERENCES.items()}
+    )
+    yield from results(random_effects.group_mean, {
+        "one": ([1.0], [0.1]), "two": ([1.0, 2.0], [0.1, 0.2]), "alike": ([1.0, 1.01, 0.99], [0.5, 0.4, 0.6]),
+        "apart": ([1.0, 4.0, 9.0, 2.0], [0.01, 0.02, 0.01, 0.03]), "none": ([], []),
+    })  # fmt: skip
+    yield from results(outcome.draws_for, {f"{a} {m}": (a, 1000, m) for a, m in product((0.05, 0.001, 1e-6), (1, 40))})
+    yield from results(outcome.clopper_pearson, {f"{c} of {n}": (c, n) for c, n in ((0, 5), (5, 5), (3, 10), (0, 1))})
+    yield from results(exact_distributions.doubled_ranks, SAMPLES)
+
+
+def of_equivalence() -> Iterator[str]:
+    cases = {name: np.asarray(one, float) for name, one in DIFFERENCES.items()}
+    for bound, alpha in ((1.0, 0.05), (0.5, 0.05), (3.0, 0.2)):
+        yield from results(tost.tost, cases, bound, alpha=alpha)
+    yield from results(tost.tost, {"small": cases["small"]}, 1.0, checks=False)
+    yield from results(tost.tost, cases, 1.0, verdict_only=True)
+    yield from results(tost.fewest, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01)})
+    yield from results(tost.fewest, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01)}, equal=True)
+    yield from results(bootstrap_t.resamples_for, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01, 0.001, 1e-5)})
+    rows = {name: one[None] for name, one in cases.items() if len(one) > 2 and not np.isnan(one).any()}
+    yield from results(bootstrap_t.p_within, rows, 1.0, 3, 200)
+    yield from results(power.sizes, rows)
+    yield from results(power.equivalent, rows, 1.0, 0.05, np.random.default_rng(1), 200)
+
+
+def of_thresholds() -> Iterator[str]:
+    rising = {
+        name: (one, LEVELS[: one.shape[1]]) for name, one in SAMPLES.items()
+        if name in ("none", "one", "ties", "few", "rise", "fall", "missing", "all missing", "ends", "one setting")
+    }  # fmt: skip
+    yield from results(threshold.noticed, rising)
+    for successes, failures in COUNTS:
+        case = {f"{successes} {failures}": (U, successes, failures, GRID)}
+        yield from results(posterior.fitted, case)
+        yield from results(posterior.band, {name: (*given, np.linspace(-1.7, -0.2, 4)) for name, given in case.items()})
+    yield from results(posterior.narrowing, {"": (U, [0, 1, 2, 3, 2, 1], [False, True, True, True, False, True], GRID)})
+    expected = np.array([0.55, 0.7, 0.9])
+    for right in ([1, 4, 9], [5, 7, 10], [0, 0, 10]):
+        yield from results(goodness.deviances, {str(right): (right, [10] * 3, expected)})
+        yield from results(goodness.p_of_fit, {str(right): (right, [10] * 3, expected)})
+    flags = ([True] * 4, [True, False, False, False], [False, True, True, True], [True])
+    shares = ([0.9, 0.6, 0.7, 0.8], [0.7] * 4)
+    drifting = {f"{given} {own}": (given, own[: len(given)]) for given, own in product(flags, shares)}
+    yield from results(goodness.drift, drifting)
+    yield from results(
+        goodness.drifts, {f"{drift} {n}": (drift, n) for drift in (None, 0.2, -0.3) for n in (1, 30, 100, 101)}
+    )
+    made = {n: np.linspace(-1, 1, n) ** 3 for n in range(1, 6)}
+    yield from results(settings.setting_statistics, {
+        f"{n} {high}": (one, np.arange(n) % 2 == high) for n, one in made.items() for high in (0, 1, 2)
+    })  # fmt: skip
+
+
+def of_models() -> Iterator[str]:
+    names = ("none", "one", "ties", "few", "one setting", "all missing", "missing")
+    yield from results(ordinal.ordinal, {name: SAMPLES[name] for name in names})
+    few = answers(10, 2, 1, 0.8)
+    yield from results(ordinal.ordinal, {"ten": few, "above": np.tile([1.0, 7.0], (11, 1))})
+    yield from results(ordinal.ordinal, {"sessions": few}, sessions=np.arange(20).reshape(10, 2) // 10)
+
+
+def of_larger_models() -> Iterator[str]:
+    some = {"half": SAMPLES["half"], "gone": answers(14, 4, 3, 0.9, 0.1), "falls": answers(12, 3, 5, -1.5)}
+    yield from results(ordinal.ordinal, some)
+    yield from results(ordinal.ordinal, some, intercepts=False)
+    yield from results(ordinal.ordinal, {"sites": some["falls"]}, sites=list("AABBBAABBBAA"))
+    yield from results(ordinal.ordinal, {"columns": some["falls"]}, np.array([[0.0], [0.0], [1.0]]))
+    needed = {name: np.asarray(DIFFERENCES[name], float) for name in ("small", "large", "outlier", "wide")}
+    yield from results(power.participants_needed, needed, 1.0, 0.05)
+
+
+TABLES = [
+    of_settings,
+    of_pairs,
+    of_equivalence,
+    of_thresholds,
+    of_models,
+    pytest.param(of_larger_models, marks=pytest.mark.slow),
+]
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_statistics_of_small_and_unusual_samples(
+    table: Callable[[], Iterator[str]], pytestconfig: pytest.Config
+) -> None:
+    compare(GOLDEN / f"statistics-{table.__name__}.txt", table(), pytestconfig, rel=1e-4)
