@@ -1,0 +1,103 @@
+"""Every psychophysical function of a table of usual and extreme arguments, compared with a reviewed file."""
+
+import math
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study_app.psychophysics import delivery, detection, families, grid, precision, questplus, simulated_tracks, updown
+from tests.golden import compare, told
+
+AXES = grid.evenly(-2, 0, 9), grid.geometric(0.3, 2, 3)
+SMALL = grid.Grid("weibull", *AXES, (0.8, 1.5), (0.0, 0.05), (0.7, 0.3), (0.5,))
+FREE = grid.Grid("logistic", *AXES, None, (0.0, 0.1), (0.5, 0.5), (0.1, 0.2, 0.3))
+LEVELS = (-1.8, -1.2, -0.8, -0.3)
+RIGHT, WRONG = (0, 3, 6, 8), (2, 3, 1, 0)
+MODELS = ("differencing", "independent")
+FAMILIES = ("weibull", "normal", "logistic")
+
+
+def lines() -> Iterator[str]:
+    for task in detection.PROPORTIONS:
+        shares = [detection.proportion_correct(task, one) for one in (0.0, 0.7, 1.5, 4.0)]
+        yield f"{task}: {told(shares)} {told([detection.d_prime_at(task, one) for one in (0.1, 0.55, 0.76, 0.99)])}"
+    for hits, signals, alarms, noises in ((8, 10, 2, 9), (0, 5, 5, 5), (5, 5, 0, 5), (3, 0, 2, 4), (3, 4, 2, 0)):
+        counts = hits, signals, alarms, noises
+        yield f"{counts}: {told(detection.yes_no(*counts))} {told(detection.two_intervals(*counts))}"
+        yield f"  {told([detection.same_different(*counts, model) for model in MODELS])}"
+        yield f"  {told([detection.abx(hits, signals, model) for model in MODELS])}"
+        yield f"  {told([detection.from_correct(task, alarms, noises) for task in ('3ifc', 'oddity')])}"
+    for noise, signal in (([1, 2, 2], [2, 4, 5]), ([3], [3]), ([], [1]), ([5, 6], [1, 2])):
+        yield f"rating {noise} {signal}: {told(detection.rating(noise, signal))}"
+    for family in FAMILIES:
+        u = np.linspace(-2, 1, 5)
+        yield f"{family}: {told(families.rise(family, u, -0.5, 0.8))}"
+        yield f"  {told(families.success(family, u, 0, 1, 0.5, 0.1))}"
+        yield f"  {told([families.position(family, share) for share in (0.05, 0.5, 0.95)])}"
+        yield f"  {told([families.level_at(family, percent, -1, 0.5, 0.5, 0.02) for percent in (50, 75, 98, 99)])}"
+    yield f"grid {SMALL.shape} {told(SMALL.prior)} {told(SMALL.success(LEVELS))}"
+    for right, wrong in ((RIGHT, WRONG), ((0,) * 4, (0,) * 4), (WRONG, RIGHT)):
+        posterior = SMALL.posterior(LEVELS, right, wrong)
+        weights = posterior.reshape(9, -1).sum(axis=1)
+        quantiles = [grid.quantile(SMALL.thresholds, weights, q) for q in (0.025, 0.5, 0.975)]
+        yield f"{right}: {told(weights)} {told(quantiles)} {told(FREE.posterior(LEVELS, right, wrong)[::3, 1, 1])}"
+        estimates = precision.estimated(SMALL, LEVELS, np.array([right, wrong], float), np.array([wrong, right], float))
+        yield f"  {told(estimates)}"
+        for learn, noise in product(("threshold", "all"), (False, True)):
+            search = questplus.search_of(SMALL, LEVELS, learn, noise)
+            counts = [(*one, 0) if noise else one for one in (right, wrong)]
+            try:
+                told_ = told([search.next(*counts), search.interval(*counts)])
+                told_ += f" {told(search.expected_entropy(search.posterior(*counts)))}"
+            except ValueError as error:
+                told_ = str(error)
+            yield f"  {learn} {noise}: {told_}"
+    observers = simulated_tracks.Observers("weibull", np.array([-1.5, -0.5]), 0.8, 0.5, 0.02)
+    later = simulated_tracks.Observers("normal", np.array([-1.5, -0.5]), 0.8, 0.5, 0.02, lambda u: u + 0.3)
+    draws = np.random.default_rng(4).random((2, 12))
+    for down, ratio, begin in ((1, 1.0, -0.3), (2, 0.5488, -1.0), (3, 0.7393, 0.0)):
+        rule = updown.Staircase(down, 0.4, ratio, -2.0, 0.0, begin)
+        found = [simulated_tracks.staircase_tracks(rule, one, draws) for one in (observers, later)]
+        yield f"{rule}: {rule.converges_to:.7g} {told(found)} {told(found[0].first(5).counts(LEVELS))}"
+        for levels, right in zip(found[0].levels.tolist(), found[0].successes.tolist(), strict=True):
+            given = list(zip(levels, right, strict=True))
+            means = [rule.mean_of_reversals(given, most) for most in (1, 2, 4, 8)]
+            yield f"  {rule.reversals_at(given)} {told(rule.reversals(given))} {told(means)} {rule.next(given):.7g}"
+        yield f"  {told(simulated_tracks.staircase_tracks(rule, observers, draws, (4, 6)))} {rule.next([])}"
+    yield told(simulated_tracks.constant_tracks(LEVELS, 3, observers, draws))
+    search = questplus.search_of(SMALL, LEVELS, "threshold")
+    for more in ({}, {"begin": 2}, {"stop": (0.9, 5)}):
+        yield f"search {more}: {told(simulated_tracks.search_tracks(search, observers, draws, **more))}"
+    yield from of_delivery()
+
+
+def of_delivery() -> Iterator[str]:
+    t = np.arange(0, 0.4, 0.001)
+    place = 0.02 * np.stack([np.sin(9 * t), np.cos(7 * t), 0 * t], axis=1)
+    moved = delivery.motion(t, place, 0.001)
+    force = -3.0 * moved.velocity_mps - 0.2 * moved.acceleration_mps2
+    yield f"motion {len(moved.times_s)} {moved.rms_speed_mps:.7g} {told(moved.velocity_mps[::97])}"
+    yield f"  {told(moved.acceleration_mps2[::97])} {moved.after(0.1, 0.3).rms_speed_mps:.7g}"
+    yield f"damping {told(delivery.damping(force, moved))} {told(delivery.damping(0 * force, moved))}"
+    model = np.roll(force, 3, axis=0)
+    yield f"share {told([delivery.share(0.8 * force, force), delivery.share(force, 0 * force)])}"
+    lags = [delivery.lag(model, force, most) for most in (0, 2, 5)]
+    yield f"lag {told(lags)} {told(delivery.lag(0 * force, force, 5))}"
+    yield f"at {told(delivery.at(np.array([0.0, 0.0105, 0.39]), t, place))}"
+    for errors in ([0.1, 0.3], [None, 0.2], [None, None], [0.1, 0.2, 0.5, None]):
+        yield f"difference {errors} {told(delivery.difference(errors, [bool(one % 2) for one in range(len(errors))]))}"
+    for spacing, half in product(("log", "linear"), (0.2, math.inf)):
+        one = precision.Expected(spacing, 40, 2, half, half / 2, 0.3)
+        groups = [one.of_group(people, trials) for people in (1, 2, 8) for trials in (None, 80.0)]
+        yield f"{told(one)}: {one.measured} {told(one.factor)} {told(groups)}"
+        for within in (0.05, 0.3):
+            yield f"  {within}: {one.participants_for(within)} {one.trials_for(within, 12)} {one.trials_for(within, 2)}"
+    yield told([precision.student_975(number) for number in (1, 2, 8, 300)])
+
+
+def test_functions_of_usual_and_extreme_arguments(pytestconfig: pytest.Config) -> None:
+    compare(Path(__file__).parent / "golden" / "cases.txt", lines(), pytestconfig)
+    assert math.isnan(families.level_at("weibull", 99, -1, 0.5, 0.5, 0.02))
