@@ -1,6 +1,7 @@
 """All outputs of a study as lines: its report and its exported tables, each figure by what it shows."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -19,19 +20,27 @@ ELSEWHERE = frozenset({"codebook.json", "methods.txt"})
 """Files of which others hold everything."""
 
 
-def report_lines(study: Study, without: frozenset[str] = ELSEWHERE) -> Iterator[str]:
-    """Yield the lines of every file of a study's report; the first page's pictures come first."""
-    first: list[str] = []
+@contextmanager
+def figures_as_lines() -> Iterator[list[str]]:
+    """Let files of figures hold what these show; yield the list that gets the lines of each, once drawn."""
+    drawn: list[str] = []
 
     def kept(figure: object, *form: object) -> bytes:
-        first.append("\n".join(figure_of(stub_png(figure))))
-        return stub_png(figure, *form)
+        content = stub_png(figure, *form)
+        drawn.append("\n".join(figure_of(content)))
+        return content
 
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(figure_style, "file_bytes", kept)
         patched.setattr(write_report, "font_faces", str)
-        for drawn in (pictures, level_pictures, question_pictures):
-            patched.setattr(write_report, drawn.__name__, partial(drawn, forms=("png",)))
+        for draw in (pictures, level_pictures, question_pictures):
+            patched.setattr(write_report, draw.__name__, partial(draw, forms=("png",)))
+        yield drawn
+
+
+def report_lines(study: Study, without: frozenset[str] = ELSEWHERE) -> Iterator[str]:
+    """Yield the lines of every file of a study's report; the first page's pictures come first."""
+    with figures_as_lines() as first:
         files, failed = write_report.report_files(study)
     assert not failed, "; ".join(map(str, failed))
     of_files = {"\n".join(figure_of(content)) for name, content in files.items() if name.endswith(".png")}

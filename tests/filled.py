@@ -1,0 +1,57 @@
+"""Results made up from their types alone: every field of a dataclass gets a seeded value, None where that may be."""
+
+import dataclasses
+import typing
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from enum import Enum
+from types import NoneType, UnionType
+from typing import Any
+
+import numpy as np
+
+WORDS = ("kalman", "water", "honey", "prompt", "late", "drag", "wake", "P001")
+
+
+def filled(kind: Any, rng: np.random.Generator, **given: Any) -> Any:
+    """Return a value of a type; ``given`` are fields by name, at any depth: a value, or what makes it of ``rng``."""
+    origin, inner = typing.get_origin(kind), typing.get_args(kind)
+    if origin in (UnionType, typing.Union):
+        some = [one for one in inner if one is not NoneType]
+        return None if len(some) < len(inner) and rng.random() < 0.25 else filled(some[0], rng, **given)
+    if origin is typing.Literal:
+        return inner[int(rng.integers(len(inner)))]
+    if origin is typing.Annotated:
+        return filled(inner[0], rng, **given)
+    if kind is np.ndarray or origin is np.ndarray:
+        return np.sort(rng.lognormal(0, 1, 12))
+    if origin is tuple and not (len(inner) == 2 and inner[1] is ...):
+        return tuple(filled(one, rng, **given) for one in inner)
+    if origin in (tuple, list, Sequence, Iterable):
+        made = [filled(inner[0], rng, **given) for _ in range(int(rng.integers(1, 4)))]
+        return made if origin is list else tuple(made)
+    if origin in (dict, Mapping):
+        return {filled(inner[0], rng, **given): filled(inner[1], rng, **given) for _ in range(2)}
+    if kind in PLAIN:
+        return PLAIN[kind](rng)
+    if isinstance(kind, type) and issubclass(kind, Enum):
+        return list(kind)[int(rng.integers(len(kind)))]
+    hints = typing.get_type_hints(kind)
+    names = (
+        [one.name for one in dataclasses.fields(kind) if one.init] if dataclasses.is_dataclass(kind) else kind._fields
+    )
+    found = {}
+    for name in names:
+        own = given.get(name, filled)
+        found[name] = filled(hints[name], rng, **given) if own is filled else own(rng) if callable(own) else own
+    return kind(**found)
+
+
+PLAIN: dict[Any, Callable[[np.random.Generator], Any]] = {
+    float: lambda rng: float(f"{rng.lognormal(0, 1.5):.6g}"),
+    int: lambda rng: int(rng.choice([0, 1, 2, 7, 40, 1200])),
+    str: lambda rng: str(rng.choice(WORDS)),
+    bool: lambda rng: bool(rng.random() < 0.5),
+    bytes: lambda rng: b"",
+    Any: lambda rng: 1.0,
+    NoneType: lambda rng: None,
+}

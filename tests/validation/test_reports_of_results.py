@@ -1,0 +1,99 @@
+"""Texts, tables and figures of results made up from their types, compared with reviewed files."""
+
+import typing
+from collections.abc import Callable, Iterator
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app import figure_style
+from study_app.validation.accuracy import accuracy_report, liquid_survey
+from study_app.validation.outlets import outlet_report
+from study_app.validation.report_rates import rates
+from study_app.validation.soak import soak
+from study_app.validation.stability import delivered_force, force_delay, stability_report, withheld_force
+from study_app.validation.thresholds import noticed_delays, verdicts
+from study_app.validation.timing import delay_report, device_lateness, timing_report
+from study_app.validation.timing.delay_results import Shown
+from study_app.validation.velocity import criteria
+from tests.filled import filled
+from tests.golden import compare, figure_of, stub_png
+
+GOLDEN = Path(__file__).parent / "golden"
+
+
+def shown(rng: np.random.Generator) -> tuple[Any, ...]:
+    """Return a trial of every screen, load and delay."""
+    places = product(("60 Hz", "144 Hz"), typing.get_args(typing.get_type_hints(Shown)["load"]), (0.0, 0.1))
+    return tuple(filled(Shown, rng, screen=screen, load=load, delay_s=late) for screen, load, late in places)
+
+
+def soaked(to: Path) -> tuple[Path, ...]:
+    """Write soaks that passed, were cut short and failed."""
+    paths: list[Path] = []
+    for name, share in (("clean", 0), ("some", 1), ("failed", 9)):
+        rng = np.random.default_rng(share)
+        counts, device = (np.zeros(1, kind)[0] for kind in (soak.sample_audit.COUNTS, soak.FAULTS))
+        for record in (counts, device):
+            for field in record.dtype.names if share else ():
+                if record.dtype[field].shape == ():
+                    record[field] = rng.integers(0, share + 1)
+        drift, rests = (
+            soak.Drift(7, 1e-12 * 10**share, 30.0),
+            soak.Rests(share, 0.1 * share, 1e-5 * share, 0.001 * share),
+        )
+        made = filled(
+            soak.Soaked, rng, drift=drift, rests=rests, counts=counts, device=device, rate_hz=1000.0, seed=share,
+            memory=(2**20, 2**21, 2**21 + share * 2**18), planned=3600, ticks=3600 - share, stops=share,
+        )  # fmt: skip
+        (to / f"{name}.txt").write_text("\n".join([made.text, made.verdict, *made.findings]))
+        paths += [to / f"{name}.txt", *(path.rename(to / f"{name}-{path.name}") for path in made.write(to))]
+    return tuple(paths)
+
+
+GIVEN: dict[str, Any] = {
+    "acted": lambda rng: tuple(rng.choice([0.0, 0.03, 0.4], len(stability_report.LIMITER_NAMES)).tolist()),
+    "shown": shown, "truths": (), "studies": 400, "hits": lambda rng: int(rng.choice([0, 12, 24, 390])),
+    "delay": lambda rng: int(rng.integers(1, 4)),
+    "device": lambda rng: str(rng.choice(list(delivered_force.DEVICES))),
+    "strokes": lambda rng: tuple(rng.choice([0.0, 0.03, 0.2], len(withheld_force.STROKES)).tolist()),
+    "after": lambda rng: tuple(tuple(rng.choice([0.0, 0.0004, 0.1], 4).tolist()) for _ in withheld_force.QUICK),
+    "reasons": lambda rng: tuple(rng.choice(["not finite", "swing"], int(rng.integers(0, 3)), replace=False)),
+}  # fmt: skip
+REPORTS = (
+    timing_report.text, timing_report.write, delay_report.text, delay_report.write, device_lateness.text,
+    accuracy_report.write,
+    liquid_survey.survey_markdown, outlet_report.stream_text, outlet_report.trigger_text, verdicts.markdown,
+    verdicts.table, noticed_delays.markdown, rates.markdown, rates.table, stability_report.group_table,
+    stability_report.in_words, stability_report.summary, force_delay.report, criteria.report, withheld_force.report,
+    delivered_force.report, soaked,
+)  # fmt: skip
+
+
+def lines_of(make: Callable[..., Any], seed: int, folder: Path) -> Iterator[str]:
+    """Yield what a function returns or writes of results."""
+    rng = np.random.default_rng(seed)
+    hints = typing.get_type_hints(make)
+    written = [
+        folder if kind is Path else filled(kind, rng, **GIVEN) for name, kind in hints.items() if name != "return"
+    ]
+    made = make(*written)
+    if not isinstance(made, tuple):
+        yield made.decode() if isinstance(made, bytes) else str(made)
+        return
+    for path in sorted(made):
+        content = path.read_bytes()
+        yield f"## {path.name}"
+        yield from figure_of(content) if content.startswith(b"\x89PNG") else content.decode().splitlines()
+
+
+@pytest.mark.parametrize("make", REPORTS, ids=lambda make: f"{make.__module__.rpartition('.')[2]}-{make.__name__}")
+def test_reports_of_results(
+    make: Callable[..., Any], tmp_path: Path, pytestconfig: pytest.Config, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(figure_style, "file_bytes", stub_png)
+    found = [line for seed in range(4) for line in (f"##### {seed}", *lines_of(make, seed, tmp_path))]
+    compare(GOLDEN / f"{make.__module__.rpartition('.')[2]}-{make.__name__}.txt", found, pytestconfig)
