@@ -1,6 +1,8 @@
 """Texts, tables and figures of results made up from their types, compared with reviewed files."""
 
+import sys
 import typing
+from collections import namedtuple
 from collections.abc import Callable, Iterator
 from itertools import product
 from pathlib import Path
@@ -8,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
-from study_app import figure_style
-from study_app.validation.accuracy import accuracy_report, liquid_survey
+from study_app.validation.accuracy import accuracy_report, candidates, liquid_survey
 from study_app.validation.outlets import outlet_report
 from study_app.validation.report_rates import rates
 from study_app.validation.soak import soak
@@ -31,16 +33,25 @@ def shown(rng: np.random.Generator) -> tuple[Any, ...]:
     return tuple(filled(Shown, rng, screen=screen, load=load, delay_s=late) for screen, load, late in places)
 
 
+def rung(rng: np.random.Generator) -> Any:
+    """Return what a report reads of a rung."""
+    family = filled(typing.get_type_hints(candidates.Rung)["family"], rng)
+    name, rate = filled(str, rng), float(rng.choice([250, 1000]))
+    return namedtuple("Rung", "name label family rate_hz counted")(name, name[:4], family, rate, bool(rate < 500))
+
+
+FAULTS = sys.modules[soak.FaultyDevice.__module__].FAULTS
+
+
 def soaked(to: Path) -> tuple[Path, ...]:
     """Write soaks that passed, were cut short and failed."""
     paths: list[Path] = []
     for name, share in (("clean", 0), ("some", 1), ("failed", 9)):
         rng = np.random.default_rng(share)
-        counts, device = (np.zeros(1, kind)[0] for kind in (soak.sample_audit.COUNTS, soak.FAULTS))
+        counts, device = (np.zeros(1, kind).view(np.recarray)[0] for kind in (soak.sample_audit.COUNTS, FAULTS))
         for record in (counts, device):
             for field in record.dtype.names if share else ():
-                if record.dtype[field].shape == ():
-                    record[field] = rng.integers(0, share + 1)
+                record[field] = rng.integers(0, share + 1, record.dtype[field].shape)
         drift, rests = (
             soak.Drift(7, 1e-12 * 10**share, 30.0),
             soak.Rests(share, 0.1 * share, 1e-5 * share, 0.001 * share),
@@ -49,14 +60,13 @@ def soaked(to: Path) -> tuple[Path, ...]:
             soak.Soaked, rng, drift=drift, rests=rests, counts=counts, device=device, rate_hz=1000.0, seed=share,
             memory=(2**20, 2**21, 2**21 + share * 2**18), planned=3600, ticks=3600 - share, stops=share,
         )  # fmt: skip
-        (to / f"{name}.txt").write_text("\n".join([made.text, made.verdict, *made.findings]))
-        paths += [to / f"{name}.txt", *(path.rename(to / f"{name}-{path.name}") for path in made.write(to))]
+        paths += [path.rename(to / f"{name}-{path.name}") for path in made.write(to)]
     return tuple(paths)
 
 
 GIVEN: dict[str, Any] = {
     "acted": lambda rng: tuple(rng.choice([0.0, 0.03, 0.4], len(stability_report.LIMITER_NAMES)).tolist()),
-    "shown": shown, "truths": (), "studies": 400, "hits": lambda rng: int(rng.choice([0, 12, 24, 390])),
+    "shown": shown, "rung": rung, "truths": (), "studies": 400, "hits": lambda rng: int(rng.choice([0, 12, 24, 390])),
     "delay": lambda rng: int(rng.integers(1, 4)),
     "device": lambda rng: str(rng.choice(list(delivered_force.DEVICES))),
     "strokes": lambda rng: tuple(rng.choice([0.0, 0.03, 0.2], len(withheld_force.STROKES)).tolist()),
@@ -84,7 +94,7 @@ def lines_of(make: Callable[..., Any], seed: int, folder: Path) -> Iterator[str]
     if not isinstance(made, tuple):
         yield made.decode() if isinstance(made, bytes) else str(made)
         return
-    for path in sorted(made):
+    for path in sorted(one for one in made if one.suffix != ".svg"):
         content = path.read_bytes()
         yield f"## {path.name}"
         yield from figure_of(content) if content.startswith(b"\x89PNG") else content.decode().splitlines()
@@ -94,6 +104,7 @@ def lines_of(make: Callable[..., Any], seed: int, folder: Path) -> Iterator[str]
 def test_reports_of_results(
     make: Callable[..., Any], tmp_path: Path, pytestconfig: pytest.Config, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(figure_style, "file_bytes", stub_png)
-    found = [line for seed in range(4) for line in (f"##### {seed}", *lines_of(make, seed, tmp_path))]
+    monkeypatch.setattr(Figure, "savefig", lambda figure, to, **_: to.write(stub_png(figure)))
+    seeds = 1 if make is soaked else 2 if make.__name__ == "write" else 4
+    found = [line for seed in range(seeds) for line in (f"##### {seed}", *lines_of(make, seed, tmp_path))]
     compare(GOLDEN / f"{make.__module__.rpartition('.')[2]}-{make.__name__}.txt", found, pytestconfig)
