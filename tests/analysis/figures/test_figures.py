@@ -10,17 +10,10 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from study_app import figure_style as style
-from study_app.analysis.figures import (
-    answer_figures,
-    captions,
-    movement_plots,
-    plotting,
-    recognition_matrix,
-    small_multiples,
-)
+from study_app.analysis.figures import answer_figures, movement_plots, plotting, small_multiples
 from study_app.analysis.tables.study_tables import load_study
 from study_app.errors import AnalysisError
-from tests.analysis.conftest import CANNOT_JUDGE, HIDDEN, Answer, Results, twelve
+from tests.analysis.conftest import HIDDEN, Answer, Results, twelve
 
 pytestmark = pytest.mark.slow
 
@@ -59,18 +52,6 @@ def test_simulated_participants_are_called_so_in_the_heading_and_real_ones_are_n
 ) -> None:
     by_person(rek, [4])
     assert "SIMULATED participants" in words(draw(load_study(rek.folder)))
-
-
-def test_a_row_with_missing_answers_tells_its_own_n(small: Results) -> None:
-    small.add("A", lambda condition, item: 3 if item == "smooth" else CANNOT_JUDGE)
-    small.add("B", lambda condition, item: 5)
-    study = load_study(small.folder)
-    figure = answer_figures.liquids(study)
-    assert words(figure).count("n 2") == 2
-    assert "n = 2 participants, 4 missing" in words(figure)
-    told = captions.caption(study, study.blocks[0])
-    assert "n = 2 participants, 4 presentations of a setting, 4 of 16 ratings missing" in told
-    assert "Cannot judge: 4; not answered: 0." in told
 
 
 def test_delays_lie_on_a_true_scale_with_a_line_per_participant_and_the_median(rek: Results) -> None:
@@ -122,18 +103,6 @@ def test_blinded_delays_are_dots_by_code_in_code_order_without_lines(rek: Result
     ] == []
 
 
-def test_a_missing_answer_breaks_a_line_and_shows_in_n(rek: Results) -> None:
-    by_person(rek, [3, 4])
-    code = rek.code("delay_75", "delays")
-    path = rek.responses("P002")
-    lines = path.read_text().splitlines(keepends=True)
-    path.write_text("".join(line for line in lines if f",{code},harder," not in line))
-    rek.open()
-    axes = panel(answer_figures.delays(load_study(rek.folder)), "item2")
-    assert [np.isnan(line.get_ydata()).sum() for line in gids(axes, r"participant\d+")] == [0, 1]
-    assert "n 1–2" in [text.get_text() for text in axes.texts]
-
-
 @pytest.mark.parametrize("fonts", [style.screen_fonts(), style.PRINT_FONTS], ids=["screen", "print"])
 @pytest.mark.parametrize("opened", [pytest.param(False, marks=pytest.mark.nightly), True], ids=["blinded", "opened"])
 @pytest.mark.parametrize("people", [pytest.param(1, marks=pytest.mark.nightly), 30])
@@ -158,48 +127,6 @@ def test_no_text_leaves_the_figure_or_touches_another(rek: Results, fonts, opene
                 assert not any(text.get_window_extent().overlaps(axes.bbox) for axes in figure.axes), text.get_text()
 
 
-def test_captions_say_what_is_missing_left_out_and_beyond_limits(rek: Results) -> None:
-    rek.add("P001", lambda *_: 6, changes={"valid": False})
-    rek.add("P002", lambda *_: 6, status="withdrawn", trials=3)
-    path = rek.responses("P001")
-    lines = path.read_text().splitlines(keepends=True)
-    path.write_text("".join(line for line in lines if ",immersive," not in line))
-    study = load_study(rek.folder)
-    caption = captions.caption(study, study.blocks[0])
-    assert "not answered: 3" in caption
-    assert "1 session is left out" in caption
-    assert "3 of 3 trials exceeded the protocol's limits" in caption
-
-
-def test_captions_say_how_many_are_excluded_and_why(rek: Results) -> None:
-    for number in range(1, 6):
-        rek.add(f"P{number:03d}", lambda *_: 6)
-    rek.exclude("P001", reason="tired")
-    rek.exclude("P002", reason="held the\nwrong  handle, " + "very " * 40)
-    rek.exclude("P003", reason="tired")
-    rek.exclude("P004", trial=rek.trial("P004", "honey"), reason="the phone rang")
-    study = load_study(rek.folder)
-    liquids, delays = (captions.caption(study, block) for block in study.blocks)
-    for caption in (liquids, delays):
-        assert "3 sessions are excluded (2 × tired; 1 × held the wrong handle, very very" in caption
-        assert " v…)." in caption
-        assert "left out, not having been completed" not in caption
-    assert "1 trial is excluded, its answers missing here (the phone rang)." in liquids
-    assert "n = 1 to 2 of 2 participants in a setting" in liquids
-    assert "trial is excluded" not in delays
-    assert "n = 2 participants, every setting rated by all" in delays
-
-
-def test_the_caption_of_opened_delays_says_how_late_they_really_were(rek: Results) -> None:
-    rek.add("P001", lambda *_: 4, changes={"delay_error_mean_ms": -2.25})
-    rek.add("P002", lambda *_: 4, changes={"delay_error_mean_ms": 4.25})
-    study = load_study(rek.folder)
-    assert "achieved" not in captions.caption(study, study.blocks[1])
-    rek.open()
-    study = load_study(rek.folder)
-    assert "by +1.0 ms on average (trials: −2.2 to +4.2 ms)" in captions.caption(study, study.blocks[1])
-
-
 def test_nothing_hidden_is_in_any_blinded_file(small: Results, tmp_path: Path) -> None:
     small.add("A", lambda *_: 3)
     for path in plotting.plot(small.folder, tmp_path / "out"):
@@ -219,42 +146,8 @@ def test_without_a_completed_session_plot_says_so_and_writes_nothing(rek: Result
     assert not (tmp_path / "out").exists()
 
 
-TABLE = ((0, 4, 0, 0, 0, 1, 0), (3, 0, 0, 0, 1, 1, 0), (0, 3, 0, 0, 0, 1, 1))
-
-
-def matrix(table: tuple[tuple[int, ...], ...] = TABLE) -> Figure:
-    return recognition_matrix.draw(
-        table,
-        ["Water", "Honey", "Light oil"],
-        ["Like honey", "Like water", "Like slime", "Like oil", "Like tar"],
-        [1, 0, 3],
-        title="Names",
-        marks=[],
-        counts=["n = 5"],
-        foot="",
-        fonts=style.PRINT_FONTS,
-    ).figure
-
-
 def texts(figure: Figure, label: str) -> list[str]:
     return [text.get_text() for axes in figure.axes if axes.get_label() == label for text in axes.texts]
-
-
-def test_every_count_stands_in_its_cell_with_its_share_of_the_row() -> None:
-    figure = matrix()
-    assert texts(figure, "name2") == ["4  (80%)", "0", "3  (60%)"]
-    assert texts(figure, "name6") == ["1  (20%)"] * 3
-    assert texts(figure, "name7") == ["0", "0", "1  (20%)"]
-
-
-def test_the_right_name_is_framed_in_every_row() -> None:
-    framed = {
-        (axes.get_label(), patch.get_gid())
-        for axes in matrix().axes
-        for patch in axes.patches
-        if patch.get_linewidth() > 1
-    }
-    assert framed == {("name2", "name2-setting1"), ("name1", "name1-setting2"), ("name4", "name4-setting3")}
 
 
 @pytest.mark.parametrize("lowest_ms", [50.0, 200.0])

@@ -65,9 +65,9 @@ def filled(number: int) -> tuple[LevelBlock, LevelsFound]:
 
     summary = ("share", "share", "settings", "geometric mean", "mean", "share")[number % 6]
     design = str(rng.choice(DESIGNS[summary]))
-    vary = str(rng.choice(list(VARIED)))
+    vary = "damping_nspm" if number % 4 == 0 else str(rng.choice(list(VARIED)))
     quantity, unit, ends, base = VARIED[vary]
-    kind = str(rng.choice(["weber", "difference", "value"]))
+    kind = "weber" if number % 4 == 0 else str(rng.choice(["weber", "difference", "value"]))
     people = [f"P{one:03d}" for one in range(1, int(rng.choice([1, 2, 2, 3] if number < 18 else [2, 5, 15])) + 1)]
     standards = [None] if rng.random() < 0.2 else [base, 2 * base, 0.0][: int(rng.integers(2, 4))]
     levels = np.geomspace(*ends, int(rng.integers(1, 5))).round(3).tolist()

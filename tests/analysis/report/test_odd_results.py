@@ -15,8 +15,7 @@ from study_app.protocol.forms.simulated_observer import NO_FEATURES
 from study_app.protocol.load import parse, source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
-from tests.analysis.conftest import CANNOT_JUDGE, Results, make_results, twelve
-from tests.analysis.report.read_report import read
+from tests.analysis.conftest import Results, make_results, twelve
 from tests.protocol.groups.grouped import GROUPS, STUDY
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("figures_of_the_page")]
@@ -33,35 +32,6 @@ def test_methods_distinguish_primary_and_exploratory_statements(tmp_path: Path) 
     both = "p adjusted over 1 statement by Holm (primary) and over {} statements by Benjamini-Hochberg (exploratory)"
     assert both.format("eight") in told
     assert both.format("four") in told
-
-
-def test_what_was_not_measured_is_neither_within_limits_nor_beyond(rek: Results, tmp_path: Path) -> None:
-    rek.add("P001", lambda *_: 4, changes={"valid": None})
-    rek.open()
-    report(rek.folder, tmp_path / "report")
-    page = read(tmp_path / "report")
-    assert "Whether trials kept to the protocol's limits of timing was not measured." in page
-    assert " not measured " in page
-
-
-def test_answers_off_the_scale_are_missing_and_never_neutral(small: Results, tmp_path: Path) -> None:
-    for number_ in range(1, 9):
-        small.add(
-            f"P{number_:03d}",
-            lambda condition, item: CANNOT_JUDGE if item == "warm" else 6 if condition == "heavyzembla" else 3,
-        )
-    small.open()
-    report(small.folder, tmp_path / "report")
-    assert "no participant answered under both settings" in read(tmp_path / "report")
-
-
-def test_sessions_without_a_completed_one_give_a_report_without_findings(rek: Results, tmp_path: Path) -> None:
-    rek.add("P001", lambda _condition, _item: 4, status="withdrawn", trials=2)
-    report(rek.folder, tmp_path / "report")
-    told = read(tmp_path / "report")
-    assert "there are no findings" in told
-    assert "no answers count yet" in told
-    assert not (tmp_path / "report" / "liquids.png").exists()
 
 
 def test_another_study_mixed_in_or_an_empty_folder_is_one_clear_error(

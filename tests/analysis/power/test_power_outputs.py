@@ -1,0 +1,52 @@
+"""Counts, tables and figures of the power of small plans, compared with reviewed files."""
+
+from pathlib import Path
+
+import pytest
+from matplotlib.figure import Figure
+
+from study_app.analysis.power.batch_counts import count
+from study_app.analysis.power.plan import plan
+from study_app.analysis.power.power_curves import powers
+from study_app.analysis.power.power_files import write
+from study_app.analysis.power.threshold_tables import threshold_csv, threshold_markdown
+from study_app.protocol.load import load, parse
+from tests.analysis.conftest import SMALL
+from tests.analysis.outputs import GOLDEN
+from tests.analysis.power.test_power import felt_in
+from tests.analysis.power.test_threshold_power import study, swept
+from tests.golden import compare, figure_of, numbers_told, stub_png
+
+THREE = SMALL.replace(
+    'conditions = ["heavyzembla", "lightquorn"]', 'conditions = ["heavyzembla", "lightquorn", "learn"]'
+)
+BOUND = '[analysis]\nequivalence_bound = 1.0\nprimary = ["smooth"]\n'
+PLANS = {"two": SMALL, "three": THREE, "decided": SMALL + BOUND, "rek2024": None}
+
+
+@pytest.mark.parametrize(
+    "name", ["two", "three", *(pytest.param(one, marks=pytest.mark.slow) for one in ("decided", "rek2024"))]
+)
+def test_power_of_small_plans(
+    name: str, tmp_path: Path, pytestconfig: pytest.Config, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Figure, "savefig", lambda figure, to, **_: to.write(stub_png(figure)))
+    text = PLANS[name]
+    protocol = load(name) if text is None else parse(text.encode(), "small.toml")
+    planned = plan(protocol, felt_in(protocol))
+    counts = count(planned, (3, 7), 1, 0, 3)
+    lines = [f"{' '.join(what)}: {numbers_told(found)}" for what, found in counts.items()]
+    for studies, asked in ((3, 3), (3, 40)):
+        for path in sorted(write(powers(planned, (3, 7), studies, asked, 1, counts), tmp_path)):
+            if path.suffix not in (".svg", ".pdf"):
+                content = path.read_bytes()
+                lines.append(f"##### {path.name}, {asked} asked")
+                lines += figure_of(content) if path.suffix == ".png" else content.decode().splitlines()
+    compare(GOLDEN / f"power-{name}.txt", lines, pytestconfig)
+
+
+@pytest.mark.parametrize("name", ["updown", pytest.param("questplus", marks=pytest.mark.slow)])
+def test_precision_of_small_plans(name: str, pytestconfig: pytest.Config) -> None:
+    method = {"updown": 'kind = "updown", trials = 20', "questplus": 'kind = "questplus", trials = 20'}[name]
+    found = swept(study(('kind = "questplus", trials = 20', method)), (10, 20), (1, 3), 4)
+    compare(GOLDEN / f"precision-{name}.txt", [threshold_csv(found).decode(), threshold_markdown(found)], pytestconfig)
