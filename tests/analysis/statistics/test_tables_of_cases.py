@@ -9,7 +9,6 @@ import pytest
 
 from study_app.analysis.statistics import (
     agreement,
-    exact_distributions,
     friedman,
     global_permutation,
     independent_groups,
@@ -125,7 +124,7 @@ def of_pairs() -> Iterator[str]:
     })  # fmt: skip
     yield from results(outcome.draws_for, {f"{a} {m}": (a, 1000, m) for a, m in product((0.05, 0.001, 1e-6), (1, 40))})
     yield from results(outcome.clopper_pearson, {f"{c} of {n}": (c, n) for c, n in ((0, 5), (5, 5), (3, 10), (0, 1))})
-    yield from results(exact_distributions.doubled_ranks, SAMPLES)
+    yield from results(friedman.doubled_ranks, SAMPLES)
 
 
 def of_equivalence() -> Iterator[str]:
