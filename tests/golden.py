@@ -107,7 +107,7 @@ def told(value: Any) -> str:
     if hasattr(value, "tolist"):
         return told(value.tolist())
     if isinstance(value, float):
-        return f"{value if abs(value) > 1e-14 else 0.0:.7g}"
+        return f"{0.0 if abs(value) < 1e-14 else value:.7g}"
     if isinstance(value, dict):
         return f"{{{', '.join(f'{told(name)}: {told(one)}' for name, one in value.items())}}}"
     if isinstance(value, list | tuple):
