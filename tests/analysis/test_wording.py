@@ -151,15 +151,6 @@ def test_sessions_are_shown_and_tested() -> None:
     assert "suggested" not in {one.verdict for one in SESSIONS.of(found)}
 
 
-def test_people_who_came_to_one_session_each_cannot_compare_them() -> None:
-    trials = [
-        one for one in everybody(delays(FOUR_LEVELS), 8, rising(1), sessions=2) if (one[0] < "P004") == (one[1] == 1)
-    ]
-    _, found = evaluated(study(delays(FOUR_LEVELS), trials))
-    assert SESSIONS.of(found) == ()
-    assert any("no one answered the same setting in all of sessions" in one.why for one in found.absent)
-
-
 def test_conditions_of_one_delay_are_replicates_of_it() -> None:
     twice = (0.0, 50.0, 50.0, 100.0, 150.0)
     results, found = evaluated(study(delays(twice), list(everybody(delays(twice), 12, rising(3)))))

@@ -1,20 +1,15 @@
 """The figures of tracks and of Weber fractions, and what they are drawn from."""
 
-import re
 from dataclasses import replace
-from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 
-from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.designs.thresholds import counts_of, thresholds
 from study_app.analysis.designs.track_courses import courses
 from study_app.analysis.figures.levels.weber_figure import weber_fractions
 from study_app.analysis.results.level_results import LevelsFound, PublishedValue, ThresholdFound
 from study_app.analysis.statistics.psychometrics.posterior import fitted, narrowing
-from study_app.analysis.tables.study_tables import load_study
 from study_app.protocol.trials.kinds import default_design
 from study_app.protocol.trials.psychometric import analysis_grid, assumed_for
 from tests.analysis.levels.level_studies import STIMULUS, block, rows
@@ -74,36 +69,3 @@ def test_weber_fractions_are_levels_or_differences_over_their_standards() -> Non
         (4.0, 0.1, 0.01, None),
         (8.0, 0.15, 0.01, None),
     ]
-
-
-def words_in(svg: Path) -> list[str]:
-    return [
-        re.sub(r"<[^>]+>", "", one).strip() for one in re.findall(r"<text[^>]*>.*?</text>", svg.read_text(), re.DOTALL)
-    ]
-
-
-@pytest.mark.slow
-def test_adaptive_blocks_have_a_panel_for_each_participant_and_standard(reported_adaptive: Path) -> None:
-    for name, panels in (("tracks-staircase", 6), ("tracks-quest", 3)):
-        for form in ("png", "svg", "pdf", "txt"):
-            assert (reported_adaptive / f"{name}.{form}").stat().st_size > 0
-        words = words_in(reported_adaptive / f"{name}.svg")
-        assert sum(word in {"P001", "P002", "P003"} for word in words) == panels
-        assert words.count("standard 4") == (3 if name == "tracks-staircase" else 0)
-    assert "Rings: reversals" in (reported_adaptive / "tracks-staircase.txt").read_text()
-    assert "Rings" not in (reported_adaptive / "tracks-quest.txt").read_text()
-
-
-@pytest.mark.slow
-def test_weber_fractions_are_drawn_where_there_are_two_standards(
-    opened_adaptive: Path, reported_adaptive: Path
-) -> None:
-    assert (reported_adaptive / "weber-staircase.png").exists()
-    assert not (reported_adaptive / "weber-quest.png").exists()
-    assert {"4", "8", "Weber fraction at 71 % correct"} < set(words_in(reported_adaptive / "weber-staircase.svg"))
-    assert "dotted: published 0.1917" in words_in(reported_adaptive / "weber-staircase.svg")
-    caption = (reported_adaptive / "weber-staircase.txt").read_text(encoding="utf-8")
-    assert "published values, Jones et al. 1997: weber 0.1917 (at 71 % correct, n = 10)." in caption
-    (block_found,) = (one for one in levels_found(load_study(opened_adaptive)) if one.block == "staircase")
-    assert [point[0] for point in weber_fractions(block_found, "P002")] == [4.0, 8.0]
-    assert np.all([point[1] > 0 for point in weber_fractions(block_found, None)])

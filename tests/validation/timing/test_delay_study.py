@@ -1,14 +1,11 @@
 """What is said of delays: errors from sample to painting, in ms and in frames, in words, tables and a figure."""
 
-import csv
-import io
-
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
-from study_app.validation.timing.delay_report import COLUMNS, csv_text, write
+from study_app.validation.timing.delay_report import write
 from study_app.validation.timing.delay_results import Delayed, Shown
 
 MS = 1_000_000
@@ -57,16 +54,6 @@ def test_one_trial_that_missed_it_is_enough():
     limits = found(*WELL.shown, shown(np.full(200, 9.0), hz=60.0, delay_s=0.1, load="gui+cpu")).limits()
     assert [said.rsplit(": ", 1)[1] for said in limits] == ["met", "missed", "met", "met"]
     assert "means within 6.00 ms of each other" in limits[1]
-
-
-def test_the_csv_holds_every_trial_once_in_ms_and_in_frames():
-    rows = list(csv.DictReader(io.StringIO(csv_text(WELL))))
-    assert tuple(rows[0]) == COLUMNS
-    assert len(rows) == 8
-    fast = next(row for row in rows if row["screen"] == "virtual, 144 Hz" and row["requested_ms"] == "200")
-    assert float(fast["achieved_ms"]) == pytest.approx(203)
-    assert float(fast["error_p99_ms"]) == pytest.approx(3)
-    assert float(fast["error_p99_frames"]) == pytest.approx(0.432)
 
 
 @pytest.mark.slow

@@ -1,7 +1,5 @@
 """How loops are timed: by the same rule, in ticks, and said in words, tables and a figure. No time is judged here."""
 
-import csv
-import io
 import sys
 import threading
 from pathlib import Path
@@ -23,7 +21,7 @@ from study_app.validation.timing.lateness import Lane, Timed
 from study_app.validation.timing.loops import LEAD_IN, PERIOD_NS, granted, taken
 from study_app.validation.timing.measurement import timing
 from study_app.validation.timing.timed_scene import FULL, PlayedHand
-from study_app.validation.timing.timing_report import BEGIN, COLUMNS, END, csv_text, markdown
+from study_app.validation.timing.timing_report import BEGIN, END, markdown
 
 NORMAL, REAL_TIME = Grant("normal", "no more was requested"), Grant("real-time", "SCHED_FIFO 60")
 
@@ -156,15 +154,6 @@ def test_each_limit_can_be_missed(servo, missed):
     limits = found(servo, *WELL.lanes[1:]).limits()
     assert [limit.held for limit in limits] == [number != missed for number in range(4)]
     assert str(limits[missed]).endswith("missed")
-
-
-def test_the_csv_holds_each_lane_once():
-    rows = list(csv.DictReader(io.StringIO(csv_text(WELL))))
-    assert tuple(rows[0]) == COLUMNS
-    assert [row["loop"] for row in rows] == [one.name for one in WELL.lanes]
-    assert float(rows[0]["p50_us"]) == 30
-    assert rows[1]["tick_p99_us"] == "n/a"
-    assert rows[3]["overruns"] == "5"
 
 
 def test_the_page_of_timing_has_such_a_table_to_be_replaced_whole():
