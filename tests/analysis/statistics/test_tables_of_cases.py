@@ -19,10 +19,9 @@ from study_app.analysis.statistics import (
     random_effects,
     recognition,
     skillings_mack,
-    student_interval,
     trend,
 )
-from study_app.analysis.statistics.equivalence import bootstrap_t, power, tost
+from study_app.analysis.statistics.equivalence import power, tost
 from study_app.analysis.statistics.psychometrics import goodness, posterior, settings, threshold
 from study_app.errors import AnalysisError
 from study_app.protocol.trials.kinds import default_design
@@ -115,9 +114,7 @@ def of_pairs() -> Iterator[str]:
     yield from results(recognition.named, named_(1, 3))
     names = {name: (recognition.named(one), (0, 1, None)) for name, one in named_(2, 3).items()}
     yield from results(recognition.recognition, names, labels=4)
-    yield from results(
-        student_interval.student_interval, {name: np.asarray(one, float) for name, one in DIFFERENCES.items()}
-    )
+    yield from results(settings.student_interval, {name: np.asarray(one, float) for name, one in DIFFERENCES.items()})
     yield from results(random_effects.group_mean, {
         "one": ([1.0], [0.1]), "two": ([1.0, 2.0], [0.1, 0.2]), "alike": ([1.0, 1.01, 0.99], [0.5, 0.4, 0.6]),
         "apart": ([1.0, 4.0, 9.0, 2.0], [0.01, 0.02, 0.01, 0.03]), "none": ([], []),
@@ -135,9 +132,9 @@ def of_equivalence() -> Iterator[str]:
     yield from results(tost.tost, cases, 1.0, verdict_only=True)
     yield from results(tost.fewest, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01)})
     yield from results(tost.fewest, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01)}, equal=True)
-    yield from results(bootstrap_t.resamples_for, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01, 0.001, 1e-5)})
+    yield from results(tost.resamples_for, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01, 0.001, 1e-5)})
     rows = {name: one[None] for name, one in cases.items() if len(one) > 2 and not np.isnan(one).any()}
-    yield from results(bootstrap_t.p_within, rows, 1.0, 3, 200)
+    yield from results(tost.p_within, rows, 1.0, 3, 200)
     yield from results(power.sizes, rows)
     yield from results(power.equivalent, rows, 1.0, 0.05, np.random.default_rng(1), 200)
 
