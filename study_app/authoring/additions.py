@@ -58,7 +58,9 @@ def added(
     if several:
         count = len(row.value or ())
         path = (*section, behind + 1 if isinstance(behind, int) and behind < count else count)
-        first = Insert(path, value) if row.value else Set(section, [value])
+        entry = row_at(study.document, path)
+        made = initial(study.document, path) if entry is not None and entry.kind == "references" else value
+        first = Insert(path, made) if row.value else Set(section, [made])
     else:
         path = (*section, free_id(names(study.document, str(section[0])), name or singular(section[-1])))
         first = Set(path, value, behind if isinstance(behind, str) else None)

@@ -76,15 +76,18 @@ def _initial(document: Mapping[str, Any], row: Row, node: Node) -> Any:
     entry = node.get("additionalProperties")
     if kind == "tables" and isinstance(entry, Mapping) and entry.get("type") == "array":
         points = [f"Point {number}" for number in range(1, POINTS + 1)]
-        return {str(language): points for _, language in entries(document, "study.languages.*")}
+        return dict.fromkeys(_languages(document) or ["en"], points)
     return _tables(document, path, node) if kind == "list" else {}
 
 
-def _tables(document: Mapping[str, Any], path: Path, node: Node) -> list[dict[str, Any]]:
-    """Return the least number of tables of a list, each with its required keys."""
-    found: list[dict[str, Any]] = []
+def _tables(document: Mapping[str, Any], path: Path, node: Node) -> list[Any]:
+    """Return the least number of tables of a list, each with its required keys; or of lists, as of sequences."""
+    found: list[Any] = []
     for number in range(max(1, node.get("minItems", 1))):
         place = (*path, number)
+        if node["items"].get("type") == "array":
+            found.append(initial(document, place))
+            continue
         table = table_of(node_at(document, place), {})
         required = () if table is None else table.get("required", ())
         name = f"{singular(path[-1])}_{number + 1}"
@@ -108,8 +111,12 @@ def _text(document: Mapping[str, Any], path: Path, node: Node, *, localised: boo
 
 
 def _in_languages(document: Mapping[str, Any], words: str) -> Any:
-    languages = [str(name) for _, name in entries(document, "study.languages.*")]
+    languages = _languages(document)
     return dict.fromkeys(languages, words) if len(languages) > 1 else words
+
+
+def _languages(document: Mapping[str, Any]) -> list[str]:
+    return [str(name) for _, name in entries(document, "study.languages.*")]
 
 
 def _number(node: Node, otherwise: float) -> float:
