@@ -1,0 +1,141 @@
+"""What the designer shows of each kind of element, compared with reviewed texts: outline, form, measures, file."""
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path as File
+
+import pytest
+
+from study_app.authoring.additions import additions_for
+from study_app.authoring.edited_study import Study, read
+from study_app.authoring.measures.observers import Asked, Measurable, Observed, Planted
+from study_app.authoring.measures.planned import Detectable, Finding, GroupPrecision
+from study_app.authoring.outline import outline
+from study_app.authoring.repairs import repairs
+from study_app.authoring.study_facts import facts
+from study_app.protocol.source.document import Path
+from study_app.viewmodels.designer.addable import addable, fields_to_go_to
+from study_app.viewmodels.designer.element_facts import brief, used_by
+from study_app.viewmodels.designer.file_text import file_text
+from study_app.viewmodels.designer.finding import found_fields
+from study_app.viewmodels.designer.form.form_rows import form, position_of
+from study_app.viewmodels.designer.measures.level_plots import Simulated
+from study_app.viewmodels.designer.measures.measures_view import Controls, SlowResults, measures_view
+from study_app.viewmodels.designer.outline_rows import outline_rows
+from study_app.viewmodels.designer.problem_rows import problem_rows
+from study_app.viewmodels.designer.prompts import series_plan, series_prompt
+from study_app.viewmodels.designer.requests import AskSeries
+from tests.authoring.test_study_transcripts import elements, generic, studies
+from tests.golden_text import changed, compare, lines_of, short
+from tests.protocol.edited_studies import CASES, Case, cases_of
+
+GOLDEN = File(__file__).parent / "golden"
+QUICK = ("rows", "sound", "levels")
+
+
+def of_study(study: Study) -> Iterator[str]:
+    times = facts(study).steps_s
+    yield from lines_of(facts(study))
+    yield from lines_of(outline_rows(study, times))
+    yield from lines_of(outline(study))
+    for words in ("viscosity", "hon", "order"):
+        yield f"find {words}"
+        yield from lines_of(outline_rows(study, times, words))
+        yield from lines_of(found_fields(study, words))
+        yield from lines_of(fields_to_go_to(study, words, ("study",)))
+
+
+def of_element(study: Study, path: Path) -> Iterator[str]:
+    document = study.document
+    marked = file_text(study, "study.toml", path)
+    yield f"brief: {brief(document, path)} | {used_by(document, path)} | {position_of(document, path)}"
+    yield f"lines: {marked.selected} {marked.faulty}"
+    yield from lines_of(form(study, path))
+    yield from lines_of(measures_view(study, facts(study), path, Controls(12), SlowResults(), {}))
+    yield from (f"add {one.words} | {one.icon} | {one.help}" for one in addable(study, path))
+    if (prompt := series_prompt(study, AskSeries(path))) is not None:
+        yield from lines_of(prompt)
+        for field, _ in prompt.fields:
+            yield from lines_of(series_plan(study, path, field, "2 5, 9.5"))
+
+
+def transcript(before: Iterable[str], names: Iterable[str]) -> Iterator[str]:
+    """Yield what is shown of some studies, and of each kind of element that none of the studies before has."""
+    seen = {generic(path) for _, study in studies(before) for path in elements(study.document)}
+    for name, study in studies(names):
+        yield f"== {name}"
+        yield from of_study(study)
+        for path in elements(study.document):
+            if generic(path) not in seen:
+                seen.add(generic(path))
+                yield f"== {name} at {path}"
+                yield from of_element(study, path)
+
+
+def of_faults(study: Study) -> Iterator[str]:
+    """Yield the rows of a study's problems, and what each repair and addition is called and changes."""
+    yield from lines_of(problem_rows(study))
+    for fault in study.faults:
+        for repair in (*repairs(study, fault), *additions_for(study, fault)):
+            yield f"repair {short(fault.path)}: {repair.words}"
+            yield from changed(study.text, study.edited(*repair.edits)[0].text)
+
+
+OBSERVED = Observed(
+    0.19, 0.02, 400, 0.75, (0.02, 0.05, 0.1, 0.2, 0.4), (0.5, 0.55, 0.66, 0.78, 0.97),
+    ((0.5, 0.53, 0.6, 0.7, 0.95), (0.5, 0.6, 0.7, 0.85, 0.98)), ((0.05, 0.3), (0.2, 0.7)),
+    ((1, (0.1, 0.15, 0.2, 0.3, 0.5)), (40, (0.15, 0.18, 0.19, 0.2, 0.24))),
+    (Asked(1, 1, 0.2, True), Asked(2, 2, 0.1, False), Asked(3, 1, 0.17, True)), 0.06, 80,
+)  # fmt: skip
+GROUP = GroupPrecision(12, 60, 0.15, 80, 0.7, 107, 0.9, 60, 14)
+SIMULATED = {
+    "viscosityjnd": SlowResults(
+        Simulated(OBSERVED, Measurable((0.05, 0.4), (Planted(0.19, 0.01, 0.95),)), GROUP, threshold=0.19, planned=12),
+        ranges={"viscosity": (0.05, 0.5), "training": None}, warnings=("methods.adaptive.trials: few trials",),
+    ),
+    "thickness": SlowResults(Simulated(measurable=Measurable(None, ()), failed={"observed": "The process ended."})),
+    "physical2": SlowResults(detectable=Detectable(12, 200, 7, (Finding("thick", 0.5), Finding("wet", None))), parts=2),
+}  # fmt: skip
+"""What simulations could answer, by study: the cards of blocks show it."""
+
+
+def of_blocks(study: Study, slow: SlowResults) -> Iterator[str]:
+    for name in study.document["blocks"]:
+        for people in (1, 13):
+            controls = Controls(people, planned=12)
+            yield from lines_of(measures_view(study, facts(study), ("blocks", name), controls, slow, {}))
+
+
+def test_what_is_shown_of_small_studies(pytestconfig: pytest.Config) -> None:
+    compare(GOLDEN / "shown.txt", list(transcript((), QUICK)), pytestconfig)
+
+
+@pytest.mark.parametrize("name", SIMULATED)
+def test_what_is_shown_of_simulations(name: str, pytestconfig: pytest.Config) -> None:
+    (_, study), *_ = studies((name,))
+    compare(GOLDEN / f"simulations_of_{name}.txt", list(of_blocks(study, SIMULATED[name])), pytestconfig)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", ["mixed", "every_design", "grouped", "rek2024", "viscosityjnd", "delaydetect", "slime"]
+)
+def test_what_is_shown_of_other_studies(name: str, pytestconfig: pytest.Config) -> None:
+    compare(GOLDEN / f"shown_of_{name}.txt", list(transcript((), (name,))), pytestconfig)
+
+
+def problems(cases: Iterable[Case]) -> list[str]:
+    found = []
+    for case in cases:
+        found += [f"== {case.study}, {case.name}", *of_faults(read(case.text.encode(), File()))]
+    return found
+
+
+def test_repairs_of_some_faults(pytestconfig: pytest.Config) -> None:
+    some = (case for file in sorted(CASES.glob("*.txt")) for case in list(cases_of(file))[::13])
+    compare(GOLDEN / "repairs.txt", problems(some), pytestconfig)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("file", sorted(CASES.glob("*.txt")), ids=lambda file: file.stem)
+def test_repairs_of_all_faults(file: File, pytestconfig: pytest.Config) -> None:
+    compare(GOLDEN / f"repairs_in_{file.stem}.txt", problems(cases_of(file)), pytestconfig)
