@@ -150,7 +150,8 @@ class RowWidget(Themed, QWidget):
             self.wrong.sentence.setText("\n".join(said))
             self.wrong.setVisible(bool(found))
         row = self.row.row
-        self.field.setAccessibleDescription(". ".join(filter(None, (row.help, self.row.bounds, *found))))
+        sentences = filter(None, (row.help, self.row.bounds, *found))
+        self.field.setAccessibleDescription(" ".join(f"{one.rstrip('.')}." for one in sentences))
         some_missing = isinstance(self.field, LanguagesField) and self.field.some_missing
         for part in self.field.findChildren(QWidget):
             if not isinstance(part, TypedLine | TypedText):
