@@ -1,0 +1,252 @@
+"""The designer's window, compared with reviewed texts: each kind of element in every tab, each field used once."""
+
+import difflib
+import re
+from collections.abc import Callable, Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QAbstractButton, QApplication
+
+from study_app.gui.widgets.background import wait_for_jobs
+from study_app.protocol.source.document import Path
+from study_app.viewmodels.designer.requests import RetypeFile, SetValue
+from tests.app.designer.support.designer import DEMO
+from tests.authoring.test_study_transcripts import elements, generic
+from tests.golden_text import changed
+from tests.gui.transcript import compare, painted, steps, told
+from tests.protocol.edited_studies import text_of
+
+TABS = ("measures", "file", "changes", "participant")
+TIME = re.compile(r"\b\d\d:\d\d\b")
+
+
+@pytest.fixture(autouse=True)
+def no_time_passes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the participant's page stand still, and typing be one step."""
+    for module in ("app.designer.editing", "app.designer.participant.preview", "gui.designer.participant.live_page"):
+        monkeypatch.setattr(f"study_app.{module}.time", SimpleNamespace(monotonic=lambda: 1000.0))
+
+
+def settle(designer: Any) -> None:
+    """Let all be done now that a timer would do later, or a job in the background."""
+    quiet = 0
+    while quiet < 2:
+        wait_for_jobs(60)
+        QApplication.processEvents()
+        found = (*designer.controller.findChildren(QTimer), *designer.window.findChildren(QTimer))
+        due = [timer for timer in found if timer.isSingleShot() and timer.isActive()]
+        for timer in due:
+            timer.stop()
+            timer.timeout.emit()
+        quiet = 0 if due else quiet + 1
+
+
+class Record:
+    """A designer, and what changes in its window, its study and its messages with each act."""
+
+    def __init__(self, designer: Any, text: str = DEMO) -> None:
+        self.designer, self.lines, self.text = designer, list[str](), text
+        designer.file.write_text(text, encoding="utf-8")
+        self.before: dict[str, list[str]] = {}
+        self.note("open", designer.open)
+
+    def note(self, name: str, act: Callable[[], Any], *, paints: bool = False) -> None:
+        """Do something, and note what it changes."""
+        if QApplication.activePopupWidget() is None and not self.designer.window.isActiveWindow():
+            self.designer.window.activateWindow()
+            QApplication.processEvents()
+        act()
+        settle(self.designer)
+        self.lines += [f"-- {name}", *self.said()]
+        shown = QApplication.activePopupWidget() or self.designer.window
+        after = {"told": [TIME.sub("HH:MM", line) for line in told(shown)]} | (
+            {"painted": painted(shown)} if paints else {}
+        )
+        for way, lines in after.items():
+            found = difflib.unified_diff(self.before.get(way, []), lines, n=0, lineterm="")
+            self.lines += [TIME.sub("HH:MM", line) for line in list(found)[2:] if line[0] in "+-"]
+        self.before |= after
+
+    def said(self) -> Iterator[str]:
+        """Yield messages, what is selected, and what changed in the text since the last time."""
+        designer = self.designer
+        yield from (f"message {title}: {sentence!r}" for title, sentence in designer.messages)
+        designer.messages.clear()
+        if designer.editing.opened is None:
+            yield "no study"
+            return
+        focus = QApplication.focusWidget()
+        at = f"{type(focus).__name__} {focus.accessibleName()!r}" if focus else "nothing"
+        yield f"selected {'.'.join(map(str, designer.editing.selected))}, steps {designer.steps}, keyboard at {at}"
+        yield from changed(self.text, designer.text)
+        self.text = designer.text
+
+    def compare(self, name: str, config: pytest.Config) -> None:
+        """Compare what was noted with the golden file of a name."""
+        compare(f"designer, {name}", [" / ".join(line.splitlines()) for line in self.lines], config)
+
+    def select(self, *path: str | int, paints: bool = False) -> None:
+        self.note(f"select {path}", lambda: self.designer.go_to(*path), paints=paints)
+
+    def hit(self, *keys: str) -> None:
+        for one in keys:
+            self.note(f"key {one}", lambda one=one: self.designer.key(one))
+
+    def type(self, text: str) -> None:
+        self.note(f"type {text!r}", lambda: self.designer.type(text))
+
+    def press(self, name: str) -> None:
+        self.note(f"press {name}", lambda: self.designer.click_on(self.designer.part(name, QAbstractButton)))
+
+
+def one_of_each(document: Any) -> list[Path]:
+    """Return the first element of each kind."""
+    found: dict[Path, Path] = {}
+    for path in elements(document):
+        found.setdefault(generic(path), path)
+    return [path for path in found.values() if path != ("format",)]
+
+
+def each_element(record: Record) -> None:
+    for path in one_of_each(record.designer.study.document):
+        record.select(*path)
+
+
+def each_tab(record: Record) -> None:
+    for path in one_of_each(record.designer.study.document):
+        record.select(*path)
+        for tab in TABS:
+            paints = tab == "measures" and path[0] in ("blocks", "questionnaires", "liquids")
+            record.note(f"tab {tab}", lambda tab=tab: record.designer.place.show_tab(tab), paints=paints)
+
+
+def by_keys(record: Record) -> None:
+    record.hit("ctrl+1", "Down", "Down", "alt+Down", "alt+Up", "ctrl+d", "ctrl+z", "ctrl+shift+z", "ctrl+z", "F2")
+    record.type("fluids")
+    record.hit(
+        "Return", "ctrl+2", "Tab", "Tab", "ctrl+3", "Right", "ctrl+e", "ctrl+e", "alt+Left", "ctrl+5", "F6", "shift+F6"
+    )
+    record.hit("ctrl+f")
+    record.type("honey")
+    record.hit("Escape", "shift+F1", "shift+F1", "ctrl+l", "ctrl+s")
+
+
+def adding_and_deleting(record: Record) -> None:
+    record.hit("ctrl+1", "Insert")
+    record.type("question")
+    record.hit("Down", "Return", "ctrl+z", "Insert")
+    record.type("Language: Du")
+    record.hit("Return", "ctrl+z", "ctrl+shift+d")
+    record.select("conditions", "late")
+    record.hit("ctrl+shift+d")
+    record.type("50 100 x")
+    record.hit("Return", "Escape")
+    record.select("liquids", "thin")
+    record.hit("ctrl+1", "Delete", "Escape", "Delete", "Return")
+    record.hit("ctrl+z", "ctrl+c", "ctrl+v", "shift+Down", "ctrl+d", "Delete")
+
+
+def problems(record: Record) -> None:
+    text = record.text.replace('liquid = "thick"', 'liquid = "thik"').replace("blinding", "blindin", 1)
+    text = text.replace("force_limit_n = 6", "force_limit_n = 60").replace("min_s = 5", 'min_s = "5"')
+    record.note("break", lambda: record.designer.editing.ask(RetypeFile(text)))
+    record.hit("ctrl+4", "F8", "F8", "F8", "F8", "F8", "ctrl+4", "Tab", "Tab", "Return")
+    record.press('Use "blinding": Study, Blindin')
+    record.note("no TOML", lambda: record.designer.editing.ask(RetypeFile("[study")))
+    record.hit("F8", "ctrl+z", "ctrl+z")
+
+
+def new_study(record: Record) -> None:
+    record.hit("ctrl+n")
+    page = record.designer.place.new_page
+    for one in page.buttons[:6]:
+        record.note(f"choose {one.accessibleName()}", lambda one=one: one.setChecked(True))
+    record.note("make", page.card.make.click)
+    record.note("title", lambda: page.card.questions.title.setText("Which is thicker?"))
+    record.note("make", page.card.make.click)
+
+
+def on_disk(record: Record) -> None:
+    designer = record.designer
+    record.note("edit", lambda: designer.editing.ask(SetValue(("blocks", "liquids", "repetitions"), 3)))
+    record.note("changes", lambda: designer.place.show_tab("changes"))
+    designer.change(("rate_hz = 1000", "rate_hz = 900"))
+    record.note("changed outside", designer.controller.enter, paints=True)
+    record.note("save", designer.saving.save)
+    for action in ("compare", "mine", "outside"):
+        record.note(f"banner {action}", lambda action=action: designer.place.banner_asked.emit(action))
+    designer.file.unlink()
+    record.note("deleted outside", designer.controller.enter)
+    record.note("open another", lambda: designer.controller.open("rek2024"))
+    record.note("open none", lambda: designer.controller.open("nonesuch"))
+    record.note("open again", lambda: designer.controller.open("kitchen"))
+
+
+def some_elements(record: Record) -> None:
+    for path in one_of_each(record.designer.study.document):
+        if len(path) > 1 or path == ("study",):
+            record.select(*path, paints=path[0] in ("blocks", "conditions"))
+    record.note("measures", lambda: record.designer.place.show_tab("measures"), paints=True)
+
+
+def editing(record: Record) -> None:
+    record.hit("ctrl+1", "Insert", "Down", "Return", "ctrl+z")
+    record.select("liquids", "thin")
+    record.hit("ctrl+1", "Delete", "Return", "ctrl+d", "alt+Up", "F2")
+    record.type("water 2")
+    record.note("break", lambda: record.designer.editing.ask(RetypeFile(record.text.replace("blinding", "blindin", 1))))
+    record.hit("F8", "Return", "ctrl+z", "shift+F1")
+
+
+QUICK = (some_elements, editing, on_disk, new_study)
+FLOWS = (each_element, by_keys, adding_and_deleting, problems)
+
+
+@pytest.mark.parametrize("flow", [*QUICK, *(pytest.param(one, marks=pytest.mark.slow) for one in FLOWS)])
+def test_what_steps_change(designer: Any, flow: Callable[[Record], None], pytestconfig: pytest.Config) -> None:
+    record = Record(designer)
+    flow(record)
+    record.compare(flow.__name__, pytestconfig)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["rek2024", "viscosityjnd"])
+def test_what_each_tab_shows(designer: Any, name: str, pytestconfig: pytest.Config) -> None:
+    record = Record(designer, text_of(name))
+    each_tab(record)
+    record.compare(name, pytestconfig)
+
+
+FIELDS = {"rek2024": ("liquids", "conditions", "tasks", "pages", "blocks"), "viscosityjnd": ("methods", "designs")}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "section"), [(name, one) for name, sections in FIELDS.items() for one in sections])
+def test_each_field_of_a_form_used_once(designer: Any, name: str, section: str, pytestconfig: pytest.Config) -> None:
+    record = Record(designer, text_of(name))
+    found: list[str] = []
+
+    def undo(path: Path) -> None:
+        settle(designer)
+        if designer.text != record.text or designer.messages:
+            found.extend(record.said())
+            designer.undo_all()
+        designer.go_to(*path)
+        record.text = designer.text
+        settle(designer)
+
+    for path in one_of_each(designer.study.document):
+        if path[0] == section:
+            record.lines += [f"== {name} at {path}"]
+            designer.go_to(*path)
+            settle(designer)
+            for line in steps(designer.place.form, lambda path=path: undo(path)):
+                record.lines += [line]
+                if line.startswith("== "):
+                    record.lines += found
+                    found.clear()
+    assert designer.text == text_of(name)
+    record.compare(f"fields of {section} in {name}", pytestconfig)
