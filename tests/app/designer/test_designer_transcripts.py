@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import QEvent, QTimer
 from PySide6.QtWidgets import QAbstractButton, QApplication
 
 from study_app.gui.widgets.background import wait_for_jobs
@@ -217,6 +217,7 @@ def test_what_steps_change(designer: Any, flow: Callable[[Record], None], pytest
 def test_what_each_tab_shows(designer: Any, name: str, pytestconfig: pytest.Config) -> None:
     record = Record(designer, text_of(name))
     each_tab(record)
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     record.compare(name, pytestconfig)
 
 

@@ -7,12 +7,12 @@ from typing import Any
 import pytest
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QPointingDevice
-from PySide6.QtWidgets import QScrollArea, QScroller, QWidget
+from PySide6.QtWidgets import QScrollArea, QScroller
 
 from study_app.protocol.wording.languages import LANGUAGES, words
-from study_app.session.pages import EndPage, PausePage, Progress, TroublePage
+from study_app.session.pages import EndPage, PausePage, TroublePage
 from study_app.session.transitions.events import Continue, EndAsked, LanguageChosen, ResumeAsked
-from tests.gui.participant.driver import KEY, Participant, name_of, tap, told_of
+from tests.gui.participant.driver import KEY, Participant, name_of, tap
 from tests.gui.small import text_page
 
 Opening = Callable[..., Participant]
@@ -35,17 +35,6 @@ def test_keys_and_the_button_go_on_but_no_space_bar_agrees(opening: Opening, kin
         else:
             seen.press(key)
         assert seen.kinds == ([] if kind == "consent" and key == KEY.Key_Space else [Continue]), key
-
-
-def test_title_paragraphs_and_progress_are_shown_as_written(opening: Opening) -> None:
-    progress = Progress(2, 2, "Delay setting 3", 3, 7)
-    seen = opening(text_page(paragraphs=("Less than < 8 N & more.", "Second."), progress=progress), FULL)
-    names = [one.accessibleName() for one in seen.page.findChildren(QWidget)]
-    assert "Part 2 of 2 · Delay setting 3 of 7" in names
-    for text in ("Before you begin", "Less than &lt; 8 N &amp; more.", "Second."):
-        assert text in seen.texts
-    assert seen.page.accessibleName() == "Before you begin"
-    assert "Less than < 8 N & more." in seen.page.accessibleDescription()
 
 
 @pytest.mark.parametrize("by_key", [False, True])
@@ -181,18 +170,6 @@ def test_tab_goes_round_to_the_language_of_the_page_and_arrows_choose(opening: O
         seen.find(names[0]).setFocus(Qt.FocusReason.TabFocusReason)
         seen.press(key)
         assert [event.language for event in seen.told] == [chosen]
-
-
-def test_the_language_of_the_page_is_marked_and_choosing_it_tells_nothing(opening: Opening) -> None:
-    seen = opening(consent("en", "nl", language="nl"), FULL, "nl")
-    for name, marked in (("English", False), ("Nederlands", True)):
-        assert bool(told_of(seen.find(name)).state().checked) is marked
-    assert name_of(seen.find("Nederlands").parentWidget()) == words("nl").choose_language
-    seen.click("Nederlands")
-    assert seen.told == []
-    assert seen.find("Nederlands").isChecked()
-    with pytest.raises(LookupError):
-        opening(text_page("consent"), FULL).find("English")
 
 
 def test_another_language_changes_every_page_that_follows(opening: Opening) -> None:

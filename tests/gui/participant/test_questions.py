@@ -225,39 +225,6 @@ def test_an_answer_taken_back_is_no_answer_and_text_keeps_to_its_length(opening:
     assert "\x07" not in text
 
 
-def test_an_answer_shows_a_question_and_hides_it_with_its_answer(opening: Opening) -> None:
-    seen = opening(form(), FULL)
-    asked = [event.item for event in seen.events]
-    assert asked == ["age", "hand", "used", "thick", "pleasant", "comment"]
-    seen.click("Both")
-    seen.settle()
-    assert seen.question(3).isVisible()
-    assert seen.events[-1] == ItemShown(seen.events[-1].at_s, "since")
-    seen.question(3).setFocus()
-    seen.type("7")
-    seen.press(KEY.Key_Return)
-    assert seen.answers[-1] == ("since", 7)
-    seen.click("Left")
-    assert not seen.question(3).isVisible()
-    assert not seen.question(3).is_answered
-    assert "7" not in entries(seen)
-    seen.click("Both")
-    assert 3 in seen.page.missing
-
-
-def test_a_form_is_answered_by_keys_alone_and_what_is_missing_is_named(opening: Opening) -> None:
-    seen = opening(form(), FULL)
-    seen.click(seen.page.button)
-    assert seen.page.message == "Four questions still need an answer: 1, 2, 5 and 6."
-    give(seen, ("42", KEY.Key_Return))
-    assert seen.page.message == "Three questions still need an answer: 2, 5 and 6."
-    give(seen, (KEY.Key_2, KEY.Key_1, KEY.Key_Down, KEY.Key_3, KEY.Key_Home, KEY.Key_Down, "Fine."))
-    seen.press(KEY.Key_Return, KEY.Key_Return)
-    wanted = {"age": 42, "hand": "right", "used": ("mouse",), "thick": 3, "pleasant": 0, "comment": "Fine."}
-    assert dict(seen.answers) == wanted
-    assert seen.kinds[-1] is Submitted
-
-
 TLX = tuple(
     SliderView(
         f"scale{n}", n, "How much of it was required, and how easy or demanding was it, taken as a whole? " * 2, True,

@@ -10,8 +10,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from study_app.session.transitions.events import Chosen, ItemShown, Submitted
-from tests.gui.participant.driver import KEY, Participant, description_of, name_of, tap, told_of
-from tests.gui.small import DUTCH_LABELS, LABELS, STATEMENTS, questionnaire
+from tests.gui.participant.driver import KEY, Participant, name_of, tap, told_of
+from tests.gui.small import DUTCH_LABELS, LABELS, questionnaire
 
 pytestmark = pytest.mark.slow
 
@@ -73,21 +73,6 @@ def test_a_change_is_told_and_a_repetition_is_not(seen: Participant) -> None:
     assert [one.isChecked() for one in seen.question(1).options] == [place == 3 for place in range(8)]
 
 
-def test_arrows_move_between_rows_and_point_in_a_row(seen: Participant) -> None:
-    seen.press(KEY.Key_Up, KEY.Key_Left, KEY.Key_Down, KEY.Key_Down, KEY.Key_Up)
-    assert seen.focus is seen.question(2)
-    seen.press(*[KEY.Key_Right] * 3, KEY.Key_Left)
-    assert seen.told == []
-    assert LABELS[1] in seen.page.heading
-    seen.press(KEY.Key_Space, *[KEY.Key_Right] * 12, KEY.Key_Space)
-    assert seen.answers == [("item2", 2), ("item3", None)]
-    seen.page.button.setFocus()
-    seen.press(KEY.Key_Left, KEY.Key_Right)
-    assert seen.focus is seen.page.button
-    seen.press(KEY.Key_Up)
-    assert seen.focus is seen.question(9)
-
-
 def test_tab_goes_from_row_to_row_to_the_button_and_back_and_backspace_changes_nothing(seen: Participant) -> None:
     seen.press(KEY.Key_6, KEY.Key_5, KEY.Key_Backspace)
     assert seen.focus is seen.question(2)
@@ -102,27 +87,6 @@ def test_tab_goes_from_row_to_row_to_the_button_and_back_and_backspace_changes_n
     seen.question(9).setFocus()
     QTest.keyClick(seen.focus, KEY.Key_Tab, Qt.KeyboardModifier.ShiftModifier)
     assert seen.focus is seen.question(8)
-
-
-def test_continue_names_and_marks_what_is_missing_and_goes_there(seen: Participant) -> None:
-    for row in (1, 2, 3, 4, 6, 7, 9):
-        seen.click(cell(seen, row, 2))
-    told = len(seen.told)
-    seen.click(seen.page.button)
-    assert seen.page.message == "Two statements still need an answer: 5 and 8."
-    assert [row.view.number for row in seen.page.fields if row.missing] == [5, 8]
-    assert seen.focus is seen.question(5)
-    assert len(seen.told) == told
-    assert "Please answer · press 1 to 7" in description_of(seen.question(5))
-    foot = seen.page.foot
-    assert "5 and 8. Everything you have answered is kept. 7 of 9 answered" in foot.accessibleName()
-    assert foot.accessibleDescription() == "↑ ↓ move, 1–7 answer"
-    seen.press(KEY.Key_4)
-    assert seen.page.message == "One statement still needs an answer: 8."
-    seen.click(cell(seen, 8, None))
-    assert seen.page.message == ""
-    seen.press(KEY.Key_Return)
-    assert seen.kinds[-1] is Submitted
 
 
 def test_the_column_that_is_pointed_at_is_labelled_beside_ends_and_middle(
@@ -143,15 +107,6 @@ def test_the_column_that_is_pointed_at_is_labelled_beside_ends_and_middle(
     seen.press(KEY.Key_Right, KEY.Key_Right)
     assert DUTCH_LABELS[1] in seen.page.heading
     assert DUTCH_LABELS[0] not in seen.page.heading
-
-
-def test_answers_come_back_after_a_pause_and_the_keyboard_is_on_the_first_without_one(opening: Opening) -> None:
-    seen = opening(questionnaire(cannot_judge="Cannot judge", chosen=(("item1", 6), ("item3", None))), FULL)
-    assert cell(seen, 1, 6).isChecked()
-    assert cell(seen, 3, None).isChecked()
-    assert seen.told == []
-    assert seen.focus is seen.question(2)
-    assert seen.page.missing == (2, 4, 5, 6, 7, 8, 9)
 
 
 def test_a_small_window_shows_five_a_page_and_asks_page_by_page(opening: Opening, finger: QPointingDevice) -> None:
@@ -175,22 +130,6 @@ def test_a_small_window_shows_five_a_page_and_asks_page_by_page(opening: Opening
     seen.window.resize(*FULL)
     assert visible(seen) == [*range(1, 10)]
     assert seen.page.tabs == []
-
-
-def test_a_screen_reader_finds_groups_of_radio_buttons_with_names_and_states(seen: Participant) -> None:
-    labels = [*(f"{n} {label}" for n, label in enumerate(LABELS, 1)), "Cannot judge"]
-    assert name_of(seen.page) == "Liquid setting 1"
-    assert description_of(seen.page).startswith("How much do you agree")
-    for row, (field, statement) in enumerate(zip(seen.page.fields, STATEMENTS, strict=True), 1):
-        assert (told_of(field).role(), name_of(field)) == (QAccessible.Role.Grouping, f"{row}. {statement}")
-        for one, label in zip(field.options, labels, strict=True):
-            assert (told_of(one).role(), name_of(one)) == (QAccessible.Role.RadioButton, label)
-            assert description_of(one) == statement
-            assert told_of(one).state().checkable
-            assert not told_of(one).state().checked
-    seen.press(KEY.Key_3)
-    assert [bool(told_of(one).state().checked) for one in seen.question(1).options] == [n == 2 for n in range(8)]
-    assert description_of(seen.question(1)) == "chosen: 3 Somewhat disagree"
 
 
 def test_what_is_pointed_at_chosen_and_missing_is_announced(seen: Participant, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -54,6 +54,7 @@ def test_ball_is_drawn_where_the_view_says(tank: TankWidget) -> None:
         assert colour.red() > colour.green() > colour.blue() + 20
 
 
+@pytest.mark.slow
 def test_right_is_right_up_is_up_near_is_large_and_the_ball_stays_in_the_glass(tank: TankWidget) -> None:
     @settings(max_examples=30)
     @given(*[st.floats(-0.98, 0.98)] * 3)

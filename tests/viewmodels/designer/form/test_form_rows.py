@@ -11,7 +11,7 @@ from study_app.authoring.outline import outline
 from study_app.authoring.templates import FOLDER, templates
 from study_app.protocol.source.document import value_at
 from study_app.protocol.source.files import shipped, shipped_file
-from study_app.viewmodels.designer.form.form_rows import first_element, form, position_of
+from study_app.viewmodels.designer.form.form_rows import form
 
 FILES = [*(shipped_file(name) for name in shipped()), *(FOLDER / f"{name}.toml" for name in templates())]
 
@@ -49,21 +49,6 @@ def test_every_key_of_every_element_is_in_its_form_with_its_value(file: Path) ->
             assert rows[around] == value_at(study.document, around)
 
 
-def test_rows_say_place_languages_and_target_and_optional_keys_are_offered(study: Study) -> None:
-    made = form(study, ("blocks", "liquids"))
-    rows = {row.row.path[-1]: row for row in made.rows}
-    place, line = rows["order"].place.split(" · line ")
-    assert place == "blocks.liquids.order"
-    assert study.text.splitlines()[int(line) - 1].startswith("order = ")
-    assert [code for code, _ in rows["title"].languages] == ["en", "nl"]
-    assert rows["task"].target == ("tasks", "explore")
-    assert [entry.title for entry in rows["conditions"].entries] == ["Water", "Honey", "Light oil"]
-    absent = {row.path[-1] for section in made.sections for row in section.absent}
-    assert {"max_repeats", "break_every", "design"} <= absent
-    assert not {"standard", "until", "catch"} & absent
-    assert not absent & set(rows)
-
-
 @pytest.mark.parametrize(
     ("name", "block", "hidden", "there"),
     [
@@ -80,10 +65,3 @@ def test_keys_that_do_not_belong_are_neither_offered_nor_shown(
     assert there <= keys
     document = template(name).document["blocks"][block]
     assert set(document) <= keys
-
-
-def test_positions_are_those_of_the_session_or_the_list(study: Study) -> None:
-    assert first_element(study.document) == ("pages", "consent")
-    assert position_of(study.document, ("pages", "consent")) == (1, len(study.document["sequence"]))
-    assert position_of(study.document, ("questionnaires", "liquid", "items", 2)) == (3, 9)
-    assert position_of(study.document, ("liquids", "water")) is None

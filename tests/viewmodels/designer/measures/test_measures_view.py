@@ -12,7 +12,6 @@ from study_app.authoring.new_study import template
 from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.edits import Set
 from study_app.haptics.model.steady_state import HAND_MPS, steady
-from study_app.protocol.load import shipped
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.measures.level_plots import AS_ASKED, Simulated
@@ -39,30 +38,6 @@ def view(
 ) -> MeasuresView:
     controls = Controls(people, planned=planned)
     return measures_view(study, facts(study), path, controls, slow or SlowResults(), {})
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", shipped())
-def test_every_element_of_every_study_has_measures(name: str) -> None:
-    study = study_of(name)
-    for section in (
-        "study",
-        "device",
-        "blocks",
-        "liquids",
-        "conditions",
-        "tasks",
-        "questionnaires",
-        "pages",
-        "stimuli",
-    ):
-        table = study.document.get(section, {})
-        paths: list[Path] = [(section,)]
-        paths += [(section, key) for key in table if section not in {"study", "device"}]
-        for path in paths:
-            shown = view(study, path)
-            assert shown.cards or shown.numbers
-            assert shown.below
 
 
 def test_a_block_of_statements_shows_session_balance_power_and_force() -> None:
