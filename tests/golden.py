@@ -11,33 +11,18 @@ from typing import Any
 
 import pytest
 
+from tests import golden_text
+
 CHANGING = re.compile(
     r"\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d(?:\.\d+)?)?(?:Z|[+-]\d\d:\d\d)?)?"
     r"|\b\d+\.\d+\.\d+\b|\b(?<!\.)[0-9a-f]{12,}\b"
 )
 """Dates, versions and hashes."""
-NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
-def compare(kept: Path, found: Iterable[str], config: pytest.Config, *, rel: float = 1e-5) -> None:
-    """Compare lines with a file but for the last digits of numbers, or write it."""
-    lines = [CHANGING.sub("*", line) for text in found for line in text.split("\n")]
-    if config.getoption("regenerate"):
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        kept.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    expected = kept.read_text(encoding="utf-8").split("\n")[:-1]
-    different = [(a, b) for a, b in zip(expected, lines, strict=False) if not alike(a, b, rel)]
-    assert (different[:5], len(lines)) == ([], len(expected)), f"{kept}: review, then --regenerate"
-
-
-def alike(expected: str, found: str, rel: float = 1e-5) -> bool:
-    """Return whether lines are equal but for the last digits of numbers, which depend on libraries and processors."""
-    if expected == found:
-        return True
-    if NUMBER.sub("", expected) != NUMBER.sub("", found):
-        return False
-    numbers = [[float(number) for number in NUMBER.findall(line)] for line in (expected, found)]
-    return numbers[0] == pytest.approx(numbers[1], rel=rel, abs=1e-9)
+def compare(kept: Path, found: Iterable[str], config: pytest.Config, **tolerance: float) -> None:
+    """Compare lines without dates, versions and hashes with a file, or write it."""
+    golden_text.compare(kept, (CHANGING.sub("*", line) for line in found), config, **tolerance)
 
 
 def page_lines(text: str) -> Iterator[str]:

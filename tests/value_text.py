@@ -1,12 +1,9 @@
-"""Values as lines of text, compared with golden files: ``--regenerate`` writes them anew; read the difference."""
+"""Values of the program as lines of text, for golden files."""
 
 import difflib
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
-from pathlib import Path
 from typing import Any
-
-import pytest
 
 
 def short(value: Any) -> str:
@@ -55,13 +52,3 @@ def changed(before: str, after: str) -> Iterator[str]:
     """Yield the lines that another text has, or lacks, with the number of the first one that differs."""
     for line in list(difflib.unified_diff(before.split("\n"), after.split("\n"), n=0, lineterm=""))[2:]:
         yield line if line[0] in "+-" else line.rpartition(" +")[2].removesuffix(" @@")
-
-
-def compare(golden: Path, found: list[str], config: pytest.Config) -> None:
-    """Compare lines with a golden file, or write it."""
-    if config.getoption("regenerate"):
-        golden.parent.mkdir(exist_ok=True)
-        golden.write_text("\n".join(found) + "\n", encoding="utf-8")
-    expected = golden.read_text(encoding="utf-8").removesuffix("\n").split("\n")
-    different = list(difflib.unified_diff(expected, "\n".join(found).split("\n"), n=0, lineterm=""))[2:]
-    assert not different, "\n".join([f"{golden.name}: review, then --regenerate", *different[:40]])

@@ -35,8 +35,9 @@ from study_app.viewmodels.designer.requests import (
     SwitchKind,
 )
 from tests.authoring.grown import PROTOCOLS
-from tests.golden_text import changed, compare, short
+from tests.golden_text import compare
 from tests.protocol.edited_studies import text_of
+from tests.value_text import changed, short
 
 GOLDEN = File(__file__).parent / "golden"
 TABLES = ("study", "device", "scene", "limits", "analysis")

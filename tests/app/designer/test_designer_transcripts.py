@@ -15,11 +15,11 @@ from study_app.protocol.source.document import Path
 from study_app.viewmodels.designer.requests import RetypeFile, SetValue
 from tests.app.designer.support.designer import DEMO
 from tests.authoring.test_study_transcripts import elements, generic
-from tests.golden_text import changed
 from tests.gui.transcript import CONTROLS, compare, painted, told
 from tests.gui.transcript import _act as act
 from tests.gui.transcript import _usable as usable
 from tests.protocol.edited_studies import text_of
+from tests.value_text import changed
 
 TABS = ("measures", "file", "changes", "participant")
 TIME = re.compile(r"\b\d\d:\d\d\b")

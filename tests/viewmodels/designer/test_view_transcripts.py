@@ -25,8 +25,9 @@ from study_app.viewmodels.designer.problem_rows import problem_rows
 from study_app.viewmodels.designer.prompts import series_plan, series_prompt
 from study_app.viewmodels.designer.requests import AskSeries
 from tests.authoring.test_study_transcripts import elements, generic, studies
-from tests.golden_text import changed, compare, lines_of, short
+from tests.golden_text import compare
 from tests.protocol.edited_studies import CASES, Case, cases_of
+from tests.value_text import changed, lines_of, short
 
 GOLDEN = File(__file__).parent / "golden"
 QUICK = ("rows", "sound", "levels")
