@@ -1,5 +1,6 @@
 """All that a session's bridge does at each signal of its windows: asked of servo and journal, paged, shown."""
 
+import logging
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -185,7 +186,7 @@ def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, ca
         lines += [
             f"== {step}",
             *map(str, world.done),
-            *(f"log {one.levelname} {one.getMessage()}" for one in caplog.records),
+            *(f"log {one.levelname} {one.getMessage()}" for one in caplog.records if one.levelno >= logging.WARNING),
         ]
         if isValid(bridge) and not bridge._gone:
             after = [*paged(bridge.participant.page), *flat("view", bridge.view()), f"trouble: {bridge.trouble}"]
