@@ -50,6 +50,10 @@ def test_a_break_is_a_ring_where_the_segment_before_ended_and_each_side_has_an_a
     assert len(places.floor) == 2
 
 
+def test_a_segment_too_short_for_an_arrow_has_none() -> None:
+    assert tail_places(tail([(0, 0, 0), (1, 0, 0)]), CAMERA, BOX).heads == ()
+
+
 def test_a_real_wake_has_as_many_rings_as_segments(moved: LabView) -> None:
     assert moved.tail is not None
     places = tail_places(moved.tail, CAMERA, BOX)
