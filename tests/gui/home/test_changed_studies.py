@@ -3,17 +3,15 @@
 import threading
 
 import pytest
-from PySide6.QtCore import QEvent, QPoint, Qt
-from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtWidgets import QApplication, QPushButton, QWidget
 
 from study_app.authoring.drafts import Draft, discard, keep
 from study_app.authoring.kept_settings import begin_settings
 from study_app.gui.home import view
-from study_app.gui.home.main_window import MainWindow
 from study_app.gui.home.study_cards import StudyCard
-from study_app.gui.home.view import HomePlace
 from study_app.protocol.load import source_bytes
-from tests.gui.home.home_window import cell, open_home, study_cards
+from tests.gui.home.home_window import open_home, study_cards
 
 pytestmark = pytest.mark.slow
 
@@ -113,42 +111,6 @@ def test_cards_of_drafts_come_first_say_what_was_not_saved_and_continue_it(qtbot
     keep(file, Draft(text, ""))
     home.enter()
     qtbot.waitUntil(hidden)
-
-
-def test_the_window_is_painted_before_the_studies_are_read_and_nothing_moves_when_they_come(
-    qtbot, results, monkeypatch
-):
-    go_on, read = threading.Event(), view.read_studies
-    monkeypatch.setattr(view, "read_studies", lambda opened: go_on.wait(10) and read(opened))
-    window = MainWindow({"home": lambda: HomePlace(results)})
-    qtbot.addWidget(window)
-    home = window.place("home")
-    with qtbot.waitExposed(window):
-        window.show()
-    qtbot.waitUntil(lambda: home.reading)
-    QApplication.processEvents()
-
-    def places():
-        """Return where each text and button stands that is shown."""
-        parts = [*home.findChildren(QLabel), *home.findChildren(QPushButton)]
-        return {part: part.mapTo(window, QPoint()) for part in parts if part.isVisible()}
-
-    before = places()
-    del before[home.waiting]
-    assert home.grid.cards == []
-    go_on.set()
-    qtbot.waitUntil(lambda: not home.reading)
-    QApplication.processEvents()
-    after = places()
-    assert {part: after[part] for part in before} == before
-    assert home.waiting not in after
-    assert study_cards(home)[0].new in after
-    assert home.lab.open in after
-    window.activateWindow()
-    window.rail.switch.setFocus()
-    window.focusNextChild()
-    assert window.focusWidget() is home.open_protocol
-    assert cell(home, 0, "Answers") == "0 of 8"
 
 
 def test_studies_that_cannot_be_read_are_named_and_the_sessions_stay(qtbot, results, monkeypatch):

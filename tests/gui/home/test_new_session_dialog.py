@@ -4,8 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QSize, Qt
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QWidget
 
 from study_app.gui.display.screens import ScreenShown
 from study_app.gui.home import new_session_dialog
@@ -102,15 +102,6 @@ def test_a_falcon_by_its_serial_number_can_be_preferred_and_an_unknown_device_is
     assert opened(device="scripted").chosen().results.name == "rek2024-scripted"
 
 
-def test_a_simulated_hand_is_kept_apart_unless_a_folder_was_chosen(dialog, tmp_path):
-    for device, name in (("scripted", "rek2024-scripted"), ("mouse", "rek2024")):
-        dialog.device.setCurrentIndex(dialog.device.findData(device))
-        assert Path(dialog.results.text()).name == name
-    dialog.results.setText(str(tmp_path / "mine"))
-    dialog.device.setCurrentIndex(dialog.device.findData("scripted"))
-    assert dialog.results.text() == str(tmp_path / "mine")
-
-
 def test_a_used_id_is_refused_with_the_ways_to_go_on_until_one_is_taken(dialog, results, qtbot):
     use(results, "P007")
     dialog.participant.setText("P007")
@@ -132,23 +123,6 @@ def test_a_used_id_is_refused_with_the_ways_to_go_on_until_one_is_taken(dialog, 
     assert dialog.begin.isEnabled()
     assert not dialog.ways[0].isVisibleTo(dialog)
     assert before == {path: path.read_bytes() for path in results.rglob("*") if path.is_file()}
-
-
-def test_a_pilot_is_in_a_window_apart_and_may_have_an_id_kept_for_it(dialog, results):
-    dialog.participant.setText("test")
-    dialog.pilot.setChecked(True)
-    assert dialog.begin.isEnabled()
-    chosen = dialog.chosen()
-    assert (chosen.pilot, chosen.windowed) == (True, True)
-    assert chosen.results.name == f"{dialog.facts.protocol.study.name}-pilot"
-    dialog.pilot.setChecked(False)
-    assert not dialog.begin.isEnabled()
-    for windowed in (True, False):
-        dialog.windowed.setChecked(windowed)
-        dialog.pilot.click()
-        dialog.pilot.click()
-        assert dialog.windowed.isEnabled()
-        assert dialog.chosen().windowed is windowed, "as it was before"
 
 
 def test_a_study_whose_conditions_were_changed_since_is_refused_with_what_to_do(results, opened):
@@ -214,27 +188,6 @@ def test_a_session_begins_with_what_is_set_for_this_machine_unless_its_firmware_
     made.device_options.fields["firmware"].clear()
     assert made.begin.isEnabled()
     assert made.chosen().device_options == {}
-
-
-def test_the_foot_stays_on_a_small_screen_and_every_question_is_reached(dialog, results, qtbot):
-    class Small:
-        def availableSize(self):  # noqa: N802 - Qt's name
-            return QSize(1024, 640)
-
-    dialog.screen = Small
-    use(results, "P001")
-    dialog.device.setCurrentIndex(dialog.device.findData("falcon"))
-    dialog.participant.setText("P001")
-    settle(qtbot, dialog)
-    dialog.show()
-    QApplication.processEvents()
-    assert dialog.height() <= 640 - 60
-    assert dialog.rect().contains(dialog.begin.mapTo(dialog, dialog.begin.rect().bottomRight()))
-    dialog.seed.setFocus()
-    for _ in range(12):
-        qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
-        at = QApplication.focusWidget()
-        assert at.visibleRegion().boundingRect() == at.rect()
 
 
 def test_a_session_beyond_the_last_is_refused(qtbot, tmp_path, opened):
