@@ -8,41 +8,12 @@ import numpy as np
 import pytest
 from PySide6.QtWidgets import QFileDialog
 
-from study_app.gui.lab.lab_plots import A, B, CurvePlot, thinned
+from study_app.gui.lab.lab_plots import thinned
 from study_app.viewmodels.estimation import LSL, SOURCES, EstimateRow, EstimateShown
 from study_app.viewmodels.lab import LabView
 from tests.gui.lab.sample import heard
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture
-def plot(qtbot: Any) -> CurvePlot:
-    made = CurvePlot((B, A), 1.0)
-    qtbot.addWidget(made)
-    made.resize(340, 260)
-    made.show()
-    qtbot.waitExposed(made)
-    return made
-
-
-def top(plot: CurvePlot) -> float:
-    return max(place for place, _ in plot.ticks["left"])
-
-
-def test_the_height_grows_at_once_and_shrinks_only_by_half(plot: CurvePlot) -> None:
-    t_s = np.linspace(-2.5, 0, 50)
-    tops = []
-    for peak in (0.5, 3.9, 3.0, 2.0, 1.0, 0.5):
-        plot.show_curves(t_s, (np.full(50, peak), np.zeros(50)))
-        tops.append(top(plot))
-    assert tops[0] == 1
-    assert tops[1:4] == [4, 4, 4]
-    assert tops[4] < 4
-    assert tops[5] == 1
-    plot.show_curves(np.empty(0), (np.empty(0), np.empty(0)), limit=8.0)
-    assert top(plot) >= 8
-    assert plot.limit.isVisible()
 
 
 @pytest.mark.parametrize("count", [0, 1, 7, 240, 241, 2500])

@@ -8,10 +8,10 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 
-from study_app.gui.lab.parameter_rows import NumberRow, SwitchRow
+from study_app.gui.lab.parameter_rows import NumberRow
 from study_app.gui.widgets.escape_key import HOLD_MS, EscapeAnywhere
 from study_app.viewmodels.lab import LabView
-from tests.gui.lab.sample import blind, heard, still_view, workbench
+from tests.gui.lab.sample import blind, heard
 from tests.gui.walk import settle
 
 pytestmark = pytest.mark.slow
@@ -48,36 +48,6 @@ def test_every_number_says_exactly_what_it_shows_when_entered_again(place: Any, 
         assert told == [(name, value, False)]
 
 
-def test_typing_and_sliding_take_si_units_and_say_when_it_is_held(place: Any, told: Any) -> None:
-    enter(fields(place)["body.diameter_m"].field, "50")
-    assert told == [("body.diameter_m", pytest.approx(0.05), False)]
-    told.clear()
-    row = fields(place)["wake.breaking_span_m"]
-    middle = QPoint(row.slider.width() // 2, row.slider.height() // 2)
-    QTest.mousePress(row.slider, Qt.MouseButton.LeftButton, pos=middle)
-    assert row.field.text() == "250"
-    place.show_view(still_view(workbench(breaking_span_m=0.1)))  # a refresh amid a drag does not pull the knob away
-    assert row.slider.number == pytest.approx(250, abs=8)
-    QTest.mouseRelease(row.slider, Qt.MouseButton.LeftButton, pos=middle)
-    assert [held for _, _, held in told] == [True, False]
-    assert told[-1][1] == pytest.approx(0.25, abs=0.008)
-
-
-def test_what_is_no_number_is_said_in_one_line_and_stays(place: Any, told: Any, still: LabView) -> None:
-    row = fields(place)["wake.exponent"]
-    enter(row.field, "0.5.5")
-    assert told == []
-    assert row.why.isVisible()
-    assert "“0.5.5” is not a number" in row.why.text()
-    place.show_view(dataclasses.replace(still, measuring=True))
-    assert row.field.text() == "0.5.5"
-    assert row.field.state == "refused"
-    QTest.keyClick(row.field, Qt.Key.Key_Escape)
-    assert row.field.text() == "0.6"
-    assert row.field.state == "changed"
-    assert not row.why.isVisible()
-
-
 def test_what_the_model_refuses_stays_with_the_reason_until_it_is_mended(place: Any, told: Any, still: LabView) -> None:
     row = fields(place)["wake.length"]
     enter(row.field, "9000")
@@ -109,63 +79,6 @@ def test_escape_leaves_what_was_refused(place: Any, told: Any, still: LabView) -
     assert row.refused == ""
     place.show_view(dataclasses.replace(still, refused=(refused[0], refused[1])))
     assert row.refused == "too long"
-
-
-@pytest.mark.parametrize("name", ["effects.history", "velocity.kind"])
-def test_lists_and_switches_wait_for_the_view(place: Any, told: Any, still: LabView, name: str) -> None:
-    row = place.form.rows[name]
-    if isinstance(row, SwitchRow):
-        row.toggle.click()
-        assert not row.toggle.isChecked()
-    else:
-        before = row.choice.currentIndex()
-        row.choice.activated.emit(before + 1)
-        assert row.choice.currentIndex() == before
-    assert len(told) == 1
-    place.show_view(dataclasses.replace(still, refused=(name, "it needs a viscosity")))
-    assert row.why.isVisible()
-    assert row.why.text() == "it needs a viscosity"
-
-
-def test_an_effect_that_comes_brings_its_rows_and_the_keyboard_stays(place: Any, told: Any, still: LabView) -> None:
-    toggle = place.form.rows["effects.added_mass"].toggle
-    toggle.setFocus()
-    QTest.keyClick(toggle, Qt.Key.Key_Space)
-    assert told == [("effects.added_mass", "on", False)]
-    more = dataclasses.replace(still, workbench=still.workbench.change(*told[0][:2]))
-    place.show_view(more)
-    assert "added_mass.coefficient" in place.form.rows
-    assert place.form.rows["effects.added_mass"].toggle is toggle
-    assert toggle.isChecked()
-    assert place.focusWidget() is toggle
-    place.show_view(still)
-    assert "added_mass.coefficient" not in place.form.rows
-
-
-def test_tab_goes_through_every_part_from_top_to_bottom(place: Any, told: Any, still: LabView) -> None:
-    place.show_view(dataclasses.replace(still, workbench=still.workbench.change("effects.added_mass", "on")))
-    wanted = [part for row in place.form.rows.values() for part in row.parts()]
-    found, part = [], place.form.copy
-    for _ in range(3 * len(wanted)):
-        part = part.nextInFocusChain()
-        if part in wanted:
-            found.append(part)
-        if len(found) == len(wanted):
-            break
-    assert found == wanted
-
-
-def test_the_liquid_and_the_copy_name_their_sides(place: Any, told: Any, still: LabView) -> None:
-    chosen = []
-    place.liquid_chosen.connect(lambda *what: chosen.append(what))
-    assert place.form.liquid.currentText() == "Water"
-    assert place.form.copy.text() == "Copy to B"
-    place.form.liquid.activated.emit(1)
-    place.show_view(dataclasses.replace(still, workbench=still.workbench.switch()))
-    assert place.form.liquid.currentText() == "Light oil"
-    assert place.form.copy.text() == "Copy to A"
-    place.form.liquid.activated.emit(3)
-    assert [(side, choice.title) for side, choice in chosen] == [("A", "Honey"), ("B", "Syrup")]
 
 
 def test_stop_force_speaks_at_the_press_and_is_never_disabled_hidden_or_moved(place: Any, still: LabView) -> None:

@@ -1,20 +1,15 @@
 """The lab draws a view and says what is asked for; it can be used by keyboard alone, and blind it tells nothing."""
 
 import dataclasses
-from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QPoint, Qt, QTimer
-from PySide6.QtGui import QKeySequence
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QComboBox, QLabel, QLineEdit, QWidget
 
-from study_app.gui.lab.tank_note import SHOWN_AFTER_MS
-from study_app.lab.ab_comparison import Workbench
 from study_app.viewmodels.lab import LabView
-from tests.gui.lab.sample import blind, heard, still_view, workbench
+from tests.gui.lab.sample import blind, heard, workbench
 from tests.gui.walk import settle
 
 pytestmark = pytest.mark.slow
@@ -33,64 +28,6 @@ def words_of(place: Any) -> str:
         if isinstance(it, QComboBox):
             said.append(it.currentText())
     return " | ".join(said)
-
-
-def test_the_felt_side_is_seen_and_buttons_and_keys_ask_also_from_within_a_field(place: Any) -> None:
-    edited = workbench().change("wake.length", 100)
-    names = ("switched", "undo_asked", "redo_asked", "blind_asked", "stop_asked")
-    said = {name: heard(place, name) for name in names}
-    place.show_view(still_view(edited))
-    a, b = place.header.sides.segments.values()
-    assert (a.isChecked(), b.isChecked()) == (True, False)
-    assert a.accessibleName() == "A: Water, edited, felt now"
-    assert (place.header.undo.isEnabled(), place.header.redo.isEnabled()) == (True, False)
-    place.show_view(still_view(edited.undo()))
-    assert place.header.redo.isEnabled()
-    field = place.form.rows["wake.length"].field
-    for target in (place, field):
-        target.setFocus()
-        for sequence in ("X", "Ctrl+Z", "Ctrl+Shift+Z"):
-            QTest.keySequence(target, QKeySequence(sequence))
-    assert field.text() == "1700"
-    for button in (a, b, *(getattr(place.header, name) for name in ("undo", "redo", "blind", "stop"))):
-        button.click()
-    assert [len(said[name]) for name in names] == [3, 3, 3, 1, 1]
-    assert said["blind_asked"] == [(True,)]
-    assert a.isChecked()  # the view says when it is the other
-    place.show_view(still_view(edited.switch()))
-    assert b.isChecked()
-    place.show_view(still_view(Workbench(workbench().b, workbench().b)))
-    assert not place.header.undo.isEnabled()
-
-
-def test_waiting_is_told_after_300_ms_and_can_be_cancelled(place: Any, still: LabView, qtbot: Any) -> None:
-    said = heard(place, "cancel_asked")
-    busy = dataclasses.replace(still, busy="Opening the Falcon")
-    place.show_view(busy)
-    assert not place.note.isVisible()
-    assert place.note.findChild(QTimer).interval() == SHOWN_AFTER_MS
-    qtbot.waitUntil(place.note.isVisible)
-    assert place.note.words.text() == "Opening the Falcon\u00a0…"
-    place.note.cancel.click()
-    assert said == [()]
-    place.show_view(busy)
-    place.show_view(dataclasses.replace(still, trouble="No Falcon answers: check its cable."))
-    assert place.note.words.text() == "No Falcon answers: check its cable."
-    assert not place.note.cancel.isVisible()
-
-
-def test_trouble_beside_a_force_that_is_on_can_be_put_away_until_there_is_another(place: Any, still: LabView) -> None:
-    full = dataclasses.replace(still, trouble="The disk is full: free some room.")
-    place.show_view(full)
-    assert place.note.words.text() == full.trouble
-    assert not place.note.fade_in.isVisible()
-    place.note.dismiss.click()
-    place.show_view(dataclasses.replace(full, measuring=True))
-    assert not place.note.isVisible()
-    place.show_view(dataclasses.replace(full, trouble="The folder is gone: choose another."))
-    assert place.note.isVisible()
-    place.show_view(dataclasses.replace(full, force_on=False))
-    assert place.note.fade_in.text() == "Try again"
 
 
 def test_while_blind_nothing_tells_the_settings_apart(place: Any, moved: LabView) -> None:
@@ -124,32 +61,6 @@ def test_while_blind_both_sides_look_alike_but_for_which_is_felt(place: Any, mov
         assert (one.text(), two.text(), one.isChecked(), two.isChecked()) == ("Setting 1", "Setting 2", True, False)
         assert (len(place.cost.lines), len(place.limiters.lines)) == (5, 11)  # nothing behind the curtain moves
     assert pictures[0] == pictures[1]
-
-
-def chosen(place: Any, button: Any, file: Path) -> str:
-    """Press a button and choose a file in its dialog; return the dialog's title and the name that it suggests."""
-    button.click()
-    assert place.dialog.isVisible()
-    suggested = place.dialog.findChild(QLineEdit, "fileNameEdit").text()
-    title: str = f"{place.dialog.windowTitle()}: {suggested}"
-    place.dialog.fileSelected.emit(str(file))
-    place.dialog.reject()
-    assert place.dialog is None
-    return title
-
-
-def test_presets_are_saved_opened_and_used_where_one_says(place: Any, still: LabView, tmp_path: Path) -> None:
-    place.show_view(still)
-    saved, opened, used = (heard(place, name) for name in ("save_asked", "preset_opened", "use_asked"))
-    assert chosen(place, place.header.save, tmp_path / "mine.toml").endswith("Water, edited: water-edited.toml")
-    chosen(place, place.form.open, tmp_path / "syrup.toml")
-    assert "Water" in chosen(place, place.form.use, tmp_path / "study.toml")
-    assert saved == [(tmp_path / "mine.toml", still.workbench.a)]
-    assert opened == [(tmp_path / "syrup.toml",)]
-    assert used == [(tmp_path / "study.toml", still.workbench.a)]
-    assert not place.form.said.isVisible()
-    place.show_view(replace(still, said="Saved as syrup.toml in /there"))
-    assert place.form.said.accessibleName() == "Saved as syrup.toml in /there"
 
 
 def test_the_mouse_moves_the_ball_from_a_click_to_the_next_and_only_while_it_leads(place: Any, still: LabView) -> None:

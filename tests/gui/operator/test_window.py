@@ -37,41 +37,6 @@ def running(window, told, health):
     return window
 
 
-def test_ending_asks_first_one_question_at_a_time_and_says_status_and_reason(running, qtbot):
-    qtbot.mouseClick(running.buttons.end, Qt.MouseButton.LeftButton)
-    question = running.question
-    running.ask_to_repeat()
-    running.ask_to_end()
-    assert running.question is question
-    qtbot.waitUntil(lambda: question.focusWidget() is not None)
-    assert question.focusWidget() is question.choices.checkedButton()
-    with qtbot.assertNotEmitted(running.end_asked):
-        qtbot.mouseClick(question.back, Qt.MouseButton.LeftButton)
-    assert running.question is None
-    running.ask_to_end()
-    running.question.choices.button(0).click()
-    running.question.reason.setText("felt unwell")
-    with qtbot.waitSignal(running.end_asked) as asked:
-        qtbot.mouseClick(running.question.go_on, Qt.MouseButton.LeftButton)
-    assert asked.args == ["withdrawn", "felt unwell"]
-
-
-def test_a_note_is_kept_by_enter_unless_it_is_empty_and_listed_newest_first(running, told, health, qtbot):
-    with qtbot.assertNotEmitted(running.note_written):
-        qtbot.keyClick(running.notes.field, Qt.Key.Key_Return)
-        qtbot.mouseClick(running.notes.add, Qt.MouseButton.LeftButton)
-    running.notes.field.setPlainText("left-handed")
-    with qtbot.waitSignal(running.note_written) as written:
-        qtbot.keyClick(running.notes.field, Qt.Key.Key_Return)
-    assert written.args == ["left-handed"]
-    assert running.notes.field.toPlainText() == ""
-    told.tell("note", kind="note", text="one")
-    told.tell("note", kind="mark", text="")
-    running.show_view(told.view(health))
-    assert [line.text.text() for line in running.notes.lines[:2]] == ["Mark", "one"]
-    assert running.notes.lines[2].isHidden()
-
-
 def test_escape_held_stops_the_force_and_a_tap_does_not(running, qtbot):
     handle = running.windowHandle()
     asked = []
@@ -118,17 +83,6 @@ def test_no_question_keeps_a_hand_from_the_force_stop_or_from_escape(running, qt
     qtbot.waitUntil(lambda: QGuiApplication.focusWindow() is handle)
     with qtbot.waitSignal(running.stop_asked, timeout=HOLD_MS * 5):
         QTest.keyPress(handle, Qt.Key.Key_Escape)
-
-
-def test_closing_is_left_to_who_listens_until_the_session_is_over(running, told, health, qtbot):
-    with qtbot.waitSignal(running.close_asked):
-        running.close()
-    assert running.isVisible()
-    told.tell("session_ended", status="completed", reason="")
-    running.show_view(told.view(health))
-    assert running.buttons.close_session.isVisible()
-    running.close()
-    assert not running.isVisible()
 
 
 @pytest.mark.slow
