@@ -4,13 +4,10 @@ import zipfile
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QFileDialog, QLabel
+from PySide6.QtWidgets import QFileDialog
 
 from study_app.devices.doctor_worker import start_examination
-from study_app.devices.falcon.failure_modes import MODES, UDEV_RULE
 from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
-from study_app.gui.devices.failure_rows import Paste, capital
 from study_app.gui.theme.theme import DARK, LIGHT
 from tests.compiled import needs_servo
 from tests.gui.states import REFUSED, Examined
@@ -33,33 +30,6 @@ def dialog(qtbot, begun):
     qtbot.addWidget(made)
     made.show()
     return made
-
-
-def words(widget):
-    return [one.text() for one in widget.findChildren(QLabel) if one.isVisibleTo(widget)]
-
-
-def test_what_is_found_stands_first_open_with_cause_cure_and_what_to_paste(dialog, begun, qtbot):
-    begun[0].told = [REFUSED]
-    with qtbot.waitSignal(dialog.over) as over:
-        pass
-    assert over.args == [False]
-    assert dialog.step.text() == "This account may not open it."
-    found = [row for row in dialog.rows if row.found]
-    assert [row.finding.id for row in found] == ["permission"]
-    assert found[0].words.text() == capital(found[0].finding.symptom)
-    assert (capital("macOS denies it"), capital("it is not found")) == ("macOS denies it", "It is not found")
-    (mode,) = (mode for mode in MODES if mode.id == "permission")
-    told = words(found[0].body)
-    assert capital(mode.cause) in told
-    assert capital(mode.cure("linux")) in told
-    assert mode.detected in told
-    (paste,) = found[0].findChildren(Paste)
-    qtbot.mouseClick(paste.copy, Qt.MouseButton.LeftButton)
-    assert UDEV_RULE in QGuiApplication.clipboard().text()
-    assert "\n" not in QGuiApplication.clipboard().text()
-    qtbot.mouseClick(dialog.copy, Qt.MouseButton.LeftButton)
-    assert "FOUND" in QGuiApplication.clipboard().text()
 
 
 @pytest.mark.parametrize("close", ["cancel", "escape", "window"])

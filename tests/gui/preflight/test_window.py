@@ -4,10 +4,8 @@ from dataclasses import replace
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication
 
 from study_app.gui.preflight import PreflightWindow
-from study_app.gui.preflight.window import LEAST
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.masking import Masking
@@ -75,17 +73,6 @@ def test_one_goes_back_without_a_trace_and_finishing_is_not_going_back(window, q
         getattr(window, how)()
     assert cancelled == ([] if how == "finish" else [how])
     assert not window.isVisible()
-
-
-def test_every_check_can_be_looked_at_by_the_keyboard_in_the_smallest_window(window, qtbot):
-    window.resize(LEAST)
-    QApplication.processEvents()
-    last = window.rows[-1]
-    assert last.visibleRegion().boundingRect().height() < last.height()
-    qtbot.keyClick(window.start, Qt.Key.Key_PageDown)
-    assert last.visibleRegion().boundingRect().height() == last.height()
-    qtbot.keyClick(window.start, Qt.Key.Key_PageUp)
-    assert window.rows[0].visibleRegion().boundingRect().height() == window.rows[0].height()
 
 
 def test_a_session_that_goes_on_says_where_and_what_is_kept(window):

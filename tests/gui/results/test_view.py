@@ -4,14 +4,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel
 
 from study_app.gui.results.view import ResultsPlace
-from study_app.gui.theme.theme import DARK
 from study_app.gui.widgets.controls import ActionButton
-from study_app.viewmodels.results import FigureShown
-from tests.gui.results.sample import LEFT_OUT, SVG, facts, view
+from tests.gui.results.sample import LEFT_OUT, facts, view
 from tests.gui.windows import results
 
 pytestmark = pytest.mark.slow
@@ -38,20 +36,6 @@ def decided(qtbot, asked, dialog, by, reason):
     with qtbot.waitSignal(asked) as heard:
         click(qtbot, dialog.go_on)
     return heard.args
-
-
-@pytest.mark.parametrize(("width", "stacked"), [(1024, True), (1920, False)])
-def test_figures_keep_their_proportions_and_stand_below_the_sessions_in_a_narrow_window(place, qtbot, width, stacked):
-    place.main.resize(width, 1080)
-
-    def fits():
-        for card in place.figures.cards:
-            assert card.drawing.settled
-            assert card.drawing.height() == card.drawing.heightForWidth(card.drawing.width())
-
-    qtbot.waitUntil(fits)
-    figures, sessions = (part.mapTo(place, QPoint()).y() for part in (place.figures, place.sessions))
-    assert (figures > sessions + 100) is stacked
 
 
 def test_sessions_are_searched_and_filtered(place, qtbot):
@@ -140,42 +124,3 @@ def test_outputs_say_that_settings_appear_as_codes_while_the_key_is_sealed_and_w
             assert not place.writing.extras["sav"].isEnabled()
             assert "It needs pyreadstat." in said
         place.writing.reject()
-
-
-def test_a_report_can_be_given_up_and_a_refusal_lets_one_try_again(place, qtbot):
-    click(qtbot, place.report)
-    dialog = place.writing
-    click(qtbot, dialog.go_on)
-    dialog.show_refused("/somewhere cannot be written (Permission denied)")
-    assert dialog.to.isVisible()
-    click(qtbot, dialog.go_on)
-    with qtbot.waitSignal(place.stop_asked):
-        click(qtbot, dialog.cancel)
-    assert dialog.isVisible(), "until it is known that nothing was written"
-    dialog.stopped()
-    assert place.writing is None
-
-
-def test_a_figure_drawn_again_keeps_its_card_and_its_caption_can_be_read(place, qtbot):
-    card = place.figures.cards[1]
-    click(qtbot, card.more)
-    assert card.caption.isVisible()
-    again = FigureShown("delays", "Answers over added delay", "Dashed: lowest.", SVG)
-    place.show_view(replace(view(), figures=(view().figures[0], again, replace(again, name="recognition"))))
-    assert place.figures.cards[1] is card
-    assert card.caption.text() == "Dashed: lowest."
-    assert (card.drawing.accessibleName(), card.drawing.accessibleDescription()) == (again.title, again.caption)
-    assert len(place.figures.cards) == 3
-    place.show_view(replace(view(), figures=(replace(again, svg=b"", caption="No completed session."),)))
-    assert [one.figure.name for one in place.figures.cards] == ["delays"]
-    assert card.drawing is None
-    assert card.caption.isVisible()
-    qtbot.waitUntil(lambda: all(one.drawing is None or one.drawing.settled for one in place.figures.cards))
-
-
-def test_figures_take_the_colours_of_the_theme(place, qtbot):
-    drawing = place.figures.cards[0].drawing
-    place.main.rail.theme_asked.emit()
-    qtbot.waitUntil(
-        lambda: drawing.settled and drawing.grab().toImage().pixelColor(3, 3).name() == DARK.surface.lower()
-    )

@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 
 import pytest
-from PySide6.QtCore import QPoint, Qt, QTimer
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QColor
 
 from study_app.gui.participant.tank.photodiode_patch import PATCH
@@ -64,17 +64,6 @@ def test_frames_are_asked_for_while_it_is_shown_and_no_longer(qtbot):
     assert not made.report_timer.isActive()
 
 
-@pytest.mark.parametrize(("mean", "spread"), [("", "1"), ("900", "1"), ("20", "400")])
-def test_an_offset_that_cannot_be_is_refused_with_what_can(test_page, qtbot, mean, spread):
-    form = test_page.offset
-    qtbot.keyClicks(form.mean, mean)
-    qtbot.keyClicks(form.spread, spread)
-    with qtbot.assertNotEmitted(test_page.kept):
-        qtbot.mouseClick(form.keep, Qt.MouseButton.LeftButton)
-    assert form.why.isVisible()
-    assert " to " in form.why.text()
-
-
 def test_greys_lie_beside_each_other_and_each_differs(qtbot):
     ramp = GreyRamp()
     qtbot.addWidget(ramp)
@@ -94,17 +83,3 @@ def test_lines_are_so_many_device_pixels_thick(qtbot, thick, standing, ratio):
     image = lines(60, 60, ratio, field)
     along = [image.pixelColor(*((n, 7) if standing else (7, n))).red() for n in range(8 * thick)]
     assert along == ([255] * thick + [0] * thick) * 4
-
-
-def test_nothing_stands_in_the_patchs_corner_of_a_small_screen(test_page, qtbot):
-    test_page.resize(1024, 640)
-
-    def apart():
-        patch = test_page.patch_area()
-        for one in (*test_page.values, test_page.leave, test_page.offset, test_page.interval):
-            place = one.geometry()
-            place.moveTopLeft(one.mapTo(test_page, QPoint()))
-            assert not place.intersects(patch)
-            assert test_page.rect().contains(place)
-
-    qtbot.waitUntil(apart)

@@ -5,13 +5,13 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtGui import QKeySequence, QShortcut, QWheelEvent
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from study_app.gui.widgets.number_field import NumberField, read_number, write_number
-from study_app.gui.widgets.sliders import Range, Slider
+from study_app.gui.widgets.sliders import Range
 
 SPANS = [
     Range(0.0, 1.0),
@@ -45,71 +45,6 @@ def test_ends_and_order(span: Range) -> None:
     decades = Range(1.0, 1000.0, logarithmic=True)
     assert [decades.share(value) for value in (1, 10, 100, 1000)] == pytest.approx([0, 1 / 3, 2 / 3, 1])
     assert (Range(3.0, 3.0).value(0.5), Range(3.0, 3.0).share(3.0)) == (3.0, 0.0)
-
-
-@pytest.fixture
-def slider(qtbot: Any) -> Slider:
-    made = Slider()
-    made.resize(222, 32)
-    made.show_number(Range(0.0, 10.0), 4.0, tick=2.5)
-    qtbot.addWidget(made)
-    made.show()
-    made.told = []  # type: ignore[attr-defined]
-    made.slid.connect(lambda value, held: made.told.append((value, held)))  # type: ignore[attr-defined]
-    return made
-
-
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        (Qt.Key.Key_Right, 4.05), (Qt.Key.Key_Up, 4.05), (Qt.Key.Key_Left, 3.95), (Qt.Key.Key_Down, 3.95),
-        (Qt.Key.Key_PageUp, 5.0), (Qt.Key.Key_PageDown, 3.0), (Qt.Key.Key_Home, 0.0), (Qt.Key.Key_End, 10.0),
-        (Qt.Key.Key_Delete, 2.5),
-    ],
-)  # fmt: skip
-def test_keys_move_it(slider: Any, qtbot: Any, key: Qt.Key, value: float) -> None:
-    qtbot.keyClick(slider, key)
-    assert slider.told == [(pytest.approx(value), False)]
-
-
-def test_a_drag_is_held_until_it_is_let_go(slider: Any, qtbot: Any) -> None:
-    QTest.mousePress(slider, Qt.MouseButton.LeftButton, pos=QPoint(111, 16))
-    assert slider.dragged
-    QTest.mouseMove(slider, QPoint(150, 16))
-    QTest.mouseRelease(slider, Qt.MouseButton.LeftButton, pos=QPoint(150, 16))
-    values, held = zip(*slider.told, strict=True)
-    assert held == (*[True] * (len(held) - 1), False)
-    assert values[0] == pytest.approx(5.0, abs=0.1)
-    assert values[-1] == values[-2] > values[0]
-    assert not slider.dragged
-
-
-def test_a_double_click_goes_back_to_the_tick_and_every_key_press_changes_a_whole_number(
-    slider: Any, qtbot: Any
-) -> None:
-    QTest.mouseDClick(slider, Qt.MouseButton.LeftButton, pos=QPoint(200, 16))
-    assert slider.told[-1] == (2.5, False)
-    assert slider.number == 2.5
-    slider.show_number(Range(1.0, 100_000.0, logarithmic=True, whole=True), 3.0)
-    qtbot.keyClick(slider, Qt.Key.Key_Right)
-    qtbot.keyClick(slider, Qt.Key.Key_Left)
-    assert [value for value, _ in slider.told[1:]] == [4.0, 3.0]
-
-
-def test_the_wheel_scrolls_the_page_and_not_the_slider_and_a_screen_reader_sets_it(slider: Any) -> None:
-    place = QPointF(20, 16)
-    turn = QWheelEvent(
-        place, slider.mapToGlobal(place), QPoint(), QPoint(0, -120), Qt.MouseButton.NoButton,
-        Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase, False,
-    )  # fmt: skip
-    QApplication.sendEvent(slider, turn)
-    assert (slider.told, slider.number) == ([], 4.0)
-    assert not turn.isAccepted()
-    slider.setValue(100)
-    assert slider.told == [(5.0, False)]
-    slider.show_number(Range(0.0, 10.0), 7.5)
-    assert slider.value() == 150
-    assert len(slider.told) == 1
 
 
 @pytest.mark.parametrize(
