@@ -1,4 +1,4 @@
-"""The diagnosis of a Falcon: what goes on is told, every mode has a row, and closing it ends the examination."""
+"""The diagnosis of a Falcon: faults are found, closing it ends the examination, and the report is saved."""
 
 import zipfile
 

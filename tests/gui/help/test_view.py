@@ -1,4 +1,4 @@
-"""The place Help: pages are chosen, searched, followed by links, and drawn in the colours of the theme."""
+"""The place Help: links lead to headings, to other pages and outside the program."""
 
 import pytest
 from PySide6.QtCore import Qt, QUrl

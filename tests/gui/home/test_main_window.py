@@ -25,9 +25,6 @@ class Room(Place):
     def leave(self):
         self.log.append(f"leave {self.name}")
 
-    def wants_narrow_rail(self):
-        return self.name == "lab"
-
 
 @pytest.fixture
 def log():

@@ -1,4 +1,4 @@
-"""The cards of the lab: plots, numbers, flow curves, the estimation, and nothing of it while blind."""
+"""The cards of the lab: how curves are thinned, and what the estimation asks for."""
 
 import dataclasses
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The lab draws a view and says what is asked for; it can be used by keyboard alone, and blind it tells nothing."""
+"""Blind, the lab tells nothing; and what the pointer moves."""
 
 import dataclasses
 from typing import Any

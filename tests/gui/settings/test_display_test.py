@@ -1,4 +1,4 @@
-"""The display test: the tank's own patch toggles when due, greys and lines are what they say, offsets are typed."""
+"""The display test: the tank's own patch toggles when due, greys and lines are what they say."""
 
 from types import SimpleNamespace
 

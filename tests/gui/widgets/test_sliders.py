@@ -1,4 +1,4 @@
-"""Sliders and number fields: what mouse, keyboard, wheel and a screen reader do to them; nothing typed is lost."""
+"""Spans of sliders, and number fields: how numbers are read and written; nothing typed is lost."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Names in plots, chips in tables, jobs beside the window, and roles for screen readers."""
+"""Plots that are painted once, jobs beside the window, and roles for screen readers."""
 
 import threading
 from typing import Any
