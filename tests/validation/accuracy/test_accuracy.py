@@ -1,13 +1,9 @@
-"""What accuracy costs in time: a reduced table and its signs, and the files made of it."""
-
-import csv
-import io
+"""What accuracy costs in time: a reduced table and its signs."""
 
 import pytest
 
 from study_app.evaluation.hand_motions import stir
 from study_app.validation.accuracy import candidate_sets
-from study_app.validation.accuracy.accuracy_report import COLUMNS, csv_text, markdown, write
 from study_app.validation.accuracy.comparison import accuracy
 from tests.validation.accuracy.scenes import REAL, TANK, compiled, first_seconds
 
@@ -84,20 +80,3 @@ def test_after_a_sudden_stop_only_unsteady_drag_keeps_the_target(found, truth):
 def test_unsteady_drag_is_within_the_target_of_a_motion_left_out_of_its_fit(found):
     errors = {row.rung.name: row.error.rms for row in found.rows if row.truth == "multi-sine at 0.0311 m/s"}
     assert errors.pop("unsteady drag") < 0.02 < min(errors.values())
-
-
-@compiled
-def test_the_table_becomes_files(found, tmp_path):
-    written = write(found, tmp_path)
-    assert [path.name for path in written] == ["accuracy.csv", "accuracy.md", "accuracy.png", "accuracy.svg"]
-    rows = list(csv.DictReader(io.StringIO(csv_text(found))))
-    assert list(rows[0]) == list(COLUMNS)
-    assert len(rows) == len(found.rows)
-    for row in rows:
-        assert float(row["ticks_per_s"]) == pytest.approx(1e9 / float(row["median_ns"]), rel=1e-5)
-        assert float(row["times_real_time"]) == pytest.approx(float(row["ticks_per_s"]) / float(row["rate_hz"]), 1e-5)
-    text = markdown(found)
-    assert found.machine in text
-    assert text.count("◎") == 1 + 1 + 9  # the legend, and the choice against each truth
-    assert "**stop at 0.6 m/s**: fluid solver: liquid-study cfd --solve." in text
-    assert written[2].read_bytes().startswith(b"\x89PNG")

@@ -1,34 +1,17 @@
-"""The command of the accuracy table, what it prints and refuses, and its survey of liquids."""
+"""Motions of the accuracy table, and its survey of liquids."""
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from study_app.cli import commands
 from study_app.cli.evidence.accuracy import motion_along
 from study_app.errors import StudyError
 from study_app.haptics.model.motion import Motion
 from study_app.protocol.load import load_scenes
 from study_app.validation.accuracy.comparison import accuracy
-from study_app.validation.accuracy.liquid_survey import FILE, PUBLISHED, survey, survey_markdown, write_survey
+from study_app.validation.accuracy.liquid_survey import PUBLISHED, survey
 from tests.validation.accuracy.scenes import TANK, compiled
 
 pytestmark = pytest.mark.slow
-
-
-def test_what_the_command_cannot_do_is_said_in_a_line():
-    for words, said in (
-        (["--liquid", "watr"], "there are water"),
-        (["--liquid", "watr"], "or give FILE, which has it"),
-        (["rek2024"], "rek2024: say which --liquid of"),
-        (["--liquid", "water", "--path", "circl"], "did you mean 'circle'"),
-        (["--liquids", "--liquid", "honey"], "--liquids and --liquid exclude each other"),
-        (["--liquids", "--path", "circle"], "--liquids and --path exclude each other"),
-        (["rek2024", "--liquids"], "no liquid has a viscosity"),
-    ):
-        refused = CliRunner().invoke(commands, ["accuracy", *words])
-        assert refused.exit_code != 0
-        assert said in f"{refused.output}{refused.exception}"
 
 
 @compiled
@@ -44,20 +27,6 @@ def test_a_motion_file_of_another_rate_is_brought_to_the_scenes(tmp_path):
     read = motion_along(str(tmp_path / "slow.csv"), TANK)
     assert read.t_s == pytest.approx(np.arange(401) / 1000)
     assert read.position_m[:, 0] == pytest.approx(read.t_s / 2)
-
-
-@compiled
-def test_the_command_prints_the_table_of_one_liquid(tmp_path):
-    small = tmp_path / "small.toml"
-    small.write_text("[liquids.gel]\ndensity_kg_m3 = 1000\n", encoding="utf-8")
-    rows = "\n".join(f"{k / 1000},{k / 4000},0,0" for k in range(50))
-    (tmp_path / "move.csv").write_text(f"t_s,x_m,y_m,z_m\n{rows}\n", encoding="utf-8")
-    told = CliRunner().invoke(commands, ["accuracy", str(small), "--path", str(tmp_path / "move.csv")])
-    assert told.exit_code == 0, told.output
-    assert "gel has no viscosity" in told.output
-    assert "central differences" in told.output
-    assert "the motion is short: calls, of some µs, count in times of 5 ticks a batch" in told.output
-    assert "| drag |" in told.output
 
 
 CHOSEN = ("water", "honey", "olive_oil")
@@ -95,16 +64,3 @@ def test_each_liquid_is_compared_with_what_is_known_of_it(found):
         assert it.expected.causes.law < 0.08
         assert 0.04 < it.expected.error_share < 0.16 + it.expected.causes.limits
         assert it.expected.cost_ns > 0
-
-
-@compiled
-def test_the_survey_says_up_to_which_speed_the_force_was_solved(found, tmp_path):
-    file = write_survey(tuple(found.values()), tmp_path)
-    text = file.read_text("utf-8")
-    assert (file.name, text) == (FILE, f"{survey_markdown(tuple(found.values()))}\n")
-    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines() if line.startswith("|")]
-    by_name = {row[0]: row for row in rows}
-    assert [by_name[name][6] for name in CHOSEN] == ["–", "0.6 m/s", "0.14 m/s"]
-    assert by_name["water"][1] == "40,700 (0.6 m/s)"
-    assert len(by_name["100,000"]) == len(PUBLISHED) + 4
-    assert "Above Re 1000 there is no reference for unsteady motion" in text

@@ -1,10 +1,6 @@
-"""How often verdicts are wrong: rates and their limits, the simulated truth, and the quick way to the same verdicts."""
-
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+"""How often verdicts are wrong: the simulated truth, and the quick way to the same verdicts."""
 
 import pytest
-from click.testing import CliRunner
 
 from study_app.analysis.designs.block_tests import of_tables
 from study_app.analysis.evaluate import found_in
@@ -17,11 +13,10 @@ from study_app.analysis.findings.other_assumptions import FINDING as AGAIN
 from study_app.analysis.findings.pair_comparison import FINDING as PAIRS
 from study_app.analysis.findings.settings_differ import FINDING as OMNIBUS
 from study_app.analysis.power.plan import plan
-from study_app.cli import commands
 from study_app.protocol.forms.simulated_observer import TrialFeatures
 from study_app.protocol.load import load
 from study_app.validation.report_rates import known_effects as studies
-from study_app.validation.report_rates import simulation, single_test_rates
+from study_app.validation.report_rates import single_test_rates
 from study_app.validation.report_rates.known_effects import (
     EXTENTS,
     GENERATORS,
@@ -30,8 +25,7 @@ from study_app.validation.report_rates.known_effects import (
     answers,
     simulated,
 )
-from study_app.validation.report_rates.rates import Limit, Rate, markdown, table
-from study_app.validation.report_rates.simulation import validate
+from study_app.validation.report_rates.rates import markdown, table
 from study_app.validation.report_rates.study_rates import CLAIMED, LOST, Cell, count, truth
 
 
@@ -48,24 +42,6 @@ def rek() -> Simulated:
         for name in block.conditions
     }
     return simulated(protocol, plan(protocol, felt))
-
-
-@pytest.mark.parametrize(
-    ("limit", "hits", "studies", "holds"),
-    [
-        ("at most 5 %", 50, 1000, "yes"),
-        ("at most 5 %", 62, 1000, "too few studies"),
-        ("at most 5 %", 80, 1000, "no"),
-        ("at most 5 %", 0, 20, "too few studies"),
-        ("at least 93 %", 900, 1000, "no"),
-        ("at most 83 %", 900, 1000, "no"),
-        ("none", 0, 10, "yes"),
-        ("none", 1, 1000, "no"),
-        ("counted", 10, 10, "counted"),
-    ],
-)
-def test_a_rate_holds_as_far_as_its_interval_tells(limit: Limit, hits: int, studies: int, holds: str) -> None:
-    assert Rate("cell", 5, "what", limit, hits, studies).holds == holds
 
 
 def test_each_generator_answers_in_its_own_way(rek: Simulated) -> None:
@@ -118,31 +94,6 @@ def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator, mo
     assert len(markdown(rates).splitlines()) == len(table(rates).splitlines()) + 1 == len(rates) + 2
 
 
-@pytest.mark.parametrize(
-    ("hits", "code", "last"),
-    [
-        ((20, 0), 0, "every rate is within its limit"),
-        ((62, 0), 4, "1 of 2 rates undecided: simulate more studies"),
-        ((62, 300), 3, "1 of 2 rates exceed their limits, 1 undecided"),
-        ((), 4, "no rate was counted"),
-    ],
-)
-def test_the_command_tells_rates_that_are_undecided_from_rates_that_hold(
-    hits: tuple[int, ...], code: int, last: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    rates = tuple(Rate("cell", 5, f"what {at}", "at most 5 %", hit, 1000) for at, hit in enumerate(hits))
-    rates += (Rate("cell", 5, "size", "counted", 7, 1000),) if rates else ()
-    monkeypatch.setattr("study_app.session.simulated.trial_features.condition_features", lambda *_args, **_named: None)
-    monkeypatch.setattr("study_app.analysis.power.plan.plan", lambda *_args: None)
-    monkeypatch.setattr("study_app.validation.report_rates.known_effects.simulated", lambda *_args: None)
-    monkeypatch.setattr(
-        "study_app.validation.report_rates.simulation.validate", lambda *_args, **_named: [(1000, rates)]
-    )
-    done = CliRunner().invoke(commands, ["validate-report"])
-    assert done.exit_code == code, done.output
-    assert done.output.splitlines()[-1] == last
-
-
 @pytest.mark.slow
 def test_single_tests_are_counted() -> None:
     (leaning,) = single_test_rates.count(("one in five differs by 5 points, the others by 0", 24), 1, 0, 4)
@@ -155,34 +106,3 @@ def test_single_tests_are_counted() -> None:
         "at least 93 %",
     )
     assert covered.hits >= 2
-
-
-@pytest.fixture
-def continued(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[tuple[int, int]]]:
-    """Two cells without any study; the batches that are counted of each."""
-    batches: dict[str, list[tuple[int, int]]] = {"clear": [], "unclear": []}
-
-    def counted(name: str, hits_of_25: int) -> Callable[[int, int, int], tuple[Rate, ...]]:
-        def count_(seed: int, batch: int, many: int) -> tuple[Rate, ...]:
-            assert seed == 1
-            batches[name].append((batch, many))
-            return (Rate(name, 5, "what", "at most 5 %", hits_of_25 if batch < 12 else 0, many),)
-
-        return count_
-
-    monkeypatch.setattr(
-        simulation, "cell_counts", lambda *_: {("clear", 5): counted("clear", 0), ("unclear", 5): counted("unclear", 2)}
-    )
-    return batches
-
-
-def test_a_cell_is_continued_until_it_is_beyond_or_has_four_times_the_studies(
-    rek: Simulated, continued: dict[str, list[tuple[int, int]]]
-) -> None:
-    told: list[str] = []
-    with ThreadPoolExecutor(1) as executor:
-        *_, (done, rates) = validate(rek, 10, executor, progress=told.append)
-    assert [(rate.hits, rate.studies, rate.holds) for rate in rates] == [(0, 40, "too few studies"), (6, 30, "no")]
-    assert continued == {"clear": [(batch, 10) for batch in range(4)], "unclear": [(batch, 10) for batch in range(3)]}
-    assert done == 70
-    assert len(told) == 5

@@ -1,18 +1,13 @@
 """A force that a study delays: it comes so late, within its limits, and the table of what is left of it."""
 
-import csv
-
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from study_app import cli
 from study_app.haptics.model.layout import records
-from study_app.protocol.checks.delayed_force import Entry, longest_ms, table
-from study_app.validation.stability import force_delay
+from study_app.protocol.checks.delayed_force import table
 from study_app.validation.stability.closed_loop import TRACE, follow
 from study_app.validation.stability.device_bench import new_bench
-from study_app.validation.stability.force_delay import LIQUIDS, delayed_trace, measure
+from study_app.validation.stability.force_delay import delayed_trace, measure
 from study_app.validation.stability.stability_cases import Case, parse
 from tests.haptics.scenes import COMPILED
 
@@ -84,29 +79,3 @@ def test_the_shipped_table_is_the_one_that_is_measured(liquid, estimator, hand):
         within = 0.3 if one.withheld_percent == 0 else 10.0  # beyond, it hangs on micrometres
         assert one.left_percent == pytest.approx(again.left_percent, abs=within)
         assert one.withheld_percent == pytest.approx(again.withheld_percent, abs=within)
-
-
-def test_the_longest_delay_is_the_last_one_before_too_much_is_withheld():
-    assert longest_ms("water", "kalman") == 10
-    assert longest_ms("water", "kalman", "middle") == 50
-    assert longest_ms("physical2_honey", "ewma") == 0
-    assert longest_ms("physical2_honey", "kalman") == 5
-    assert longest_ms("physical2_water", "kalman", "middle") == 200
-    assert longest_ms("water", "kalman", withheld_percent=-1.0) == -1
-    assert all(longest_ms(it, "kalman") <= longest_ms(it, "kalman", "middle") for it in LIQUIDS)
-    with pytest.raises(KeyError):
-        longest_ms("oil", "kalman")
-
-
-def test_command_writes_the_table_and_prints_it(monkeypatch, tmp_path):
-    entries = (Entry("water", "ewma", "light", 0, 100.0, 0.0), Entry("water", "ewma", "light", 50, 39.0, 65.1))
-    monkeypatch.setattr(force_delay, "measure", lambda: iter(entries))
-    ran = CliRunner().invoke(
-        cli.commands, ["stability", "--delayed", str(tmp_path / "late.csv")], standalone_mode=False
-    )
-    assert ran.exception is None
-    assert "water, ewma, light" in ran.stdout
-    assert "   100    39" in ran.stdout
-    with (tmp_path / "late.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    assert rows[1] == dict(zip(Entry._fields, ("water", "ewma", "light", "50", "39", "65.1"), strict=True))

@@ -1,18 +1,15 @@
 """Hard cases of the closed loop: some of them unstable without safety, none with it; and what safety takes away."""
 
-import csv
 import dataclasses
 from concurrent.futures import ThreadPoolExecutor
 from importlib import resources
 
 import pytest
-from click import UsageError
 from click.testing import CliRunner
 
 from study_app import cli
 from study_app.cli.options import EXIT_FOUND
-from study_app.errors import StoreError, StudyError
-from study_app.haptics.model.layout import LIMITER_NAMES
+from study_app.errors import StudyError
 from study_app.haptics.model.slope_limits import table
 from study_app.validation.stability import stability_report as stability
 from study_app.validation.stability.case_groups import Group, groups, some, sweep
@@ -134,65 +131,8 @@ def test_what_no_handle_bears_is_said_to_be_limited(name):
     assert not found.within
 
 
-@pytest.mark.nightly
-@compiled
-def test_the_files_hold_every_case_and_the_lines_that_reproduce_the_failing_ones(swept, tmp_path):
-    few = stability.Swept(swept.off[:60], swept.on[:60], 1.0)
-    found = fidelities(["honey"], STUDY_LOOPS)
-    written = {path.name: path for path in stability.write(tmp_path / "new", few, found)}
-    with written["cases.csv"].open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert len(rows) == 60
-    assert [row["liquid"] for row in rows] == [verdict.case.liquid for verdict in few.on]
-    assert sum(bool(row["unstable_off"]) for row in rows) == sum(not verdict.stable for verdict in few.off)
-    lines = written["unstable-safety-off.txt"].read_text("utf-8").splitlines()
-    assert [parse(line) for line in lines] == [verdict.case for verdict in few.off if not verdict.stable]
-    assert lines
-    assert written["unstable-safety-on.txt"].read_bytes() == b""
-    assert "60 cases" in written["stability.md"].read_text("utf-8")
-    assert written["map.png"].read_bytes().startswith(b"\x89PNG")
-    assert b"Friction b" in written["map.svg"].read_bytes()
-    failing = dataclasses.replace(swept.off[0], reasons=("force",), case=Case(plant="arm"))
-    more = dataclasses.replace(few, others=(stability.Judged("second plant", (failing,)),))
-    stability.write(tmp_path / "more", more, found)
-    lines = (tmp_path / "more" / "unstable-safety-on.txt").read_text("utf-8").splitlines()
-    assert [parse(line) for line in lines] == [failing.case]
-    (tmp_path / "file").write_text("")
-    with pytest.raises(StoreError, match="choose another with --to"):
-        stability.write(tmp_path / "file" / "below", few, found)
-
-
-@compiled
-def test_the_summary_counts_cases_reasons_and_limiters(swept):
-    text = stability.summary(swept, fidelities(["honey"], STUDY_LOOPS))
-    assert "120 cases" in text
-    first, gentle = (line.split() for line in text.splitlines() if line.startswith(("  first plant", "  gentle")))
-    assert first[2:4] == ["120", "0"]
-    assert gentle[1:3] == ["2", "0"]
-    assert float(gentle[4]) == 0.0
-    (line,) = [line for line in text.splitlines() if line.startswith("unstable")]
-    assert line.split() == ["unstable", str(sum(not verdict.stable for verdict in swept.off)), "0"]
-    assert "slope" in text
-    assert "honey" in text
-    worst = max(swept.off, key=lambda verdict: verdict.fast_n)
-    assert "unstable (" in stability.in_words(worst)
-    acting = next(verdict for verdict in swept.on if verdict.acted[LIMITER_NAMES.index("energy")])
-    assert "energy" in stability.in_words(acting)
-
-
 def command(*words):
     return CliRunner().invoke(cli.commands, ["stability", *words], standalone_mode=False)
-
-
-@compiled
-def test_the_command_judges_one_case_in_words():
-    ran = command("--case", UNSTABLE)
-    assert ran.exception is None
-    assert not ran.return_value
-    case, off, on = ran.stdout.splitlines()
-    assert parse(case) == parse(UNSTABLE)
-    assert off.startswith("safety off: unstable")
-    assert on.startswith("safety on: stable")
 
 
 @compiled
@@ -208,31 +148,6 @@ def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
     lines = [line for line in ran.stderr.splitlines() if line.startswith("liquid=")]
     assert len(lines) == 2 * (1 + len(groups(count=2)))
     assert {parse(line).plant for line in lines} == {"handle", "arm", "falcon"}
-
-
-@pytest.mark.nightly
-@compiled
-def test_the_command_judges_only_the_groups_that_are_named():
-    ran = command("--only", "non-Newtonian", "--cases", "2")
-    assert ran.exception is None
-    _, *lines = ran.stdout.splitlines()
-    assert len(lines) == sum("non-Newtonian" in group.name for group in groups(count=2)) == 10
-    assert all("non-Newtonian" in line for line in lines)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--only", "mercury"), "no group has 'mercury' in its name: there are second plant, held, "),
-        (("--only", "lost", "--withheld"), "--withheld and --only exclude each other"),
-        (("--only", "lost", "--velocity"), "--velocity and --only exclude each other"),
-        (("--withheld", "--to", "shares"), "--to and --withheld exclude each other"),
-    ],
-)
-def test_what_cannot_be_judged_is_refused(words, said):
-    with pytest.raises((StudyError, UsageError), match=said):
-        raise command(*words).exception
 
 
 @compiled

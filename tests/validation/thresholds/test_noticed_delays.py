@@ -1,12 +1,7 @@
 """The rated and the detected delay of the same simulated people."""
 
-from dataclasses import replace
-from pathlib import Path
-
 import pytest
-from click.testing import CliRunner
 
-from study_app.cli import commands
 from study_app.protocol.streams import stream
 from study_app.protocol.trials.kinds import default_design
 from study_app.session.simulated.design_observer import OBSERVER, Comparison
@@ -16,7 +11,6 @@ from study_app.validation.thresholds.noticed_delays import (
     MEAN_CRITERION_S,
     Compared,
     compare,
-    markdown,
     people_of,
     rated,
 )
@@ -55,23 +49,3 @@ def test_adaptation_moves_the_rating_and_no_forced_choice(found: Compared) -> No
             attended.choose(design, [0.2 - shift, 0.22 - shift], 0.0, stream(seed, "x").random) for shift in (0.0, 0.03)
         ]
         assert chosen[0] == chosen[1]
-
-
-def test_the_table_has_a_row_for_each_procedure_and_criterion(found: Compared) -> None:
-    rows = [line for line in markdown(found).splitlines() if line.startswith("| ")][1:]
-    assert len(rows) == 2 + len(CRITERIA_S)
-    assert rows[0].startswith("| delaydetect: forced choice, 75 % correct | – | ")
-    assert rows[-1].startswith("| rek2024: rating of “different”, half agree, adapted to 30 ms | 130 ms | ")
-    nothing = replace(found.rated[0], found=replace(found.rated[0].found, effect=None, lower=None, upper=None))
-    assert "| none | – |" in markdown(replace(found, rated=(nothing,)))
-
-
-@pytest.mark.nightly
-def test_the_command_writes_table_and_figure_the_same_each_time(tmp_path: Path) -> None:
-    for to in ("one", "two"):
-        result = CliRunner().invoke(commands, ["delay-thresholds", "--people", "8", "--to", str(tmp_path / to)])
-        assert result.exit_code == 0, result.output
-    names = {path.name for path in (tmp_path / "one").iterdir()}
-    assert names == {f"delay-thresholds.{end}" for end in ("md", "txt", "png", "svg", "pdf")}
-    for name in names:
-        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()

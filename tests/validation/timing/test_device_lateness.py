@@ -1,4 +1,4 @@
-"""Emulated devices compared with the scripted hand: in turn, by ratio and interval, with a verdict and an exit code."""
+"""Emulated devices compared with the scripted hand: in turn, by ratio and interval, with a verdict."""
 
 import threading
 from contextlib import nullcontext
@@ -7,15 +7,13 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 if numba.config.DISABLE_JIT:
     pytest.skip("the servo exists compiled only", allow_module_level=True)
 
-from study_app.cli import commands
 from study_app.errors import StudyError
 from study_app.validation.timing import device_lateness
-from study_app.validation.timing.device_lateness import DeviceLateness, emulated_devices, text, time_devices
+from study_app.validation.timing.device_lateness import emulated_devices, time_devices
 from study_app.validation.timing.loops import Taken
 
 pytestmark = pytest.mark.slow
@@ -79,25 +77,3 @@ def test_every_emulated_device_is_compared() -> None:
     names = emulated_devices()
     assert names[0] == "scripted"
     assert {"falcon-emulated", "inverse3-emulated", "force-dimension-emulated"} <= set(names)
-
-
-@pytest.mark.parametrize(("low", "exit_code"), [(1.2, 0), (1.6, 3)])
-def test_the_command_prints_ratios_and_ends_with_3_where_one_is_missed(
-    low: float, exit_code: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Any
-) -> None:
-    found = (
-        DeviceLateness("scripted", 1000, 20.0, 50.0, 1.0, 1.0, 1.0),
-        DeviceLateness("falcon-emulated", 1000, 25.0, 95.0, 1.9, low, 2.5),
-    )
-    monkeypatch.setattr(device_lateness, "time_devices", lambda *_, **__: found)
-    done = CliRunner().invoke(commands, ["timing", "--devices", "--to", str(tmp_path / "out")])
-    assert done.exit_code == exit_code
-    assert f"1.90 ({low:.2f} to 2.50): {'missed' if exit_code else 'undecided'}" in done.output
-    assert (tmp_path / "out" / "devices.txt").read_text(encoding="utf-8") == text(found)
-
-
-@pytest.mark.parametrize("other", [["--delays"], ["--spin", "50"]])
-def test_options_of_other_measurements_are_refused(other: list[str]) -> None:
-    refused = CliRunner().invoke(commands, ["timing", "--devices", *other])
-    assert refused.exit_code != 0
-    assert "--spin applies" in str(refused.exception) or "exclude each other" in refused.output

@@ -1,18 +1,15 @@
-"""The accuracy of velocity estimators: measured as its closed form says, and the command that judges it."""
+"""The accuracy of velocity estimators: measured as its closed form says."""
 
 import math
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from study_app import cli
-from study_app.cli.options import EXIT_FOUND
 from study_app.haptics.model.estimator import ewma_response
 from study_app.haptics.model.scene import Ewma, Kalman, Raw
 from study_app.validation.stability.stability_cases import GRIPS
-from study_app.validation.velocity import criteria, held_handle, imposed_motions
-from study_app.validation.velocity.criteria import PARTS, Row, report
+from study_app.validation.velocity import held_handle, imposed_motions
+from study_app.validation.velocity.criteria import PARTS
 from study_app.validation.velocity.imposed_motions import COUNT_M, Stroke, noise_mmps
 from tests.haptics.scenes import COMPILED
 
@@ -62,24 +59,3 @@ def test_the_kalman_filter_meets_its_limits(part):
     rows = tuple(PARTS[part]())
     assert any(row.goal is not None for row in rows)
     assert [row.name for row in rows if not row.met] == []
-
-
-def test_a_row_is_judged_by_its_first_value():
-    assert Row("error", (2.5, 9.0), 2.5).met
-    assert not Row("error", (2.51, 0.0), 2.5).met
-    assert Row("damping", (40.0, 0.0), 40.0, least=True).met
-    assert not Row("damping", (39.9, 90.0), 40.0, least=True).met
-    assert Row("shown", (1e9, 0.0)).met
-    text = report((Row("error", (2.51, 0.0, 0.0), 2.5), Row("shown", (1.0, 0.0, 0.0))))
-    assert "≤ 2.5: not met" in text
-    assert not text.endswith("met")
-
-
-def test_command_prints_the_rows_and_ends_with_3_where_one_is_missed(monkeypatch):
-    for value, code in ((1.0, None), (3.0, EXIT_FOUND)):
-        rows = (Row("error of v·|v|", (value, 7.0, 3.5), 2.5),)
-        monkeypatch.setattr(criteria, "measure", lambda _progress, rows=rows: rows)
-        ran = CliRunner().invoke(cli.commands, ["stability", "--velocity"], standalone_mode=False)
-        assert ran.exception is None
-        assert (ran.return_value or None) == code
-        assert "error of v·|v|" in ran.stdout
