@@ -47,11 +47,6 @@ def drawn(rng: np.random.Generator) -> Study:
     return study(settings, trials, decided)
 
 
-def check(number: int) -> None:
-    """Evaluate the random study of this number, and write its texts."""
-    keeps_contract(drawn(np.random.default_rng(number)))
-
-
 def keeps_contract(made: Study, forms: Sequence[str] = ()) -> Results:
     """Evaluate a study, write all its texts and draw its figures in these forms; return what is found.
 

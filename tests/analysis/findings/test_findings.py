@@ -21,14 +21,13 @@ from study_app.analysis.worker_messages import FigureDrawn, ReadStudy
 from study_app.store.blinded.unblinding import unblind
 from tests.analysis.conftest import HIDDEN, SAMPLE, Results, twelve
 from tests.analysis.made_up import delays, everybody, liquids, study
-from tests.analysis.random_studies import check, keeps_contract
+from tests.analysis.random_studies import drawn, keeps_contract
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 TOY = Path(__file__).parent / "toy"
 KEY = "highest_answers"
 RANDOM = 12
-"""tests/benchmarks/analysis/random_studies.py checks 2,000."""
 
 
 def rising(_person: int, session: int, code: str, _item: str) -> int:
@@ -68,7 +67,7 @@ def test_every_finding_keeps_its_contract_in_studies_of_every_shape(shape: str) 
 @pytest.mark.variants(6)
 @pytest.mark.parametrize("number", range(RANDOM))
 def test_every_finding_keeps_its_contract_in_random_studies(number: int) -> None:
-    check(number)
+    keeps_contract(drawn(np.random.default_rng(number)))
 
 
 def test_while_sealed_findings_speak_of_codes_and_say_what_waits(rek: Results, small: Results) -> None:
