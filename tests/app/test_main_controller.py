@@ -14,8 +14,7 @@ from PySide6.QtWidgets import QDialog, QLabel
 from study_app.app.main_controller import MainController, home
 from study_app.app.session import live_session
 from study_app.app.session.termination import BY_SIGNAL_S
-from study_app.errors import DeviceLost, DeviceNotFound
-from study_app.gui.theme.theme import DARK
+from study_app.errors import DeviceLost
 from study_app.session.request import NewSession
 
 pytestmark = pytest.mark.slow
@@ -99,37 +98,6 @@ def test_a_signal_waits_two_seconds_at_most_for_a_device_that_is_being_opened(
     may_open.set()
     assert took_s < BY_SIGNAL_S + 1.0
     assert visit.code == 128 + 15
-
-
-def test_of_one_session_at_a_time_the_theme_stays_and_a_device_that_is_gone_is_told(
-    visit: MainController, monkeypatch: Any
-) -> None:
-    machine = Machine(lost=True)
-    monkeypatch.setattr(live_session.LiveSession, "open", lambda _self: None)
-    home = visit.window.place("home")
-    home.session_asked.emit(CHOSEN)
-    live = visit.live
-    home.session_asked.emit(CHOSEN)
-    assert visit.live is live is not None
-    live.rig = machine  # type: ignore[assignment]
-    live.theme = DARK
-    live.cancel()
-    assert machine.stopped
-    assert visit.window.isVisible()
-    assert visit.window.notice is not None
-    assert visit.window.theme is DARK
-    assert visit.machine.settings.theme == "dark"
-
-
-def test_a_session_that_was_not_begun_is_told_so(visit: MainController, monkeypatch: Any, qtbot: Any) -> None:
-    def refuse(*_words: Any, **_named: Any) -> Machine:
-        raise DeviceNotFound("no Falcon is connected: plug it in")
-
-    monkeypatch.setattr(live_session, "open_rig", refuse)
-    visit.window.place("home").session_asked.emit(CHOSEN)
-    qtbot.waitUntil(lambda: visit.window.notice is not None)
-    assert visit.window.notice is not None
-    assert visit.window.notice.windowTitle() == "The session did not start"
 
 
 def test_a_mistake_before_the_first_window_leads_home_again(

@@ -1,4 +1,4 @@
-"""Results with their real place: rehearsed studies read, unblinded, left out of, exported and reported."""
+"""Results with their real place: rehearsed studies read, unblinded, left out of and reported."""
 
 import multiprocessing
 import shutil
@@ -13,14 +13,14 @@ from pytestqt.qtbot import QtBot
 
 from study_app.analysis.study_worker import carry_out
 from study_app.analysis.worker_client import start_analysis_worker
-from study_app.analysis.worker_messages import Answer, Order, WriteReport
+from study_app.analysis.worker_messages import Answer, Order
 from study_app.app.results_controller import ResultsController
 from study_app.errors import StudyError
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.main_view import Place
 from study_app.store.blinded.blinding import reveals
-from study_app.store.exclusions import exclude, exclusions
+from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
 from study_app.workers.messages import Crashed, Refused
 from tests.studies import rehearsed
@@ -157,32 +157,6 @@ def test_leaving_out_changes_foot_figures_and_list_until_it_is_taken_back(shown:
     assert not shown.place.exclusions.lines
 
 
-def test_what_the_store_refuses_is_said(shown: Opened, results: Path) -> None:
-    exclude(results / "demo", "P001", 1, by="BC", reason="late")  # meanwhile, by another program
-    shown.place.sessions.rows.table.selectRow(0)
-    shown.decide(shown.place.exclusions.leave_out, "AK", "fell asleep")
-    assert shown.window.notice is not None
-    assert shown.window.notice.windowTitle() == "It was not excluded"
-    assert len(exclusions(results / "demo")) == 1
-    assert shown.place.sessions.why.text() == "P001 is excluded."
-    shown.click(shown.window.notice.close_button)
-    assert not shown.window.notice.isVisible()
-
-
-def test_tables_are_written_and_their_folder_opened(shown: Opened, tmp_path: Path) -> None:
-    shown.click(shown.place.export)
-    dialog: Any = shown.place.writing
-    assert Path(dialog.to.text()) == tmp_path / "demo-tables"
-    dialog.extras["wide"].click()
-    shown.click(dialog.go_on)
-    shown.wait()
-    assert (tmp_path / "demo-tables" / "study-demo_description-wide_data.csv").is_file()
-    shown.click(dialog.go_on)
-    assert shown.files == [tmp_path / "demo-tables"]
-    shown.click(dialog.cancel)
-    assert shown.place.writing is None
-
-
 def cut_table(study: Path) -> None:
     table = StudyFolder(study).session("P002", 1).table("demo", "responses")
     table.write_bytes(table.read_bytes()[:-120])
@@ -221,71 +195,8 @@ def test_what_cannot_be_shown_is_said_in_one_sentence(
         assert opened.window.here == "home"
 
 
-def test_a_results_folder_that_is_none_is_told_and_looked_at_again(qtbot: QtBot, results: Path) -> None:
-    aside = results.rename(results.with_name("aside"))
-    results.write_text("x")
-    opened = Opened(qtbot, results)
-    assert opened.place.figures.trouble.title.text() == "The results folder cannot be read"
-    results.unlink()
-    aside.rename(results)
-    opened.click(opened.place.figures.trouble.button)
-    opened.wait()
-    assert len(opened.titles) == 2
-    assert not opened.place.figures.trouble.isVisible()
-
-
-def test_one_participant_is_enough_for_figures(qtbot: QtBot, tmp_path: Path) -> None:
-    rehearsed(tmp_path / "results", people=1)
-    opened = Opened(qtbot, tmp_path / "results")
-    assert opened.controller.view.trouble is None
-    assert all(card.drawing is not None for card in opened.place.figures.cards)
-    opened.decide(opened.place.unblind, "AK", "closed")
-    assert opened.controller.view.trouble is None
-    assert opened.titles[0] == "Agreement for each liquid"
-
-
-def test_the_newest_study_is_shown_first_and_another_can_be_chosen(qtbot: QtBot, results: Path) -> None:
-    shutil.copytree(results / "demo", results / "demo-rehearsal-1")
-    for session in (results / "demo" / "data").glob("sub-*/ses-*"):
-        session.touch()
-    opened = Opened(qtbot, results)
-    assert opened.place.study.currentText() == "demo  ·  simulated"
-    assert opened.place.study.count() == 2
-    opened.place.study.setFocus()
-    qtbot.keyClick(opened.place.study, Qt.Key.Key_Down)
-    opened.wait()
-    assert opened.controller.view.chosen == results / "demo-rehearsal-1"
-    opened.window.go("home")
-    opened.window.go("results")
-    opened.wait()
-    assert opened.controller.view.chosen == results / "demo-rehearsal-1", "one comes back to where one was"
-
-
 def nobody_left() -> bool:
     return not any(child.name == "analysis" for child in multiprocessing.active_children())
-
-
-def test_a_report_under_way_is_stopped(qtbot: QtBot, results: Path, tmp_path: Path) -> None:
-    workers: list[Here] = []
-
-    class Writes(Here):
-        """Never comes to the end of a report."""
-
-        def __init__(self) -> None:
-            super().__init__()
-            workers.append(self)
-
-        def order(self, order: Order) -> int:
-            return 0 if isinstance(order, WriteReport) else super().order(order)
-
-    opened = Opened(qtbot, results, Writes)
-    opened.click(opened.place.report)
-    dialog: Any = opened.place.writing
-    dialog.to.setText(str(tmp_path / "report"))
-    opened.click(dialog.go_on)
-    assert not workers[-1].stops
-    opened.click(dialog.cancel)
-    assert workers[-1].stops
 
 
 @pytest.mark.nightly

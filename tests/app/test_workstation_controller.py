@@ -1,31 +1,27 @@
-"""What is set for this machine: kept at once, taken back, told in the receipt; and devices looked for in a thread."""
+"""What is set for this machine: kept at once, taken back, told in the receipt."""
 
-import threading
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QMainWindow
 
-from study_app.app.devices_controller import DevicesController
 from study_app.app.main_controller import MainController
 from study_app.app.session.live_session import LiveSession
 from study_app.app.workstation_controller import WorkstationController
 from study_app.app.workstation_settings import described, settings_here, text_scale_on
-from study_app.devices.descriptor import NONE, READY, Backend
+from study_app.devices.descriptor import READY, Backend
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.widgets.dialogs import Notice
 from study_app.session.request import NewSession
 from study_app.store import workstation
-from study_app.store.workstation import DEFAULTS, DisplayOffset, MachineSettings, load, save
+from study_app.store.workstation import DEFAULTS, DisplayOffset, MachineSettings, save
 from study_app.user_folder import settings_file
 
 pytestmark = pytest.mark.slow
 
 MOUSE = Backend("mouse", "the window", READY, "seen, not felt")
-FALCON = Backend("falcon", "libusb 1.0", NONE, "felt, up to 8 N", "plug its cable in")
 
 
 @pytest.fixture
@@ -50,20 +46,6 @@ def test_a_device_that_nobody_knows_is_told_and_the_mouse_stands_in(qapp):
     assert "\n" not in trouble
 
 
-def test_the_place_shows_what_is_set_and_sets_what_is_typed(desk, qtbot):
-    desk.change({"device": "scripted"})
-    place = desk.make_place()
-    qtbot.addWidget(place)
-    place.show()
-    assert place.sessions.device.currentData() == "scripted"
-    qtbot.mouseClick(place.windows.sound, Qt.MouseButton.LeftButton)
-    assert load().sound
-    qtbot.mouseClick(place.undo, Qt.MouseButton.LeftButton)
-    assert not load().sound
-    assert not place.windows.sound.isChecked()
-    assert place.kept_in.accessibleName() == f"Saved in {settings_file()}"
-
-
 def test_the_receipt_says_distance_width_and_offset_of_the_participants_screen(qapp):
     screen = QGuiApplication.primaryScreen()
     offset = DisplayOffset(mean_ms=20, spread_ms=1, measured="2026-11-20", screen=screen.name())
@@ -74,61 +56,6 @@ def test_the_receipt_says_distance_width_and_offset_of_the_participants_screen(q
     assert screens["participant"]["display_offset"]["mean_ms"] == 20
     assert screens["participant"]["text_scale"] == pytest.approx(text_scale_on(settings, screen), abs=0.001)
     assert "viewing_distance_mm" not in screens["operator"]
-
-
-@pytest.mark.slow
-def test_devices_are_looked_for_beside_the_windows_one_look_at_a_time(desk, qtbot):
-    looks, may_end, where = [], threading.Event(), []
-
-    def look():
-        where.append(threading.current_thread())
-        assert may_end.wait(20)
-        looks.append(1)
-        return [MOUSE, FALCON]
-
-    devices = DevicesController(desk, look)
-    place = devices.make_place()
-    qtbot.addWidget(place)
-    place.enter()
-    place.enter()
-    assert not place.refresh.isEnabled()
-    assert devices.preferred.word == "Looking …"
-    with qtbot.waitSignal(devices.looked):
-        may_end.set()
-    assert (len(looks), place.refresh.isEnabled()) == (1, True)
-    assert where[0] is not threading.main_thread()
-    assert devices.preferred.word == "Ready"
-    place.chosen.emit("falcon")
-    assert (load().device, devices.preferred.word) == ("falcon", "Not connected")
-    place.option_chosen.emit("firmware", "/there/firmware.bin")
-    assert load().firmware == "/there/firmware.bin"
-
-
-@pytest.fixture
-def following(qtbot, tmp_path, monkeypatch):
-    """A main window that follows the workspace that is set."""
-    monkeypatch.chdir(tmp_path)
-    made = MainController()
-    qtbot.addWidget(made.window)
-    made.window.show()
-    yield made
-    made.end()
-
-
-def test_the_main_window_follows_what_is_set(following, tmp_path, monkeypatch):
-    visit = following
-    monkeypatch.delenv("LIQUID_STUDY_WORKSPACE")
-    home = visit.window.place("home")
-    assert visit.window.theme is LIGHT
-    visit.machine.change({"theme": "dark"})
-    assert visit.window.theme is DARK
-    visit.window.rail.theme_asked.emit()
-    assert load().theme == "light"
-    visit.machine.change({"workspace": str(tmp_path / "elsewhere")})
-    assert home.results == visit.results == tmp_path / "elsewhere" / "results"
-    assert home.folder.accessibleName() == f"Workspace: {tmp_path / 'elsewhere'}"
-    visit.machine.change({"device": "scripted"})
-    assert home.device.name.text() == "Scripted hand"
 
 
 def test_a_folder_asked_for_by_command_counts_for_this_stay(qtbot, tmp_path, monkeypatch):
@@ -144,15 +71,6 @@ def test_a_folder_asked_for_by_command_counts_for_this_stay(qtbot, tmp_path, mon
     assert following.results == tmp_path / "other" / "results"
 
 
-def test_the_display_test_is_one_click_from_home(visit, qtbot):
-    qtbot.mouseClick(visit.window.place("home").device.display, Qt.MouseButton.LeftButton)
-    assert visit.window.here == "machine"
-    test = visit.machine.place.test
-    assert test.isVisible()
-    with qtbot.waitSignal(test.left):
-        qtbot.keyClick(test, Qt.Key.Key_Escape)
-
-
 @pytest.mark.slow
 def test_a_damaged_file_is_told_when_the_window_opens(qtbot, tmp_path, monkeypatch):
     monkeypatch.setattr(workstation, "load_or_default", lambda: (DEFAULTS, "the file is no JSON"))
@@ -164,46 +82,6 @@ def test_a_damaged_file_is_told_when_the_window_opens(qtbot, tmp_path, monkeypat
     assert made.window.notice.isVisible()
     made.window.notice.close_button.click()
     assert made.window.place("home").device.state.word == "Ready"
-
-
-def test_a_diagnosis_ends_when_the_place_is_left(visit, qtbot, monkeypatch):
-    begun = []
-
-    class Examined:
-        def __init__(self, name, options):
-            self.asked = name, options
-            self.closed = False
-            begun.append(self)
-
-        def answers(self):
-            return []
-
-        def close(self):
-            self.closed = True
-
-    monkeypatch.setattr("study_app.app.devices_controller.DiagnosisDialog", _with(Examined))
-    visit.machine.change({"device": "falcon:FT1", "firmware": "/there/firmware.bin"})
-    visit.devices.backends = lambda: [MOUSE, FALCON]
-    visit.window.go("devices")
-    with qtbot.waitSignal(visit.devices.looked):
-        visit.devices.look()
-    row = visit.devices.place.people.rows["falcon"]
-    qtbot.mouseClick(row.diagnose, Qt.MouseButton.LeftButton)
-    assert [(name, str(options["firmware"])) for name, options in (one.asked for one in begun)] == [
-        ("falcon:FT1", "/there/firmware.bin")
-    ]
-    visit.window.go("home")
-    qtbot.waitUntil(lambda: begun[0].closed)
-    assert visit.devices.dialog is None
-
-
-def _with(begin):
-    from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
-
-    def made(*words, **options):
-        return DiagnosisDialog(*words, **options, begin=begin)
-
-    return made
 
 
 @pytest.mark.parametrize(("device", "held"), [("mouse", None), ("falcon:FT1", True), ("falcon-emulated", False)])

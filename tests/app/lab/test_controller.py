@@ -67,29 +67,6 @@ def test_closing_the_window_ends_in_zero_force(felt: LabController) -> None:
     assert is_let_go(live)
 
 
-def test_what_is_edited_is_presented_and_what_is_refused_is_said(felt: LabController, qtbot: Any) -> None:
-    assert felt.live is not None
-    telemetry = felt.live.servo.telemetry
-    before = telemetry.latest().scene
-    for k in range(5):
-        felt.place.changed.emit("liquid.density_kg_m3", 1300.0 - k, True)
-    felt.place.changed.emit("liquid.density_kg_m3", 1200.0, False)
-    qtbot.waitUntil(lambda: felt.live.due_in_s is None and telemetry.latest().scene > before, timeout=SOON_MS)
-    assert felt.live.felt is not None
-    assert felt.live.felt.a.scene.liquids[0].density_kg_m3 == 1200.0
-    felt.place.changed.emit("liquid.density_kg_m3", -5.0, False)
-    refused = felt.view().refused
-    assert refused is not None
-    assert refused[0] == "liquid.density_kg_m3"
-    assert "must be 1 kg/m³ to 25000 kg/m³" in refused[1]
-    felt.place.undo_asked.emit()
-    assert felt.view().refused is None
-    assert felt.bench.a.scene.liquids[0].density_kg_m3 == 1400.0
-    felt.place.redo_asked.emit()
-    assert felt.bench.a.scene.liquids[0].density_kg_m3 == 1200.0
-    assert felt.live is not None
-
-
 def test_the_force_stops_at_once_and_fades_in_again(felt: LabController, qtbot: Any) -> None:
     felt.place.stop_asked.emit()
     qtbot.waitUntil(lambda: force_n(felt) == 0.0, timeout=SOON_MS)
@@ -181,19 +158,3 @@ def test_while_blind_nothing_tells_one_from_the_other(felt: LabController, qtbot
     assert not list(tmp_path.iterdir())
     felt.place.blind_asked.emit(False)
     assert not felt.view().workbench.blind
-
-
-def test_the_pointer_moves_the_ball(visit: LabController, qtbot: Any) -> None:
-    visit.device = "mouse"
-    visit.place.show()
-    qtbot.waitUntil(lambda: visit.live is not None, timeout=OPENS_MS)
-    visit.place.hand_moved.emit(0.02, 0.01, -0.01)
-    visit.place.hand_pressed.emit(1)
-
-    def is_there() -> bool:
-        now = visit.view().now
-        return now is not None and now.position_m == pytest.approx((0.02, 0.01, -0.01), abs=2e-3)
-
-    qtbot.waitUntil(is_there, timeout=SOON_MS)
-    assert visit.live is not None
-    assert visit.live.servo.telemetry.latest().buttons == 1

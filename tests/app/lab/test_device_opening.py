@@ -1,16 +1,14 @@
 """Devices opened behind the lab's page: one at a time, cancelled, refused, let go of."""
 
-import threading
 from collections.abc import Callable
 from typing import Any
 
 import pytest
 
-from study_app.app.lab import controller
 from study_app.app.lab.controller import LabController
 from study_app.app.lab.device_opening import LabOpening
 from study_app.app.session.termination import Patience
-from study_app.errors import DeviceNotFound, ServoFault
+from study_app.errors import ServoFault
 from tests.app.lab.worlds import SOON_MS, SlowDevices
 from tests.compiled import needs_servo
 
@@ -74,23 +72,3 @@ def test_a_force_that_was_stopped_does_not_come_with_a_device_that_is_being_open
     assert (view.busy, view.trouble, view.may_fade_in) == ("", "No device is open", True)
     visit.place.changed.emit("liquid.density_kg_m3", 900.0, False)
     assert visit.view().trouble == "No device is open"  # an edit opens none
-
-
-def test_a_long_opening_is_explained_by_the_compilation_and_a_device_that_is_not_there_is_told(
-    make_lab: MakeLab, qtbot: Any, monkeypatch: Any
-) -> None:
-    gate = threading.Event()
-
-    def compile_slowly(_name: str, **_: Any) -> Any:
-        gate.wait(30.0)
-        raise DeviceNotFound("none is plugged in")
-
-    monkeypatch.setattr(controller, "LONG_AFTER_S", 0.1)
-    visit = make_lab(open_live=compile_slowly)
-    visit.place.show()
-    assert visit.view().busy == "Opening Scripted hand"
-    qtbot.waitUntil(lambda: visit.view().busy == controller.COMPILING, timeout=SOON_MS)
-    gate.set()
-    qtbot.waitUntil(lambda: visit.view().trouble == "none is plugged in", timeout=SOON_MS)
-    view = visit.view()
-    assert (view.force_on, view.device.ready) == (False, False)

@@ -1,4 +1,4 @@
-"""The lab with its real page, servo and device: values estimated, computation times, presets that are saved."""
+"""The lab with its real page, servo and device: values estimated, presets that are saved."""
 
 import threading
 from collections.abc import Callable
@@ -11,9 +11,7 @@ from study_app.app.lab.controller import LabController
 from study_app.app.session.termination import Patience
 from study_app.lab.ab_comparison import Setting
 from study_app.lab.presets import save
-from study_app.protocol.load import load, source_bytes
-from study_app.workers.messages import Crashed
-from tests.app.lab.worlds import COSTS, ERRORS, OPENS_MS, SOON_MS, Prices
+from tests.app.lab.worlds import OPENS_MS, SOON_MS, Prices
 from tests.compiled import needs_servo
 from tests.lab.estimation.measured import WATER, planted
 
@@ -85,35 +83,6 @@ def test_a_value_that_the_setting_refuses_is_said_and_the_force_goes_on(
     assert drag(lab) == pytest.approx(0.47)
 
 
-def test_an_appraiser_that_died_is_not_waited_for(felt: LabController, prices: Prices, qtbot: Any) -> None:
-    qtbot.waitUntil(lambda: bool(prices.asked), timeout=SOON_MS)
-    assert felt.view().measuring
-    prices.works, prices.told = False, [(1, Crashed(-9))]
-    qtbot.waitUntil(lambda: not felt.view().measuring, timeout=SOON_MS)
-
-
-def test_prices_are_asked_for_once_the_hand_rests_and_old_answers_do_not_count(
-    felt: LabController, prices: Prices, qtbot: Any
-) -> None:
-    qtbot.waitUntil(lambda: len(prices.asked) == 1, timeout=SOON_MS)
-    for k in range(10):
-        felt.place.changed.emit("liquid.density_kg_m3", 1300.0 - k, True)
-    assert felt.view().measuring
-    qtbot.waitUntil(lambda: len(prices.asked) == 2, timeout=SOON_MS)
-    assert prices.asked[1].liquids[0].density_kg_m3 == 1291.0
-    prices.told = [(1, COSTS)]
-    qtbot.waitUntil(lambda: not prices.told, timeout=SOON_MS)
-    assert felt.view().cost == ()
-    prices.told = [(2, COSTS), (2, ERRORS)]
-    qtbot.waitUntil(lambda: not felt.view().measuring, timeout=SOON_MS)
-    view = felt.view()
-    assert [(row.effect, row.ns) for row in view.cost] == [("Servo alone", 60.0), ("Drag", 10.0), ("History", None)]
-    assert view.tick_ns == 160.0
-    assert [row.value for row in view.errors] == ["2e−15", "< 0.001 N", "9.5 ms"]
-    felt.place.changed.emit("liquid.density_kg_m3", 900.0, False)
-    assert felt.view().cost == ()  # it was the price of something else
-
-
 def test_no_price_is_no_reason_to_stop(make_lab: Callable[..., LabController], qtbot: Any) -> None:
     def nobody() -> Prices:
         raise OSError("no more processes")
@@ -124,48 +93,6 @@ def test_no_price_is_no_reason_to_stop(make_lab: Callable[..., LabController], q
     qtbot.waitUntil(lambda: not visit.view().measuring, timeout=SOON_MS)
     assert visit.live is not None
     assert visit.view().trouble == ""
-
-
-def test_a_preset_is_saved_opened_again_and_used_in_a_study(felt: LabController, qtbot: Any, tmp_path: Path) -> None:
-    study = tmp_path / "study.toml"
-    study.write_bytes(source_bytes("demo"))
-    felt.place.changed.emit("liquid.density_kg_m3", 1234.5, False)
-    felt.place.save_asked.emit(tmp_path / "syrup.toml", felt.bench.in_hand)
-    qtbot.waitUntil(lambda: felt.view().said == f"Saved as syrup.toml in {tmp_path}", timeout=SOON_MS)
-    felt.place.undo_asked.emit()
-    assert felt.bench.in_hand.scene.liquids[0].density_kg_m3 != 1234.5
-    felt.place.preset_opened.emit(tmp_path / "syrup.toml")
-    assert felt.bench.in_hand.scene.liquids[0].density_kg_m3 == 1234.5
-    assert felt.view().said == "Opened syrup.toml: Honey"
-    assert str(tmp_path / "syrup.toml") in [it.source for it in felt.liquids], "at hand from then on"
-    felt.place.use_asked.emit(study, felt.bench.in_hand)
-    qtbot.waitUntil(lambda: felt.view().said.startswith("Added to study.toml as [liquids.syrup]"), timeout=SOON_MS)
-    assert load(study).scene_of("syrup").liquids[0].density_kg_m3 == 1234.5
-    assert sorted(path.name for path in tmp_path.glob("*.toml")) == ["study.toml", "syrup.toml"]
-    (tmp_path / "broken.toml").write_text("format = 1")
-    felt.place.preset_opened.emit(tmp_path / "broken.toml")
-    assert "broken.toml" in felt.view().trouble
-    felt.place.save_asked.emit(tmp_path / "nowhere" / "mine.toml", felt.bench.in_hand)
-    qtbot.waitUntil(lambda: "cannot be written" in felt.view().trouble, timeout=SOON_MS)
-    assert felt.live is not None
-
-
-def test_what_was_refused_is_no_longer_shown_once_a_file_is_written(
-    felt: LabController, qtbot: Any, tmp_path: Path
-) -> None:
-    setting, study = felt.bench.in_hand, tmp_path / "study.toml"
-    felt.place.save_asked.emit(tmp_path / "syrup.toml", setting)
-    qtbot.waitUntil(lambda: felt.view().said.startswith("Saved as syrup.toml"), timeout=SOON_MS)
-    study.write_bytes(source_bytes("demo"))
-    for asked, path, said in (
-        (felt.place.use_asked, study, "Added to study.toml"),
-        (felt.place.save_asked, tmp_path / "again.toml", "Saved as again.toml"),
-    ):
-        felt.place.use_asked.emit(tmp_path / "syrup.toml", setting)
-        qtbot.waitUntil(lambda: "syrup.toml is not a study file" in felt.view().trouble, timeout=SOON_MS)
-        asked.emit(path, setting)
-        qtbot.waitUntil(lambda said=said: felt.view().said.startswith(said), timeout=SOON_MS)
-        assert felt.view().trouble == ""
 
 
 def test_a_preset_is_on_the_disk_before_the_program_ends(

@@ -172,47 +172,6 @@ def test_the_strip_covers_no_page_and_stops_the_force_at_the_first_touch(one_scr
     assert (strip.state.word, world.force_is_on) == ("Paused, force is off", False)
 
 
-def test_each_window_leads_to_the_other_by_a_click_and_by_f6(one_screen, world, qtbot):
-    participant, operator = one_screen.participant, one_screen.operator
-    focus = participant.focusWidget()
-    qtbot.mouseClick(one_screen.strip.operator, LEFT)
-    assert participant.focusWidget() is focus is not None, "the strip leaves the keyboard to the page"
-    qtbot.waitUntil(lambda: QApplication.activeWindow() is operator)
-    qtbot.mouseClick(operator.header.page, LEFT)
-    qtbot.waitUntil(lambda: QApplication.activeWindow() is participant)
-    begin_trial(one_screen, world)
-    for here, there in ((participant, operator), (operator, participant)):
-        qtbot.keyClick(here, Qt.Key.Key_F6)
-        qtbot.waitUntil(lambda there=there: QApplication.activeWindow() is there)
-    assert world.force_is_on
-
-
-def test_trouble_brings_the_operators_window_to_the_front_once(one_screen, world, qtbot, caplog):
-    begin_trial(one_screen, world)
-    one_screen.participant.come_forward()
-    one_screen.fail(RuntimeError("the disk is gone"))
-    qtbot.waitUntil(lambda: QApplication.activeWindow() is one_screen.operator)
-    one_screen.participant.come_forward()
-    qtbot.waitUntil(lambda: QApplication.activeWindow() is one_screen.participant)
-    one_screen.show_tiles()
-    assert QApplication.activeWindow() is one_screen.participant
-    caplog.clear()
-
-
-@pytest.mark.parametrize("key", [Qt.Key.Key_Space, Qt.Key.Key_Escape, None])
-def test_the_last_page_ends_by_a_key_or_a_click_and_leads_to_the_operator(one_screen, world, qtbot, key):
-    begin_trial(one_screen, world)
-    one_screen.operator.end_asked.emit("withdrawn", "felt unwell")
-    participant = one_screen.participant
-    if key is None:
-        qtbot.mouseClick(participant.widget.button, LEFT)
-    else:
-        qtbot.keyClick(participant.focusWidget(), key)
-    assert not participant.isVisible()
-    qtbot.waitUntil(lambda: QApplication.activeWindow() is one_screen.operator)
-    assert one_screen.operator.buttons.close_session.isVisible()
-
-
 def pushes(world: World, count: int = 400) -> Any:
     """Return samples of the scene now loaded with a force of 3 N, 1.5 N of it along x, limited now and then."""
     samples = records(SAMPLE, count)

@@ -9,11 +9,10 @@ from PySide6.QtCore import QEvent, Qt, QTimer
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication
 
-from study_app.errors import DeviceNotFound
 from study_app.gui.widgets.dialogs import Notice
 from study_app.gui.widgets.escape_key import EscapeHold
 from study_app.session.pages import PausePage, TaskPage, TroublePage
-from study_app.session.transitions.events import EndAsked, Submitted
+from study_app.session.transitions.events import EndAsked
 from tests.app.world import begin_trial
 
 pytestmark = pytest.mark.slow
@@ -35,14 +34,6 @@ def test_what_breaks_in_a_slot_is_zero_force_and_told_and_written_once(bridge, w
     world.broken_clock = False
     bridge.show_tiles()
     assert "the clock fell off the wall" in bridge.operator.banner.what.text()
-
-
-def test_an_event_that_comes_too_late_changes_nothing(bridge, world):
-    before = list(world.done)
-    bridge.participant.event.emit(Submitted(world.now_s))
-    assert world.done == before
-    assert bridge.trouble == ""
-    assert world.force_is_on
 
 
 BROKEN = "no such colour"
@@ -251,21 +242,6 @@ def test_what_the_device_asks_for_is_shown_and_the_button_waits(lost, device, wo
     lost.operator.resume_asked.emit()
     assert isinstance(lost.participant.page, TaskPage)
     assert world.force_is_on
-
-
-@pytest.mark.parametrize("error", [DeviceNotFound("none is connected"), OSError("no bus")])
-def test_why_it_failed_is_told_and_it_can_be_tried_again(lost, device, qtbot, caplog, error):
-    device.error = error
-    device.go_on.set()
-    lost.operator.reconnect_asked.emit()
-    settled(lost, qtbot)
-    assert str(error) in lost.operator.banner.then.text()
-    assert "was not reconnected" in caplog.text
-    caplog.clear()
-    device.error = None
-    lost.operator.reconnect_asked.emit()
-    settled(lost, qtbot)
-    assert isinstance(lost.participant.page, PausePage)
 
 
 def test_a_session_that_ends_meanwhile_stays_ended(lost, device, world, qtbot):

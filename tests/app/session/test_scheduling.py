@@ -12,13 +12,7 @@ import pytest
 
 from study_app.app.session import garbage_collection, thread_priority
 from study_app.app.session.frame_budget import MOST_PERIODS, MOST_SHARE, FrameBudget
-from study_app.app.session.garbage_collection import (
-    OLDEST,
-    PERIOD_MS,
-    collecting_here,
-    freeze_garbage,
-    unfreeze_garbage,
-)
+from study_app.app.session.garbage_collection import collecting_here, freeze_garbage, unfreeze_garbage
 from study_app.app.session.thread_priority import ThreadPriority
 
 MS = 1_000_000
@@ -157,44 +151,6 @@ def test_what_has_settled_is_looked_at_no_more_until_it_is_again() -> None:
         unfreeze_garbage()
     gc.collect()
     assert len(freed_in) == 3
-
-
-@pytest.mark.nightly
-@pytest.mark.usefixtures("automatic_collection")
-def test_what_made_a_collection_take_long_is_passed_over_until_a_session_has_ended(
-    qtbot: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(garbage_collection, "LONG_S", -1.0)
-    monkeypatch.setattr(garbage_collection, "collect_if_due", lambda: OLDEST)
-    freed_in: list[int] = []
-    held = [Cycle(freed_in)]
-    with collecting_here():
-        qtbot.wait(2 * PERIOD_MS + 100)
-        held.clear()
-        gc.collect()
-        assert freed_in == []
-        unfreeze_garbage()
-        gc.collect()
-        assert freed_in == [threading.get_ident()]
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("automatic_collection", "qapp")
-def test_what_is_passed_over_is_bounded_between_sessions_alone(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(garbage_collection, "PERIOD_MS", 5)
-    monkeypatch.setattr(garbage_collection, "LONG_S", -1.0)
-    monkeypatch.setattr(garbage_collection, "collect_if_due", lambda: OLDEST)
-    unfreeze_garbage()
-    with collecting_here():
-        qtbot.waitUntil(lambda: gc.get_freeze_count() > 0)
-        count = gc.get_freeze_count()
-        monkeypatch.setattr(garbage_collection, "MOST_FROZEN", count // 2)
-        freeze_garbage()
-        qtbot.wait(50)
-        assert gc.get_freeze_count() > count // 2, "no collection of everything while a session runs"
-        unfreeze_garbage()
-        qtbot.wait(50)
-        assert gc.get_freeze_count() == 0
 
 
 def level() -> int:
