@@ -170,16 +170,6 @@ def test_a_session_goes_by_the_name_that_sessions_lists(study: Path, monkeypatch
     assert "nothing to do" in said("rebuild", listed[0].split()[0])
 
 
-def test_studies_lists_protocols_and_results(study: Path) -> None:
-    (study.parents[1] / "protocols").mkdir()
-    (study.parents[1] / "protocols" / "mine.toml").write_bytes(source_bytes("demo"))
-    (study.parents[1] / "protocols" / "bad.toml").write_text("format = 1\n")
-    shown = said("studies")
-    assert "  mine  A first look\n" in shown
-    assert "  bad  cannot be used: " in shown
-    assert "  demo  2 sessions\n" in shown
-
-
 def test_the_workspace_is_shown_and_changed(study: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     assert said("workspace").strip() == str(study.parents[1])
     monkeypatch.delenv("LIQUID_STUDY_WORKSPACE")

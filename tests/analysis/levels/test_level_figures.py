@@ -1,26 +1,14 @@
 """The figures of tracks and of Weber fractions, and what they are drawn from."""
 
-from dataclasses import replace
-
 import pandas as pd
 import pytest
 
 from study_app.analysis.designs.thresholds import counts_of, thresholds
 from study_app.analysis.designs.track_courses import courses
-from study_app.analysis.figures.levels.weber_figure import weber_fractions
-from study_app.analysis.results.level_results import LevelsFound, PublishedValue, ThresholdFound
 from study_app.analysis.statistics.psychometrics.posterior import fitted, narrowing
 from study_app.protocol.trials.kinds import default_design
 from study_app.protocol.trials.psychometric import analysis_grid, assumed_for
 from tests.analysis.levels.level_studies import STIMULUS, block, rows
-
-
-def found(level_kind: str, *ones: ThresholdFound) -> LevelsFound:
-    return LevelsFound("b", "Block", "2ifc", True, (), "share", "correct", level_kind=level_kind, thresholds=ones)
-
-
-def threshold(participant: str | None, standard: float | None, level: float) -> ThresholdFound:
-    return ThresholdFound(participant, standard, 3, level, level / 2, level * 2)
 
 
 def test_the_interval_after_the_last_answer_is_that_of_all_answers() -> None:
@@ -51,21 +39,3 @@ def test_courses_are_in_the_order_of_the_trials_and_end_at_the_threshold() -> No
     _, estimated, _ = thresholds(block(), frame)
     assert (one.low[-1], one.high[-1]) == pytest.approx((estimated.low, estimated.high))
     assert len(list(courses(block(), frame, most=1))) == 1
-
-
-def test_weber_fractions_are_levels_or_differences_over_their_standards() -> None:
-    ones = [threshold(None, 4.0, 0.2), threshold(None, 8.0, 0.3), threshold("P001", 4.0, 0.1), threshold(None, 0.0, 1)]
-    assert weber_fractions(found("weber", *ones), None) == [(4.0, 0.2, 0.1, 0.4), (8.0, 0.3, 0.15, 0.6)]
-    assert weber_fractions(found("difference", *ones), None) == [
-        (4.0, 0.05, 0.025, 0.1),
-        (8.0, pytest.approx(0.0375), pytest.approx(0.01875), pytest.approx(0.075)),
-    ]
-    assert weber_fractions(found("difference", *ones), "P001") == [(4.0, 0.025, 0.0125, 0.05)]
-    assert weber_fractions(found("value", *ones), None) == []
-    published = (PublishedValue("weber", 0.2, None, None, None, 71.0, 10, "A"),)
-    shown = [replace(one, compared=one.threshold / 2, compared_low=0.01) for one in ones]
-    compared = replace(found("weber", *shown), published=published)
-    assert [(x, value, low, high) for x, value, low, high in weber_fractions(compared, None)] == [
-        (4.0, 0.1, 0.01, None),
-        (8.0, 0.15, 0.01, None),
-    ]

@@ -1,16 +1,12 @@
 """The precision of thresholds over participants and trials: simulated studies, and what the command prints."""
 
-import csv
 import math
-from collections.abc import Iterator
 from concurrent.futures import Executor, Future
-from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.power import threshold_studies
 from study_app.analysis.power.threshold_studies import BATCH, plans, sweep
 from study_app.analysis.power.threshold_tables import Precisions, threshold_markdown
 from study_app.cli import commands
@@ -140,43 +136,6 @@ def test_trials_are_rounded_to_what_the_method_divides_them_into() -> None:
     with pytest.raises(AnalysisError, match="give at least 7"):
         plans(constant, (3,))
     assert plans(load("rek2024"), (30,)) == {}
-
-
-@pytest.mark.nightly
-@pytest.mark.slow
-def test_the_command_writes_the_same_bytes_with_one_worker_two_and_a_cluster(
-    worker_options: tuple[tuple[str, str], ...], tmp_path: Path
-) -> None:
-    file = tmp_path / "smallest.toml"
-    file.write_text(TEXT)
-    written = []
-    for number, words in enumerate(worker_options):
-        to = tmp_path / str(number)
-        asked = ("power", str(file), "--sizes", "3,5", "--trials", "8,12", "--studies", "25", "--to", str(to))
-        result = CliRunner().invoke(commands, [*asked, *words])
-        assert result.exit_code == 0, result.output
-        written.append({path.name: path.read_bytes() for path in to.iterdir()})
-    assert written[0].keys() == {"power.csv", "power.md"}
-    assert all(files == written[0] for files in written)
-    rows = list(csv.DictReader(written[0]["power.csv"].decode().splitlines()))
-    assert [(row["trials"], row["participants"]) for row in rows] == [("8", "3"), ("8", "5"), ("12", "3"), ("12", "5")]
-    assert all(float(row["half_interval"]) > 0 and 0 <= float(row["within"]) <= 1 for row in rows)
-
-
-def test_the_command_ended_by_the_user_writes_what_it_has(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    first = next(sweep(plans(study(), (10,)), (3,), 30, 1, Here()))
-
-    def until(*_: Any, **__: Any) -> Iterator[Any]:
-        yield first
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(threshold_studies, "sweep", until)
-    file = tmp_path / "smallest.toml"
-    file.write_text(TEXT)
-    asked = ["power", str(file), "--sizes", "3", "--trials", "10", "--to", str(tmp_path / "to")]
-    result = CliRunner().invoke(commands, asked)
-    assert result.exit_code == 130
-    assert "Ended early: 10 of 200 studies" in (tmp_path / "to" / "power.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -23,26 +23,6 @@ from tests.analysis.report.read_report import answered_by_two, numbers, read, ru
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 
-def test_figures_have_every_form_and_the_page_names_every_file_read(of_twelve: Path) -> None:
-    names = {path.name for path in of_twelve.iterdir()}
-    for figure in ("liquids", "recognition", "delays"):
-        assert {f"{figure}.{form}" for form in ("png", "svg", "pdf", "txt")} <= names
-    found = numbers(of_twelve)
-    assert found["methods"] in read(of_twelve)
-    assert "blinding/key.sealed" in found["files"]
-    assert sum(name.endswith("receipt.json") for name in found["files"]) == 12
-
-
-def test_the_contents_lead_to_every_section(of_twelve: Path) -> None:
-    page = (of_twelve / "report.html").read_text(encoding="utf-8")
-    links = re.findall(r'<a href="#([^"]+)">([^<]+)</a>', page)
-    sections = re.findall(r'<details class="part" id="([^"]+)">\s*<summary><h2>([^<]+)</h2>', page)
-    assert len(links) == page.count('<details class="part"') == 10
-    for (target, title), (place, heading) in zip(links, sections, strict=True):
-        assert target == place
-        assert heading.startswith(title.split()[0])
-
-
 def test_the_typeface_is_in_the_page_with_every_sign(of_twelve: Path) -> None:
     page = (of_twelve / "report.html").read_text(encoding="utf-8")
     fonts = re.findall(r"font-weight: (\d+); src: url\(data:font/woff;base64,([^)]+)\)", page)

@@ -63,41 +63,6 @@ def test_the_entry_of_every_folder_that_is_created_is_flushed(
     assert results.parent not in flushed
 
 
-def test_the_first_line_says_what_is_run(start: Start) -> None:
-    store = start(session=2, pilot=True)
-    store.close()
-    (line,) = journal.read(store.folder.journal)
-    assert line == {
-        "n": 1,
-        "event": "session_started",
-        "format": 2,
-        "t_s": 0.0,
-        "at": "2026-03-01T10:00:00.000+01:00",
-        "participant": "P007",
-        "session": 2,
-        "study": "brackish",
-        "seed": 11,
-        "language": "en",
-        "operator": "AB",
-        "simulated": False,
-        "pilot": True,
-        "recordings": False,
-        "key_hash": store.key.hash,
-        "protocol_hash": SOURCE_HASH,
-        "version": __version__,
-        "device": "scripted",
-        "limits": {
-            "lateness_ms": 2.0,
-            "worst_gap_ms": 20.0,
-            "delay_error_ms": 25.0,
-            "frame_gap_ms": 250.0,
-            "withheld_percent": 5.0,
-        },
-        "previous": hashlib.sha256(b"").hexdigest(),
-        "measures_sealed": True,
-    }
-
-
 def test_the_receipt_holds_what_reproduces_the_session(start: Start) -> None:
     store = start()
     before = receipt.read(store.folder.receipt)

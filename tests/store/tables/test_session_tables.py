@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from study_app.errors import StoreError
 from study_app.store.progress import progress_of
 from study_app.store.tables.column import MISSING, Column, header
-from study_app.store.tables.columns import RESPONSES, TABLES, TRIALS
+from study_app.store.tables.columns import TABLES, TRIALS
 from study_app.store.tables.csv_files import csv_bytes, in_columns_of, read_table
 from study_app.store.tables.formulas import guarded
-from study_app.store.tables.session_tables import participant, responses, trials
+from study_app.store.tables.session_tables import participant, trials
 
 TEXT = (Column("first", "text", "One."), Column("second", "text", "Two."))
 
@@ -84,53 +84,6 @@ def test_a_table_that_was_written_before_texts_were_guarded_is_what_the_journal_
     assert in_columns_of(early, now, TEXT) == (early, TEXT)
     changed = early.replace(b"=1+2", b"=1+3")
     assert in_columns_of(changed, now, TEXT) == (now, TEXT)
-
-
-def test_a_response_is_a_row_with_its_trial() -> None:
-    script = Script()
-    script.trial(1)
-    script.end(1)
-    script.answer(1, 6, None, None)
-    script.lines[-1]["items"][2] |= {"first_s": None, "last_s": None, "changes": 0}  # left out
-    rows = responses(script.lines)
-    assert participant(script.lines)["responses"] == 2
-    assert [tuple(row) for row in rows] == [header(RESPONSES)] * 3
-    assert rows[2]["cannot_judge"] is False
-    assert rows[0] == {
-        "study": "brackish",
-        "participant": "P007",
-        "session": 1,
-        "simulated": False,
-        "pilot": False,
-        "trial": 1,
-        "attempt": 1,
-        "block": "liquids",
-        "phase": "main",
-        "part": 1,
-        "index": 1,
-        "code": "L1",
-        "item": "i1",
-        "number": 1,
-        "response": 6,
-        "cannot_judge": False,
-        "onset_s": 1.0,
-        "first_choice_s": 2.0,
-        "last_change_s": 3.0,
-        "changes": 1,
-        "answered_at": "2026-03-01T10:00:04.000+01:00",
-    }
-    assert (rows[1]["response"], rows[1]["cannot_judge"]) == (None, True)
-
-
-def test_a_trial_is_a_row_with_what_was_measured(summary: dict[str, Any]) -> None:
-    script = Script()
-    script.trial(1)
-    script.end(1, **summary)
-    (row,) = trials(script.lines)
-    assert tuple(row) == header(TRIALS)
-    assert summary.items() < row.items()
-    assert (row["trial"], row["of"], row["outcome"], row["marked"], row["notes"]) == (1, 3, "complete", False, None)
-    assert (row["trial_started_at"], row["trial_started_s"]) == ("2026-03-01T10:00:02.000+01:00", 2.0)
 
 
 def test_a_running_trial_has_no_outcome_and_a_left_one_is_interrupted() -> None:
