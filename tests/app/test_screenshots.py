@@ -1,46 +1,15 @@
 """Pictures of the windows: taken of a real session, whole, and nothing of it stays behind."""
 
-import importlib
 import threading
-from functools import partial
-from itertools import chain
 from pathlib import Path
 
 import pytest
 from PySide6.QtGui import QImage
-from PySide6.QtWidgets import QApplication, QLabel
+from PySide6.QtWidgets import QApplication
 
 from study_app.app.screenshots import screenshots, session_pictures
 from study_app.errors import StudyError
 from tests.compiled import needs_servo
-
-GROUPS = {
-    "places": ["take_places", "take_places"],
-    "designer": ["take_designer", "take_designer"],
-    "session": ["take_session"],
-    "single-blind": ["take_single_blind"],
-}
-
-
-@pytest.mark.parametrize("only", [None, *GROUPS])
-def test_all_windows_or_one_group_of_them_are_taken_in_both_themes(qapp, tmp_path, monkeypatch, only):
-    module = importlib.import_module("study_app.app.screenshots.screenshots")
-
-    def take(name, camera, *details):
-        themes.extend(one for one in details if one in (module.LIGHT, module.DARK))
-        camera.take(QLabel(name), f"{name}-{len(camera.taken)}", (80, 40), at_once=True)
-
-    themes, told = [], []
-    for name in ("take_places", "take_designer", "take_session", "take_single_blind"):
-        monkeypatch.setattr(module, name, partial(take, name))
-    for name in ("rehearsed", "write_studies", "quick"):
-        monkeypatch.setattr(module, name, lambda *_words, **_named: None)
-    taken = screenshots(tmp_path, only=only, progress=told.append)
-    wanted = [*chain(*GROUPS.values())] if only is None else GROUPS[only]
-    assert [path.name for path in taken] == [f"{name}-{at}.png" for at, name in enumerate(wanted)]
-    assert {QImage(str(path)).size().toTuple() for path in taken} == {(80, 40)}
-    assert told == [str(path) for path in taken]
-    assert themes == [module.LIGHT, module.DARK] * (len(themes) // 2)
 
 
 @pytest.mark.slow

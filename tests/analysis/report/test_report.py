@@ -10,11 +10,7 @@ from pathlib import Path
 import pytest
 from fontTools.ttLib import TTFont
 
-from study_app.analysis.report import typeface
-from study_app.analysis.report.html_page import page
-from study_app.analysis.report.typeface import font_faces
 from study_app.analysis.report.write_report import report
-from study_app.analysis.results.words import counted, listed, number, p_equals, p_value
 from study_app.analysis.tables.study_tables import load_study
 from study_app.errors import AnalysisError
 from tests.analysis.conftest import HIDDEN, Results, twelve
@@ -90,29 +86,6 @@ def test_what_progress_raises_ends_the_report_at_every_step_and_nothing_is_writt
         assert not (tmp_path / "not").exists()
 
 
-@pytest.mark.parametrize(
-    ("told", "expected"),
-    [
-        (p_value(0.0499), ".050"),
-        (p_value(0.00004), "< .0001"),
-        (p_value(0.00044), ".0004"),
-        (p_value(0.9999), "1"),
-        (p_value(None), "–"),
-        (p_equals(0.00001), "p < .0001"),
-        (p_equals(0.031), "p = .031"),
-        (number(-0.0001), "0.00"),
-        (number(-1.25, 1), "−1.2"),
-        (number(None), "–"),
-        (counted(1, "delay"), "1 delay"),
-        (counted(3, "delay"), "three delays"),
-        (listed(["a", "b", "c"]), "a, b and c"),
-        (listed(["a"]), "a"),
-    ],
-)
-def test_numbers_in_words(told: str, expected: str) -> None:
-    assert told == expected
-
-
 def test_an_unreadable_place_leaves_nothing(small: Results, tmp_path: Path) -> None:
     answered_by_two(small)
     (tmp_path / "file").write_text("x")
@@ -172,21 +145,3 @@ def test_r_compares_sessions(sessions: int, rek: Results, tmp_path: Path) -> Non
     assert len(tested) == 14
     assert {one["outcome"]["n"] for one in tested} == {6}
     assert done.stdout.count(", sessions " + ("Wilcoxon V" if sessions == 2 else "Friedman chi2")) == len(tested)
-
-
-def style(media: str = "") -> str:
-    """Return the rules of the style for all media, or of one of its media alone."""
-    rules = re.search(r"<style>(.*)</style>", page("", ""), re.DOTALL)
-    assert rules is not None
-    everywhere, *special = rules[1].split("@media ")
-    return next(part for part in special if part.startswith(media)) if media else everywhere
-
-
-@pytest.mark.slow
-def test_a_page_without_the_typeface_is_whole(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert font_faces("abc").count("@font-face") == 2
-    assert font_faces("abc") == font_faces("abc")
-    assert len(font_faces("abc")) < len(font_faces("abcdefghij–≤χ²"))
-    monkeypatch.setattr(typeface, "WEIGHTS", {400: "Absent"})
-    assert font_faces("abc") == ""
-    assert page("Title", "body", font_faces("abc")).rstrip().endswith("</html>")

@@ -1,6 +1,5 @@
 """Simulated participants: how they move, what they sense, and how they go through a session."""
 
-import math
 import re
 from collections.abc import Iterable
 from itertools import count
@@ -18,13 +17,12 @@ from study_app.haptics.model.scene import Ewma, Kalman
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol import formats
 from study_app.protocol.load import load, source_bytes
-from study_app.protocol.model import Protocol, Reach
+from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
-from study_app.protocol.questions.rating import RatingView
 from study_app.session.simulated import rehearsal
 from study_app.session.simulated.design_observer import OBSERVER, Comparison
 from study_app.session.simulated.exploration import RATE_HZ, exploration
-from study_app.session.simulated.observers import Reacher, SensedTrial, choices
+from study_app.session.simulated.observers import SensedTrial
 from study_app.session.simulated.rehearsed_session import RehearsedSession
 from study_app.session.simulated.trial_features import condition_features
 from study_app.session.tasks import TaskView
@@ -90,61 +88,6 @@ def test_senses_measure_force_speed_of_the_hand_roughness_and_delay() -> None:
     assert felt.delay_s == pytest.approx(0.105)
     for delays, vary, sensed in ((True, "delay_ms", 0.105), (False, "force_loss", 5.0), (False, "", 12.5)):
         assert Comparison(delays, False, OBSERVER, vary).sensed(felt) == pytest.approx(sensed)
-
-
-class StillHand:
-    """A device whose hand is where it was told to be, at once."""
-
-    moving = False
-
-    def __init__(self) -> None:
-        self.orders: list[tuple[float, float, float]] = []
-
-    def reach_to(self, x_m: float, y_m: float, z_m: float) -> None:
-        self.orders.append((x_m, y_m, z_m))
-
-
-def test_a_hand_reaches_for_what_is_seen_lit_and_no_sooner_than_a_person_could() -> None:
-    device = StillHand()
-    orders = device.orders
-    task = small.protocol().tasks["reach"]
-    assert isinstance(task, Reach)
-    hand = Reacher(task, device, stream(1, "test").random)
-
-    def see(now_s: float, lit: int | None, place: Any = (0.0, 0.0, 0.0)) -> None:
-        hand.act(now_s, TankView(np.asarray(place), TaskView(lit, 0, 2, 0.0, now_s), 0))
-
-    see(0.0, 0)
-    see(0.15, 0)
-    assert orders == []
-    see(0.4, 0)
-    assert len(orders) == 1
-    assert math.dist(orders[0], task.targets_m[0]) < task.radius_m
-    see(1.0, 0, task.targets_m[0])  # there: nothing to mend
-    see(1.5, 0, task.targets_m[0])
-    assert len(orders) == 1
-    see(2.0, 0, (0.0, 0.01, 0.0))  # seen at rest beside it
-    see(2.2, 0, (0.0, 0.01, 0.0))
-    assert len(orders) == 1
-    see(2.4, 0, (0.0, 0.01, 0.0))
-    assert len(orders) == 2
-    see(2.5, 1)
-    see(3.0, 1)
-    assert math.dist(orders[2], task.targets_m[1]) < task.radius_m
-    see(3.1, None)
-    assert len(orders) == 3
-
-
-@pytest.mark.slow
-@given(st.integers(0, 2**32), st.lists(st.integers(1, 7), min_size=1, max_size=9))
-def test_the_last_choice_for_an_item_is_its_answer_and_every_choice_is_on_the_scale(
-    seed: int, values: list[int]
-) -> None:
-    answers = {f"item_{number}": value for number, value in enumerate(values)}
-    items = tuple(RatingView(item, 1, "Statement.", True, labels=("point",) * 7) for item in answers)
-    given_ = choices(items, answers, stream(seed, "test").random)
-    assert {choice.item: choice.value for choice in given_} == answers
-    assert all(1 <= choice.value <= 7 and choice.after_s > 0 for choice in given_)
 
 
 @needs_servo
