@@ -168,7 +168,7 @@ def told(window: QWidget) -> list[str]:
     lines = []
     for part in [window, *window.findChildren(QWidget)]:
         interface = QAccessible.queryAccessibleInterface(part)
-        if not part.isVisible() or interface is None:
+        if not part.isVisible() or interface is None or isinstance(part, QScrollBar):
             continue
         kinds = (QAccessible.Text.Name, QAccessible.Text.Description, QAccessible.Text.Value)
         words = [interface.text(kind).replace("\n", " / ") for kind in kinds]

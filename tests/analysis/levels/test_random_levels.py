@@ -198,7 +198,7 @@ def lines_of(number: int) -> Iterator[str]:
     yield from (*script[1:], f"numbers compared: {compared}")
 
 
-@pytest.mark.parametrize("part", [0, 1, *(pytest.param(part, marks=pytest.mark.slow) for part in (2, 3, 4))])
+@pytest.mark.parametrize("part", [0, 1, *(pytest.param(part, marks=pytest.mark.nightly) for part in (2, 3, 4))])
 def test_a_block_with_missing_numbers(part: int, pytestconfig: pytest.Config) -> None:
     kept = GOLDEN / Path(f"levels-{part}.txt")
     found = (line for number in range(6 * part, 6 * part + 6) for line in (f"##### {number}", *lines_of(number)))
