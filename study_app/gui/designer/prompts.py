@@ -127,7 +127,6 @@ class SeriesCard(Prompt):
         paths = [path for path, _ in asked.among]
         self.elements.setCurrentIndex(paths.index(asked.path) if asked.path in paths else -1)
         self.elements.activated.connect(lambda at: self.chosen.emit(paths[at]))
-        self.elements.setVisible(bool(paths))
         self.number = Choice()
         self.number.setFont(font("label"))
         self.number.setAccessibleName("Number that differs")
@@ -137,6 +136,7 @@ class SeriesCard(Prompt):
         self.values.setAccessibleName("Values of the series")
         self.values.setPlaceholderText("Values, such as 0 60 120 240")
         add_layout(self.column, hbox(self.elements, self.number, (self.values, 1), spacing=10))
+        self.elements.setVisible(bool(paths))  # without a parent it would be a window of its own
         self.refusal = label("", "label", "bad", wraps=True)
         self.lines = label("", "label")
         said = QWidget()
