@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
 
 from study_app.gui.widgets.background import wait_for_jobs
 from study_app.protocol.source.document import Path
-from study_app.viewmodels.designer.requests import RetypeFile, SetValue
+from study_app.viewmodels.designer.requests import ChangeLanguage, RetypeFile, SetValue
 from tests.app.designer.support.designer import DEMO
 from tests.authoring.test_study_transcripts import elements, generic
 from tests.gui.transcript import CONTROLS, compare, painted, told
@@ -22,6 +22,7 @@ from tests.protocol.edited_studies import text_of
 from tests.value_text import changed
 
 TABS = ("measures", "file", "changes", "participant")
+LISTED = ("blocks", "liquids", "conditions")
 TIME = re.compile(r"\b\d\d:\d\d\b")
 
 
@@ -55,18 +56,17 @@ class Record:
         self.before: dict[str, list[str]] = {}
         self.note("open", designer.open)
 
-    def note(self, name: str, act: Callable[[], Any], *, paints: bool = False) -> None:
-        """Do something, and note what it changes."""
+    def note(self, name: str, act: Callable[[], Any], *, paints: bool = False, of: QWidget | None = None) -> None:
+        """Do something, and note what it changes: in the window, or in a part since the last act of that name."""
         if QApplication.activePopupWidget() is None and not self.designer.window.isActiveWindow():
             self.designer.window.activateWindow()
             QApplication.processEvents()
         act()
         settle(self.designer)
         self.lines += [f"-- {name}", *self.said()]
-        shown = QApplication.activePopupWidget() or self.designer.window
-        after = {"told": [TIME.sub("HH:MM", line) for line in told(shown)]} | (
-            {"painted": painted(shown)} if paints else {}
-        )
+        shown, key = (of, name) if of else (QApplication.activePopupWidget() or self.designer.window, "")
+        heard = [TIME.sub("HH:MM", line) for line in told(shown) if not line.startswith("ScrollBar")]
+        after = {f"{key} told": heard} | ({f"{key} painted": painted(shown)} if paints else {})
         for way, lines in after.items():
             found = difflib.unified_diff(self.before.get(way, []), lines, n=0, lineterm="")
             self.lines += [TIME.sub("HH:MM", line) for line in list(found)[2:] if line[0] in "+-"]
@@ -118,11 +118,12 @@ def each_element(record: Record) -> None:
 
 
 def each_tab(record: Record) -> None:
+    place = record.designer.place
     for path in one_of_each(record.designer.study.document):
         record.select(*path)
         for tab in TABS:
             paints = tab == "measures" and path[0] in ("blocks", "questionnaires", "liquids")
-            record.note(f"tab {tab}", lambda tab=tab: record.designer.place.show_tab(tab), paints=paints)
+            record.note(f"tab {tab}", lambda tab=tab: place.show_tab(tab), paints=paints, of=place.pane)
 
 
 def by_keys(record: Record) -> None:
@@ -187,6 +188,78 @@ def on_disk(record: Record) -> None:
     record.note("open again", lambda: designer.controller.open("kitchen"))
 
 
+def series(record: Record) -> None:
+    record.note("list one", lambda: record.designer.editing.ask(SetValue(LISTED, ["thin"])))
+    record.select("conditions", "thin")
+    record.hit("ctrl+shift+d", "Return")
+    record.type("0 5000")
+    record.hit("Return", "ctrl+a")
+    record.type("0 60 120 240")
+    record.hit("Return", "ctrl+z", "ctrl+z")
+    record.select("conditions", "thin")
+    record.hit("ctrl+shift+d")
+    record.type("0 60")
+    record.press("List only these in Liquids")
+    record.hit("ctrl+z", "Insert")
+    record.type("series of thin")
+    record.hit("Return")
+    record.type("1 x")
+    record.hit("Escape", "ctrl+shift+d", "Escape")
+    for path in (("study",), LISTED[:2], LISTED[:1]):
+        record.select(*path)
+        record.hit("ctrl+shift+d", "Escape")
+
+
+def copies(record: Record) -> None:
+    record.select("conditions", "late")
+    record.hit("ctrl+1", "ctrl+c")
+    record.lines += QApplication.clipboard().text().splitlines()
+    record.hit("ctrl+v", "ctrl+z")
+    for text in ("1. How cold was it?\n- Did it smell?\n", "[liquids.thin]\n# own\ndensity_kg_m3 = 1000\n", "[study"):
+        for path in (("questionnaires", "liquid", "items", 1), ("study",)):
+            QApplication.clipboard().setText(text)
+            record.select(*path)
+            record.hit("ctrl+1", "ctrl+v", "ctrl+z")
+    record.select(*LISTED[:2])
+    record.note("first entry", record.designer.field(*LISTED).rows[0].setFocus)
+    record.hit("alt+Down", "shift+Up", "ctrl+c", "alt+Down", "Delete", "ctrl+z", "ctrl+z", "Return", "alt+Left")
+
+
+def finding(record: Record) -> None:
+    for words, *keys in (
+        ("force limit", "Return"), ("williams", "Return"), ("xyzzy", "Escape"), ("delay", "Down", "Down", "Return"),
+        ("honey", "Return", "Return"), ("break every", "Return", "space", "ctrl+z"),
+    ):  # fmt: skip
+        record.hit("ctrl+f")
+        record.type(words)
+        record.hit(*keys)
+    for words in ("williams design", "force limit"):
+        record.hit("Insert")
+        record.type(words)
+        record.hit("Return")
+
+
+def languages(record: Record) -> None:
+    record.note("add", lambda: record.designer.editing.ask(ChangeLanguage("add", "nl")))
+    record.select("pages", "welcome")
+    record.hit("ctrl+l", "ctrl+4", "F8", "Return", "ctrl+z")
+    record.note("copy", lambda: record.designer.editing.ask(ChangeLanguage("copy", "nl")))
+    record.select("pages", "welcome")
+    record.note("title", record.designer.field("pages", "welcome", "title").lines["nl"].setFocus)
+    record.type("Een blik")
+    record.hit("Return", "ctrl+l", "ctrl+s")
+    record.select("study")
+    record.note("remove", lambda: record.designer.editing.ask(ChangeLanguage("remove", "nl")))
+
+
+def small_window(record: Record) -> None:
+    record.note("small", lambda: record.designer.window.resize(1024, 640))
+    record.hit("ctrl+1", "Down", "Down", "Return", "ctrl+3", "ctrl+3", "ctrl+2", "ctrl+e", "ctrl+e", "ctrl+l", "F6")
+    record.hit("ctrl+1", "ctrl+f")
+    record.type("honey")
+    record.hit("Return", "Return", "ctrl+1", "Escape", "ctrl+d", "shift+F1", "ctrl+2")
+
+
 def some_elements(record: Record) -> None:
     for path in one_of_each(record.designer.study.document):
         if len(path) > 1 or path == ("study",):
@@ -204,7 +277,9 @@ def editing(record: Record) -> None:
 
 
 QUICK = (some_elements, editing, on_disk, new_study)
-FLOWS = (each_element, by_keys, adding_and_deleting, problems)
+FLOWS = (
+    each_element, by_keys, adding_and_deleting, problems, series, copies, finding, languages, small_window,
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("flow", [*QUICK, *(pytest.param(one, marks=pytest.mark.slow) for one in FLOWS)])
@@ -223,7 +298,7 @@ def test_what_each_tab_shows(designer: Any, name: str, pytestconfig: pytest.Conf
     record.compare(name, pytestconfig)
 
 
-FIELDS = {"rek2024": ("tasks",), "viscosityjnd": ("designs",)}
+FIELDS = {"rek2024": ("tasks", "scales"), "viscosityjnd": ("designs",)}
 
 
 @pytest.mark.slow
