@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import combinations, pairwise
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from study_app.protocol.questions.number import NumberView
 from study_app.protocol.trials.task import lasting
 from study_app.protocol.wording.languages import LANGUAGES, words
 from study_app.session.pages import ChoicePage, FeedbackPage, Interval, NumberPage, Progress, TaskPage
-from study_app.session.transitions.events import Continue, ItemShown, PauseAsked, Stepped, Submitted
+from study_app.session.transitions.events import Continue, PauseAsked, Stepped, Submitted
 from tests.gui.participant.driver import KEY, Participant
 from tests.gui.small import follow, task_page, view
 
@@ -48,24 +48,6 @@ def values(seen: Participant) -> list[Any]:
     return [value for _, value in seen.answers]
 
 
-@pytest.mark.parametrize("size", [SMALL, FULL])
-def test_buttons_are_large_apart_in_order_named_and_none_is_preselected(
-    opening: Opening, size: tuple[int, int]
-) -> None:
-    seen = opening(choice(4), size)
-    assert [type(event) for event in seen.events] == [ItemShown]
-    buttons = [seen.find(name) for name in ("First", "Second", "Third", "Fourth")]
-    for button in buttons:
-        assert not button.hasFocus()
-        assert button.width() >= 160
-        assert button.height() >= 96
-        assert button.font().pixelSize() >= 22
-        assert (button.accessibleName(), button.accessibleDescription()) == (button.text(), "Which one was stronger?")
-    gaps = [b.x() - a.geometry().right() - 1 for a, b in pairwise(buttons)]
-    assert min(gaps) >= 24
-    assert buttons[-1].geometry().right() < size[0]
-
-
 @pytest.mark.parametrize(
     ("key", "language", "value"),
     [
@@ -90,17 +72,6 @@ def test_one_key_answers_and_continues_once(opening: Opening, key: KEY, language
     assert seen.kinds.count(Submitted) == 1
 
 
-def test_a_click_answers_and_of_four_the_arrows_and_enter(opening: Opening) -> None:
-    seen = opening(choice(), FULL)
-    seen.click("Second", place=QPoint(5, 5))
-    assert values(seen) == ["second"]
-    seen = opening(choice(4), FULL)
-    seen.press(KEY.Key_Right, KEY.Key_Right)
-    assert values(seen) == []
-    seen.press(KEY.Key_Return)
-    assert values(seen) == ["second"]
-
-
 @pytest.mark.parametrize("typed", ["12", "2.5", "2,5", "1e3", "", "0", "-3", "many", "nan", "inf", "1e400"])
 def test_a_number_above_0_is_taken_and_anything_else_is_reported(opening: Opening, typed: str) -> None:
     taken = {"12": [12], "2.5": [2.5], "2,5": [2.5], "1e3": [1000]}.get(typed, [])
@@ -112,23 +83,6 @@ def test_a_number_above_0_is_taken_and_anything_else_is_reported(opening: Openin
     if not taken:
         seen.type("4")
         assert "Enter a number above 0." not in seen.texts
-
-
-def test_digits_on_the_screen_write_a_number_and_keep_their_order_from_right_to_left(opening: Opening) -> None:
-    seen = opening(number(), FULL)
-    for text in ("4", "2", "⌫", ".", "5", seen.page.button.text()):
-        seen.click(text)
-    assert values(seen) == [4.5]
-    seen = opening(number("ar"), FULL, "ar")
-    row = [seen.find(digit).x() for digit in "123456"]
-    assert row == sorted(row)
-
-
-@pytest.mark.parametrize("right", [True, False])
-def test_feedback_says_in_words_whether_the_answer_was_correct(opening: Opening, right: bool) -> None:
-    for language, said in LANGUAGES.items():
-        seen = opening(FeedbackPage(right), FULL, language)
-        assert seen.page.accessibleName() == (said.right if right else said.not_right)
 
 
 @pytest.mark.parametrize("language", LANGUAGES)

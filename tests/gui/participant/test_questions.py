@@ -168,22 +168,6 @@ def test_an_answer_comes_back_after_a_pause_and_is_not_told_again(opening: Openi
 
 
 @ALL
-def test_a_missing_answer_is_named_and_one_that_is_optional_is_not(opening: Opening, name: str) -> None:
-    kind = KINDS[name]
-    seen = opening(kind.page, FULL)
-    seen.click(seen.page.button)
-    what = "statement" if name == "statement" else "question"
-    assert seen.page.message == f"One {what} still needs an answer: 1."
-    assert "Please answer" in description_of(seen.question(1))
-    give(seen, kind.keys)
-    assert seen.page.message == ""
-    optional = opening(replace(kind.page, items=(replace(kind.item, required=False),)), FULL)  # type: ignore[call-arg]
-    assert description_of(optional.question(1)).endswith("optional, no answer yet")
-    optional.click(optional.page.button)
-    assert optional.kinds == [Submitted]
-
-
-@ALL
 def test_escape_pauses_and_takes_what_was_typed(opening: Opening, name: str) -> None:
     kind = KINDS[name]
     seen = opening(kind.page, FULL)
@@ -191,21 +175,6 @@ def test_escape_pauses_and_takes_what_was_typed(opening: Opening, name: str) -> 
     seen.press(KEY.Key_Escape)
     assert seen.kinds[-1] is PauseAsked
     assert len(seen.answers) == isinstance(kind.keys[0], str)
-
-
-@pytest.mark.parametrize("typed", ["12", "100", "20.5"])
-def test_a_number_that_is_not_permitted_is_reported_and_not_taken(opening: Opening, typed: str) -> None:
-    seen = opening(form(), FULL)
-    height = seen.question(1).height()
-    seen.type(typed)
-    seen.press(KEY.Key_Return)
-    seen.settle()
-    assert "Enter a whole number from 16 to 99." in seen.texts
-    assert seen.question(1).height() == height, "there was room for the sentence"
-    assert seen.answers == []
-    assert isinstance(seen.focus, QLineEdit)
-    seen.click(seen.page.button)
-    assert Submitted not in seen.kinds
 
 
 def test_an_answer_taken_back_is_no_answer_and_text_keeps_to_its_length(opening: Opening) -> None:
@@ -273,22 +242,6 @@ def test_every_part_fits_and_can_be_hit(
             assert one.geometry().bottom() < other.geometry().top() + 1
     assert shown == [field.view.id for field in seen.page.asked]
     assert items is not TLX or size != FULL or text_scale > 1 or len(seen.page.parts) == 1
-
-
-def test_scales_keep_their_order_from_right_to_left_and_all_else_is_mirrored(opening: Opening) -> None:
-    here, there = opening(form(), FULL), opening(form(), FULL, "ar")
-
-    def lefts(*names: str) -> list[int]:
-        return [place_of(there, there.find(name)).left() for name in names]
-
-    digits = lefts("1", "2", "3", "4", "5")
-    points = lefts(*(f"{point} {label}" for point, label in enumerate(FIVE, 1)))
-    hands = lefts("Left", "Right", "Both")
-    assert (digits, points) == (sorted(digits), sorted(points))
-    assert hands == sorted(hands, reverse=True)
-    for number in (2, 7):
-        words_here, words_there = (place_of(one, one.question(number).statement) for one in (here, there))
-        assert words_here.left() == pytest.approx(here.page.width() - words_there.right() - 1, abs=2)
 
 
 GIVEN: dict[str, tuple[KEY | str, ...]] = {

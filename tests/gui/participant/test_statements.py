@@ -66,13 +66,6 @@ def test_all_is_answered_in_one_way_alone_and_told_in_order(
     assert times == sorted(times)
 
 
-def test_a_change_is_told_and_a_repetition_is_not(seen: Participant) -> None:
-    for value in (3, 3, 4):
-        seen.click(cell(seen, 1, value), place=QPoint(2, 2))
-    assert values(seen) == [3, 4]
-    assert [one.isChecked() for one in seen.question(1).options] == [place == 3 for place in range(8)]
-
-
 def test_tab_goes_from_row_to_row_to_the_button_and_back_and_backspace_changes_nothing(seen: Participant) -> None:
     seen.press(KEY.Key_6, KEY.Key_5, KEY.Key_Backspace)
     assert seen.focus is seen.question(2)

@@ -32,24 +32,6 @@ def seen(tank: TankWidget, video: VideoFrame | None) -> np.ndarray:
     return shown(tank)
 
 
-def test_a_frame_fills_the_place_of_the_tank_with_its_own_ratio(made: Make) -> None:
-    tank = filmed(made, overlay=False)
-    picture = seen(tank, frame(0, BLUE))
-    drawn = tank.video.middle(frame(0, (0, 0, 0))).toRect()
-    assert drawn.width() / drawn.height() == pytest.approx(16 / 9, abs=0.02)
-    inside = picture[drawn.top() + 2 : drawn.bottom() - 2, drawn.left() + 2 : drawn.right() - 2]
-    assert (inside == BLUE).all()
-
-
-def test_ball_and_target_are_drawn_over_the_video_or_not_at_all(made: Make) -> None:
-    over, alone = filmed(made), filmed(made, overlay=False)
-    differs = (seen(over, frame(0, BLUE)) != seen(alone, frame(0, BLUE))).any(axis=2)
-    assert over.ball is not None
-    for place in (over.ball.middle, over.targets[0].middle):
-        x, y = round(place.x()), round(place.y())
-        assert differs[y - 40 : y + 40, x - 40 : x + 40].any()
-
-
 def test_another_frame_is_painted_and_the_same_one_is_not(made: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     tank = filmed(made, overlay=False)
     seen(tank, frame(0, BLUE))

@@ -37,11 +37,6 @@ PAGES: list[tuple[Page, str]] = [
 ]
 
 
-def test_before_the_first_page_it_says_that_it_prepares(opened: Participant) -> None:
-    assert opened.window.page is None
-    assert words("en").preparing in opened.page.accessibleName()
-
-
 @pytest.mark.slow
 def test_every_page_fills_the_window_names_itself_and_leaves_no_widget_behind(opened: Participant) -> None:
     for page, name in PAGES:
@@ -180,13 +175,6 @@ def test_a_page_that_comes_while_a_tank_is_waited_for_is_shown_at_once(opening: 
 def test_a_pause_paints_the_tank_that_it_interrupted(opened: Participant, qtbot: Any) -> None:
     opened.show(PausePage(force_off=False, coming=task_page()))
     qtbot.waitUntil(lambda: opened.window.painting is not None)
-
-
-def test_keyboard_goes_where_the_page_says_and_shows_no_ring_unasked(opened: Participant) -> None:
-    for page in (text_page(), questionnaire(), text_page("break")):
-        opened.show(page)
-    assert opened.focus is opened.page.button
-    assert not opened.page.button.ringed
 
 
 def test_page_follows_the_window_down_to_its_least_size(opened: Participant) -> None:
