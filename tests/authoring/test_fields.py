@@ -7,18 +7,15 @@ from typing import Any
 import pytest
 
 from study_app.authoring.edited_study import Study, read
-from study_app.authoring.fields import Row, label_of, row_at, rows, unit_of
-from study_app.protocol.load import shipped
+from study_app.authoring.fields import Row, rows, unit_of
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.json_schema import schema
 from study_app.protocol.source.problems import Fault, shown
 from study_app.viewmodels.designer.form.form_rows import Form, form
 from study_app.viewmodels.designer.problem_rows import element_of
-from tests.authoring.grown import PROTOCOLS
 from tests.protocol.faulty_protocols import CASES, Case
 
 DEFS = schema()["$defs"]
-STUDIES = {name: read((PROTOCOLS / f"{name}.toml").read_bytes(), PROTOCOLS).document for name in shipped()}
 
 
 def with_value(document: Any, path: Path, value: Any) -> Any:
@@ -78,19 +75,6 @@ def test_every_unit_of_the_models_is_known() -> None:
             for unit in re.findall(r"\[([^\[\]]+)\]", part.get("description", "")):
                 if (plain := unit.split(",")[0]) not in {"designs", "methods", "decades"} and " " not in plain:
                     assert unit_of(key) == plain, (key, unit)
-
-
-def test_rows_say_label_unit_bounds_and_reason() -> None:
-    document = STUDIES["rek2024"]
-    row = row_at(document, ("device", "force_limit_n"))
-    assert row is not None
-    assert (row.label, row.unit, row.kind, row.value, row.default) == ("Force limit", "N", "number", 8, 8)
-    assert row.bounds == ("at least 0.1", "at most 8")
-    assert "8 N is the most" in row.reason
-    assert label_of("density_kg_m3") == "Density"
-    for name, model in DEFS.items():
-        labels = [label_of(key) for key in model.get("properties", ())]
-        assert len(labels) == len(set(labels)), name
 
 
 def test_every_value_that_can_be_chosen_has_its_sentence() -> None:

@@ -14,11 +14,9 @@ from study_app.authoring.names import (
     named_at,
     references_to,
     renamed,
-    replaced,
     with_references,
 )
 from study_app.authoring.templates import FOLDER
-from study_app.authoring.writer.edits import Set
 from study_app.authoring.writer.refused import Refused
 from study_app.ids import MAX_ID
 from study_app.protocol.orders.schedule import build_schedule
@@ -108,25 +106,6 @@ def test_with_references_leaves_no_list_empty() -> None:
     assert not changed.faults
 
 
-def test_replaced_lets_everything_name_the_other() -> None:
-    study = study_of("demo")
-    changed, _ = study.edited(*replaced(study.document, ("liquids", "thick"), "thin"))
-    assert changed.document["conditions"]["thick"]["liquid"] == "thin"
-    assert "thick" not in changed.document["liquids"]
-
-
-def test_names_lead_both_ways() -> None:
-    document = study_of("demo").document
-    place = ("blocks", "liquids", "conditions", 1)
-    assert named_at(document, place) == ("conditions", "thick")
-    assert place in references_to(document, ("conditions", "thick"))
-    assert choices_at(document, place) == ("thin", "thick", "prompt", "late")
-    assert choices_at(document, ("sequence", 0)) == (
-        "welcome", "reaching", "thanks", "liquids", "delays", "liquid", "delay",
-    )  # fmt: skip
-    assert choices_at(document, ("study", "title")) is None
-
-
 def test_liquids_are_named_as_conditions_where_a_study_has_none() -> None:
     text = re.sub(r"\[conditions\.\w+\]\n(?:\w+ = .*\n)+", "", (FOLDER / "compare-liquids.toml").read_text())
     study = read(text.replace('conditions = ["practice"]', 'conditions = ["syrup"]').encode(), FOLDER)
@@ -147,23 +126,3 @@ def test_liquids_are_named_as_conditions_where_a_study_has_none() -> None:
 def test_check_id_refuses_what_is_no_id(name: str) -> None:
     with pytest.raises(Refused, match="is not an id: write at most"):
         check_id(name)
-
-
-@pytest.mark.parametrize(
-    ("thing", "name", "free"),
-    [
-        (("liquids", "thick"), "thin", "thin_2"),
-        (("liquids", "thick"), "Thin", "thin_2"),
-        (("liquids", "thick"), "Crème brûlée", "creme_brulee"),
-        (("liquids", "thick"), "", "thick"),
-        (("questionnaires", "liquid", "items", 1), "feels_liquid", "feels_liquid_2"),
-        (("questionnaires", "liquid", "items", 1), "", "this_liquid_behaves_like"),
-        (("blocks", "liquids"), "2", "comparing_liquids"),
-    ],
-)
-def test_a_refused_id_proposes_one_that_is_free(thing: Path, name: str, free: str) -> None:
-    document, _ = study_of("demo").edited(Set(("blocks", "liquids", "title"), "Comparing liquids"))
-    with pytest.raises(Refused, match=f'"{free}" is free$') as refused:
-        renamed(document.document, thing, name)
-    assert refused.value.free == free
-    assert renamed(document.document, thing, free)

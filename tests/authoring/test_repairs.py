@@ -4,8 +4,6 @@ import itertools
 
 import pytest
 
-from study_app.authoring.additions import additions_for
-from study_app.authoring.changes.languages import with_language
 from study_app.authoring.edited_study import Study, read
 from study_app.authoring.new_study import template
 from study_app.authoring.repairs import repairs
@@ -42,67 +40,6 @@ def _repaired(case: Case) -> int:
             assert (fault.path, fault.message) not in {(one.path, one.message) for one in after.faults}
             count += 1
     return count
-
-
-@pytest.mark.parametrize(
-    ("name", "change", "words"),
-    [
-        ("demo", ('liquid = "thick"', 'liquid = "thik"'), 'Use "thick"'),
-        ("demo", ("force_limit_n = 6", "force_limit_n = 60"), "Use 8"),
-        ("demo", ("force_limit_n = 6", "force_limit_n = -6"), "Use 6"),
-        ("demo", ("force_limit_n = 6", 'force_limit_n = "6"'), "Use 6 as a number"),
-        ("demo", ("targets_mm = [[-30, 0, 0], [30, 0, 0]]", "targets_mm = [[-30, 0, 0], [48, 0, 0]]"), "Move to 44 mm"),
-        (
-            "demo",
-            ('repetitions = 1\ntask = "reach"', 'repetitions = 4\nmax_repeats = 2\ntask = "reach"'),
-            'Use order = "constrained"',
-        ),
-        ("demo", ("blinding =", "blindin ="), 'Use "blinding"'),
-        ("demo", ('kind = "explore"', 'kind = "explor"'), 'Use "explore"'),
-        ("demo", ('sequence = ["welcome", ', "sequence = ["), "Add to the session"),
-        (
-            "rek2024",
-            ('title = { en = "Welcome", nl = "Welkom" }', 'title = { en = "Welcome" }'),
-            "Copy English to Dutch",
-        ),
-        ("rek2024", ('title = { en = "Welcome", nl = "Welkom" }', 'title = "Hi"'), "Use this text in every language"),
-    ],
-)
-def test_repairs_make_a_study_sound_again(name: str, change: tuple[str, str], words: str) -> None:
-    study = study_of(name, change)
-    (fault, *others) = study.faults
-    assert not others
-    (repair, *_) = repairs(study, fault)
-    assert repair.words == words
-    assert study.edited(*repair.edits)[0].protocol is not None
-
-
-@pytest.mark.parametrize(
-    ("change", "nearest", "added"),
-    [
-        (('liquid = "thick"', 'liquid = "syrup"'), None, 'Add liquid "syrup"'),
-        (('conditions = ["thin", "thick"]', 'conditions = ["thin", "syrup"]'), None, 'Add condition "syrup"'),
-        (('task = "reach"', 'task = "xyz"'), 'Use "', 'Add task "xyz"'),
-    ],
-)
-def test_a_name_of_nothing_is_replaced_by_the_nearest_or_added(
-    change: tuple[str, str], nearest: str | None, added: str
-) -> None:
-    study = study_of("demo", change)
-    fault = next(one for one in study.faults if one.message.startswith("there is no "))
-    words = [one.words for one in repairs(study, fault)]
-    assert any(one.startswith(nearest or 'Use "') for one in words)
-    (repair,) = additions_for(study, fault)
-    assert repair.words == added
-    after, _ = study.edited(*repair.edits)
-    assert len(after.faults) <= len(study.faults)
-    assert fault not in after.faults
-
-
-def test_nothing_is_added_for_a_name_that_is_not_an_id() -> None:
-    study = study_of("demo", ('liquid = "thick"', 'liquid = "Thick syrup"'))
-    fault = next(one for one in study.faults if one.message.startswith("there is no "))
-    assert additions_for(study, fault) == ()
 
 
 @pytest.mark.slow
@@ -143,22 +80,6 @@ def test_a_fault_of_a_table_that_two_blocks_name_counts_once() -> None:
     assert [fault.path for fault in study.faults].count(("designs", "pair", "feedback")) == 1
 
 
-def test_every_text_that_a_language_lacks_is_copied_in_one_step() -> None:
-    study = study_of("demo")
-    edits = with_language(study, "nl")
-    study, _ = study.edited(*edits)
-    missing = [fault for fault in study.faults if fault.missing_language]
-    assert len(missing) > 10
-    (every,) = {
-        repair.words: repair
-        for fault in missing
-        for repair in repairs(study, fault)
-        if repair.words.startswith("Copy all")
-    }.values()
-    assert every.words == f"Copy all {len(missing)} to Dutch"
-    assert study.edited(*every.edits)[0].faults == ()
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", shipped())
 def test_facts_are_those_of_the_session_and_of_check(name: str) -> None:
@@ -174,16 +95,6 @@ def test_facts_are_those_of_the_session_and_of_check(name: str) -> None:
     assert all(warning in words for warning in found.warnings)
     assert set(found.forces_n) == set(study.protocol.liquids)
     assert found.missing == {}
-
-
-def test_facts_count_the_texts_that_each_language_lacks() -> None:
-    study = study_of(
-        "rek2024",
-        ('title = { en = "Welcome", nl = "Welkom" }', 'title = { en = "Welcome" }'),
-        ('short = { en = "Immersive", nl = "Meeslepend" }', 'short = { en = "Immersive" }'),
-    )
-    assert facts(study).missing == {"nl": 2}
-    assert facts(study).expected_s == pytest.approx(facts(study_of("rek2024")).expected_s, rel=0.01)
 
 
 @pytest.mark.parametrize(

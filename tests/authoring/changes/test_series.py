@@ -52,16 +52,6 @@ def test_a_whole_number_is_refused_with_a_fraction(study: Study) -> None:
         made(study, ("blocks", "liquids", "repetitions"), "1 1.5")
 
 
-def test_ids_are_free_and_replace_the_number_that_they_end_in() -> None:
-    study = read((PROTOCOLS / "rek2024.toml").read_bytes(), PROTOCOLS)
-    delay = ("conditions", "delay_0", "delay_ms")
-    assert made(study, delay, "10 50 2.5") == [
-        ("delay_10", "Delay 10"), ("delay_50_2", "Delay 50 2"), ("delay_2_5", "Delay 2 5"),
-    ]  # fmt: skip
-    density = ("liquids", "light_oil", "density_kg_m3")
-    assert [name for name, _ in made(study, density, "900 950")] == ["light_oil", "light_oil_950"]
-
-
 def test_titles_say_the_number_in_each_language() -> None:
     assert TITLE in REK
     field = ("blocks", "liquids", "repetitions")

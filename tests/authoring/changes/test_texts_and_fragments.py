@@ -7,7 +7,7 @@ import pytest
 from study_app.authoring.changes.fragments import copied, pasted
 from study_app.authoring.changes.languages import filled_in, texts_of, with_language
 from study_app.authoring.changes.moves import moved
-from study_app.authoring.changes.short_texts import followed, short_of
+from study_app.authoring.changes.short_texts import followed
 from study_app.authoring.edited_study import Study, read
 from study_app.authoring.measures.participant_texts import copied_texts, missing_texts
 from study_app.authoring.study_facts import facts
@@ -65,16 +65,6 @@ def test_a_pasted_copy_has_the_values_and_comments_of_its_original(name: str) ->
                     assert comments[(*copy, *place[len(path) :]), comment] >= count, (path, comment)
         lines = set(study.text.splitlines())
         assert lines <= set(made.text.splitlines())
-
-
-def test_names_within_a_pasted_text_follow_the_one_that_was_taken() -> None:
-    study = Study(TEXTS["demo"])
-    text = '[conditions.new]\nliquid = "thick"\ndelay_ms = 0\n\n[liquids.thick]\ndensity_kg_m3 = 1\n'
-    made = pasted(study, ("pages", "welcome"), text)
-    document = Study(made.text).document
-    assert document["conditions"]["new"]["liquid"] == "thick_2"
-    assert made.paths == (("conditions", "new"), ("liquids", "thick_2"))
-    assert document["liquids"]["thick"] == study.document["liquids"]["thick"]
 
 
 def test_keys_before_a_header_do_not_end_up_in_another_table() -> None:
@@ -162,9 +152,3 @@ def study_of(text: str, short: str) -> Study:
 def test_a_short_text_that_says_what_the_text_says_follows_it(text: str, short: str, found: dict[Any, str]) -> None:
     edits = followed(study_of(text, short), (*ITEM, "text"), "en", "Was it cold?")
     assert {edit.path[len(ITEM) :]: edit.value for edit in edits} == found  # type: ignore[union-attr]
-
-
-def test_a_short_text_has_no_stop_and_at_most_forty_letters() -> None:
-    assert short_of("How cold was it?") == "How cold was it"
-    assert short_of("  one\n two ") == "one two"
-    assert len(short_of("letters " * 20)) <= 40

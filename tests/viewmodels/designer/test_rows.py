@@ -5,30 +5,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from study_app.authoring.edited_study import Study, read
-from study_app.authoring.writer.edits import Set
-from study_app.protocol.source.document import Path
 from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.file_text import file_text, retyped, shown
-from study_app.viewmodels.designer.finding import SENTENCE, found_fields
-from study_app.viewmodels.designer.outline_rows import outline_rows
 from study_app.viewmodels.designer.problem_rows import element_of
 
 
 @pytest.fixture(scope="module")
 def study() -> Study:
     return read(shipped_file("rek2024").read_bytes(), shipped_file("rek2024").parent)
-
-
-def test_what_is_chosen_comes_before_what_could_be_chosen(study: Study) -> None:
-    def fields(study: Study) -> set[Path]:
-        return {row.field for row in outline_rows(study, {}, "williams") if row.path}
-
-    blocks = {("blocks", name, "order") for name in study.document["blocks"]}
-    assert fields(study) == blocks
-    chosen, _ = study.edited(Set(("blocks", "liquids", "order"), "williams"))
-    assert fields(chosen) == {("blocks", "liquids", "order")}
-    assert {one.label for one in found_fields(chosen, "design")} == {"Trial design"}
-    assert {one.rank for one in found_fields(study, "anew in each")} == {SENTENCE}
 
 
 def test_a_place_belongs_to_the_nearest_element(study: Study) -> None:

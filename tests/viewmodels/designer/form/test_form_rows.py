@@ -6,7 +6,6 @@ from typing import Any
 import pytest
 
 from study_app.authoring.edited_study import Study, read
-from study_app.authoring.new_study import template
 from study_app.authoring.outline import outline
 from study_app.authoring.templates import FOLDER, templates
 from study_app.protocol.source.document import value_at
@@ -47,21 +46,3 @@ def test_every_key_of_every_element_is_in_its_form_with_its_value(file: Path) ->
             around = next((leaf[:length] for length in range(len(leaf), 0, -1) if leaf[:length] in rows), None)
             assert around is not None, leaf
             assert rows[around] == value_at(study.document, around)
-
-
-@pytest.mark.parametrize(
-    ("name", "block", "hidden", "there"),
-    [
-        ("viscosity-jnd", "viscosity", {"order", "repetitions", "standard", "compares"}, {"standards", "catch"}),
-        ("compare-liquids", "liquids", {"method", "catch", "until"}, {"order", "repetitions", "design"}),
-    ],
-)
-def test_keys_that_do_not_belong_are_neither_offered_nor_shown(
-    name: str, block: str, hidden: set[str], there: set[str]
-) -> None:
-    made = form(template(name), ("blocks", block))
-    keys = {row.row.path[2] for row in made.rows} | {row.path[2] for one in made.sections for row in one.absent}
-    assert not hidden & keys
-    assert there <= keys
-    document = template(name).document["blocks"][block]
-    assert set(document) <= keys
