@@ -153,36 +153,3 @@ def test_keys_open_the_list_and_no_other_study(qtbot: Any, designer: Any) -> Non
     qtbot.keyClick(box.view(), Qt.Key.Key_Return)
     QApplication.processEvents()
     assert designer.editing.opened.name == "zeta"
-
-
-CONTROL, KEY = Qt.KeyboardModifier.ControlModifier, Qt.Key
-
-
-@pytest.mark.parametrize("opened", [False, True])
-def test_ctrl_n_begins_a_study_anywhere_and_keeps_what_is_typed_for_one(
-    qtbot: Any, designer: Any, opened: bool
-) -> None:
-    if opened:
-        designer.open()
-        designer.place.parts.focus_outline()
-    for _ in range(2):
-        designer.key("ctrl+n")
-        assert designer.place.stack.currentWidget() is designer.place.new_page
-        title = designer.place.new_page.card.questions.title
-        assert title.hasFocus()
-        qtbot.keyClicks(title, "a")
-    assert title.text() == "aa"
-
-
-def test_the_list_of_studies_is_no_wider_than_the_window_and_begins_at_its_first_line(designer: Any) -> None:
-    add_study(designer, "alpha", "Which of two liquids is the thicker one? " * 9)
-    designer.controller.enter()
-    box = designer.place.header.study
-    box.setFocus()
-    designer.hit("Down")
-    assert box.view().width() < designer.window.width()
-    assert [index.row() for index in box.view().selectedIndexes()] == [0]
-    cut = box.fitted(box.itemText(1), 240)
-    assert "…" in cut
-    assert box.fontMetrics().horizontalAdvance(cut) <= 240
-    box.hidePopup()

@@ -11,8 +11,6 @@ from study_app.viewmodels.designer.requests import RetypeFile, SetText, SetValue
 
 pytestmark = pytest.mark.slow
 
-MOMENT = "2026-11-21T12:00:00+00:00"
-
 
 def test_opening_and_looking_at_every_form_changes_neither_file_nor_its_time(designer: Any) -> None:
     before = (designer.file.read_bytes(), designer.file.stat().st_mtime_ns)
@@ -62,19 +60,6 @@ def test_opening_the_open_study_again_keeps_its_steps(designer: Any) -> None:
     assert designer.saving.banner is None
     designer.editing.undo()
     assert designer.text == before
-
-
-def test_the_text_of_the_file_follows_as_soon_as_it_is_seen(designer: Any) -> None:
-    designer.open("kitchen", "blocks", "delays")
-    designer.editing.ask(SetValue(("study", "name"), "larder"))
-    editor = designer.place.file.editor
-    assert "larder" not in editor.toPlainText()
-    designer.place.show_tab("file")
-    assert editor.toPlainText() == designer.text
-    line = designer.text.split("\n").index("[blocks.delays]")
-    assert editor.textCursor().blockNumber() <= line <= editor.textCursor().blockNumber() + 3
-    designer.editing.ask(SetValue(("study", "name"), "pantry"))
-    assert editor.toPlainText() == designer.text
 
 
 def test_what_is_being_typed_stays_in_its_study_when_another_is_opened(designer: Any) -> None:
@@ -156,21 +141,3 @@ def test_a_file_that_is_not_utf_8_is_refused_with_a_message(designer: Any) -> No
     designer.file.write_bytes(b"format = 1\n# \xff\n")
     designer.open()
     assert designer.messages == [("kitchen.toml cannot be opened", "line 2 is not UTF-8 text: save the file as UTF-8.")]
-
-
-@pytest.mark.parametrize("then", ["another study", "the same study", "a new study", "another place"])
-def test_why_a_file_cannot_be_opened_is_closed_by_what_is_opened_next(designer: Any, then: str) -> None:
-    designer.file.with_name("odd.toml").write_bytes(b"\xff")
-    designer.open()
-    designer.window.go("home")
-    designer.open("odd")
-    designer.window.go("designer")
-    notice = designer.window.notice
-    assert notice.isVisible()
-    if then == "a new study":
-        designer.controller.ask_for_new()
-    elif then == "another place":
-        designer.window.go("home")
-    else:
-        designer.open("demo" if then == "another study" else "kitchen")
-    assert not notice.isVisible()

@@ -20,49 +20,6 @@ pytestmark = pytest.mark.slow
 KILLS = int(os.environ.get("LIQUID_STUDY_DRAFT_KILLS", "2"))
 
 
-def test_a_small_study_is_edited_by_keys_alone(qtbot: Any, designer: Any) -> None:
-    designer.open()
-    designer.window.activateWindow()
-    before = designer.file.read_text()
-    designer.key("ctrl+1")
-    assert designer.place.outline.tree.hasFocus()
-    designer.key("Down")
-    designer.key("Down")
-    designer.key("Up")
-    assert designer.place.view.form.path == ("blocks", "liquids")
-    designer.key("alt+Down")
-    assert designer.value("sequence")[:3] == ("welcome", "reaching", "liquids")
-    designer.key("alt+Up")
-    designer.key("F2")
-    assert designer.place.form.head.id.hasFocus()
-    qtbot.keyClicks(designer.place.form.head.id, "fluids")
-    designer.key("Return")
-    assert "[blocks.fluids]" in designer.text
-    assert '"fluids"' in designer.text
-    designer.key("ctrl+2")
-    for _ in range(60):
-        if designer.keyboard is designer.field("blocks", "fluids", "repetitions").line:
-            break
-        designer.key("Tab")
-    line = designer.field("blocks", "fluids", "repetitions").line
-    assert line.hasFocus()
-    qtbot.keyClicks(line, "4")
-    designer.key("Return")
-    assert designer.value("blocks", "fluids", "repetitions") == int(line.text())
-    assert f"repetitions = {line.text()}" in designer.place.file.editor.words()
-    designer.key("ctrl+e")
-    assert designer.place.file.editor.hasFocus()
-    designer.key("ctrl+z")
-    designer.key("ctrl+z")
-    assert "[blocks.liquids]" in designer.place.file.editor.words()
-    designer.key("ctrl+shift+z")
-    designer.key("ctrl+s")
-    assert designer.file.read_text() == designer.text != before
-    while designer.editing.opened.history.done:
-        designer.key("ctrl+z")
-    assert designer.text == before
-
-
 @pytest.mark.parametrize(
     ("kind", "study"),
     [
@@ -104,21 +61,6 @@ def test_typing_into_the_file_reaches_the_form_and_a_fault_its_field(qtbot: Any,
     assert designer.place.form.isAncestorOf(designer.keyboard)
     designer.key("ctrl+z")
     assert not designer.form_row("blocks", "liquids", "order").wrong.isVisible()
-
-
-def test_a_file_that_is_not_toml_keeps_the_outline_and_says_its_fault(qtbot: Any, designer: Any) -> None:
-    designer.open()
-    rows = len(designer.place.outline.rows)
-    editor = designer.place.file.editor
-    editor.setFocus()
-    editor.go_to(0)
-    qtbot.keyClicks(editor, "broken = ")
-    qtbot.waitUntil(lambda: not editor.pending)
-    assert designer.place.header.problems.words == "1 problem"
-    qtbot.wait(400)
-    assert len(designer.place.outline.rows) == rows
-    designer.key("F8")
-    assert editor.hasFocus()
 
 
 SCRIPT = """

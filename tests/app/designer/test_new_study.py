@@ -7,8 +7,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QLineEdit
 
 from study_app.app.designer.controller import DesignerController
-from study_app.authoring.templates import templates
-from study_app.protocol.source.files import shipped
 from study_app.viewmodels.designer.requests import SetValue
 from study_app.workspace import workspace
 
@@ -21,21 +19,6 @@ def button(page: Any, source: str) -> Any:
 
 def own(page: Any, words: str) -> QLineEdit:
     return next(field for question, field in page.card.questions.own.items() if question.words == words)
-
-
-def test_every_template_and_shipped_study_can_be_begun_from(designer: Any) -> None:
-    designer.controller.ask_for_new()
-    sources = {one.choice.source for one in designer.place.new_page.buttons}
-    assert sources == {*(f"template:{name}" for name in templates()), *shipped()}
-    for one in designer.place.new_page.buttons:
-        one.setChecked(True)
-        choice = one.choice
-        assert bool(choice.session) == (not choice.copy)
-        assert choice.description
-        assert ".." not in one.accessibleDescription()
-        assert (choice.recovery is not None) == (
-            choice.source in {"template:viscosity-jnd", "template:delay-detection"}
-        )
 
 
 def test_a_study_begins_with_the_answers_and_nothing_is_on_disk(qtbot: Any, designer: Any) -> None:
@@ -65,26 +48,6 @@ def test_a_study_begins_with_the_answers_and_nothing_is_on_disk(qtbot: Any, desi
     designer.controller.ask_for_new("template:viscosity-jnd")
     questions = page.card.questions
     assert (questions.title.text(), questions.name.text(), questions.languages["nl"].isChecked()) == ("", "", False)
-
-
-@pytest.mark.parametrize(
-    ("field", "text", "words"),
-    [
-        ("Standards", "thick", "“thick” is not a number."),
-        ("Standards", "0,5", "“0,5” may be one number or several: separate numbers by spaces or semicolons."),
-        ("Trials for each", "0", "at least"),
-        ("Trials for each", "1 2", "is not"),
-    ],
-)
-def test_an_answer_that_is_not_permitted_is_refused_in_place(designer: Any, field: str, text: str, words: str) -> None:
-    designer.controller.ask_for_new()
-    page = designer.place.new_page
-    button(page, "template:viscosity-jnd").click()
-    page.name.setText("mine")
-    own(page, field).setText(text)
-    page.make.click()
-    assert words in page.refusal.text()
-    assert designer.editing.opened is None
 
 
 @pytest.mark.parametrize(("name", "free"), [("rek2024", "rek2024v2"), ("kitchen", "kitchen2"), ("My study", "mystudy")])
@@ -121,20 +84,6 @@ def test_a_study_begins_as_a_copy_of_a_file(designer: Any, monkeypatch: pytest.M
     document = designer.study.document
     assert (document["study"]["name"], document["study"]["version"]) == ("mine", "0.1")
     assert designer.text.count("#") == designer.file.read_text().count("#")
-
-
-@pytest.mark.parametrize(("typed", "name"), [("", "olethickthin"), ("oils", "oils")])
-def test_the_title_gives_the_short_name_where_none_is_typed(qtbot: Any, designer: Any, typed: str, name: str) -> None:
-    designer.controller.ask_for_new()
-    page = designer.place.new_page
-    title = page.card.questions.title
-    qtbot.waitUntil(title.hasFocus)
-    qtbot.keyClicks(title, "2 Öle: thick & thin")
-    assert page.name.placeholderText() == "olethickthin"
-    qtbot.keyClicks(page.name, typed)
-    qtbot.keyClick(title, Qt.Key.Key_Return)
-    assert designer.editing.opened.name == name
-    assert designer.place.outline.tree.hasFocus()
 
 
 def test_a_copy_has_a_short_name_that_is_free_where_none_is_typed(qtbot: Any, designer: Any) -> None:

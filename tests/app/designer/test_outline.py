@@ -8,7 +8,7 @@ from PySide6.QtGui import QGuiApplication, QMouseEvent
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.designer.outline.rows import ROW_ROLE
-from study_app.viewmodels.designer.requests import MoveTo, RemoveKey, SetValue
+from study_app.viewmodels.designer.requests import MoveTo, SetValue
 
 pytestmark = pytest.mark.slow
 
@@ -108,22 +108,6 @@ def test_several_selected_elements_move_are_copied_and_deleted_together(qtbot: A
     assert designer.text == text
 
 
-def test_parts_are_numbered_again_where_a_move_would_break_them(designer: Any) -> None:
-    designer.controller.begin("rek2024", "mine")
-    study = designer.study
-    parts = [
-        study.document["blocks"][name].get("part") for name in sequence(designer) if name in study.document["blocks"]
-    ]
-    assert [part for part in parts if part] == [1, 2, 2]
-    last = max(
-        at for at, name in enumerate(sequence(designer)) if study.document["blocks"].get(name, {}).get("part") == 2
-    )
-    designer.editing.ask(MoveTo((("sequence", last),), 0))
-    after = designer.study
-    assert after.document["blocks"][study.document["sequence"][last]]["part"] == 1
-    assert not [fault for fault in after.faults if fault.path[-1] == "part"]
-
-
 def test_entries_of_a_list_are_dragged_or_moved_by_keys(qtbot: Any, designer: Any) -> None:
     designer.controller.begin("rek2024", "mine")
     path = ("blocks", "liquids", "conditions")
@@ -157,23 +141,6 @@ def test_entries_of_a_list_are_dragged_or_moved_by_keys(qtbot: Any, designer: An
     assert f"{second}_2" in designer.value("conditions")
     designer.editing.undo()
     assert designer.editing.selected == path[:2]
-
-
-def test_rows_say_what_and_where_they_are_and_contain_the_problems_below_them(designer: Any) -> None:
-    designer.open("rek2024")
-    rows = designer.place.outline.rows
-    count = len(sequence(designer))
-    block = next(row for row in rows if row.path == ("blocks", "liquids"))
-    at = sequence(designer).index("liquids") + 1
-    assert block.name == f"{block.title}, block, {block.note}, step {at} of {count}"
-    designer.controller.begin("rek2024", "mine")
-    designer.editing.ask(RemoveKey(("questionnaires", "liquid", "items", 1, "text")))
-    designer.controller.show_outline()
-    rows = designer.place.outline.rows
-    faulty = {row.path for row in rows if row.faults}
-    assert {("blocks", "liquids"), ("questionnaires", "liquid"), ("questionnaires", "liquid", "items", 1)} <= faulty
-    block = next(row for row in rows if row.path == ("blocks", "liquids"))
-    assert block.name.endswith(f"step {at} of {count}, {block.faults} problem{'s' * (block.faults > 1)}")
 
 
 def test_what_changes_by_itself_is_said_once(designer: Any, monkeypatch: Any) -> None:

@@ -9,8 +9,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.edits import Set
-from study_app.gui.designer.repair_button import RepairButton
-from study_app.viewmodels.designer.requests import ChangeLanguage, SetValue
+from study_app.viewmodels.designer.requests import SetValue
 
 pytestmark = pytest.mark.slow
 
@@ -84,30 +83,6 @@ def test_the_chip_of_warnings_opens_a_list_of_them(qtbot: Any, designer: Any) ->
     qtbot.waitUntil(lambda: not problems.isVisible())
 
 
-def test_every_text_of_a_second_language_is_copied_from_the_list_or_a_field_in_one_step(
-    qtbot: Any, designer: Any
-) -> None:
-    designer.open()
-    designer.editing.ask(ChangeLanguage("add", "nl"))
-    before, count = designer.text, len(designer.place.view.problems)
-    designer.place.header.problems.click()
-    words = f"Copy all {count} to Dutch"
-    line = designer.place.problems.lines[0]
-    qtbot.waitUntil(lambda: len(line.repairs) == 2)
-    assert [button.text() for button in line.repairs] == ["Copy English to Dutch", words]
-    qtbot.mouseClick(line.repairs[1], Qt.MouseButton.LeftButton)
-    assert designer.place.view.problems == ()
-    assert designer.study.faults == ()
-    designer.editing.undo()
-    assert designer.text == before
-    designer.editing.select(("pages", "welcome"))
-    title = designer.form_row("pages", "welcome", "title")
-    qtbot.waitUntil(lambda: any(button.text() == words for button in title.repairs), timeout=20_000)
-    next(button for button in title.repairs if button.text() == words).click()
-    assert designer.study.faults == ()
-    assert "not translated yet" in designer.field("pages", "welcome", "title").copied.text()
-
-
 @pytest.mark.parametrize("width", [1600, 1100])
 def test_a_file_that_was_never_readable_is_opened_at_the_line_of_its_fault(designer: Any, width: int) -> None:
     text = designer.file.read_text()
@@ -131,9 +106,6 @@ def test_a_file_that_was_never_readable_is_opened_at_the_line_of_its_fault(desig
     assert place.outline.add.isEnabled()
 
 
-KEY = Qt.Key
-
-
 @pytest.fixture
 def broken(qtbot: Any, designer: Any) -> Any:
     """The study with two problems, whose repairs were found."""
@@ -147,24 +119,6 @@ def broken(qtbot: Any, designer: Any) -> Any:
     qtbot.waitUntil(lambda: len(found.lines) == 2 and all(line.repairs for line in found.lines))
     designer.place.outline.tree.setFocus()
     return designer
-
-
-@pytest.mark.parametrize(("width", "side"), [(1600, "form"), (1024, "pane")])
-def test_enter_alone_makes_every_repair(broken: Any, monkeypatch: pytest.MonkeyPatch, width: int, side: str) -> None:
-    monkeypatch.setattr("study_app.app.designer.repair_search.REST_MS", 1_000_000)  # a user does not wait for repairs
-    broken.window.resize(width, 768)
-    broken.place.parts.show_side(side)
-    first, second = broken.place.view.problems
-    for problem, key in ((first, "F8"), (second, "Return")):
-        repair = broken.hit(key)
-        assert isinstance(repair, RepairButton)
-        assert repair.problem.fault.path == problem.fault.path
-        assert broken.editing.selected == problem.element
-        assert broken.form_row(*problem.fault.path).isAncestorOf(repair)
-        assert repair.visibleRegion().boundingRect() == repair.rect()
-    field = broken.hit("Return")
-    assert broken.place.view.problems == ()
-    assert broken.form_row(*second.fault.path).isAncestorOf(field), "nothing is left: the field that was repaired"
 
 
 def test_enter_passes_problems_without_a_repair_and_ends_at_a_field_of_one(broken: Any) -> None:

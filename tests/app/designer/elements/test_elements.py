@@ -4,52 +4,16 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel
 
 from study_app.app.designer.edit_steps import Steps
 from study_app.authoring.edited_study import read
 from study_app.authoring.undo_stack import History
 from study_app.authoring.writer.edits import Set
 from study_app.protocol.source.document import value_at
-from study_app.protocol.source.files import shipped_file
-from study_app.viewmodels.designer.addable import addable
-from study_app.viewmodels.designer.requests import ChangeLanguage, RenameElement, SetText, SwitchKind
+from study_app.viewmodels.designer.requests import ChangeLanguage, RenameElement, SetText
 from tests.authoring.grown import PROTOCOLS
 
 pytestmark = pytest.mark.slow
-
-
-def test_deleting_the_only_task_asks_what_becomes_of_the_blocks_that_leave_its_name_out(designer: Any) -> None:
-    study = shipped_file("delayjnd").read_text().replace('name = "delayjnd"', 'name = "kitchen"')
-    designer.file.write_text(study)
-    designer.open()
-    designer.controller.ask_to_delete(("tasks", "reach"))
-    words = [one.text() for one in designer.place.prompt.findChildren(QLabel)]
-    assert "Block Delay: Task (the only one)" in words
-    assert "Also deletes: Analysis Published, Block Delay." in words
-    designer.place.prompt.all.click()
-    assert "[blocks.delay]" not in designer.text
-
-
-def test_what_can_be_added_is_filtered_by_typing_and_comes_after_the_selected_element(
-    designer: Any, qtbot: Any
-) -> None:
-    designer.open()
-    of_format_1 = addable(designer.study, ("questionnaires", "liquid", "items", 0))
-    assert len([one for one in of_format_1 if one.words.startswith("Question")]) == 2
-    designer.controller.begin("template:questionnaire-only", "asked")
-    form = next(iter(designer.value("questionnaires")))
-    items = ("questionnaires", form, "items")
-    designer.editing.select((*items, 0))
-    designer.place.ask_to_add()
-    assert designer.place.adding.list.item(0).data(Qt.ItemDataRole.UserRole).asks.section == items
-    adding = designer.place.adding
-    adding.words.setText("questi slid")
-    assert adding.list.count() == 1
-    qtbot.keyClick(adding.words, Qt.Key.Key_Return)
-    assert designer.place.view.form.path == (*items, 1)
-    assert designer.value("questionnaires", form, "items", 1, "kind") == "slider"
-    assert designer.study.faults == ()
 
 
 def test_an_id_that_is_refused_can_be_replaced_by_one_that_is_free(qtbot: Any, designer: Any) -> None:
@@ -63,15 +27,6 @@ def test_an_id_that_is_refused_can_be_replaced_by_one_that_is_free(qtbot: Any, d
     assert (head.id.text(), designer.editing.selected) == ("thick_2", ("liquids", "thick_2"))
     assert head.id.hasFocus()
     assert not head.refusal.isVisible()
-
-
-def test_a_kind_is_switched_and_back_without_losing_values(designer: Any) -> None:
-    designer.open("kitchen", "tasks", "explore")
-    before = designer.value("tasks", "explore")
-    designer.editing.ask(SwitchKind(("tasks", "explore"), "reach"))
-    assert designer.value("tasks", "explore", "kind") == "reach"
-    designer.editing.ask(SwitchKind(("tasks", "explore"), "explore"))
-    assert designer.value("tasks", "explore") == before
 
 
 def test_one_key_is_given_in_place_of_another_and_back_without_losing_its_value(designer: Any) -> None:
@@ -119,32 +74,6 @@ def test_after_a_rename_comments_that_mention_the_old_name_are_listed_and_left(d
     assert designer.text.endswith("# The pages `thanks` and `thanks_2` are short.\n")
     designer.editing.select(("pages", "welcome"))
     assert not head.comments.isVisible()
-
-
-def test_a_rename_says_once_how_many_references_followed(
-    designer: Any, qtbot: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    said: list[str] = []
-    monkeypatch.setattr("study_app.gui.designer.form.form_head.say", lambda _head, words: said.append(words))
-    designer.open()
-    head = designer.place.form.head
-    for path, name, words in (
-        (("conditions", "thick"), "honey", "1 place updated"),
-        (("tasks", "reach"), "touch", "1 place updated"),
-        (("scales", "agreement"), "likert", "2 places updated"),
-        (("questionnaires", "liquid", "items", 0), "feels", ""),
-    ):
-        designer.go_to(*path)
-        assert head.followed.text() == ""
-        head.edit_id()
-        qtbot.keyClicks(head.id, name)
-        qtbot.keyClick(head.id, Qt.Key.Key_Return)
-        assert head.followed.text() == words
-        assert head.followed.isVisible()
-        assert not words or said.pop() == words
-    designer.editing.undo()
-    assert head.followed.text() == ""
-    assert not said
 
 
 ITEMS = ("questionnaires", "liquid", "items")

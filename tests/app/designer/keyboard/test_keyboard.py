@@ -7,20 +7,15 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QShortcut
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel, QLineEdit, QWidget
+from PySide6.QtWidgets import QLineEdit, QWidget
 
-from study_app.gui.designer.form.languages_field import LanguagesField
-from study_app.gui.designer.form.typed_fields import TypedText
-from study_app.gui.designer.outline.rows import ROW_ROLE
 from study_app.gui.designer.tab_order import stops
-from study_app.gui.widgets.controls import Cap
-from study_app.viewmodels.designer.keys import GROUPS, KEYS
+from study_app.viewmodels.designer.keys import KEYS
 from study_app.viewmodels.designer.requests import SetValue
 
 pytestmark = pytest.mark.slow
 
 
-SHIFT = Qt.KeyboardModifier.ShiftModifier
 PAGE = Path(__file__).parents[4] / "docs" / "designer.md"
 
 
@@ -29,29 +24,6 @@ def test_every_key_of_the_place_is_one_shortcut(designer: Any) -> None:
     made.append(designer.place.header.play.play.shortcut().toString())
     wanted = [keys for one in KEYS if not one.within for keys in one.keys]
     assert sorted({"Ins": "Insert"}.get(keys, keys) for keys in made) == sorted(wanted)
-
-
-def test_the_card_lists_every_key_and_esc_gives_the_keyboard_back(qtbot: Any, designer: Any) -> None:
-    designer.open()
-    tree, card = designer.place.outline.tree, designer.place.keys
-    tree.setFocus()
-    qtbot.mouseClick(designer.place.header.keys, Qt.MouseButton.LeftButton)
-    assert card.isVisible()
-    words = {label.text() for label in card.findChildren(QLabel)}
-    assert {*GROUPS, "Duplicate", "Find in the study", "Delete (outline, lists)"} <= words
-    assert sorted(cap.words for cap in card.findChildren(Cap)) == sorted(keys for one in KEYS for keys in one.shown)
-    designer.key("Escape")
-    assert not card.isVisible()
-    tree.setFocus()
-    qtbot.keyClick(tree, Qt.Key.Key_F1, SHIFT)
-    assert card.isVisible()
-    assert card.isAncestorOf(designer.keyboard)
-    designer.key("Escape")
-    assert tree.hasFocus()
-    qtbot.keyClick(tree, Qt.Key.Key_F1, SHIFT)
-    designer.key("ctrl+2")
-    assert not card.isVisible(), "it does not lie over what one goes to"
-    assert designer.place.form.isAncestorOf(designer.keyboard)
 
 
 def test_the_documentation_lists_every_key() -> None:
@@ -96,72 +68,8 @@ def test_a_button_of_the_header_that_is_disabled_gives_the_keyboard_back(
     assert "repetitions = 3" in designer.file.read_text()
 
 
-def test_a_question_that_is_given_up_gives_the_keyboard_back(qtbot: Any, designer: Any) -> None:
-    field = typed(qtbot, designer)
-    designer.controller.ask_to_delete(("liquids", "thick"))
-    assert designer.place.prompt.isAncestorOf(designer.keyboard)
-    assert designer.hit("Escape") is field
-
-
-CONTROL = Qt.KeyboardModifier.ControlModifier
-
-
 def first_row(designer: Any) -> QWidget:
     return designer.place.form.rows[0]
-
-
-@pytest.mark.variants(3)
-@pytest.mark.parametrize("width", [1600, 1366])
-@pytest.mark.parametrize("area", ["form", "outline"])
-@pytest.mark.parametrize(
-    "path", [("blocks", "liquids"), ("conditions", "thick"), ("questionnaires", "liquid", "items", 0)]
-)
-def test_a_duplicate_is_selected_everywhere_and_has_the_keyboard(
-    designer: Any, width: int, area: str, path: tuple[str | int, ...]
-) -> None:
-    designer.window.resize(width, 768)
-    designer.open("kitchen", *path)
-    outline, tree = designer.place.outline, designer.place.outline.tree
-    designer.place.areas.focus_form() if area == "form" else designer.place.parts.focus_outline()
-    keyboard = designer.hit("ctrl+d")
-    copy = (*path[:-1], path[-1] + 1 if isinstance(path[-1], int) else f"{path[-1]}_2")
-    assert designer.editing.selected == copy
-    assert designer.place.form.form.path == copy
-    assert outline.selected == (copy,)
-    texts = [row for row in designer.place.form.rows if isinstance(row.field, LanguagesField)]
-    if area == "outline" and width == 1600:
-        assert tree.hasFocus()
-    elif texts:
-        assert texts[0].isAncestorOf(keyboard)
-        chosen = keyboard.textCursor().selectedText() if isinstance(keyboard, TypedText) else keyboard.selectedText()
-        assert chosen == keyboard.words() != ""
-    else:
-        assert first_row(designer).isAncestorOf(keyboard)
-    assert designer.hit("ctrl+1") is tree
-    assert tree.currentIndex().data(ROW_ROLE).path == copy
-    assert tree.viewport().rect().contains(tree.visualRect(tree.currentIndex()))
-    assert first_row(designer).isAncestorOf(designer.hit("Return"))
-    assert designer.place.form.form.path == copy
-
-
-def test_a_reference_leads_to_the_form_of_its_element_and_back(designer: Any) -> None:
-    designer.open("kitchen", "blocks", "liquids")
-    designer.field("blocks", "liquids", "task").arrow.setFocus()
-    keyboard = designer.hit("Return")
-    assert designer.editing.selected == ("tasks", "explore")
-    assert first_row(designer).isAncestorOf(keyboard)
-    keyboard = designer.hit("alt+Left")
-    assert designer.editing.selected == ("blocks", "liquids")
-    assert designer.place.form.isAncestorOf(keyboard)
-
-
-def test_a_field_that_is_added_has_the_keyboard(designer: Any) -> None:
-    designer.open("kitchen", "conditions", "thick")
-    before = {row.row.row.path for row in designer.place.form.rows}
-    next(iter(designer.place.form.adds.values())).setFocus()
-    keyboard = designer.hit("Return")
-    (added,) = (row for row in designer.place.form.rows if row.row.row.path not in before)
-    assert added.isAncestorOf(keyboard)
 
 
 @pytest.mark.parametrize("back", [False, True])
@@ -180,19 +88,6 @@ def test_a_number_that_is_left_by_tab_at_once_keeps_the_keyboard_in_its_form(
     assert designer.form_row(*beside).isAncestorOf(designer.keyboard)
 
 
-@pytest.mark.parametrize("width", [1600, 1024])
-def test_ctrl_e_goes_to_the_file_and_back_to_the_same_field(designer: Any, width: int) -> None:
-    designer.window.resize(width, 640)
-    designer.open("kitchen", "blocks", "liquids")
-    field = designer.field("blocks", "liquids", "repetitions").line
-    field.setFocus()
-    assert designer.hit("ctrl+e") is designer.place.file.editor
-    assert designer.hit("ctrl+e") is field
-    assert designer.hit("ctrl+e") is designer.place.file.editor
-    field.setEnabled(False)
-    assert first_row(designer).isAncestorOf(designer.hit("ctrl+e")), "the field cannot take the keyboard"
-
-
 def test_the_first_row_has_the_keyboard_where_undo_removes_the_row_that_had_it(designer: Any) -> None:
     designer.open("kitchen", "tasks", "explore")
     designer.editing.ask(SetValue(("tasks", "explore", "kind"), "reach"))
@@ -200,17 +95,6 @@ def test_the_first_row_has_the_keyboard_where_undo_removes_the_row_that_had_it(d
     keyboard = designer.hit("ctrl+z")
     assert designer.value("tasks", "explore", "kind") == "explore"
     assert first_row(designer).isAncestorOf(keyboard)
-
-
-def test_ctrl_3_goes_to_the_page_and_then_to_the_tabs_where_enter_chooses(designer: Any) -> None:
-    designer.open()
-    pane = designer.place.pane
-    first_row(designer).setFocus()
-    assert designer.hit("ctrl+3") not in pane.tabs.buttons
-    assert designer.hit("ctrl+3") in pane.tabs.buttons
-    pane.tabs.buttons[1].setFocus()
-    designer.hit("Return")
-    assert pane.tab == "measures"
 
 
 def test_ctrl_delete_removes_the_key_of_a_field_whose_cross_tab_passes(designer: Any) -> None:

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.gui.designer.tab_order import stops
@@ -12,7 +11,6 @@ from study_app.viewmodels.designer.requests import ChangeLanguage
 
 pytestmark = pytest.mark.slow
 
-KEY, CONTROL = Qt.Key, Qt.KeyboardModifier.ControlModifier
 MOST = 250
 
 
@@ -72,32 +70,6 @@ def test_tab_goes_to_each_stop_of_a_form_once(dutch: Any, editors: None, path: t
     assert [part.accessibleName() for part in seen if form.inside.isAncestorOf(part)] == [
         part.accessibleName() for part in stops(form.inside) if part.isVisible() and part.isEnabled()
     ]
-
-
-def test_f6_goes_to_the_tabs_and_enter_on_a_language_shows_its_page(dutch: Any) -> None:
-    pane, tab = dutch.place.pane, dutch.controller.preview.tab
-    dutch.place.areas.focus_form()
-    assert dutch.hit("F6") is pane.tabs.buttons[0]
-    passed(dutch, lambda part: part is tab.languages.buttons[1])
-    dutch.hit("Return")
-    assert tab.view.language == "nl"
-    assert tab.languages.buttons[1].hasFocus()
-
-
-@pytest.mark.parametrize("width", [1600, 1100])
-def test_ctrl_l_shows_the_page_in_the_next_language(dutch: Any, width: int) -> None:
-    dutch.window.resize(width, 768)
-    place, tab = dutch.place, dutch.controller.preview.tab
-    place.show_tab("measures")
-    place.areas.focus_form()
-    field = dutch.keyboard
-    keyboard = dutch.hit("ctrl+l")
-    assert keyboard is field if width == 1600 else place.pane.isAncestorOf(keyboard)
-    assert tab.isVisible()
-    assert tab.view.language == "nl"
-    assert "(Ctrl+L)" in tab.languages.buttons[0].toolTip()
-    dutch.hit("ctrl+l")
-    assert tab.view.language == "en"
 
 
 def test_tab_goes_through_problems_questions_and_the_banner_which_are_made_later(

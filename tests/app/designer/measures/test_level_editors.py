@@ -6,17 +6,6 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
-from study_app.authoring.edited_study import read
-from study_app.authoring.fields import label_of, row_at
-from study_app.authoring.new_study import template
-from study_app.authoring.writer.edits import Set
-from study_app.protocol.load import load
-from study_app.protocol.orders.block_orders import order_of
-from study_app.protocol.orders.durations import block_duration_s
-from study_app.protocol.source.files import shipped_file
-from study_app.viewmodels.designer.special.level_axis import level_axis
-from study_app.viewmodels.designer.special.trial_strip import trial_strip
-
 LEVELS = ("stimuli", "damping", "levels")
 LEFT, NONE = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
 
@@ -67,54 +56,6 @@ def test_keys_move_an_end_but_not_beyond_the_other(qtbot: Any, designer: Any) ->
     for _ in range(60):
         qtbot.keyClick(view.ends[0], Qt.Key.Key_PageUp)
     assert low < ends(designer)[0] < high
-
-
-def test_the_axis_says_where_limits_begin() -> None:
-    study = template("viscosity-jnd")
-    row = row_at(study.document, LEVELS)
-    assert row is not None
-    shown = level_axis(study, row)
-    assert shown is not None
-    assert (shown.low, shown.high, shown.logarithmic, shown.unit) == (0.02, 0.6, True, "%")
-    assert shown.standard == "standard 8 N·s/m"
-    assert shown.least < shown.low < shown.high < shown.most
-    assert shown.limits == {}  # they are far away at 8 N·s/m
-    strong, _ = study.edited(Set(("stimuli", "damping", "standards"), [32]))
-    row = row_at(strong.document, LEVELS)
-    assert row is not None
-    near = level_axis(strong, row)
-    assert near is not None
-    slope = near.limits["slope"]
-    assert slope.words == "slope limit 53 N·s/m"
-    assert slope.level == pytest.approx(53 / 32 - 1, rel=1e-3)
-    broken, _ = study.edited(Set(LEVELS, [0.6, 0.02]))
-    row = row_at(broken.document, LEVELS)
-    assert row is not None
-    assert level_axis(broken, row) is None
-
-
-@pytest.mark.parametrize(
-    ("name", "block"),
-    [("viscosityjnd", "viscosity"), ("viscosityjnd", "training"), ("delaydetect", "delay"), ("thickness", "thickness")],
-)
-def test_a_trial_takes_as_long_as_check_says(name: str, block: str) -> None:
-    protocol = load(name)
-    study = read(shipped_file(name).read_bytes(), shipped_file(name).parent)
-    row = row_at(study.document, ("blocks", block, "design"))
-    assert row is not None
-    strip = trial_strip(study, row)
-    assert strip is not None
-    trials = order_of(protocol, protocol.blocks[block]).trials
-    whole_s = block_duration_s(protocol, protocol.blocks[block], "en")
-    breaks_s = whole_s - trials * strip.duration_s
-    assert 0 <= breaks_s + 1e-6 < 0.2 * whole_s
-    kinds = [phase.kind for phase in strip.phases]
-    assert kinds.count("interval") == (1 if name == "thickness" else 2)
-    assert ("feedback" in kinds) == (name == "viscosityjnd")
-    assert [phase.name for phase in strip.phases][-1] == label_of("between_s") == "Between trials"
-    rows_of = {phase.field: row_at(study.document, phase.field) for phase in strip.phases if phase.field}
-    assert len(rows_of) >= len(set(kinds))
-    assert None not in rows_of.values()
 
 
 @pytest.mark.slow

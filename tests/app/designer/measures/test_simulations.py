@@ -5,7 +5,7 @@ from concurrent.futures import Executor, Future
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QPoint, QSize, Qt
+from PySide6.QtCore import QSize, Qt
 
 from study_app.analysis.power.threshold_studies import plans, sweep
 from study_app.app.designer.measures.measures_worker import (
@@ -26,7 +26,6 @@ from study_app.authoring.edited_study import read
 from study_app.authoring.measures.planned import ENOUGH
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
-from study_app.gui.designer.measures.parts import SessionPart
 from study_app.gui.participant.page_parts import parts_of
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.protocol.checks.expected_precision import imprecise, threshold_plan
@@ -168,24 +167,6 @@ def test_numbers_of_what_is_broken_stay_in_grey(qtbot: Any, designer: Any, worke
     qtbot.waitUntil(lambda: not page.earlier.isVisible())
     assert grey not in {ink(part) for part in page.numbers.parts}
     assert not page.function.shown.anew
-
-
-@pytest.mark.slow
-def test_a_click_on_a_step_of_the_session_bar_opens_the_step(qtbot: Any, designer: Any) -> None:
-    designer.open("kitchen", "pages", "welcome")
-    facts = designer.place.pane.facts
-
-    def bar() -> Any:
-        return next((one.strip for one in facts.grid.parts if isinstance(one, SessionPart)), None)
-
-    qtbot.waitUntil(lambda: bar() is not None and bar().width() > 100)
-    strip, x = bar(), 0.0
-    for _, share, _, path in strip.segments:
-        if path == ("blocks", "liquids"):
-            break
-        x += share * strip.width()
-    qtbot.mouseClick(strip, Qt.MouseButton.LeftButton, pos=QPoint(round(x + share * strip.width() / 2), 7))
-    assert designer.editing.selected == ("blocks", "liquids")
 
 
 class Serial(Executor):

@@ -18,8 +18,8 @@ from study_app.authoring.kept_settings import kept_language
 from study_app.authoring.writer.edits import Set, Unset
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.wording.languages import words
-from study_app.session.pages import QuestionnairePage, TaskPage, TextPage
-from study_app.viewmodels.designer.requests import ChangeLanguage, DuplicateElement, RetypeFile, SetText, SetValue
+from study_app.session.pages import TaskPage, TextPage
+from study_app.viewmodels.designer.requests import ChangeLanguage, DuplicateElement, SetText
 
 pytestmark = pytest.mark.slow
 
@@ -39,50 +39,10 @@ def answers(live: Any) -> dict[str, Any]:
     return {field.view.id: field.value for field in live.page_window.widget.fields if field.is_answered}
 
 
-def focused(live: Any) -> str:
-    """Return the question that has the page's focus."""
-    here = live.page_window.focusWidget()
-    return next(one.view.id for one in live.page_window.widget.fields if one is here or one.isAncestorOf(here))
-
-
 def place_of(live: Any, part: Any) -> QPoint:
     """Return where the middle of a part of the page is in the view."""
     middle = part.mapTo(live.page_window, part.rect().center())
     return live.mapFromScene(QPointF(middle))
-
-
-def test_the_page_is_that_of_the_selected_element(designer: Any, live: Any) -> None:
-    preview, tab = designer.controller.preview, designer.controller.preview.tab
-    assert isinstance(tab.view.page, QuestionnairePage)
-    assert focused(live) == "like_honey"
-    assert tab.view.step == "Liquids, trial 1 of 2"
-    assert tab.accessibleName() == "Participant's page, English"
-    for path, kind, step in (
-        (("pages", "thanks"), TextPage, "That was it"),
-        (("blocks", "delays"), QuestionnairePage, "Delays, trial 1 of 2"),
-        (("tasks", "explore"), TaskPage, "Liquids, trial 1 of 2"),
-    ):
-        designer.go_to(*path)
-        assert isinstance(live.page_window.page, kind)
-        assert tab.view.step == step
-    for liquid in ("thin", "thick"):
-        designer.go_to("liquids", liquid)
-        assert isinstance(live.page_window.page, TaskPage)
-        found = preview._found
-        trial = found.shown.schedule.steps[found.index]
-        condition = found.shown.codes[trial.block][trial.code]
-        assert liquid in found.shown.protocol.conditions[condition].liquid_ids
-    tab.step_asked.emit(1)
-    assert preview.position[:2] != ("", 0)
-    in_line = [tab.before, tab.step, tab.trial, tab.trials, tab.after, tab.moments, tab.zoom]
-    assert sorted(in_line, key=lambda part: part.x()) == in_line
-    tab.moment_asked.emit(tab.view.moments[1][0])
-    assert isinstance(live.page_window.page, QuestionnairePage)
-    designer.go_to("pages", "welcome")
-    first = tab.view.step
-    for by in (-1, 1, -1):
-        tab.step_asked.emit(by)
-    assert tab.view.step == first
 
 
 def test_a_trial_is_typed_stepped_to_and_played(qtbot: Any, designer: Any) -> None:
@@ -152,30 +112,6 @@ def test_an_edit_repaints_the_page_and_keeps_answers_and_focus_where_they_were(d
     assert designer.keyboard is typing
 
 
-def test_faults_elsewhere_do_not_blank_the_page(designer: Any, live: Any) -> None:
-    tab = designer.controller.preview.tab
-    designer.editing.ask(SetValue(("device", "force_limit_n"), -1.0))
-    designer.editing.ask(SetText((*ITEM, "text"), "en", "Like honey?"))
-    assert "1 problem" in tab.view.note
-    assert any(item.text == "Like honey?" for item in live.page_window.page.items)
-    designer.editing.ask(RetypeFile(designer.text.replace('task = "explore"', 'task = "nothing"')))
-    assert isinstance(live.page_window.page, QuestionnairePage)
-    designer.editing.ask(RetypeFile(designer.text.replace("[study]", "[study")))
-    assert isinstance(live.page_window.page, QuestionnairePage)
-    assert tab.note.isVisible()
-
-
-def test_a_study_that_was_never_sound_shows_what_is_sound(designer: Any) -> None:
-    designer.file.write_text(
-        designer.file.read_text().replace('task = "reach"', 'task = "nothing"').replace("dwell_s", "dwel_s")
-    )
-    designer.open("kitchen", *ITEM)
-    live = designer.controller.preview.tab.page
-    assert [item.id for item in live.page_window.page.items].count("like_honey") == 1
-    designer.go_to("tasks", "reach")
-    assert designer.controller.preview.tab.view.note == "Reach has a problem (is missing): an initial value is shown."
-
-
 @pytest.mark.variants(6)
 @pytest.mark.parametrize(
     "broken",
@@ -206,16 +142,6 @@ def test_no_fault_blanks_the_page(designer: Any, broken: Any, opened: str) -> No
     view = designer.controller.preview.tab.view
     assert getattr(view.page, "title", "") == "A first look"
     assert "last valid" in view.note
-
-
-def test_a_study_of_which_no_page_can_be_shown_says_why_on_the_ground_of_cards(designer: Any) -> None:
-    designer.file.write_text("format = 2\n[study]\nname = 3\n")
-    designer.open()
-    tab = designer.controller.preview.tab
-    QApplication.processEvents()
-    assert tab.view.page is None
-    assert tab.note.text().startswith("The page cannot be shown: ")
-    assert tab.page.backgroundBrush().color().name() == designer.place.theme.surface.lower()
 
 
 def test_nothing_moves_while_the_page_is_hidden(qtbot: Any, designer: Any, live: Any) -> None:
@@ -338,19 +264,6 @@ def test_a_copied_question_has_the_text_of_its_original_and_the_others_keep_thei
     assert tab.view.note.endswith("(reads as an earlier item does): the text as it is written is shown.")
     designer.editing.ask(SetText((*COPY, "text"), "en", "Another statement"))
     assert dict(statements(tab))["like_honey_2"] == "Another statement"
-
-
-def test_a_missing_text_is_said_in_the_language_that_lacks_it(designer: Any, tab: Any) -> None:
-    designer.editing.ask(ChangeLanguage("add", "nl"))
-    assert tab.view.language == "en"
-    assert not tab.view.note
-    designer.controller.preview.show_language("nl")
-    assert tab.view.note == "Like honey has no Dutch text; the text of another language is shown."
-    designer.go_to("device")
-    assert tab.view.note.endswith(" texts missing in Dutch: shown in another language.")
-    designer.editing.ask(SetText((*ITEM, "text"), "en", ""))
-    designer.controller.preview.show_language("en")
-    assert "Dutch" not in tab.view.note
 
 
 def test_the_language_is_kept_for_the_study(designer: Any, tab: Any) -> None:

@@ -117,10 +117,6 @@ class Designer(KeyUser):
         """The part that has the keyboard."""
         return QApplication.focusWidget()
 
-    def has_keyboard(self, *path: str | int) -> bool:
-        """Return whether the field of a place has the keyboard."""
-        return bool(self.form_row(*path).isAncestorOf(self.keyboard))
-
     def hit(self, keys: str, times: int = 1) -> Any:
         """Press keys where the keyboard is; return the part that has it then."""
         self.key(keys, times)
@@ -142,12 +138,3 @@ class Designer(KeyUser):
     def index(self, *path: str | int) -> Any:
         """The index of an element's first row in the outline."""
         return next(one for one in self.outline.indexes() if one.data(ROW_ROLE).path == path)
-
-    def click_row_of(self, *path: str | int, held: str = "") -> None:
-        """Click the first row of an element in the outline."""
-        self.click_on(self.outline.tree.viewport(), held, self.middle_of(*path))
-
-    def middle_of(self, *path: str | int) -> QPoint:
-        """The middle of an element's first row in the outline, which is scrolled to."""
-        self.outline.tree.scrollTo(self.index(*path))
-        return self.outline.tree.visualRect(self.index(*path)).center()
