@@ -59,7 +59,10 @@ class Record:
         self.note("open", designer.open)
 
     def note(self, name: str, act: Callable[[], Any], *, paints: bool = False, of: QWidget | None = None) -> None:
-        """Do something, and note what it changes: in the window, or in a part since the last act of that name."""
+        """Do something, and note what it changes: in the window, or in a part since the last act of that name.
+
+        Only the form is painted: the cards beside it keep a height that depends on when they are laid out.
+        """
         if QApplication.activePopupWidget() is None and not self.designer.window.isActiveWindow():
             self.designer.window.activateWindow()
             QApplication.processEvents()
@@ -69,7 +72,7 @@ class Record:
         shown, key = (of, name) if of else (QApplication.activePopupWidget() or self.designer.window, "")
         every = (TIP.sub(r"\1", TIME.sub("HH:MM", line)) for line in told(shown))
         heard = [line for line in every if not line.startswith("ScrollBar")]
-        after = {f"{key} told": heard} | ({f"{key} painted": painted(shown)} if paints else {})
+        after = {f"{key} told": heard} | ({"painted": painted(self.designer.place.form)} if paints else {})
         for way, lines in after.items():
             found = difflib.unified_diff(self.before.get(way, []), lines, n=0, lineterm="")
             self.lines += [TIME.sub("HH:MM", line) for line in list(found)[2:] if line[0] in "+-"]
@@ -123,10 +126,9 @@ def each_element(record: Record) -> None:
 def each_tab(record: Record) -> None:
     place = record.designer.place
     for path in one_of_each(record.designer.study.document):
-        record.select(*path)
+        record.select(*path, paints=path[0] in ("blocks", "stimuli", "liquids"))
         for tab in TABS:
-            paints = tab == "measures" and path[0] in ("blocks", "questionnaires", "liquids")
-            record.note(f"tab {tab}", lambda tab=tab: place.show_tab(tab), paints=paints, of=place.pane)
+            record.note(f"tab {tab}", lambda tab=tab: place.show_tab(tab), of=place.pane)
 
 
 def by_keys(record: Record) -> None:
