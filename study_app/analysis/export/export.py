@@ -4,8 +4,8 @@ from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
 from study_app.analysis.export import psychds_dataset, spss
-from study_app.analysis.export.frame_csv import table_bytes
 from study_app.analysis.export.table_files import NOTHING_ELSE, Extra, file_name, table_files
+from study_app.analysis.export.table_formats import table_bytes
 from study_app.analysis.export.typed_tables import deliver
 from study_app.analysis.export.wide_table import wide
 from study_app.analysis.results.section_failures import Failure, Progress, silent

@@ -14,7 +14,6 @@ from study_app.analysis.tables.compared_blocks import spoken
 from study_app.analysis.tables.study_tables import Study
 from study_app.protocol.texts import text_in
 from study_app.store.output_files import FileCopy
-from study_app.store.tables.cells import variable
 from study_app.store.tables.column import Column
 
 FOLDER: Final = "psych-ds"
@@ -56,7 +55,7 @@ def dataset_files(
 def _sidecar(study: Study, name: str, columns: tuple[Column, ...]) -> bytes:
     """Return what describes the columns of one table alone, with authors and licence."""
     head = {"@context": CONTEXT, "@type": "Dataset", "name": PurePosixPath(name).stem}
-    return _json({**head, VARIABLES: [variable(column) for column in columns], **stated_credits(study)})
+    return _json({**head, VARIABLES: [column.variable for column in columns], **stated_credits(study)})
 
 
 def _settings(study: Study) -> bytes:
@@ -76,7 +75,7 @@ def variables(columns: Mapping[str, tuple[Column, ...]]) -> list[dict[str, Any]]
     for file, of_table in columns.items():
         table = file.partition("_description-")[2].partition("_")[0]
         for column in of_table:
-            found.setdefault(column.name, {})[table] = variable(column)
+            found.setdefault(column.name, {})[table] = column.variable
     return [_in_all(described) for described in found.values()]
 
 

@@ -201,7 +201,7 @@ def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd
 
 
 def _place(lengths: Whole, index: int) -> tuple[int, int]:
-    """Return the session of the row at ``index``, and the row's number in its file, from 1."""
+    """Return the session of the row at ``index``, and the row's number in its file, the header's being 1."""
     ends = np.cumsum(lengths)
     which = int(np.searchsorted(ends, index, side="right"))
-    return which, int(index - ends[which] + lengths[which]) + 1
+    return which, int(index - ends[which] + lengths[which]) + 2

@@ -1,7 +1,6 @@
 """Reading files of a results folder into typed columns, or saying exactly what is wrong with one and where."""
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, TypeAlias
 
@@ -9,20 +8,20 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from study_app.analysis.tables.table_cells import again, cells
 from study_app.errors import AnalysisError
 from study_app.store.atomic import read_regular
 from study_app.store.journals.parsing import parse_json
-from study_app.store.tables.column import MISSING, Column, Kind
-from study_app.store.tables.formulas import unguarded
+from study_app.store.tables.column import MISSING, Column, header
+from study_app.store.tables.columns import LATER, columns_held
+from study_app.store.tables.csv_files import cells
 
-_ARRAYS: Final[dict[str, tuple[Any, Callable[[Any, Any], Any]]]] = {
-    "integer": (np.int64, pd.arrays.IntegerArray),
-    "number": (np.float64, pd.arrays.FloatingArray),
-    "flag": (np.bool_, pd.arrays.BooleanArray),
+DTYPES: Final[dict[str, Any]] = {
+    "text": "string",
+    "time": "string",
+    "integer": "Int64",
+    "number": "Float64",
+    "flag": "boolean",
 }
-AT_ONCE: Final = 250
-"""Files whose cells are held at the same time."""
 
 Whole: TypeAlias = NDArray[np.int64]
 
@@ -33,22 +32,63 @@ def tables(paths: Sequence[Path], columns: tuple[Column, ...]) -> tuple[pd.DataF
     Returns
     -------
     DataFrame, (files,) array
-        The rows of all files in their order, and how many each holds.
+        The rows of all files in their order, and how many each holds. Columns that the version which wrote a file did
+        not have yet, or that are sealed, are missing.
 
     Raises
     ------
     AnalysisError
-        A file cannot be read, or is not the table the dictionary describes: names the file, the row (1 is the first
-        below the header), the column and the value.
+        A file cannot be read, or is not the table the dictionary describes: names the file, the row (1 is the
+        header), the column and the value.
     """
-    lengths: list[int] = []
-    frames: list[pd.DataFrame] = []
-    for first in range(0, max(len(paths), 1), AT_ONCE):
-        files = paths[first : first + AT_ONCE]
-        read, rows = cells(files, columns)
-        lengths += rows
-        frames.append(_typed(read, columns, files, rows))
-    return pd.concat(frames, ignore_index=True), np.array(lengths, dtype=np.int64)
+    texts: dict[str, list[str]] = {column.name: [] for column in columns}
+    lengths = []
+    for path in paths:
+        found, rows = _texts(path, columns)
+        lengths.append(rows)
+        for name in texts:
+            texts[name] += found.get(name, [MISSING] * rows)
+    ends = np.cumsum(lengths, dtype=np.int64)
+
+    def place(index: int) -> tuple[Path, int]:
+        which = int(np.searchsorted(ends, index, side="right"))
+        return paths[which], int(index - ends[which] + lengths[which]) + 2
+
+    typed = {column.name: _values(column, texts[column.name], place) for column in columns}
+    return pd.DataFrame(typed), np.array(lengths, dtype=np.int64)
+
+
+def _texts(path: Path, columns: tuple[Column, ...]) -> tuple[Mapping[str, Sequence[str]], int]:
+    """Return the cells of a file by column, and how many rows it has."""
+    try:
+        names, *rows = cells(read_regular(path))
+    except OSError as error:
+        raise unreadable(path, error, _again(path)) from error
+    except ValueError as error:
+        raise AnalysisError(f"{path} {error}: it was cut off or changed; {_again(path)}") from error
+    held = columns_held(names, columns, LATER | {column.name for column in columns if column.sealed})
+    if tuple(names) != header(held):
+        raise AnalysisError(
+            f"{path} does not begin with the columns of this table: it was changed, or written by another version of "
+            f"the program (expected {', '.join(header(held)[:4])} …, {len(held)} columns); {_again(path)}"
+        )
+    return (dict(zip(names, zip(*rows, strict=True), strict=True)) if rows else {}), len(rows)
+
+
+def _values(column: Column, texts: list[str], place: Callable[[int], tuple[Path, int]]) -> Any:
+    """Return the values of a column; every text that occurs is understood once."""
+    known: dict[str, Any] = {MISSING: None}
+    for text in dict.fromkeys(texts):
+        try:
+            known[text] = column.value(text) if text != MISSING or not column.sealed else None
+        except ValueError as error:
+            path, row = place(texts.index(text))
+            raise AnalysisError(f"{path}, row {row}, column {column.name}: {error}; {_again(path)}") from error
+    return pd.array([known[text] for text in texts], dtype=DTYPES[column.kind])
+
+
+def _again(path: Path) -> str:
+    return f"make it again from the journal: liquid-study rebuild {path.parent}"
 
 
 def document(path: Path) -> dict[str, Any]:
@@ -70,102 +110,8 @@ def document(path: Path) -> dict[str, Any]:
     return found
 
 
-def unreadable(path: Path, error: OSError) -> AnalysisError:
+def unreadable(path: Path, error: OSError, remedy: str = "restore it from a copy") -> AnalysisError:
     """Return the error for a file that cannot be read."""
-    why = error.strerror or type(error).__name__
-    return AnalysisError(f"{path} cannot be read ({why}): restore it from a copy, or correct its permissions")
-
-
-def _typed(cells: Any, columns: tuple[Column, ...], paths: Sequence[Path], lengths: Sequence[int]) -> pd.DataFrame:
-    """Turn the cells of files into typed columns; every text that occurs is understood once."""
-    typed = {}
-    for column in columns:
-        texts = cells[column.name].combine_chunks()
-        which = texts.indices.to_numpy()
-        values: list[Any] = []
-        for number, cell in enumerate(texts.dictionary.to_pylist()):
-            try:
-                values.append(_cell(column, cell, _PARSERS[column.kind]))
-            except ValueError as error:
-                path, row = _place(paths, lengths, int(np.flatnonzero(which == number)[0]))
-                raise AnalysisError(
-                    f"{path}, row {row}, column {column.name}: {cell!r} is not {_permitted(column)}; {again(path)}"
-                ) from error
-        typed[column.name] = _array(column.kind, values, which)
-    return pd.DataFrame(typed)
-
-
-def _array(kind: Kind, values: list[Any], which: Whole) -> Any:
-    """Return ``values[which]``, None where one is missing, as an array of pandas."""
-    if kind in {"text", "time"}:
-        return pd.array(np.array(values, dtype=object)[which], dtype="string")
-    plain, make = _ARRAYS[kind]
-    missing = np.array([value is None for value in values], dtype=bool)
-    known = np.array([0 if value is None else value for value in values], dtype=plain)
-    return make(known[which], missing[which])
-
-
-def _place(paths: Sequence[Path], lengths: Sequence[int], index: int) -> tuple[Path, int]:
-    """Return the file of the row at ``index`` over all files, and its number there."""
-    for path, length in zip(paths, lengths, strict=True):
-        if index < length:
-            return path, index + 1
-        index -= length
-    raise AssertionError("the row is in none of the files")
-
-
-def _cell(column: Column, cell: str, parse: Callable[[str], Any]) -> Any:
-    if cell == MISSING:
-        if not column.may_miss:
-            raise ValueError(cell)
-        return None
-    value = parse(cell)
-    if column.minimum is not None and value < column.minimum:
-        raise ValueError(cell)
-    if column.maximum is not None and value > column.maximum:
-        raise ValueError(cell)
-    if column.levels and cell not in dict(column.levels):
-        raise ValueError(cell)
-    return value
-
-
-def _number(cell: str) -> float:
-    value = float(cell)
-    if not math.isfinite(value):
-        raise ValueError(cell)
-    return value
-
-
-def _integer(cell: str) -> int:
-    value = int(cell)
-    if not -(2**63) <= value < 2**63:
-        raise ValueError(cell)
-    return value
-
-
-def _flag(cell: str) -> bool:
-    if cell not in ("true", "false"):
-        raise ValueError(cell)
-    return cell == "true"
-
-
-_PARSERS: Final[dict[str, Callable[[str], Any]]] = {
-    "text": unguarded,
-    "time": str,
-    "integer": _integer,
-    "number": _number,
-    "flag": _flag,
-}
-
-
-def _permitted(column: Column) -> str:
-    """Say in words what a cell of the column may be."""
-    if column.levels:
-        words = "one of " + ", ".join(level for level, _ in column.levels)
-    else:
-        words = {"integer": "a whole number", "number": "a number", "flag": "true or false"}.get(column.kind, "a text")
-        if column.minimum is not None and column.maximum is not None:
-            words += f" from {column.minimum:g} to {column.maximum:g}"
-        elif column.minimum is not None:
-            words += f" of at least {column.minimum:g}"
-    return f"{words} or {MISSING}" if column.may_miss else words
+    return AnalysisError(
+        f"{path} cannot be read ({error.strerror or type(error).__name__}): {remedy}, or correct its permissions"
+    )

@@ -1,12 +1,32 @@
-"""The description of a table's column."""
+"""What a column of a table is: its name, the values of its cells and their meaning."""
 
+import math
+import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal, TypeAlias
+from typing import Any, Final, Literal, NamedTuple, TypeAlias
+
+from study_app.store.tables.formulas import unguarded
 
 Kind: TypeAlias = Literal["text", "integer", "number", "flag", "time"]
 
 MISSING = "n/a"
+
+
+class _Cells(NamedTuple):
+    words: str
+    pattern: str
+    read: Callable[[str], Any]
+
+
+_KINDS: Final[dict[Kind, _Cells]] = {
+    "text": _Cells("a text", r"[\s\S]*", unguarded),
+    "integer": _Cells("a whole number", r"-?[0-9]{1,18}", int),
+    "number": _Cells("a number", r"-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?", float),
+    "flag": _Cells("true or false", "true|false", "true".__eq__),
+    "time": _Cells("a time with zone", r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}[+-]\d\d:\d\d", str),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +47,51 @@ class Column:
     maximum: float | None = None
     may_miss: bool = False
     sealed: bool = False
+
+    def value(self, cell: str) -> Any:
+        """Return what a cell holds, None where it is missing.
+
+        Raises
+        ------
+        ValueError
+            The column permits no such cell.
+        """
+        if cell == MISSING and self.may_miss:
+            return None
+        if re.fullmatch(self.pattern, cell):
+            value = _KINDS[self.kind].read(cell)
+            low, high = (-math.inf if self.minimum is None else self.minimum), self.maximum
+            if self.kind not in {"integer", "number"} or low <= value <= (math.inf if high is None else high):
+                return value
+        raise ValueError(f"{(cell if len(cell) <= 40 else cell[:39] + '…')!r} is not {self.permitted}")
+
+    @property
+    def pattern(self) -> str:
+        """The regular expression of a cell that is not missing."""
+        return "|".join(level for level, _ in self.levels) or _KINDS[self.kind].pattern
+
+    @property
+    def permitted(self) -> str:
+        """What a cell may be, in words."""
+        levels = ", ".join(level for level, _ in self.levels)
+        words = f"one of {levels}" if levels else _KINDS[self.kind].words
+        if self.maximum is not None:
+            words += f" from {self.minimum:g} to {self.maximum:g}"
+        elif self.minimum is not None:
+            words += f" of at least {self.minimum:g}"
+        return f"{words} or {MISSING}" if self.may_miss else words
+
+    @property
+    def variable(self) -> dict[str, Any]:
+        """The column as a schema.org PropertyValue."""
+        meanings = "; ".join(f"{level}: {meaning}" for level, meaning in self.levels)
+        described = {
+            "@type": "PropertyValue",
+            "name": self.name,
+            "description": f"{self.description} Levels: {meanings}." if meanings else self.description,
+        }
+        more = {"unitText": self.unit or None, "minValue": self.minimum, "maxValue": self.maximum}
+        return described | {name: value for name, value in more.items() if value is not None}
 
 
 optional = partial(Column, may_miss=True)

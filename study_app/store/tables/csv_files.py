@@ -1,4 +1,7 @@
-"""CSV files: tables with the columns of ``columns``, and columns of numbers to their last digit."""
+"""Tables as CSV: comma, UTF-8, RFC 4180 quoting, one line feed a record, ``n/a`` where nothing is known.
+
+Numbers are written in full; a text that a spreadsheet would compute has an apostrophe before it (``formulas``).
+"""
 
 import csv
 import io
@@ -19,12 +22,7 @@ Row: TypeAlias = dict[str, Any]
 
 
 def csv_bytes(columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]) -> bytes:
-    """Return the table as CSV: comma, UTF-8, RFC 4180 quoting, one line feed a record, ``n/a`` where nothing is known.
-
-    Numbers are written in full (the shortest text that reads back as the same number). A text that a spreadsheet would
-    compute has an apostrophe before it (``formulas``); half a surrogate pair, which no file can hold, becomes a
-    question mark.
-    """
+    """Return a table; half a surrogate pair, which no file can hold, becomes a question mark."""
     return b"".join([header_bytes(columns), *records(columns, rows)])
 
 
@@ -35,9 +33,41 @@ def header_bytes(columns: Sequence[Column]) -> bytes:
 
 def records(columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]) -> Iterator[bytes]:
     """Yield each row of a table as `csv_bytes` writes it."""
-    names = header(tuple(columns))
     for row in rows:
-        yield f"{','.join([cell_text(row[name]) for name in names])}\n".encode("utf-8", "replace")
+        yield f"{','.join([cell_text(row[column.name]) for column in columns])}\n".encode("utf-8", "replace")
+
+
+def cell_text(value: Any) -> str:
+    """Return a cell as text in a table."""
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return MISSING
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(value) if isinstance(value, int | float) else _quoted(guarded(str(value)))
+
+
+def _quoted(text: str) -> str:
+    if "," in text or '"' in text or "\n" in text or "\r" in text or text != text.strip():
+        return '"' + text.replace('"', '""') + '"'
+    return text
+
+
+def cells(table: bytes) -> list[list[str]]:
+    """Return the records of a table as texts, the header first.
+
+    Raises
+    ------
+    ValueError
+        It is not CSV in UTF-8, or its records differ in length.
+    """
+    try:
+        found = list(csv.reader(io.StringIO(table.decode("utf-8"), newline=""), strict=True)) or [[]]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ValueError(f"is not CSV in UTF-8 ({error})") from error
+    for number, row in enumerate(found[1:], start=2):
+        if len(row) != len(found[0]):
+            raise ValueError(f"row {number} has {len(row)} cells, not {len(found[0])}")
+    return found
 
 
 def read_table(table: bytes, columns: Sequence[Column]) -> list[Row]:
@@ -45,25 +75,39 @@ def read_table(table: bytes, columns: Sequence[Column]) -> list[Row]:
 
     Raises
     ------
-    ValueError, csv.Error
+    ValueError
         It is not such a table.
     """
-    found = list(csv.reader(io.StringIO(table.decode("utf-8"), newline=""), strict=True)) or [[]]
-    places = [(column, found[0].index(column.name)) for column in columns]
-    if any(len(row) != len(found[0]) for row in found):
-        raise ValueError("its rows differ in length")
-    return [{column.name: _value(column, row[place]) for column, place in places} for row in found[1:]]
+    names, *rows = cells(table)
+    places = [(column, names.index(column.name)) for column in columns]
+    return [{one.name: None if row[at] == MISSING else one.value(row[at]) for one, at in places} for row in rows]
 
 
-def _value(column: Column, cell: str) -> Any:
-    if cell == MISSING:
-        return None
-    match column.kind:
-        case "integer" | "number":
-            return int(cell) if cell.removeprefix("-").isdigit() else float(cell)
-        case "flag":
-            return cell == "true"
-    return unguarded(cell)
+def problems(table: bytes, columns: Sequence[Column]) -> Iterator[str]:
+    """Yield what is wrong with a table, a sentence each; a column's first bad cell stands for all of them."""
+    expected = header(tuple(columns))
+    try:
+        names, *rows = cells(table)
+    except ValueError as error:
+        yield str(error)
+        return
+    if tuple(names) != expected:
+        missing = [name for name in expected if name not in names]
+        unknown = [name for name in names if name not in expected]
+        if missing:
+            yield f"columns are missing: {', '.join(missing)}"
+        if unknown:
+            yield f"columns are unknown: {', '.join(unknown)}"
+        if not missing and not unknown:
+            yield "columns are in another order or duplicated"
+        return
+    for column, texts in zip(columns, zip(*rows, strict=True), strict=True) if rows else ():
+        for text in dict.fromkeys(texts):
+            try:
+                column.value(text)
+            except ValueError as error:
+                yield f"row {texts.index(text) + 2}, {column.name}: {error}"
+                break
 
 
 def in_columns_of(
@@ -78,31 +122,8 @@ def in_columns_of(
     there = tuple(column for column in columns if column.name in ours)
     kept = columns_held(names, there, may_lack)
     table = table if kept == there else csv_bytes(kept, read_table(table, kept))
-    return (held if b"'" in table and held == _without_guards(table) else table), kept
-
-
-def _without_guards(table: bytes) -> bytes:
-    """Return a table that `csv_bytes` wrote without the apostrophes before texts that a spreadsheet would compute."""
-    rows = csv.reader(io.StringIO(table.decode("utf-8"), newline=""))
-    return "".join(f"{','.join([_quoted(unguarded(cell)) for cell in row])}\n" for row in rows).encode()
-
-
-def cell_text(value: Any) -> str:
-    """Return a cell as text in a table."""
-    kind = type(value)
-    if value is None or (kind is float and not math.isfinite(value)):
-        return MISSING
-    if kind is int or kind is float:
-        return repr(value)
-    if kind is bool:
-        return "true" if value else "false"
-    return _quoted(guarded(str(value)))
-
-
-def _quoted(text: str) -> str:
-    if "," in text or '"' in text or "\n" in text or "\r" in text or text != text.strip():
-        return '"' + text.replace('"', '""') + '"'
-    return text
+    plain = "".join(f"{','.join([_quoted(unguarded(cell)) for cell in row])}\n" for row in cells(table)).encode()
+    return (held if held == plain else table), kept
 
 
 def write_columns(path: Path, table: np.recarray[Any, Any]) -> None:

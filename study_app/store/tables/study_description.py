@@ -17,7 +17,6 @@ from study_app.store.blinded.blinding import reveals
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.parsing import check_study_name, parse_json
 from study_app.store.sites.merged import refuse_merged
-from study_app.store.tables.cells import variable
 from study_app.store.tables.columns import LATER, SEALED, every_column
 
 # What a study folder holds besides tables; patterns as in .gitignore.
@@ -53,7 +52,7 @@ def description_bytes(study: StudyHead, *, sealed: bool, protocol_format: int = 
         "description": study.description or title,
         "version": study.version,
         "variableMeasured": [
-            variable(column)
+            column.variable
             for column in every_column(protocol_format, intervals=intervals)
             if not (sealed and column.sealed)
         ],

@@ -32,7 +32,6 @@ from study_app.store.tables import csv_files
 from study_app.store.tables.column import Column
 from study_app.store.tables.participants import opened_or_none, row_from
 from study_app.store.tables.session_tables import table_columns
-from study_app.store.verification import table_checks
 from study_app.store.verification.fingerprints import fingerprint
 from study_app.store.verification.violations import Gathered
 
@@ -263,7 +262,7 @@ def check_table(
         report = found.warning if follows else found.error
         report(path, f"differs from the journal, from line {differing[0]} on; rebuild renews it")
     if not (differing and follows):  # else a row may be half written
-        for problem in table_checks.problems(content, columns):
+        for problem in csv_files.problems(content, columns):
             found.error(path, problem)
 
 

@@ -26,6 +26,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import Place
+from study_app.store.tables import csv_files
 from study_app.store.tables.columns import EXCLUSIONS
 from study_app.store.tables.participants import columns_of, table_bytes
 from study_app.store.tables.study_description import (
@@ -35,7 +36,7 @@ from study_app.store.tables.study_description import (
     has_intervals,
     names_sealed,
 )
-from study_app.store.verification import psychds, table_checks
+from study_app.store.verification import psychds
 from study_app.store.verification.fingerprints import listed, place_of, read_copy, unreadable
 from study_app.store.verification.leaks import certain_telltales, find_leaks, presented_numbers, recorded_numbers
 from study_app.store.verification.verify_allocation import check_allocation
@@ -257,7 +258,7 @@ def _exclusions(study: StudyFolder, sessions: Sessions, found: Gathered) -> None
         rows = exclusions.exclusions(study.path)
         if not is_there(study.exclusions):
             return
-        for problem in table_checks.problems(exclusions.without_mark(read_regular(study.exclusions)), EXCLUSIONS):
+        for problem in csv_files.problems(exclusions.without_mark(read_regular(study.exclusions)), EXCLUSIONS):
             found.error(study.exclusions, problem)
         trials = {(one.place.folder.participant, one.place.folder.number): one.trials for one in sessions}
         for row in rows:

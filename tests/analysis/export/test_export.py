@@ -8,7 +8,7 @@ import pytest
 
 from study_app.analysis.export.delivered import Delivered
 from study_app.analysis.export.export import export
-from study_app.analysis.export.frame_csv import table_bytes
+from study_app.analysis.export.table_formats import table_bytes
 from study_app.errors import AnalysisError
 from study_app.store.output_files import write_files
 from study_app.store.tables.column import Column

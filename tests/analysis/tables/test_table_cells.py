@@ -1,4 +1,4 @@
-"""The cells of tables: both parsers read the same, and every way a file can be damaged is refused."""
+"""The cells of tables: report and `verify` read the same, and every way a file can be damaged is refused."""
 
 import csv
 import io
@@ -12,6 +12,7 @@ from study_app.analysis.tables import measures
 from study_app.analysis.tables.typed_files import tables
 from study_app.errors import AnalysisError
 from study_app.store.tables.column import MISSING, Column
+from study_app.store.tables.csv_files import problems
 
 COLUMNS = (
     Column("who", "text", "Text."),
@@ -36,7 +37,7 @@ def drawn(count: int, seed: int) -> list[list[str]]:
     return [
         [
             str(draw.choice(["P001", "größer", "", "NA", "null", "x;y", "1.5"])),
-            str(draw.choice(["2026-11-21T20:00:00", MISSING])),
+            str(draw.choice(["2026-11-21T20:00:00.000+01:00", MISSING])),
             str(draw.choice(["0", "-7", "9007199254740993", MISSING])),
             str(draw.choice([repr(float(draw.random())), "1e-300", "3", MISSING])),
             str(draw.choice(["true", "false", MISSING])),
@@ -45,7 +46,7 @@ def drawn(count: int, seed: int) -> list[list[str]]:
     ]
 
 
-def test_both_parsers_read_the_same(tmp_path: Path) -> None:
+def test_quotes_change_nothing(tmp_path: Path) -> None:
     rows = [drawn(200, 1), [], drawn(300, 2)]
     plain = [written(tmp_path / f"{number}.csv", some) for number, some in enumerate(rows)]
     quoted = [written(tmp_path / f"{number}q.csv", some, quoted=True) for number, some in enumerate(rows)]
@@ -76,13 +77,11 @@ def test_a_sealed_column_that_a_file_lacks_is_missing(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("5,true", "5", "row 2: 4 cells instead of 5"),
-        ("5,true", "5,true,", "row 2: 6 cells instead of 5"),
-        ("5,true", "-5,true", "row 2, column size: '-5' is not a number of at least 0"),
-        ("5,true", "nan,true", "row 2, column size: 'nan'"),
-        ("P2,", "\nP2,", "row 2: 0 cells instead of 5"),
+        ("5,true", "5", "row 3 has 4 cells, not 5"),
+        ("5,true", "5,true,", "row 3 has 6 cells, not 5"),
+        ("P2,", "\nP2,", "row 3 has 0 cells, not 5"),
         ("who", "whom", "does not begin with the columns"),
-        ("P2", '"P2"x', "is damaged"),
+        ("P2", '"P2"x', "is not CSV in UTF-8"),
     ],
 )
 def test_a_damaged_file_is_refused_with_its_row(tmp_path: Path, quoted: bool, old: str, new: str, says: str) -> None:
@@ -93,6 +92,31 @@ def test_a_damaged_file_is_refused_with_its_row(tmp_path: Path, quoted: bool, ol
     with pytest.raises(AnalysisError, match=r"a\.csv") as refused:
         tables([written(tmp_path / "b.csv", drawn(4, 1)), tmp_path / "a.csv"], COLUMNS)
     assert says in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("column", "cell", "permitted"),
+    [
+        ("count", "1_000", "a whole number or n/a"),
+        ("count", " 5", "a whole number or n/a"),
+        ("count", "9" * 20, "a whole number or n/a"),
+        ("size", "-5", "a number of at least 0 or n/a"),
+        ("size", "nan", "a number of at least 0 or n/a"),
+        ("when", "yesterday", "a time with zone or n/a"),
+        ("kept", "True", "true or false or n/a"),
+    ],
+)
+def test_report_and_verify_refuse_the_same_cells_in_the_same_row(
+    tmp_path: Path, column: str, cell: str, permitted: str
+) -> None:
+    rows = drawn(2, 1)
+    rows[1][NAMES.index(column)] = cell
+    path = written(tmp_path / "a.csv", rows)
+    with pytest.raises(AnalysisError, match=r"a\.csv") as refused:
+        tables([path], COLUMNS)
+    sentence = f"{column}: {cell!r} is not {permitted}"
+    assert f"row 3, column {sentence}; " in str(refused.value)
+    assert list(problems(path.read_bytes(), COLUMNS)) == [f"row 3, {sentence}"]
 
 
 def table(rows: list[tuple[str, str, str, float | None]], *, cannot_judge: tuple[int, ...] = ()) -> pd.DataFrame:

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from study_app.store.tables.column import Column, header
+from study_app.store.tables.csv_files import problems
 from study_app.store.verification.psychds import Issue, validate
-from study_app.store.verification.table_checks import problems
 
 DESCRIPTION: dict[str, Any] = {
     "@context": "https://schema.org/",
