@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from study_app.analysis.tables import typed_files
 from study_app.analysis.tables.study_tables import Study, load_study
 from study_app.errors import AnalysisError, StoreError
 from study_app.protocol.load import parse, source_bytes
@@ -218,7 +217,7 @@ def test_the_folder_above_the_studies_names_them(rek: Results) -> None:
     [
         (",immersive,2,4,", ",immersive,2,8,", "column response: '8' is not a whole number from 1 to 7 or n/a"),
         (",immersive,2,4,", ",immersive,2,good,", "column response: 'good'"),
-        (",immersive,2,4,", ",immersive,", "cells instead of"),
+        (",immersive,2,4,", ",immersive,", "cells, not"),
         (",immersive,2,4,", ",imersive,2,4,", "knows no statement 'imersive'"),
         (",L1,immersive,", ",L9,immersive,", "setting 'L9'"),
         (",L1,immersive,", ",L1,feels_liquid,", "stands there twice"),
@@ -293,9 +292,8 @@ def test_an_opened_key_that_was_changed_is_refused(rek: Results) -> None:
         load_study(rek.folder)
 
 
-def test_a_bad_cell_is_found_in_whichever_file_and_row_it_stands(rek: Results, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Files are read some at a time, and the row is counted in its own file."""
-    monkeypatch.setattr(typed_files, "AT_ONCE", 2)
+def test_a_bad_cell_is_found_in_whichever_file_and_row_it_stands(rek: Results) -> None:
+    """The row is counted in its own file, the header as row 1."""
     for number in range(1, 6):
         rek.add(f"P{number:03d}", lambda *_: 4)
     path = rek.responses("P004")
@@ -304,6 +302,6 @@ def test_a_bad_cell_is_found_in_whichever_file_and_row_it_stands(rek: Results, m
     cells[header(RESPONSES).index("changes")] = "99999999999999999999"
     path.write_text("\n".join([*lines[:7], ",".join(cells), *lines[8:]]), encoding="utf-8")
     with pytest.raises(
-        AnalysisError, match=r"subject-P004.*row 7, column changes: '99999999999999999999' is not a whole"
+        AnalysisError, match=r"subject-P004.*row 8, column changes: '99999999999999999999' is not a whole"
     ):
         load_study(rek.folder)
