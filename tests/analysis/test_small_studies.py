@@ -12,7 +12,11 @@ from tests.golden import compare
 
 QUICK = (5, 14, 16)
 SLOW = (0, 1, 6, 7, 9, 11, 12, 15, 17, 19, 23)
-STUDIES = [*QUICK, *(pytest.param(number, marks=pytest.mark.slow) for number in SLOW)]
+STUDIES = [
+    *QUICK,
+    *(pytest.param(number, marks=pytest.mark.slow) for number in SLOW[:3]),
+    *(pytest.param(number, marks=pytest.mark.nightly) for number in SLOW[3:]),
+]
 
 
 @pytest.mark.parametrize("number", STUDIES)

@@ -294,7 +294,7 @@ def test_what_steps_change(designer: Any, flow: Callable[[Record], None], pytest
     record.compare(flow.__name__, pytestconfig)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["rek2024", "viscosityjnd"])
 def test_what_each_tab_shows(designer: Any, name: str, pytestconfig: pytest.Config) -> None:
     record = Record(designer, text_of(name))
@@ -306,7 +306,7 @@ def test_what_each_tab_shows(designer: Any, name: str, pytestconfig: pytest.Conf
 FIELDS = {"rek2024": ("tasks", "scales"), "viscosityjnd": ("designs",)}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(("name", "section"), [(name, one) for name, sections in FIELDS.items() for one in sections])
 def test_each_field_of_a_form_used_once(designer: Any, name: str, section: str, pytestconfig: pytest.Config) -> None:
     record = Record(designer, text_of(name))
