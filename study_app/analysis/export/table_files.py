@@ -7,7 +7,7 @@ from typing import Final, Literal, TypeAlias
 from study_app.analysis.export import spss
 from study_app.analysis.export.codebook import codebook_bytes
 from study_app.analysis.export.delivered import Delivered
-from study_app.analysis.export.table_formats import table_bytes
+from study_app.analysis.export.table_formats import parquet_bytes, table_bytes
 from study_app.analysis.export.wide_table import Cells, QuestionCells
 from study_app.analysis.tables.study_tables import Study
 
@@ -32,8 +32,6 @@ def table_files(
     columns = {file_name(study, table, "csv"): table.columns for table in written}
     files["codebook.json"] = codebook_bytes(study, columns)
     if "parquet" in extras:
-        from study_app.analysis.export.table_formats import parquet_bytes  # noqa: PLC0415 - loads its library where it is asked for
-
         files |= {file_name(study, table, "parquet"): parquet_bytes(table) for table in written}
     if "sav" in extras:
         files[file_name(study, tables[0], "sav")] = spss.long_sav(study, tables[0])

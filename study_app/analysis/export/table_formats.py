@@ -1,16 +1,10 @@
 """A table that is handed out as CSV and as Parquet."""
 
 import io
-from typing import Final
-
-import pyarrow as pa  # type: ignore[import-untyped]
-from pyarrow import parquet
 
 from study_app.analysis.export.delivered import Delivered
 from study_app.store.tables.column import header
 from study_app.store.tables.csv_files import csv_bytes
-
-_TYPES: Final = {"integer": pa.int64(), "number": pa.float64(), "flag": pa.bool_()}
 
 
 def table_bytes(table: Delivered) -> bytes:
@@ -23,10 +17,14 @@ def table_bytes(table: Delivered) -> bytes:
 
 def parquet_bytes(table: Delivered) -> bytes:
     """Return a table as Parquet; every column with its description and unit, points of a scale as Int8."""
+    import pyarrow as pa  # type: ignore[import-untyped]  # noqa: PLC0415 - takes long to load
+    from pyarrow import parquet  # noqa: PLC0415
+
+    types = {"integer": pa.int64(), "number": pa.float64(), "flag": pa.bool_()}
     fields = [
         pa.field(
             one.name,
-            pa.int8() if one.kind == "integer" and (one.maximum or 128) < 128 else _TYPES.get(one.kind, pa.string()),
+            pa.int8() if one.kind == "integer" and (one.maximum or 128) < 128 else types.get(one.kind, pa.string()),
             metadata={name: text for name in ("description", "unit") if (text := getattr(one, name))},
         )
         for one in table.columns

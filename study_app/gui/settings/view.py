@@ -135,7 +135,10 @@ class MachinePlace(Place):
         """Fill the participant's screen with the display test."""
         if self.test is not None:
             return
-        there = self.participants
+        there, screens = self.participants, QGuiApplication.screens()
+        if there.number > len(screens):  # it was unplugged
+            self._show()
+            return
         self.test = DisplayTest(
             "  ·  ".join(filter(None, (f"Screen {there.number}", there.name, there.words))), there.refresh_hz
         )
@@ -143,8 +146,7 @@ class MachinePlace(Place):
         self.test.forgotten.connect(lambda: self.changed.emit({"display_offset": None}))
         self.test.left.connect(self._test_left)
         self.test.show_offset(self.settings.display_offset, there.name)
-        left = QGuiApplication.screens()  # the screen may have been unplugged meanwhile
-        self.test.open_on(left[min(there.number, len(left)) - 1])
+        self.test.open_on(screens[there.number - 1])
 
     def _test_left(self) -> None:
         test, self.test = self.test, None

@@ -20,12 +20,19 @@ class _Cells(NamedTuple):
     read: Callable[[str], Any]
 
 
+def _number(cell: str) -> float:
+    """Return a number; a whole one as a whole number, so that it is written again as it was read."""
+    return int(cell) if re.fullmatch("-?[0-9]{1,15}", cell) else float(cell)
+
+
 _KINDS: Final[dict[Kind, _Cells]] = {
     "text": _Cells("a text", r"[\s\S]*", unguarded),
     "integer": _Cells("a whole number", r"-?[0-9]{1,18}", int),
-    "number": _Cells("a number", r"-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?", float),
+    "number": _Cells("a number", r"-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?", _number),
     "flag": _Cells("true or false", "true|false", "true".__eq__),
-    "time": _Cells("a time with zone", r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}[+-]\d\d:\d\d", str),
+    "time": _Cells(
+        "a time with zone", r"[0-9]{4}(-[0-9]{2}){2}T[0-9]{2}(:[0-9]{2}){2}\.[0-9]{3}[+-][0-9]{2}:[0-9]{2}", str
+    ),
 }
 
 
@@ -61,7 +68,8 @@ class Column:
         if re.fullmatch(self.pattern, cell):
             value = _KINDS[self.kind].read(cell)
             low, high = (-math.inf if self.minimum is None else self.minimum), self.maximum
-            if self.kind not in {"integer", "number"} or low <= value <= (math.inf if high is None else high):
+            bounded = self.kind in {"integer", "number"}
+            if not bounded or (low <= value <= (math.inf if high is None else high) and math.isfinite(value)):
                 return value
         raise ValueError(f"{(cell if len(cell) <= 40 else cell[:39] + '…')!r} is not {self.permitted}")
 

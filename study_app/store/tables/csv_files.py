@@ -52,6 +52,10 @@ def _quoted(text: str) -> str:
     return text
 
 
+def _lines(rows: Iterable[Iterable[str]]) -> bytes:
+    return "".join(f"{','.join(map(_quoted, row))}\n" for row in rows).encode()
+
+
 def cells(table: bytes) -> list[list[str]]:
     """Return the records of a table as texts, the header first.
 
@@ -121,9 +125,12 @@ def in_columns_of(
     names, ours = (one.partition(b"\n")[0].decode("utf-8", "replace").split(",") for one in (held, table))
     there = tuple(column for column in columns if column.name in ours)
     kept = columns_held(names, there, may_lack)
-    table = table if kept == there else csv_bytes(kept, read_table(table, kept))
-    plain = "".join(f"{','.join([_quoted(unguarded(cell)) for cell in row])}\n" for row in cells(table)).encode()
-    return (held if held == plain else table), kept
+    if kept != there:
+        places = [ours.index(column.name) for column in kept]
+        table = _lines([row[place] for place in places] for row in cells(table))
+    if b"'" in table and held == _lines(map(unguarded, row) for row in cells(table)):
+        return held, kept
+    return table, kept
 
 
 def write_columns(path: Path, table: np.recarray[Any, Any]) -> None:

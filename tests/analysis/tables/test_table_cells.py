@@ -102,7 +102,9 @@ def test_a_damaged_file_is_refused_with_its_row(tmp_path: Path, quoted: bool, ol
         ("count", "9" * 20, "a whole number or n/a"),
         ("size", "-5", "a number of at least 0 or n/a"),
         ("size", "nan", "a number of at least 0 or n/a"),
+        ("size", "1e999", "a number of at least 0 or n/a"),
         ("when", "yesterday", "a time with zone or n/a"),
+        ("when", "٢٠٢٦-11-21T20:00:00.000+01:00", "a time with zone or n/a"),
         ("kept", "True", "true or false or n/a"),
     ],
 )
