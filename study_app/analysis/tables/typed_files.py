@@ -1,6 +1,6 @@
 """Reading files of a results folder into typed columns, or saying exactly what is wrong with one and where."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, TypeAlias
 
@@ -41,20 +41,16 @@ def tables(paths: Sequence[Path], columns: tuple[Column, ...]) -> tuple[pd.DataF
         A file cannot be read, or is not the table the dictionary describes: names the file, the row (1 is the
         header), the column and the value.
     """
-    texts: dict[str, list[str]] = {column.name: [] for column in columns}
+    values: dict[str, list[Any]] = {column.name: [] for column in columns}
+    known: dict[str, dict[str, Any]] = {column.name: {} for column in columns}
     lengths = []
     for path in paths:
-        found, rows = _texts(path, columns)
+        texts, rows = _texts(path, columns)
         lengths.append(rows)
-        for name in texts:
-            texts[name] += found.get(name, [MISSING] * rows)
-    ends = np.cumsum(lengths, dtype=np.int64)
-
-    def place(index: int) -> tuple[Path, int]:
-        which = int(np.searchsorted(ends, index, side="right"))
-        return paths[which], int(index - ends[which] + lengths[which]) + 2
-
-    typed = {column.name: _values(column, texts[column.name], place) for column in columns}
+        for column in columns:
+            of_file = texts.get(column.name, [MISSING] * rows)
+            values[column.name] += _values(column, of_file, known[column.name], path)
+    typed = {column.name: pd.array(values[column.name], dtype=DTYPES[column.kind]) for column in columns}
     return pd.DataFrame(typed), np.array(lengths, dtype=np.int64)
 
 
@@ -75,16 +71,16 @@ def _texts(path: Path, columns: tuple[Column, ...]) -> tuple[Mapping[str, Sequen
     return (dict(zip(names, zip(*rows, strict=True), strict=True)) if rows else {}), len(rows)
 
 
-def _values(column: Column, texts: list[str], place: Callable[[int], tuple[Path, int]]) -> Any:
-    """Return the values of a column; every text that occurs is understood once."""
-    known: dict[str, Any] = {MISSING: None}
+def _values(column: Column, texts: Sequence[str], known: dict[str, Any], path: Path) -> list[Any]:
+    """Return the values of a column in a file; ``known`` keeps the value of each text of all files."""
     for text in dict.fromkeys(texts):
         try:
-            known[text] = column.value(text) if text != MISSING or not column.sealed else None
+            if text not in known:
+                known[text] = None if text == MISSING and column.sealed else column.value(text)
         except ValueError as error:
-            path, row = place(texts.index(text))
+            row = texts.index(text) + 2
             raise AnalysisError(f"{path}, row {row}, column {column.name}: {error}; {_again(path)}") from error
-    return pd.array([known[text] for text in texts], dtype=DTYPES[column.kind])
+    return [known[text] for text in texts]
 
 
 def _again(path: Path) -> str:
