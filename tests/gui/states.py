@@ -8,7 +8,7 @@ from typing import Any
 
 from PySide6.QtCore import Qt, QTimer, QUrl
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.app.computer_check import ComputerCheck
 from study_app.devices.descriptor import Backend
@@ -182,7 +182,7 @@ DISPLAY_TEST: Actions = {
 def computer(qtbot: Any) -> QWidget:
     below = QWidget()
     qtbot.addWidget(below)
-    check = ComputerCheck(below, LIGHT, Path(), below.screen())
+    check = ComputerCheck(below, LIGHT, Path(), QApplication.screens()[0])
     made: Any = check.window
     made.below, made.check = below, check
     made.asked.disconnect()  # it would measure

@@ -89,7 +89,7 @@ def test_what_each_state_paints_and_tells(qtbot: Any, name: str, pytestconfig: p
     window.window().hide()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", dict.fromkeys((*WINDOWS, *STATES)))
 def test_what_each_control_does(qtbot: Any, name: str, pytestconfig: pytest.Config) -> None:
     window = opened(qtbot, name) if name in WINDOWS else STATES[name][0](qtbot)
