@@ -110,6 +110,19 @@ class Program:
     def click(self, window: str, place: QPoint) -> None:
         self.xdotool("mousemove", "--window", window, str(place.x()), str(place.y()), "click", "1")
 
+    def click_until(self, window: str, place: QPoint, title: str) -> str:
+        """Click until a window of this title is shown: a click before its button is there has no effect."""
+
+        def click() -> bool:
+            self.click(window, place)
+            deadline = time.monotonic() + 3.0
+            while not self.windows(title) and time.monotonic() < deadline:
+                threading.Event().wait(0.1)
+            return bool(self.windows(title))
+
+        wait_for(click, f"the window {title!r}")
+        return self.windows(title)[-1]
+
     def key(self, window: str, *keys: str) -> None:
         self.xdotool("windowfocus", "--sync", window, "key", "--clearmodifiers", *keys)
 
