@@ -1,5 +1,6 @@
 """What all tests share: no screen, no Qt where its libraries are missing, and no warning that no test expects."""
 
+import functools
 import gc
 import itertools
 import logging
@@ -38,6 +39,13 @@ else:
     QT_IS_HERE = True
 
 
+@functools.cache
+def listed_circles() -> dict[str, str]:
+    """Return circles of tests that run later than their marks say, written by `tests/benchmarks/project/circles.py`."""
+    lines = Path(__file__).with_name("circles.txt").read_text(encoding="utf-8").splitlines()
+    return {name: circle for circle, _, name in (line.partition(" ") for line in lines)}
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the option that writes golden files anew."""
     parser.addoption("--regenerate", action="store_true", help="write the golden files anew; review the difference")
@@ -59,6 +67,8 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     """Do not import modules of slow tests that `-m` leaves out."""
     if "not slow" not in config.option.markexpr or collection_path.suffix != ".py":
         return None
+    if collection_path.relative_to(config.rootpath).as_posix() in listed_circles():
+        return True
     slow = re.search(
         r"^pytestmark = (\[[^\]]*)?pytest\.mark\.slow\b", collection_path.read_text(encoding="utf-8"), re.M
     )
@@ -67,7 +77,12 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the variants of a test as nightly but for n, evenly spread, of `variants(n)`."""
+    """Mark the tests that `circles.txt` lists, and as nightly all but n variants, evenly spread, of `variants(n)`."""
+    listed = listed_circles()
+    for item in items:
+        names = item.nodeid.partition("::")[0], item.nodeid.partition("[")[0], item.nodeid
+        for circle in {listed[name] for name in names if name in listed}:
+            item.add_marker(circle)
     collected: dict[str, list[pytest.Item]] = {}
     for item in items:
         if item.get_closest_marker("variants"):

@@ -183,8 +183,9 @@ def durations(folder: Path, circle: str) -> dict[str, float]:
     """Return how long each test took [s], by its name in the contexts."""
     found = {}
     for case in ElementTree.parse(folder / f"{circle}.xml").iter("testcase"):  # noqa: S314
-        module = case.attrib["classname"].replace(".", "/")
-        found[f"{module}.py::{case.attrib['name']}"] = float(case.attrib["time"])
+        module, _, group = case.attrib["classname"].partition(".Test")
+        within = f"Test{group}::" if group else ""
+        found[f"{module.replace('.', '/')}.py::{within}{case.attrib['name']}"] = float(case.attrib["time"])
     return found
 
 
