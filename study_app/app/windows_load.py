@@ -19,7 +19,7 @@ from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.protocol.load import load, load_scene
-from study_app.protocol.trials.tasks.explore import Explore
+from study_app.protocol.trials.tasks import Explore
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import TaskPage
 from study_app.session.tasks import TaskView

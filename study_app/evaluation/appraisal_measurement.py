@@ -15,7 +15,7 @@ from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.paths import path
 from study_app.haptics.model.scene import Effect, Everywhere, Knee, Scene
 from study_app.haptics.runtime.offline import samples_along, simulate
-from study_app.protocol.trials.tasks.stroke import Stroke
+from study_app.protocol.trials.tasks import Stroke
 
 BATCHES: Final = 60
 RAMP_MPS2: Final = 2.0

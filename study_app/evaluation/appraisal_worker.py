@@ -9,7 +9,7 @@ from typing import TypeAlias
 from study_app.evaluation.appraisal import Costs, Errors
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.scene import Scene
-from study_app.protocol.trials.tasks.stroke import Stroke
+from study_app.protocol.trials.tasks import Stroke
 from study_app.workers.client import WorkerClient
 from study_app.workers.server import Send, Stop
 

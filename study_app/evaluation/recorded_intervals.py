@@ -11,8 +11,7 @@ from study_app.haptics.model.layout import LIMITER_GLITCH
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.offline import law_along
 from study_app.protocol.model import Protocol
-from study_app.protocol.trials.answered import presented_by
-from study_app.protocol.trials.presentation import scene_of
+from study_app.protocol.trials.presentation import presented_by, scene_of
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tracks import adjusting_of, design_of
 from study_app.store.blinded.blinding import Key

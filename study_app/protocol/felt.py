@@ -14,7 +14,7 @@ from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.scene import Box, Everywhere, Liquid, MotionBox, Scene
 from study_app.protocol.model import DeviceNeeds, SceneDefaults
-from study_app.protocol.trials.tasks.stroke import Stroke
+from study_app.protocol.trials.tasks import Stroke
 
 LEAST_N: Final = 0.01
 """Less is not felt: a tenth of the force that a hand at rest notices. [choice]"""

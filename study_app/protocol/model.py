@@ -34,14 +34,10 @@ from study_app.protocol.groups.session_steps import every_step
 from study_app.protocol.table import ExtendedTable, Table
 from study_app.protocol.texts import Body as PageBody
 from study_app.protocol.texts import Description, Id, Language, Localised, text_in
-from study_app.protocol.trials.asked import asked
-from study_app.protocol.trials.kinds import AnyDesign, AnyMethod, default_design
+from study_app.protocol.trials.designs import AnyDesign, asked, default_design
+from study_app.protocol.trials.methods import AnyMethod
 from study_app.protocol.trials.stimuli import Condition, Stimulus
-from study_app.protocol.trials.task import Task
-from study_app.protocol.trials.tasks.explore import Explore
-from study_app.protocol.trials.tasks.follow import Follow
-from study_app.protocol.trials.tasks.reach import Reach
-from study_app.protocol.trials.tasks.stroke import Seconds
+from study_app.protocol.trials.tasks import Explore, Follow, Reach, Seconds, Task
 from study_app.protocol.trials.trial_limits import Limits
 
 __all__ = [

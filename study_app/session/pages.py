@@ -10,7 +10,7 @@ from study_app.protocol.forms.show_if import Value
 from study_app.protocol.questions.choice import ChoiceView
 from study_app.protocol.questions.number import NumberView
 from study_app.protocol.questions.question import ItemView
-from study_app.protocol.trials.task import AnyTask
+from study_app.protocol.trials.tasks import AnyTask
 
 
 @dataclass(frozen=True, slots=True)

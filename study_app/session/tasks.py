@@ -17,11 +17,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.protocol.trials.task import AnyTask
-from study_app.protocol.trials.tasks.explore import Explore
-from study_app.protocol.trials.tasks.follow import Follow
-from study_app.protocol.trials.tasks.reach import Reach
-from study_app.protocol.trials.tasks.stroke import Point
+from study_app.protocol.trials.tasks import AnyTask, Explore, Follow, Point, Reach
 
 Outcome: TypeAlias = Literal["complete", "timeout"]
 

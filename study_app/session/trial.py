@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from study_app.haptics.model.layout import LIMITER_GLITCH
 from study_app.haptics.model.scene import Scene
-from study_app.protocol.trials.task import AnyTask
-from study_app.protocol.trials.tasks.follow import Follow
+from study_app.protocol.trials.tasks import AnyTask, Follow
 from study_app.session.ports import ServoPort
 from study_app.session.tasks import Outcome, TargetReached, TaskView, track
 from study_app.session.transitions.commands import StartTrial

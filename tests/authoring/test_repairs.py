@@ -10,9 +10,9 @@ from study_app.authoring.repairs import repairs
 from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.edits import Set
 from study_app.protocol.describe import describe
-from study_app.protocol.levels.presented_levels import levels
 from study_app.protocol.load import load, shipped
 from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule
+from study_app.protocol.trials.presented_levels import levels
 from tests.authoring.grown import PROTOCOLS
 from tests.protocol.faulty_protocols import CASES, Case
 

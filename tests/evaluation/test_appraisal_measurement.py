@@ -22,9 +22,7 @@ from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Box, Ewma, Given, Kalman, Line, Liquid, MotionBox, Raw, Scene
 from study_app.haptics.runtime.offline import samples_along
 from study_app.protocol.load import load, load_scenes
-from study_app.protocol.trials.tasks.explore import Explore
-from study_app.protocol.trials.tasks.reach import Reach
-from study_app.protocol.trials.tasks.stroke import Stroke
+from study_app.protocol.trials.tasks import Explore, Reach, Stroke
 from tests.haptics.materials import PRESETS, tank
 
 if numba.config.DISABLE_JIT:

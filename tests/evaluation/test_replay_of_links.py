@@ -13,7 +13,7 @@ from study_app.analysis.tables.tracks import tracks
 from study_app.evaluation import replay as replay_module
 from study_app.evaluation.replay import replay
 from study_app.protocol.load import parse
-from study_app.protocol.trials.answered import presented_by
+from study_app.protocol.trials.presentation import presented_by
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.blinding import read_key
 from study_app.store.blinded.sealing import opened

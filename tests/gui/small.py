@@ -12,10 +12,7 @@ from study_app.protocol.questions.question import ItemView
 from study_app.protocol.questions.rating import RatingView
 from study_app.protocol.questions.slider import SliderView
 from study_app.protocol.questions.text import TextView
-from study_app.protocol.trials.task import AnyTask
-from study_app.protocol.trials.tasks.explore import Explore
-from study_app.protocol.trials.tasks.follow import Follow
-from study_app.protocol.trials.tasks.reach import Reach
+from study_app.protocol.trials.tasks import AnyTask, Explore, Follow, Reach
 from study_app.session.pages import Progress, QuestionnairePage, TaskPage, TextPage
 from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView

@@ -8,7 +8,7 @@ from study_app.protocol.groups.own_protocol import variants
 from study_app.protocol.instruments.instrument import instrument, instruments
 from study_app.protocol.load import parse
 from study_app.protocol.orders.block_orders import orders_of
-from study_app.protocol.trials.kinds import DESIGN_KINDS
+from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
 from study_app.protocol.trials.tracks import design_of
 from tests.protocol.groups.grouped import grouped
 

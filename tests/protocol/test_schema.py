@@ -10,7 +10,7 @@ import pytest
 from study_app.protocol.load import SceneFile, shipped
 from study_app.protocol.source.json_schema import editor_schema, schema
 from study_app.protocol.source.schema_reference import format_markdown
-from study_app.protocol.trials.kinds import DESIGN_KINDS
+from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
 from tests.protocol.edited_studies import CASES, STUDIES, cases_of, text_of
 from tests.protocol.forms.mixed import MIXED
 

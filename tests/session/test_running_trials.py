@@ -7,8 +7,7 @@ import pytest
 from study_app.errors import VideoError
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.trials.stimuli import Stimulated
-from study_app.protocol.trials.tasks.explore import Explore
-from study_app.protocol.trials.tasks.follow import Follow
+from study_app.protocol.trials.tasks import Explore, Follow
 from study_app.session.tasks import TaskView
 from study_app.session.transitions.commands import StartTrial
 from study_app.session.trial import SETTLED_S, RunningTrial

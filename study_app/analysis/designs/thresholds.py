@@ -21,8 +21,7 @@ from study_app.analysis.statistics.random_effects import group_mean
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.measures import number_or_none
 from study_app.analysis.tables.tracks import TRACK, answers_of, setting_of
-from study_app.protocol.trials.psychometric import analysis_grid
-from study_app.protocol.trials.stimuli import Stimulus
+from study_app.protocol.trials.stimuli import Stimulus, analysis_grid
 from study_app.psychophysics.families import CLIP, level_at, success
 from study_app.psychophysics.grid import Grid
 

@@ -12,7 +12,7 @@ from study_app.analysis.designs.thresholds import counts_of
 from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.statistics.psychometrics.posterior import narrowing
 from study_app.analysis.tables.level_blocks import LevelBlock
-from study_app.protocol.trials.psychometric import analysis_grid
+from study_app.protocol.trials.stimuli import analysis_grid
 
 Flags = NDArray[np.bool_]
 

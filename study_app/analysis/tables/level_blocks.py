@@ -10,11 +10,10 @@ from study_app.protocol.blocks import Phase
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import every_step_of
 from study_app.protocol.texts import text_in
-from study_app.protocol.trials.designs import Design
-from study_app.protocol.trials.kinds import DESIGN_KINDS, default_design
-from study_app.protocol.trials.method import Method
-from study_app.protocol.trials.psychometric import Assumed, assumed_for, rises
-from study_app.protocol.trials.stimuli import Stimulus
+from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
+from study_app.protocol.trials.designs import Design, default_design
+from study_app.protocol.trials.methods import Method
+from study_app.protocol.trials.stimuli import Assumed, Stimulus, assumed_for, rises
 from study_app.protocol.trials.tracks import design_of, has_correct_answer, method_of, stimulus_of, success_name
 from study_app.store.blinded.blinding import Key
 from study_app.store.blinded.whole_protocol import whole_protocol

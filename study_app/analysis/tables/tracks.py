@@ -9,7 +9,7 @@ import pandas as pd
 
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.study_tables import Study
-from study_app.protocol.trials.method import Answer, TrackSetting
+from study_app.protocol.trials.methods import Answer, TrackSetting
 from study_app.protocol.trials.presentation import arrangement_of
 from study_app.protocol.trials.stimuli import DELAY, FORCE_DELAY, Stimulus
 

@@ -19,7 +19,7 @@ from study_app.gui.theme.theme import Theme
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.model import Protocol
-from study_app.protocol.trials.tasks.stroke import Stroke
+from study_app.protocol.trials.tasks import Stroke
 from study_app.session.preflight import Facts, checks
 from study_app.session.request import NewSession
 from study_app.session.start import Ready, measured

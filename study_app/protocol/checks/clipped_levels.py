@@ -12,7 +12,9 @@ from study_app.haptics.model.slope_limits import slope_limit
 from study_app.haptics.model.steady_state import steady
 from study_app.number_text import counted
 from study_app.protocol.blocks import Block
-from study_app.protocol.levels.presented_levels import (
+from study_app.protocol.model import Follow, Protocol
+from study_app.protocol.source.problems import Fault
+from study_app.protocol.trials.presented_levels import (
     FASTER,
     UNPACED_MPS,
     Level,
@@ -22,8 +24,6 @@ from study_app.protocol.levels.presented_levels import (
     level_limits,
     levels,
 )
-from study_app.protocol.model import Follow, Protocol
-from study_app.protocol.source.problems import Fault
 from study_app.protocol.trials.stimuli import OF_LINK, Stimulus
 from study_app.protocol.trials.tracks import condition_of, stimulus_of
 

@@ -34,7 +34,7 @@ from study_app.protocol.model import (
 from study_app.protocol.source.document import Path, names
 from study_app.protocol.source.problems import Fault
 from study_app.protocol.trials.stimuli import OF_CONDITION
-from study_app.protocol.trials.task import Task
+from study_app.protocol.trials.tasks import Task
 
 DIGITS = 6
 """Conditions whose delays differ by less than a nanosecond present the same."""

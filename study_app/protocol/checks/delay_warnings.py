@@ -13,7 +13,7 @@ from study_app.protocol.checks.returned_energy import longest_ms as longest_retu
 from study_app.protocol.felt import numbers
 from study_app.protocol.load import load
 from study_app.protocol.model import Follow, Protocol
-from study_app.protocol.trials.tasks.stroke import Stroke
+from study_app.protocol.trials.tasks import Stroke
 
 STIRRED: Final = Stroke(frequency_hz=1.061, amplitude_m=0.03)
 """The motion of the stored table: ±30 mm with at most 0.2 m/s."""

@@ -19,9 +19,9 @@ from study_app.protocol.quantities import can_vary
 from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.source.problems import Fault, did_you_mean
 from study_app.protocol.table import Table
-from study_app.protocol.trials.kinds import DESIGN_KINDS, METHOD_KINDS
-from study_app.protocol.trials.psychometric import rises
-from study_app.protocol.trials.stimuli import OF_CONDITION, Stimulus
+from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
+from study_app.protocol.trials.methods import KINDS as METHOD_KINDS
+from study_app.protocol.trials.stimuli import OF_CONDITION, Stimulus, rises
 from study_app.protocol.trials.tracks import (
     condition_of,
     design_of,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ClassVar, Final, TypeAlias
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.designs import Design, Rated
-from study_app.protocol.trials.psychometric import rises
+from study_app.protocol.trials.stimuli import rises
 from study_app.protocol.trials.tracks import (
     design_of,
     has_correct_answer,

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, ClassVar, Final
 
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_means import MeanPlan, expected_mean, mean_plan
-from study_app.protocol.levels.presented_levels import Clipping, clipping
 from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity
 from study_app.protocol.trials.designs import Design
-from study_app.protocol.trials.method import Method, TrackSetting
-from study_app.protocol.trials.psychometric import analysis_grid, guesses_of, rises
-from study_app.protocol.trials.stimuli import Stimulus
+from study_app.protocol.trials.methods import Method, TrackSetting
+from study_app.protocol.trials.presented_levels import Clipping, clipping
+from study_app.protocol.trials.stimuli import Stimulus, analysis_grid, guesses_of, rises
 from study_app.protocol.trials.tracks import design_of, method_of, standards_of, stimulus_of, tracks_of
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.checks.clipped_levels import PACED, clipped_unpaced
 from study_app.protocol.checks.estimator_response import fastest_hz
 from study_app.protocol.checks.expected_precision import imprecise
-from study_app.protocol.levels.presented_levels import highest_damping
 from study_app.protocol.model import Follow, Protocol
+from study_app.protocol.trials.presented_levels import highest_damping
 from study_app.protocol.trials.tracks import design_of, method_of, tracks_of
 
 

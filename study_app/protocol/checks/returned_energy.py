@@ -19,7 +19,7 @@ from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.source.problems import Fault
 from study_app.protocol.trials.presentation import scene_of
 from study_app.protocol.trials.stimuli import Stimulated
-from study_app.protocol.trials.tasks.stroke import Stroke
+from study_app.protocol.trials.tasks import Stroke
 from study_app.protocol.trials.tracks import condition_of, standards_of, stimulus_of
 
 LIMIT_J: Final = 0.5e-3

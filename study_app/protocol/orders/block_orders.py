@@ -16,7 +16,7 @@ from study_app.protocol.groups.group import Group
 from study_app.protocol.groups.session_steps import every_step, numbered_parts, sessions_differ, steps_of
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.order_constraint import Constraint
-from study_app.protocol.trials.method import TrackOrder
+from study_app.protocol.trials.methods import TrackOrder
 from study_app.protocol.trials.tracks import method_of, tracks_of
 
 CodeOrder: TypeAlias = Literal[Order, TrackOrder]

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from study_app.protocol.groups.own_protocol import variants
 from study_app.protocol.model import Block, Explore, Protocol, Questionnaire
 from study_app.protocol.orders.block_orders import order_of
-from study_app.protocol.trials.methods.adjustment import Adjustment
-from study_app.protocol.trials.task import AnyTask
+from study_app.protocol.trials.methods import Adjustment
+from study_app.protocol.trials.tasks import AnyTask
 from study_app.protocol.trials.tracks import design_of, method_of
 
 READING_WORDS_PER_S = 3.0

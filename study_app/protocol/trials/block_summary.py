@@ -11,12 +11,12 @@ from study_app.haptics.model.slope_limits import slope_limit
 from study_app.haptics.model.steady_state import steady
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import precision_rows
-from study_app.protocol.levels.presented_levels import FASTER, highest_damping
 from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity
-from study_app.protocol.trials.methods.adjustment import Adjustment
+from study_app.protocol.trials.methods import Adjustment
+from study_app.protocol.trials.presented_levels import FASTER, highest_damping
 from study_app.protocol.trials.stimuli import DELAY, OF_LINK
-from study_app.protocol.trials.tasks.follow import Follow
+from study_app.protocol.trials.tasks import Follow
 from study_app.protocol.trials.tracks import (
     condition_of,
     design_of,

@@ -8,17 +8,26 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Collection, Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, Protocol, TypeAlias
+from functools import reduce
+from operator import or_
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, Protocol, TypeAlias, get_args
 
 from pydantic import Field
 
 from study_app.haptics.model.ranges import within
+from study_app.protocol.forms.questionnaire import Questionnaire
+from study_app.protocol.questions.choice import Choice, Option
+from study_app.protocol.questions.number import Number
+from study_app.protocol.questions.question import Question
+from study_app.protocol.questions.rating import Rating
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Id, Localised
+from study_app.protocol.wording.languages import words
 
 if TYPE_CHECKING:
     from study_app.psychophysics import detection
     from study_app.psychophysics.detection import Sensitivity
+
 
 Feedback: TypeAlias = Literal["never", "practice", "always"]
 Reply: TypeAlias = Literal["choice", "rating", "number", "setting"]
@@ -443,4 +452,45 @@ class Adjusted(JudgementDesign):
         return ((False, True),) if self.standard else ((True,),)
 
 
-KINDS: Final = (Abx, Adjusted, Estimation, ForcedChoice, Oddity, Rated, SameDifferent, YesNo)
+KINDS: Final[dict[str, type[Design]]] = {
+    kind: design
+    for design in (Abx, Adjusted, Estimation, ForcedChoice, Oddity, Rated, SameDifferent, YesNo)
+    for kind in get_args(design.model_fields["kind"].annotation)
+}
+
+if TYPE_CHECKING:
+    AnyDesign: TypeAlias = Design
+else:
+    AnyDesign = Annotated[reduce(or_, dict.fromkeys(KINDS.values())), Field(discriminator="kind")]
+
+
+def default_design(kind: str) -> Design:
+    """Return a design of a kind with all its defaults (KeyError of an unknown kind)."""
+    return KINDS[kind].model_validate({"kind": kind})
+
+
+LEAST: Final = 1e-9
+"""An estimate is above 0, and no estimate is smaller."""
+
+
+def asked(design: Design, languages: Sequence[str]) -> Questionnaire:
+    """Return what a design asks, in the program's own words where it has none."""
+    text: Localised = design.question or {
+        language: words(language).design_questions[design.wording] for language in languages
+    }
+    return Questionnaire(intro=text, items=(_item(design, text, languages),))
+
+
+def _item(design: Design, text: Localised, languages: Sequence[str]) -> Question:
+    short: Localised = {language: words(language).design_short for language in languages}
+    if design.item is not None:
+        short = design.item.replace("_", " ").capitalize()
+    about = {"id": design.name, "text": text, "short": short}
+    if design.reply == "rating":
+        return Rating(**about, scale=str(getattr(design, "scale", "")))
+    if design.reply == "number":
+        return Number(**about, least=LEAST)
+    if design.reply == "setting":
+        return Number(**about, whole=True, unit="steps")
+    named = {answer: {one: words(one).design_answers[answer] for one in languages} for answer in design.answers}
+    return Choice(**about, options=tuple(Option(id=answer, text=said) for answer, said in named.items()))

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 from study_app.haptics.model.overrides import value_of
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
-from study_app.protocol.trials.designs import Design
-from study_app.protocol.trials.kinds import default_design, default_method
-from study_app.protocol.trials.method import Method
-from study_app.protocol.trials.methods.adjustment import Adjusting, Adjustment
+from study_app.protocol.trials.designs import Design, default_design
+from study_app.protocol.trials.methods import Adjusting, Adjustment, Method, default_method
 from study_app.protocol.trials.stimuli import OF_CONDITION, Stimulus
 
 

@@ -21,7 +21,7 @@ from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Explore, Follow, Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.trials.stimuli import DELAYS, Stimulated
-from study_app.protocol.trials.task import AnyTask
+from study_app.protocol.trials.tasks import AnyTask
 from study_app.session.pages import DesignPage, FeedbackPage, Interval, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import REHEARSED_SCREENS
 from study_app.session.simulated.adjusting_observer import LOOK_S

@@ -16,7 +16,7 @@ from study_app.protocol.forms.show_if import Value, shown
 from study_app.protocol.forms.simulated_observer import Rater, TrialFeatures, judgements
 from study_app.protocol.model import Explore, Follow, Reach
 from study_app.protocol.questions.question import ItemView
-from study_app.protocol.trials.task import AnyTask
+from study_app.protocol.trials.tasks import AnyTask
 from study_app.psychophysics.delivery import lag
 from study_app.session.pages import DesignPage, QuestionnairePage, TextPage
 from study_app.session.simulated.exploration import exploration

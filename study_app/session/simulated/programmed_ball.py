@@ -6,10 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.protocol.orders.schedule import stream
-from study_app.protocol.trials.task import AnyTask
-from study_app.protocol.trials.tasks.explore import Explore
-from study_app.protocol.trials.tasks.follow import Follow
-from study_app.protocol.trials.tasks.reach import Reach
+from study_app.protocol.trials.tasks import AnyTask, Explore, Follow, Reach
 from study_app.session.simulated.exploration import RATE_HZ, exploration
 from study_app.session.tasks import track
 from study_app.session.trial import TankView

@@ -5,7 +5,7 @@ from typing import Any
 
 from study_app.errors import SessionError
 from study_app.protocol.orders.schedule import FormStep
-from study_app.protocol.trials.answered import heard_of
+from study_app.protocol.trials.presentation import heard_of
 from study_app.session.transitions.commands import Write
 from study_app.session.transitions.events import Chosen, ItemShown, Retracted, Submitted
 from study_app.session.transitions.state import Answer, Phase, SessionState

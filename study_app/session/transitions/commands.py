@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
 from study_app.protocol.trials.stimuli import Stimulated
-from study_app.protocol.trials.task import AnyTask
+from study_app.protocol.trials.tasks import AnyTask
 from study_app.session.pages import Page
 
 Status: TypeAlias = Literal["completed", "withdrawn", "aborted", "broken"]

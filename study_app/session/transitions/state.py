@@ -11,11 +11,10 @@ from study_app.protocol.model import Protocol, Questionnaire
 from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial
 from study_app.protocol.questions.question import Context, Question
 from study_app.protocol.trials.designs import Design
-from study_app.protocol.trials.due import Due, next_level
 from study_app.protocol.trials.keyed import Key
-from study_app.protocol.trials.method import Heard
-from study_app.protocol.trials.methods.adjustment import Adjusting, Adjustment
-from study_app.protocol.trials.task import AnyTask, lasting
+from study_app.protocol.trials.methods import Adjusting, Adjustment, Heard
+from study_app.protocol.trials.presentation import Due, next_level
+from study_app.protocol.trials.tasks import AnyTask, lasting
 from study_app.protocol.trials.tracks import adjusting_of, design_of, method_of
 from study_app.session.resume import FIRST, Start
 from study_app.session.transitions.commands import Command

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from study_app.errors import StoreError
-from study_app.protocol.trials.answered import heard_in
+from study_app.protocol.trials.presentation import heard_in
 from study_app.store import receipt
 from study_app.store.blinded.blinding import Key, read_key
 from study_app.store.blinded.sealing import opened

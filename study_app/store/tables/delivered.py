@@ -13,11 +13,9 @@ import numpy as np
 
 from study_app.haptics.model.layout import FORCE_STEP_N, LIMITER_GLITCH, LIMITER_NORM, LIMITER_SATURATED, SAMPLE
 from study_app.protocol.model import Protocol
-from study_app.protocol.trials.due import Due
-from study_app.protocol.trials.presentation import presented_condition
+from study_app.protocol.trials.presentation import Due, presented_condition
 from study_app.protocol.trials.stimuli import DELAY, DELAYS, FORCE_DELAY, OF_CONDITION, Stimulated
-from study_app.protocol.trials.task import AnyTask
-from study_app.protocol.trials.tasks.follow import Follow
+from study_app.protocol.trials.tasks import AnyTask, Follow
 from study_app.protocol.trials.trial_limits import Limits
 from study_app.psychophysics.delivery import Times, Vectors, at, damping, difference, lag, motion, share
 

@@ -18,10 +18,8 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of_receipt
 from study_app.protocol.orders.reproduce import recorded_trials, reproduce
 from study_app.protocol.orders.schedule import Schedule, build_schedule
-from study_app.protocol.trials.answered import heard_in
-from study_app.protocol.trials.due import next_level
 from study_app.protocol.trials.keyed import Key
-from study_app.protocol.trials.presentation import arrangement_text
+from study_app.protocol.trials.presentation import arrangement_text, heard_in, next_level
 from study_app.protocol.trials.tracks import adjusting_of, design_of
 from study_app.store import receipt
 from study_app.store.blinded.blinding import read_key

@@ -17,11 +17,9 @@ from study_app.analysis.results.level_results import ThresholdFound
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.protocol.orders.schedule import build_schedule, draw_key
 from study_app.protocol.streams import stream
-from study_app.protocol.trials.answered import heard_of
-from study_app.protocol.trials.due import Due, next_level
 from study_app.protocol.trials.keyed import Key, draw_secret
-from study_app.protocol.trials.method import Heard
-from study_app.protocol.trials.presentation import arrangement_text
+from study_app.protocol.trials.methods import Heard
+from study_app.protocol.trials.presentation import Due, arrangement_text, heard_of, next_level
 from study_app.protocol.trials.stimuli import DELAYS
 from study_app.protocol.trials.tracks import design_of, method_of, stimulus_of
 from study_app.session.simulated.design_observer import Comparison, Observer

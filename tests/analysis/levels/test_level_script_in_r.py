@@ -15,7 +15,7 @@ from study_app.analysis.report.answers.level_r_script import level_lines
 from study_app.analysis.report.r_script import START
 from study_app.analysis.results.level_results import LevelsFound
 from study_app.analysis.tables.study_tables import Study
-from study_app.protocol.trials.kinds import default_design
+from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.presentation import arrangement_text
 from tests.analysis.levels.level_studies import ONE, ROVING, block
 from tests.analysis.report.read_report import numbers, run_in_r

@@ -32,11 +32,8 @@ from study_app.analysis.results.level_results import (
 from study_app.analysis.results.question_answers import GroupAnswers
 from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.tables.level_blocks import LevelBlock
-from study_app.protocol.trials.designs import Rated
-from study_app.protocol.trials.kinds import default_design
-from study_app.protocol.trials.methods.constant import Constant
-from study_app.protocol.trials.methods.questplus import QuestPlus
-from study_app.protocol.trials.methods.updown import UpDown
+from study_app.protocol.trials.designs import Rated, default_design
+from study_app.protocol.trials.methods import Constant, QuestPlus, UpDown
 from study_app.protocol.trials.stimuli import Stimulus
 from tests.analysis.made_up import delays, everybody, study
 from tests.analysis.outputs import GOLDEN

@@ -14,7 +14,7 @@ from study_app.analysis.designs.adjustment_settings import settings
 from study_app.analysis.report.write_report import report
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.protocol.trials.designs import Adjusted
-from study_app.protocol.trials.kinds import default_method
+from study_app.protocol.trials.methods import default_method
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.blinding import read_key

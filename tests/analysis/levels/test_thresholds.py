@@ -12,12 +12,9 @@ from study_app.analysis.statistics.psychometrics.goodness import p_of_fit
 from study_app.analysis.statistics.psychometrics.posterior import band, fitted
 from study_app.analysis.statistics.random_effects import group_mean
 from study_app.protocol.analysis_plan import Published
-from study_app.protocol.trials.kinds import default_design
-from study_app.protocol.trials.method import Heard, TrackSetting
-from study_app.protocol.trials.methods.questplus import QuestPlus
-from study_app.protocol.trials.methods.updown import UpDown
-from study_app.protocol.trials.psychometric import analysis_grid, assumed_for
-from study_app.protocol.trials.stimuli import Stimulus
+from study_app.protocol.trials.designs import default_design
+from study_app.protocol.trials.methods import Heard, QuestPlus, TrackSetting, UpDown
+from study_app.protocol.trials.stimuli import Stimulus, analysis_grid, assumed_for
 from study_app.psychophysics.families import success
 from tests.analysis.levels.level_studies import LEVELS, NAMES, STIMULUS, block, rows
 

@@ -24,8 +24,8 @@ from study_app.analysis.statistics import (
 from study_app.analysis.statistics.equivalence import power, tost
 from study_app.analysis.statistics.psychometrics import goodness, posterior, settings, threshold
 from study_app.errors import AnalysisError
-from study_app.protocol.trials.kinds import default_design
-from study_app.protocol.trials.psychometric import analysis_grid, assumed_for
+from study_app.protocol.trials.designs import default_design
+from study_app.protocol.trials.stimuli import analysis_grid, assumed_for
 from tests.analysis.levels.level_studies import STIMULUS
 from tests.analysis.outputs import GOLDEN
 from tests.golden import compare, told

@@ -24,7 +24,7 @@ from study_app.haptics.runtime.clocks.grants import NO_THREAD
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.load import load
-from study_app.protocol.trials.tasks.stroke import Stroke
+from study_app.protocol.trials.tasks import Stroke
 from study_app.session.preflight import Facts
 from study_app.session.request import NewSession
 from study_app.session.start import Ready

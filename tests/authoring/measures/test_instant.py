@@ -9,10 +9,10 @@ from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.edits import Set, Unset
 from study_app.haptics.model.slope_limits import slope_limit
-from study_app.protocol.levels.presented_levels import level_limits, levels, standard_of
 from study_app.protocol.load import load, shipped
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s
 from study_app.protocol.source.files import shipped_file
+from study_app.protocol.trials.presented_levels import level_limits, levels, standard_of
 from tests.protocol.faulty_protocols import CASES
 
 

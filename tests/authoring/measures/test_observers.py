@@ -13,7 +13,7 @@ from study_app.authoring.measures.observers import OBSERVERS, PLANTED, GivenUp, 
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
 from study_app.protocol.checks.expected_precision import ThresholdPlan, expected, threshold_plan
-from study_app.protocol.levels.presented_levels import LevelLimits, clipping
+from study_app.protocol.trials.presented_levels import LevelLimits, clipping
 from study_app.viewmodels.designer.measures.measures_view import Controls, focus_of
 
 CLIPPED = Set(("stimuli", "damping", "standards"), [32]), Set(("stimuli", "damping", "levels"), [0.02, 2.0])

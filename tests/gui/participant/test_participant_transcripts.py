@@ -17,7 +17,7 @@ from study_app.protocol.questions.question import ItemView
 from study_app.protocol.questions.rating import RatingView
 from study_app.protocol.questions.slider import SliderView
 from study_app.protocol.questions.text import TextView
-from study_app.protocol.trials.task import lasting
+from study_app.protocol.trials.tasks import lasting
 from study_app.session.pages import (
     ChoicePage,
     EndPage,

@@ -19,9 +19,8 @@ from study_app.protocol.checks.expected_means import (
 )
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.trials.designs import Rated
-from study_app.protocol.trials.kinds import default_design
-from study_app.protocol.trials.methods.constant import Constant
+from study_app.protocol.trials.designs import Rated, default_design
+from study_app.protocol.trials.methods import Constant
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.detection import NORMAL, two_intervals
 from study_app.psychophysics.precision import ESTIMATE_NOISE

@@ -14,7 +14,7 @@ from study_app.protocol.checks.expected_precision import (
     threshold_plan,
 )
 from study_app.protocol.load import examined, parse, read_document
-from study_app.protocol.trials.methods.adjustment import Adjustment
+from study_app.protocol.trials.methods import Adjustment
 
 TEXT = """
 format = 2

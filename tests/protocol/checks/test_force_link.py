@@ -10,7 +10,7 @@ from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.presentation import delays_force, link_seed, scene_of
 from study_app.protocol.trials.stimuli import Stimulated
-from study_app.protocol.trials.tasks.stroke import Stroke
+from study_app.protocol.trials.tasks import Stroke
 from study_app.store.verification.leaks import telltales
 from tests.protocol.edited_studies import text_of
 

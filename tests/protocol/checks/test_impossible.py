@@ -6,8 +6,7 @@ import pytest
 from study_app.haptics.model.motion import Motion
 from study_app.protocol.felt import LEAST_N, force_n
 from study_app.protocol.load import load, shipped
-from study_app.protocol.trials.tasks.explore import Explore
-from study_app.protocol.trials.tasks.stroke import Stroke
+from study_app.protocol.trials.tasks import Explore, Stroke
 from tests.compiled import needs_servo
 
 

@@ -4,10 +4,9 @@ from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule, draw_key
 from study_app.protocol.streams import stream
-from study_app.protocol.trials.answered import heard_of
-from study_app.protocol.trials.due import Due, next_level
 from study_app.protocol.trials.keyed import Key
-from study_app.protocol.trials.method import Heard
+from study_app.protocol.trials.methods import Heard
+from study_app.protocol.trials.presentation import Due, heard_of, next_level
 from study_app.protocol.trials.tracks import design_of
 from tests.protocol.edited_studies import text_of as text_of_study
 

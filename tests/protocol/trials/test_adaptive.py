@@ -8,9 +8,8 @@ import pytest
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.trials.due import next_level
-from study_app.protocol.trials.method import Heard, TrackSetting
-from study_app.protocol.trials.methods.updown import UpDown
+from study_app.protocol.trials.methods import Heard, TrackSetting, UpDown
+from study_app.protocol.trials.presentation import next_level
 from study_app.protocol.trials.tracks import design_of, tracks_of
 from tests.protocol.trials.level_studies import answered, key_of, study
 

@@ -5,9 +5,9 @@ import math
 import pytest
 
 from study_app.protocol.describe import describe
-from study_app.protocol.trials.methods.adjustment import START_SHARE, Adjustment
+from study_app.protocol.trials.methods import START_SHARE, Adjustment
 from study_app.protocol.trials.stimuli import Stimulus
-from study_app.protocol.trials.task import lasting
+from study_app.protocol.trials.tasks import lasting
 from study_app.protocol.trials.tracks import adjusting_of, method_of
 from tests.protocol.trials.level_studies import key_of, run
 from tests.protocol.trials.matching import ALONE, DELAY, matching

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.protocol.trials.designs import Design, Rated
-from study_app.protocol.trials.kinds import DESIGN_KINDS, default_design
+from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
+from study_app.protocol.trials.designs import Design, Rated, default_design
 from study_app.protocol.trials.stimuli import Stimulus
-from study_app.protocol.trials.tasks.follow import Follow
+from study_app.protocol.trials.tasks import Follow
 
 
 def stimulus(**keys: Any) -> Stimulus:

@@ -8,7 +8,7 @@ import pytest
 from study_app.haptics.model.layout import LIMITER_GLITCH, LIMITER_NORM, SAMPLE
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.trials.due import Due
+from study_app.protocol.trials.presentation import Due
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.store.tables.delivered import delay_error_ms, delivered, delivered_error, judged, missed, undelivered
 

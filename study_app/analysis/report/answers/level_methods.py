@@ -8,7 +8,7 @@ from study_app.analysis.results.words import listed
 from study_app.analysis.statistics.psychometrics.goodness import SETS
 from study_app.analysis.statistics.random_effects import FEWEST
 from study_app.analysis.tables.level_blocks import LevelBlock
-from study_app.protocol.trials.psychometric import ANALYSIS_LAPSES
+from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES
 
 FAMILIES: Final = {"weibull": "Weibull", "normal": "cumulative normal", "logistic": "logistic"}
 LEVELS: Final = {"weber": "Weber fractions", "difference": "differences", "value": "values"}

@@ -13,7 +13,7 @@ from study_app.analysis.results.level_results import (
 )
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.study_tables import Study
-from study_app.protocol.trials.methods.updown import UpDown
+from study_app.protocol.trials.methods import UpDown
 
 START: Final = """
 # Blocks with a design: d' and criterion, means of reversals, random-effects means with Hartung-Knapp intervals,

@@ -9,9 +9,9 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.measures.participant_texts import text_keys
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import ThresholdPlan, threshold_plan
-from study_app.protocol.levels.presented_levels import clipping
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import value_at
+from study_app.protocol.trials.presented_levels import clipping
 from study_app.viewmodels.designer.measures.measures_view import Controls, Focus
 
 PLANNED: Final = ("analysis", "participants")

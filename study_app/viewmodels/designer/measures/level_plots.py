@@ -11,7 +11,9 @@ from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
 from study_app.number_text import counted
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.clipped_levels import clipped, clipped_unpaced
-from study_app.protocol.levels.presented_levels import (
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.block_orders import BlockOrder
+from study_app.protocol.trials.presented_levels import (
     Clipping,
     Level,
     LevelLimits,
@@ -20,8 +22,6 @@ from study_app.protocol.levels.presented_levels import (
     levels,
     standard_of,
 )
-from study_app.protocol.model import Protocol
-from study_app.protocol.orders.block_orders import BlockOrder
 from study_app.protocol.trials.tracks import design_of, stimulus_of
 from study_app.viewmodels.designer.measures.level_words import LevelWords, even_ticks, rounded
 from study_app.viewmodels.designer.measures.number_cards import (

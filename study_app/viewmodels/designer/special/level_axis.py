@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Row
-from study_app.protocol.trials.kinds import default_design
+from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.viewmodels.designer.form.row_facts import RowFacts
 from study_app.viewmodels.designer.measures.level_plots import level_block

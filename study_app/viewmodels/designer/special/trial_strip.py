@@ -9,8 +9,8 @@ from study_app.protocol.model import Follow, Reach
 from study_app.protocol.orders.durations import ANSWER_S, CHOICE_S
 from study_app.protocol.source.document import Path
 from study_app.protocol.trials.designs import ORDINALS
-from study_app.protocol.trials.methods.adjustment import Adjustment
-from study_app.protocol.trials.task import AnyTask
+from study_app.protocol.trials.methods import Adjustment
+from study_app.protocol.trials.tasks import AnyTask
 from study_app.protocol.trials.tracks import design_of, method_of
 from study_app.viewmodels.designer.form.row_facts import RowFacts
 from study_app.viewmodels.number_words import duration, exact_duration

@@ -20,6 +20,7 @@ from study_app.protocol.trials.tracks import condition_of, method_of, standards_
 if TYPE_CHECKING:
     from study_app.psychophysics.families import Floats
 
+
 FASTER: Final = 1.2
 """A hand exceeds the pace of its target by up to a fifth. [choice]"""
 UNPACED_MPS: Final = 0.3

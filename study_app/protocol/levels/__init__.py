@@ -1,1 +1,0 @@
-"""Levels of stimuli as they are presented."""

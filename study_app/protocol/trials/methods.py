@@ -1,0 +1,692 @@
+"""Methods: how many trials a track has, and the level of each.
+
+`Method` says what each kind must state; a kind is a subclass in `KINDS`.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from operator import or_
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, TypeAlias
+
+from pydantic import Field
+
+from study_app.haptics.model.ranges import within
+from study_app.number_text import counted
+from study_app.protocol.streams import Draw, shuffle
+from study_app.protocol.table import Table
+from study_app.protocol.trials.designs import Design
+from study_app.protocol.trials.stimuli import (
+    CONSTANT_LEVELS,
+    LAPSES,
+    LEVELS_MOST,
+    Assumed,
+    Family,
+    Stimulus,
+    assumed_for,
+    ratio_in_u,
+    running_grid,
+)
+from study_app.psychophysics.updown import RATIOS, Staircase, converges_to
+
+if TYPE_CHECKING:
+    from numpy.random import Generator
+
+    from study_app.psychophysics.families import Floats
+    from study_app.psychophysics.questplus import Search
+    from study_app.psychophysics.simulated_tracks import Answers, Observers
+
+
+TrackOrder: TypeAlias = Literal["interleaved", "blocked"]
+Answer: TypeAlias = tuple[float, bool]
+"""The level of a comparison, and whether the answer was a success."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrackSetting:
+    """What a method chooses levels for.
+
+    Attributes
+    ----------
+    stimulus : Stimulus
+        What is varied.
+    design : Design
+        How a trial is built.
+    number : int
+        Which of the tracks of its standard, from 1.
+    """
+
+    stimulus: Stimulus
+    design: Design
+    number: int
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Heard:
+    """One answered trial: its last attempt, confirmed; never printed, since it reveals a level.
+
+    Attributes
+    ----------
+    trial : int
+        The trial's number in the session.
+    code : str
+        The code of its track.
+    level : float
+        The level that was presented.
+    success : bool or None
+        Whether the answer was correct; for yes–no whether it was yes; "comparison chosen" where no answer is correct;
+        None where the answer enters no psychometric function.
+    correct : bool or None
+        Whether the answer was correct; None where no answer is.
+    catch : bool
+        Whether it was a catch trial: no level follows from its answer.
+    noise : bool
+        Whether it presented the standard alone, so that it has no level of its own.
+    """
+
+    trial: int
+    code: str
+    level: float
+    success: bool | None
+    correct: bool | None
+    catch: bool = False
+    noise: bool = False
+
+
+class Method(Table):
+    """How the levels of a track are chosen: the keys that all kinds share, and what each kind must say.
+
+    A kind is a subclass whose ``kind`` is a ``Literal`` with a default, in `KINDS`.
+    """
+
+    if TYPE_CHECKING:
+        kind: str
+
+    order: TrackOrder = Field(
+        default="interleaved",
+        description="interleaved: the tracks alternate in random order; blocked: one follows another.",
+    )
+
+    tracks: Annotated[int, Field(ge=1, le=4)] = Field(default=1, description="How many tracks each standard has.")
+
+    adaptive: ClassVar[bool] = True
+    """Whether answers choose the next level."""
+    adjusts: ClassVar[bool] = False
+    """Whether its levels are those at which settings start, so that the design must be "adjustment"."""
+
+    @property
+    def name(self) -> str:
+        """Its kind."""
+        return self.kind
+
+    @property
+    def paper_name(self) -> str:
+        """What a paper calls it, with its source."""
+        return self.kind
+
+    @abstractmethod
+    def presentations(self, stimulus: Stimulus) -> int:
+        """Return how many comparisons one track presents at most."""
+
+    @abstractmethod
+    def asked(self, stimulus: Stimulus) -> tuple[float, ...]:
+        """Return levels that include the smallest and the largest that it can present."""
+
+    @abstractmethod
+    def level(self, track: TrackSetting, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float:
+        """Return the level of a track's comparison ``number`` (from 0), where the track has not ended.
+
+        Parameters
+        ----------
+        track : TrackSetting
+            What is varied, and how it is asked.
+        number : int
+            Which comparison of the track.
+        heard : sequence of Heard
+            The track's earlier answers, in the order of presentation.
+        draws : sequence of callable
+            Secret uniform numbers in [0, 1), one source per round of levels.
+        """
+
+    def assumed(self, stimulus: Stimulus, design: Design) -> Assumed:
+        """Return what is assumed about the psychometric function of its answers."""
+        return assumed_for(stimulus, design)
+
+    def ended(self, track: TrackSetting, heard: Sequence[Heard]) -> bool:
+        """Return whether a track has ended with these answers, before its last trial."""
+        return False
+
+    def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
+        """Yield what is wrong with it for a stimulus: the key, a message and a hint."""
+        return iter(())
+
+    def warnings(self) -> Iterator[tuple[str, str]]:
+        """Yield what is permitted and may still be a mistake: the key and a sentence."""
+        return iter(())
+
+    def target(self, guess: float | None, success: str) -> str | None:
+        """Return in words which share of successes its levels aim at; None: at none.
+
+        Parameters
+        ----------
+        guess : float or None
+            The share of successes by guessing, 0 where no answer is correct; None: it is free.
+        success : str
+            What is counted, such as "correct".
+        """
+        return None
+
+    @property
+    def target_percent(self) -> float | None:
+        """The percentage of successes at the mean of its reversals; None where it has no steps."""
+        return None
+
+    def reversals(self, track: TrackSetting, answers: Sequence[Answer]) -> tuple[int, ...]:
+        """Return the places, from 0, of a track's answers at which its direction changed; none if it has no steps."""
+        return ()
+
+    def reversal_mean(self, track: TrackSetting, answers: Sequence[Answer]) -> float | None:
+        """Return the classical estimate of a track, a level; None where it has none."""
+        return None
+
+    def simulated(
+        self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None
+    ) -> Answers | None:
+        """Return the answers of simulated observers to one track each; None: the method has no such tracks.
+
+        Parameters
+        ----------
+        track : TrackSetting
+            What is varied, and how it is asked.
+        observers : Observers
+            Who answers.
+        random : random.Generator
+            Where their answers are drawn from.
+        noise : (tracks, noise trials) array or None
+            The uniform numbers of the answers to noise trials.
+        """
+        return None
+
+    def rounds(self, stimulus: Stimulus) -> int:
+        """Return how many rounds of drawn levels a track has."""
+        return 0
+
+
+Trials = Annotated[int, within(1, 1000, "no participant answers more in one track")]
+
+
+class Adaptive(Method):
+    """A method that chooses each level from the answers to the levels before."""
+
+    trials: Trials = Field(
+        default=60, description="How many trials each standard has at most, divided among its tracks."
+    )
+    begin: Annotated[tuple[float, ...], Field(max_length=4)] | float | None = Field(
+        default=None, description="The first level, or that of each track."
+    )
+
+    def presentations(self, stimulus: Stimulus) -> int:
+        """Return the trials of one track."""
+        return self.trials // self.tracks
+
+    def asked(self, stimulus: Stimulus) -> tuple[float, ...]:
+        """Return the grid of the stimulus."""
+        return stimulus.grid
+
+    def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
+        """Yield what is wrong with the number of trials and with the first levels."""
+        if self.trials % self.tracks:
+            message = f"{self.trials} trials cannot be divided among {self.tracks} tracks"
+            yield "trials", message, f"a multiple of {self.tracks}"
+        least, most = stimulus.levels
+        begin = self.begin if isinstance(self.begin, tuple) else () if self.begin is None else (self.begin,)
+        hint = f"one for each track, {least:g} to {most:g}"
+        if isinstance(self.begin, tuple) and len(begin) != self.tracks:
+            yield "begin", f"{counted(len(begin), 'level')} for {counted(self.tracks, 'track')}", hint
+        for level in begin:
+            if not least <= level <= most:
+                yield "begin", f"{level:g} is not within levels", hint
+
+    def first(self, track: int) -> float | None:
+        """Return the first level of a track (from 1) as it is written; None: the method's own."""
+        return self.begin[track - 1] if isinstance(self.begin, tuple) else self.begin
+
+    def level(self, track: TrackSetting, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float:
+        """Return the level of comparison ``number``: that after the answers so far."""
+        return self.after(track, heard)
+
+    @abstractmethod
+    def after(self, track: TrackSetting, heard: Sequence[Heard]) -> float:
+        """Return the level after these answers."""
+
+
+STEPS: Final = 40
+"""Steps from the smallest level to the largest, by default."""
+START_SHARE: Final = 0.125
+"""A setting starts within this share of the span from an end: the same number of steps is not right every time."""
+_ROUNDING: Final = 1e-9
+
+
+class Adjustment(Method):
+    """Settings start alternately near the smallest and near the largest level; which is first is drawn."""
+
+    kind: Literal["adjustment"] = "adjustment"
+    adaptive: ClassVar[bool] = False
+    adjusts: ClassVar[bool] = True
+    repetitions: Annotated[int, Field(ge=1, le=1000)] = Field(
+        default=10, description="How many settings each track has."
+    )
+    step_size: Annotated[float, within(1e-6, 1e6, "a step is at least 1e-6 and at most 1e6")] | None = Field(
+        default=None, description="A step: a factor on log spacing, else a difference; default: a 40th of the span."
+    )
+    most_s: Annotated[float, within(2, 600, "a hand needs 2 s to feel a change, and tires within minutes")] = Field(
+        default=60, description="Longest time for a setting [s]."
+    )
+
+    def asked(self, stimulus: Stimulus) -> tuple[float, ...]:
+        """Return the ends: every level between them can be set."""
+        return stimulus.levels
+
+    def presentations(self, stimulus: Stimulus) -> int:
+        """Return the settings of one track."""
+        return self.repetitions
+
+    def rounds(self, stimulus: Stimulus) -> int:
+        """Return the settings: each has a source of its own."""
+        return self.repetitions
+
+    def level(self, track: TrackSetting, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float:
+        """Return the level at which setting ``number`` starts: earlier settings change nothing."""
+        low, high = track.stimulus.domain
+        first_at_low = draws[0]() < 0.5
+        away = START_SHARE * (high - low) * draws[number]()
+        return track.stimulus.level_of(low + away if first_at_low is (number % 2 == 0) else high - away)
+
+    def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
+        """Yield that a step leads nowhere, or beyond all levels."""
+        low, high = stimulus.domain
+        if stimulus.spacing == "log" and self.step_size is not None and self.step_size <= 1:
+            yield "step_size", f"is {self.step_size:g}; on log spacing a step is a factor above 1", "such as 1.05"
+        elif self.step(stimulus) > (high - low) / 2:
+            most = stimulus.level_of((high - low) / 4)
+            yield "step_size", f"is {self.step_size:g}: more than half the range of levels", f"such as {most:.3g}"
+
+    def warnings(self) -> Iterator[tuple[str, str]]:
+        """Yield that the settings cannot start equally often at both ends."""
+        if self.repetitions % 2:
+            message = f"{self.repetitions} settings cannot start equally often at both ends: choose an even number"
+            yield "repetitions", message
+
+    def adjusting(self, stimulus: Stimulus, standard: float | None, start: float) -> Adjusting:
+        """Return a setting that starts at a level."""
+        low, high = (stimulus.comparison(standard, level) for level in stimulus.levels)
+        step = self.step(stimulus)
+        return Adjusting(stimulus, standard, start, step if high > low else -step)
+
+    def step(self, stimulus: Stimulus) -> float:
+        """Return how far a step goes, in u."""
+        low, high = stimulus.domain
+        return (high - low) / STEPS if self.step_size is None else stimulus.coordinate(self.step_size)
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Adjusting:
+    """One setting: from which level it starts, and what its steps lead to; never printed, since it reveals the level.
+
+    A place is a number of steps from the start, above 0 towards more of the varied number. Places end with the levels.
+
+    Attributes
+    ----------
+    stimulus : Stimulus
+        What is varied.
+    standard : float or None
+        The standard, in the unit of the varied number.
+    start : float
+        The starting level.
+    step : float
+        What a step adds to u; below 0 where more of the number is a smaller level.
+    """
+
+    stimulus: Stimulus
+    standard: float | None
+    start: float
+    step: float
+
+    def moved(self, place: int, steps: int) -> int:
+        """Return the place that steps lead to: beyond the first place at an end there is none."""
+        ends = [(end - self.stimulus.coordinate(self.start)) / self.step for end in self.stimulus.domain]
+        least, most = math.floor(min(ends) + _ROUNDING), math.ceil(max(ends) - _ROUNDING)
+        return min(max(place + steps, least), most)
+
+    def level(self, place: int) -> float:
+        """Return the level at a place."""
+        if place == 0:
+            return self.start
+        low, high = self.stimulus.levels
+        return min(max(self.stimulus.level_of(self.stimulus.coordinate(self.start) + place * self.step), low), high)
+
+    def comparison(self, place: int) -> float:
+        """Return the varied number at a place, in its unit."""
+        return self.stimulus.comparison(self.standard, self.level(place))
+
+    def reached(self, steps: Iterable[int]) -> int:
+        """Return the place that a setting reached by these steps, in their order."""
+        place = 0
+        for one in steps:
+            place = self.moved(place, one)
+        return place
+
+
+Count = Annotated[int, Field(ge=1, le=LEVELS_MOST)]
+Listed = Annotated[tuple[float, ...], Field(min_length=1, max_length=LEVELS_MOST)]
+
+
+class Constant(Method):
+    """Every round presents every level once, in a random order of its own."""
+
+    kind: Literal["constant"] = "constant"
+    adaptive: ClassVar[bool] = False
+    levels: Count | Listed = Field(
+        default=CONSTANT_LEVELS, description="The levels, or how many, evenly spaced over the stimulus' range."
+    )
+    repetitions: Annotated[int, Field(ge=1, le=1000)] = Field(
+        default=20, description="How often each level is presented."
+    )
+
+    @property
+    def paper_name(self) -> str:
+        """What a paper calls it."""
+        return "the method of constant stimuli"
+
+    def asked(self, stimulus: Stimulus) -> tuple[float, ...]:
+        """Return the levels that are presented, in the order written."""
+        return stimulus.spaced(self.levels) if isinstance(self.levels, int) else self.levels
+
+    def presentations(self, stimulus: Stimulus) -> int:
+        """Return levels × repetitions."""
+        return len(self.asked(stimulus)) * self.repetitions
+
+    def rounds(self, stimulus: Stimulus) -> int:
+        """Return the repetitions."""
+        return self.repetitions
+
+    def level(self, track: TrackSetting, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float:
+        """Return the level of comparison ``number``: answers change nothing."""
+        levels = self.asked(track.stimulus)
+        return shuffle(levels, draws[number // len(levels)])[number % len(levels)]
+
+    def simulated(self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None) -> Answers:
+        """Return the answers of simulated observers to every level, equally often."""
+        from study_app.psychophysics.simulated_tracks import constant_tracks  # noqa: PLC0415 - loads numpy
+
+        levels = [track.stimulus.coordinate(level) for level in self.asked(track.stimulus)]
+        draws = random.random((len(observers.thresholds), len(levels) * self.repetitions))
+        return constant_tracks(levels, self.repetitions, observers, draws)
+
+
+Positive = Annotated[float, within(1e-6, 1e6, "a function is neither a step nor flat")]
+Lapse = Annotated[float, Field(ge=0, lt=0.5)]
+
+
+class Precision(Table):
+    """When a track ends early: once the threshold's 95 % interval is narrow enough."""
+
+    ratio: Annotated[float, Field(gt=1, le=1e12)] = Field(description="Its upper end over its lower end, at most.")
+    after: Trials = Field(default=30, description="After how many answers at the earliest.")
+
+
+class QuestPlus(Adaptive):
+    """The level after whose answer the least uncertainty about the threshold is expected."""
+
+    kind: Literal["questplus"] = "questplus"
+    learn: Literal["threshold", "all"] = Field(
+        default="threshold",
+        description="threshold: the entropy of the threshold is minimised; all: that of all parameters.",
+    )
+    family: Family | None = Field(
+        default=None,
+        description="weibull: a Weibull function, the default for distances; normal: a cumulative normal, the default "
+        "otherwise; logistic: a logistic function.",
+    )
+    widths: tuple[Positive, Positive] | None = Field(
+        default=None, description="Smallest and largest width, from 5 to 95 % [decades, or units of the level]."
+    )
+    width_prior: tuple[Positive, Annotated[float, Field(gt=1, le=1e6)]] | None = Field(
+        default=None, description="Median and factor of the width's log-normal prior."
+    )
+    lapses: Annotated[tuple[Lapse, ...], Field(min_length=1, max_length=10)] = Field(
+        default=LAPSES, description="Lapse rates that are considered."
+    )
+    stop: Precision | None = Field(default=None, description="When a track ends early; left out: never.")
+
+    def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
+        """Yield what is wrong with its keys, too."""
+        yield from super().faults(stimulus)
+        if self.widths is not None and not self.widths[0] < self.widths[1]:
+            low, high = self.widths
+            yield "widths", f"{low:g} and {high:g}: the first width must be the smaller", ""
+        if self.family == "weibull" and stimulus.spacing == "linear":
+            yield "family", '"weibull" is a function of the logarithm of a level', 'spacing = "log", or "normal"'
+
+    @property
+    def paper_name(self) -> str:
+        """What a paper calls it, with its source."""
+        what, prins = ("the threshold", "; Prins 2013") if self.learn == "threshold" else ("all parameters", "")
+        return f"QUEST+, which minimises the expected entropy of {what} (Watson 2017{prins})"
+
+    def target(self, guess: float | None, success: str) -> str | None:
+        """Return the percentage of the threshold."""
+        return None if guess is None else f"threshold at {50 * (1 + guess):.3g} % {success}"
+
+    def ended(self, track: TrackSetting, heard: Sequence[Heard]) -> bool:
+        """Return whether the threshold's interval is narrow enough."""
+        if self.stop is None or sum(not one.noise for one in heard) < self.stop.after:
+            return False
+        search, counts = self._search(track), self._counts(track, heard)
+        return ratio_in_u(track.stimulus, *search.interval(*counts)) <= self.stop.ratio
+
+    def after(self, track: TrackSetting, heard: Sequence[Heard]) -> float:
+        """Return the level after these answers: their order does not matter."""
+        levels = _levels(track)
+        if all(one.noise for one in heard) and (first := self.first(track.number)) is not None:
+            return levels[_nearest(_coordinates(track), track.stimulus.coordinate(first))]
+        return levels[self._search(track).next(*self._counts(track, heard))]
+
+    def simulated(self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None) -> Answers:
+        """Return the tracks of simulated observers; a track ends early only where levels have logarithms."""
+        from study_app.psychophysics.simulated_tracks import search_tracks  # noqa: PLC0415 - loads numpy
+
+        draws = random.random((len(observers.thresholds), self.presentations(track.stimulus)))
+        first, log = self.first(track.number), track.stimulus.spacing == "log"
+        begin = None if first is None else _nearest(_coordinates(track), track.stimulus.coordinate(first))
+        stop = None if self.stop is None or not log else (math.log10(self.stop.ratio), self.stop.after)
+        return search_tracks(self._search(track), observers, draws, begin, noise, stop)
+
+    def assumed(self, stimulus: Stimulus, design: Design) -> Assumed:
+        """Return the family and the prior on the width that its keys state, else the defaults."""
+        default = assumed_for(stimulus, design)
+        return Assumed(
+            self.family or default.family, self.widths or default.widths, self.width_prior or default.width_prior
+        )
+
+    def _search(self, track: TrackSetting) -> Search:
+        from study_app.psychophysics.questplus import search_of  # noqa: PLC0415 - loads numpy
+
+        stimulus, design = track.stimulus, track.design
+        grid = running_grid(stimulus, design, self.assumed(stimulus, design), self.lapses)
+        return search_of(grid, _coordinates(track), self.learn, design.has_noise)
+
+    def _counts(self, track: TrackSetting, heard: Sequence[Heard]) -> tuple[list[int], list[int]]:
+        """Return successes and failures at each level."""
+        coordinates = _coordinates(track)
+        counts = ([0] * len(coordinates), [0] * len(coordinates))
+        for (level, success), number in Counter((one.level, bool(one.success)) for one in heard).items():
+            counts[0 if success else 1][_nearest(coordinates, track.stimulus.coordinate(level))] += number
+        return counts
+
+
+def _levels(track: TrackSetting) -> tuple[float, ...]:
+    """Return the levels of a track's trials, ascending: the grid, after 0 where there are noise trials."""
+    return (0.0, *track.stimulus.grid) if track.design.has_noise else track.stimulus.grid
+
+
+def _coordinates(track: TrackSetting) -> tuple[float, ...]:
+    return tuple(track.stimulus.coordinate(level) for level in _levels(track))
+
+
+def _nearest(coordinates: Sequence[float], u: float) -> int:
+    """Return the index of the coordinate that is nearest to ``u``; of two the lower."""
+    if u == coordinates[0]:
+        return 0  # also −∞, that of noise trials
+    return min(range(len(coordinates)), key=lambda index: abs(coordinates[index] - u))
+
+
+class Reversals(Table):
+    """When a track ends early: after so many changes of direction."""
+
+    reversals: Trials = Field(description="How many reversals, at least.")
+    after: Trials = Field(default=1, description="After how many answers at the earliest.")
+
+
+class UpDown(Adaptive):
+    """A step down after successes in a row, a step up after each failure."""
+
+    kind: Literal["updown"] = "updown"
+    rule: Literal["1down1up", "2down1up", "3down1up", "4down1up"] = Field(
+        default="2down1up",
+        description="1down1up: a step down after each success; 2down1up: after 2 successes in a row; 3down1up: after "
+        "3; 4down1up: after 4.",
+    )
+    step_up: Annotated[float, within(1e-6, 1e6, "a step is at least 1e-6 and at most 1e6")] | None = Field(
+        default=None,
+        description="Step after a failure: a factor on log spacing, else a difference; default: a tenth of the span.",
+    )
+    ratio: Annotated[float, Field(gt=0, le=10)] | None = Field(
+        default=None, description="Step down over step up; default: that of García-Pérez for the rule."
+    )
+    average: Annotated[int, Field(ge=2, le=100)] = Field(
+        default=8, description="How many of the last reversals are averaged at most."
+    )
+    stop: Reversals | None = Field(default=None, description="When a track ends early; left out: never.")
+
+    def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
+        """Yield what is wrong with its keys, too."""
+        yield from super().faults(stimulus)
+        if stimulus.spacing == "log" and self.step_up is not None and self.step_up <= 1:
+            yield "step_up", f"is {self.step_up:g}; on log spacing a step is a factor above 1", "such as 1.4"
+
+    def warnings(self) -> Iterator[tuple[str, str]]:
+        """Yield that a ratio converges for small steps alone, and that one track can be predicted."""
+        if self.ratio is not None and self.ratio != self._published_ratio:
+            reached, published = (
+                100 * converges_to(int(self.rule[0]), ratio) for ratio in (self.ratio, self._published_ratio)
+            )
+            yield (
+                "ratio",
+                f"{self.rule} with ratio {self.ratio:g} converges to {reached:.1f} % for small steps alone: "
+                f"omit ratio: {published:.1f} % for any step",
+            )
+        if self.tracks == 1:
+            yield "tracks", "participants can predict a single up–down track: choose tracks = 2"
+
+    def target(self, guess: float | None, success: str) -> str | None:
+        """Return the percentage to which it converges."""
+        return f"converges to {self.target_percent:.1f} % {success}"
+
+    @property
+    def paper_name(self) -> str:
+        """What a paper calls it, with its source."""
+        return (
+            f"weighted up–down tracks ({self.rule}, steps down {self._ratio:.4g} of those up; García-Pérez 1998), "
+            f"which converge to {self.target_percent:.1f} %"
+        )
+
+    @property
+    def target_percent(self) -> float:
+        """The percentage to which the rule converges."""
+        return 100 * converges_to(int(self.rule[0]), self._ratio)
+
+    @property
+    def _ratio(self) -> float:
+        return self._published_ratio if self.ratio is None else self.ratio
+
+    @property
+    def _published_ratio(self) -> float:
+        return RATIOS[int(self.rule[0])]
+
+    def ended(self, track: TrackSetting, heard: Sequence[Heard]) -> bool:
+        """Return whether there are as many reversals as asked for."""
+        if self.stop is None:
+            return False
+        answers = _answers(track, heard)
+        reversals = self.staircase(track.stimulus, track.number).reversals(answers)
+        return len(answers) >= self.stop.after and len(reversals) >= self.stop.reversals
+
+    def after(self, track: TrackSetting, heard: Sequence[Heard]) -> float:
+        """Return the level after these answers: a step from the last one, or that one again."""
+        low, high = track.stimulus.levels
+        u = self.staircase(track.stimulus, track.number).next(_answers(track, heard))
+        return min(max(track.stimulus.level_of(u), low), high)
+
+    def simulated(self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None) -> Answers:
+        """Return the tracks of simulated observers."""
+        from study_app.psychophysics.simulated_tracks import staircase_tracks  # noqa: PLC0415 - loads numpy
+
+        draws = random.random((len(observers.thresholds), self.presentations(track.stimulus)))
+        stop = None if self.stop is None else (self.stop.reversals, self.stop.after)
+        return staircase_tracks(self.staircase(track.stimulus, track.number), observers, draws, stop)
+
+    def reversals(self, track: TrackSetting, answers: Sequence[Answer]) -> tuple[int, ...]:
+        """Return the places of the answers at which the direction changed."""
+        return tuple(self.staircase(track.stimulus, track.number).reversals_at(_in_u(track.stimulus, answers)))
+
+    def reversal_mean(self, track: TrackSetting, answers: Sequence[Answer]) -> float | None:
+        """Return the level of the mean of the last reversals; None where there are too few."""
+        staircase = self.staircase(track.stimulus, track.number)
+        mean = staircase.mean_of_reversals(_in_u(track.stimulus, answers), self.average)
+        return None if mean is None else track.stimulus.level_of(mean)
+
+    def staircase(self, stimulus: Stimulus, track: int) -> Staircase:
+        """Return the rule for a stimulus, in the coordinate u; ``track`` counts from 1."""
+        low, high = stimulus.domain
+        first = self.first(track)
+        return Staircase(
+            down_after=int(self.rule[0]),
+            step_up=(high - low) / 10 if self.step_up is None else stimulus.coordinate(self.step_up),
+            ratio=self._ratio,
+            low=low,
+            high=high,
+            begin=high if first is None else stimulus.coordinate(first),
+        )
+
+
+def _answers(track: TrackSetting, heard: Sequence[Heard]) -> list[Answer]:
+    """Return the answers to comparisons, with their levels in u: noise trials move no track."""
+    return _in_u(track.stimulus, [(one.level, bool(one.success)) for one in heard if not one.noise])
+
+
+def _in_u(stimulus: Stimulus, answers: Sequence[Answer]) -> list[Answer]:
+    return [(stimulus.coordinate(level), success) for level, success in answers]
+
+
+KINDS: Final[dict[str, type[Method]]] = {
+    "adjustment": Adjustment,
+    "constant": Constant,
+    "questplus": QuestPlus,
+    "updown": UpDown,
+}
+
+if TYPE_CHECKING:
+    AnyMethod: TypeAlias = Method
+else:
+    AnyMethod = Annotated[reduce(or_, KINDS.values()), Field(discriminator="kind")]
+
+
+def default_method(kind: str) -> Method:
+    """Return a method of a kind with all its defaults (KeyError of an unknown kind)."""
+    return KINDS[kind].model_validate({"kind": kind})

@@ -1,1 +1,0 @@
-"""Methods: how the levels of a track are chosen; one module per kind."""

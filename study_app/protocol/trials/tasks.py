@@ -1,0 +1,290 @@
+"""The tasks of a trial: what the hand does, for how long, and how fast it moves at most."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Annotated, ClassVar, Final, Literal, NamedTuple, Self, TypeAlias
+
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from study_app.haptics.model.ranges import within
+from study_app.protocol.table import Table
+from study_app.protocol.texts import Localised
+
+Seconds: TypeAlias = Annotated[float, within(0.1, 3600, "a hand moves within 0.1 s, no trial takes an hour")]
+Radius: TypeAlias = Annotated[float, within(0.5, 100, "a hand at rest trembles by a few tenths of a millimetre")]
+Point: TypeAlias = tuple[float, float, float]
+
+
+class Stroke(NamedTuple):
+    """A straight stroke to and fro: x = A cos 2πft in the hand frame."""
+
+    frequency_hz: float
+    amplitude_m: float
+
+    @property
+    def speed_mps(self) -> float:
+        """The greatest speed [m/s]."""
+        return 2.0 * math.pi * self.frequency_hz * self.amplitude_m
+
+    @property
+    def acceleration_mps2(self) -> float:
+        """The greatest acceleration [m/s²]."""
+        return 2.0 * math.pi * self.frequency_hz * self.speed_mps
+
+
+SHAKE_HZ: Final = 5.0
+SHAKE_M: Final = 0.03
+"""As quick and as wide as free shaking of a light handle commonly is. [choice]"""
+
+
+class Explore(Table):
+    """Free motion in the tank, for ``min_s`` to ``max_s``; after ``min_s`` the participant may continue."""
+
+    kind: Literal["explore"]
+    min_s: float = Field(ge=0, le=3600, description="Least time before the participant may go on [s].")
+    max_s: Seconds = Field(description="Time after which the task ends by itself [s].")
+    instruction: Localised = Field(description="One sentence shown under the tank.")
+
+    activity: ClassVar[str] = "free exploration"
+    lead_s: ClassVar[float] = 0.0
+    start_m: ClassVar[Point | None] = None
+
+    @property
+    def summary(self) -> str:
+        """What is done, for those who read the study."""
+        return f"explore for {self.min_s:g} to {self.max_s:g} s"
+
+    @property
+    def expected_s(self) -> float:
+        """About how long it takes [s]."""
+        return (self.min_s + self.max_s) / 2
+
+    def fastest_stroke(self, workspace_m: Point) -> Stroke:
+        """Return the fastest stroke that is likely, in a tank of these extents [m, hand frame]."""
+        return Stroke(SHAKE_HZ, min(SHAKE_M, workspace_m[0] / 2))
+
+    @property
+    def limit_s(self) -> float:
+        """When the task ends by itself [s]."""
+        return self.max_s
+
+    @model_validator(mode="after")
+    def _least_before_most(self) -> Self:
+        if self.min_s > self.max_s:
+            raise PydanticCustomError(
+                "order",
+                "min_s = {low} is more than max_s = {high}",
+                {"low": f"{self.min_s:g}", "high": f"{self.max_s:g}", "place": "min_s"},
+            )
+        return self
+
+
+class Follow(Table):
+    """A target that moves as A r(t) sin 2πft along an axis, with a raised-cosine ramp r over lead_s.
+
+    The task ends after the lead and ``cycles`` whole periods; only the periods after the lead are judged.
+    """
+
+    kind: Literal["follow"]
+    axis: Literal["x"] = Field(default="x", description="Axis along which the target moves, hand frame.")
+    amplitude_mm: Annotated[float, within(1, 250, "the tank is 10 to 1000 mm wide, and a hand trembles")] = Field(
+        default=20, description="From the middle to either end, hand frame [mm]."
+    )
+    frequency_hz: Annotated[float, within(0.05, 5, "a hand follows no faster swing, and a slower one is none")] = Field(
+        default=1, description="Frequency of the target [Hz]."
+    )
+    cycles: int = Field(default=3, ge=1, le=1000, description="Number of periods after the lead, which are judged.")
+    radius_mm: Radius = Field(default=6, description="Radius of the target [mm].")
+    lead_s: Annotated[float, within(0.1, 10, "a hand needs 0.2 s to react; nothing of the lead is judged")] = Field(
+        default=1, description="Time over which the amplitude rises before the judged periods [s]."
+    )
+    instruction: Localised | None = Field(
+        default=None, description="One sentence shown under the tank; default: the program's own words."
+    )
+
+    activity: ClassVar[str] = "following a target"
+
+    @property
+    def summary(self) -> str:
+        """What is done, for those who read the study."""
+        swings = f"{self.cycles} swing" if self.cycles == 1 else f"{self.cycles} swings"
+        return (
+            f"follow a target of {self.radius_mm:g} mm that swings ±{self.amplitude_mm:g} mm at {self.frequency_hz:g} "
+            f"Hz: {swings} after {self.lead_s:g} s"
+        )
+
+    @property
+    def limit_s(self) -> float:
+        """When the task ends by itself [s]."""
+        return self.lead_s + self.cycles / self.frequency_hz
+
+    @property
+    def expected_s(self) -> float:
+        """How long it takes [s]."""
+        return self.limit_s
+
+    @property
+    def radius_m(self) -> float:
+        """Radius of the target [m]."""
+        return self.radius_mm / 1000
+
+    @property
+    def start_m(self) -> Point:
+        """Where the target starts, hand frame [m]: the ball must be there before an interval begins."""
+        return self.target_m(0.0)
+
+    @property
+    def amplitude_m(self) -> float:
+        """From the middle to either end [m]."""
+        return self.amplitude_mm / 1000
+
+    @property
+    def rms_speed_mps(self) -> float:
+        """Root mean square of the target's speed over what is judged, A 2πf / √2 [m/s]."""
+        return 2 * math.pi * self.frequency_hz * self.amplitude_m / math.sqrt(2)
+
+    def fastest_stroke(self, _workspace_m: Point) -> Stroke:
+        """Return the swing of the target."""
+        return Stroke(self.frequency_hz, self.amplitude_m)
+
+    def target_m(self, t_s: float) -> Point:
+        """Return where the target is ``t_s`` after the task began, hand frame [m]; before it in the middle."""
+        return self.amplitude_m * self._ramp(t_s) * math.sin(2 * math.pi * self.frequency_hz * t_s), 0.0, 0.0
+
+    def _ramp(self, t_s: float) -> float:
+        """Return the ramp r, 0 … 1."""
+        if t_s <= 0:
+            return 0.0
+        return 1.0 if t_s >= self.lead_s else (1 - math.cos(math.pi * t_s / self.lead_s)) / 2
+
+
+Millimetres: TypeAlias = Annotated[float, within(-500, 500, "the tank reaches to 500 mm on either side at most")]
+
+REACH_S: Final = 0.3
+"""From target to target, as fast as aimed reaches are. [choice]"""
+MOVE_S: Final = 1.5
+"""How long people take from one target to the next, for the expected duration. [choice]"""
+
+
+class Reach(Table):
+    """Targets light up one after the other, repeatedly; the ball must stay in the lit target for ``dwell_s``.
+
+    The task is complete after ``count`` targets or after ``duration_s``, whichever of the two the protocol gives; it
+    ends without being complete at ``timeout_s``. Points are in the hand frame.
+    """
+
+    ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = (("count", "duration_s"),)
+
+    kind: Literal["reach"]
+    targets_mm: tuple[tuple[Millimetres, Millimetres, Millimetres], ...] = Field(
+        min_length=2, max_length=100, description="Centres of the targets, hand frame [mm]."
+    )
+    radius_mm: Radius = Field(description="Radius of a target [mm].")
+    dwell_s: float = Field(ge=0, le=10, description="How long the ball must stay in the lit target [s].")
+    count: int | None = Field(default=None, ge=1, le=1000, description="Targets to reach; or give duration_s.")
+    duration_s: Seconds | None = Field(default=None, description="Length of the task [s]; or give count.")
+    timeout_s: Seconds = Field(default=120, description="Time after which the task ends in any case [s].")
+    instruction: Localised = Field(description="One sentence shown under the tank.")
+
+    activity: ClassVar[str] = "reaching targets"
+    lead_s: ClassVar[float] = 0.0
+    start_m: ClassVar[Point | None] = None
+
+    @property
+    def summary(self) -> str:
+        """What is done, for those who read the study."""
+        end = f"until {self.count} are reached" if self.count is not None else f"for {self.duration_s:g} s"
+        return (
+            f"reach for {len(self.targets_mm)} targets of {self.radius_mm:g} mm in turn, {self.dwell_s:g} s in each, "
+            f"{end}, at most {self.timeout_s:g} s"
+        )
+
+    @property
+    def expected_s(self) -> float:
+        """About how long it takes [s]."""
+        if self.count is not None:
+            return min(self.timeout_s, self.count * (self.dwell_s + MOVE_S))
+        return self.duration_s or 0.0
+
+    def fastest_stroke(self, _workspace_m: Point) -> Stroke:
+        """Return the stroke between the two neighbours that are farthest apart."""
+        following = (*self.targets_m[1:], self.targets_m[0])
+        way_m = max(math.dist(*pair) for pair in zip(self.targets_m, following, strict=True))
+        return Stroke(0.5 / REACH_S, way_m / 2)
+
+    @property
+    def targets_m(self) -> tuple[Point, ...]:
+        """Centres of the targets, hand frame [m]."""
+        return tuple((x / 1000, y / 1000, z / 1000) for x, y, z in self.targets_mm)
+
+    @property
+    def limit_s(self) -> float:
+        """When the task ends by itself [s]."""
+        return self.timeout_s if self.duration_s is None else self.duration_s
+
+    @property
+    def radius_m(self) -> float:
+        """Radius of a target [m]."""
+        return self.radius_mm / 1000
+
+    @model_validator(mode="after")
+    def _ends_before_its_timeout(self) -> Self:
+        if self.duration_s is not None and self.duration_s > self.timeout_s:
+            raise PydanticCustomError(
+                "order",
+                "duration_s = {duration} is longer than timeout_s = {timeout}",
+                {"duration": f"{self.duration_s:g}", "timeout": f"{self.timeout_s:g}", "place": "duration_s"},
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _time_for_every_target(self) -> Self:
+        limit, targets = self.duration_s or self.timeout_s, self.count or 1
+        if targets * self.dwell_s >= limit:
+            raise PydanticCustomError(
+                "order",
+                "dwell_s = {dwell} in {targets} takes as long as the {limit} s that the task lasts at most: shorten it",
+                {
+                    "dwell": f"{self.dwell_s:g}",
+                    "targets": "a target" if targets == 1 else f"each of {targets} targets",
+                    "limit": f"{limit:g}",
+                    "place": "dwell_s",
+                },
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _targets_apart(self) -> Self:
+        for index, (one, other) in enumerate(pairwise((*self.targets_mm, self.targets_mm[0])), start=1):
+            distance = math.dist(one, other)
+            if distance <= 2 * self.radius_mm:
+                raise PydanticCustomError(
+                    "overlap",
+                    "target {index} and the next are {distance} mm apart and overlap at radius_mm = {radius}",
+                    {
+                        "index": index,
+                        "distance": f"{distance:g}",
+                        "radius": f"{self.radius_mm:g}",
+                        "place": "targets_mm",
+                    },
+                )
+        return self
+
+
+AnyTask: TypeAlias = Explore | Reach | Follow
+Task: TypeAlias = Annotated[AnyTask, Field(discriminator="kind")]
+
+
+def lasting(task: AnyTask, most_s: float) -> AnyTask:
+    """Return a task that time alone ends: after ``most_s``, or the first whole swing of a target after it [s]."""
+    match task:
+        case Explore():
+            return task.model_copy(update={"min_s": most_s, "max_s": most_s})
+        case Reach():
+            return task.model_copy(update={"count": None, "duration_s": most_s, "timeout_s": most_s})
+        case Follow():
+            swings = math.ceil((most_s - task.lead_s) * task.frequency_hz)
+            return task.model_copy(update={"cycles": max(swings, task.cycles)})
