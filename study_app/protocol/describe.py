@@ -19,7 +19,7 @@ from study_app.protocol.model import Block, Condition, Protocol, Questionnaire, 
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
 from study_app.protocol.orders.durations import block_duration_s, expected_duration_s
 from study_app.protocol.orders.latin_squares import row_count
-from study_app.protocol.questions.question import Context, Question
+from study_app.protocol.questions import Context, Question
 from study_app.protocol.trials.block_summary import design_rows
 from study_app.protocol.trials.presentation import link_words
 from study_app.protocol.trials.trial_limits import Limits

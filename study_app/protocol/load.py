@@ -17,8 +17,8 @@ from study_app.protocol.checks.consistency import check
 from study_app.protocol.checks.designs import designs
 from study_app.protocol.checks.pace import paced
 from study_app.protocol.checks.returned_energy import returned
-from study_app.protocol.instruments.instrument import with_instruments
 from study_app.protocol.model import Format, HandForceN, Named, Protocol, SceneDefaults
+from study_app.protocol.questionnaires import with_instruments
 from study_app.protocol.source.document import Path, entries, frozen
 from study_app.protocol.source.files import at_hand, protocol_hash, shipped, source_bytes
 from study_app.protocol.source.json_schema import schema

@@ -6,10 +6,7 @@ Texts are already in the participant's language. Lengths are metres in the hand 
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
-from study_app.protocol.forms.show_if import Value
-from study_app.protocol.questions.choice import ChoiceView
-from study_app.protocol.questions.number import NumberView
-from study_app.protocol.questions.question import ItemView
+from study_app.protocol.questions import ChoiceView, ItemView, NumberView, Value
 from study_app.protocol.trials.tasks import AnyTask
 
 

@@ -4,14 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from study_app.protocol.forms.show_if import ShowIf
 from study_app.protocol.load import load
-from study_app.protocol.questions.choice import ChoiceView
-from study_app.protocol.questions.number import NumberView
-from study_app.protocol.questions.question import ItemView
-from study_app.protocol.questions.rating import RatingView
-from study_app.protocol.questions.slider import SliderView
-from study_app.protocol.questions.text import TextView
+from study_app.protocol.questions import ChoiceView, ItemView, NumberView, RatingView, ShowIf, SliderView, TextView
 from study_app.protocol.trials.tasks import AnyTask, Explore, Follow, Reach
 from study_app.session.pages import Progress, QuestionnairePage, TaskPage, TextPage
 from study_app.session.tasks import TaskView

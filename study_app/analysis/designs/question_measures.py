@@ -13,8 +13,7 @@ from study_app.analysis.tables.asked_questions import AskedIn, AskedQuestion, As
 from study_app.analysis.tables.compared_blocks import setting_name
 from study_app.analysis.tables.study_tables import Study
 from study_app.discovery import modules_of
-from study_app.protocol.instruments.instrument import instrument, instruments
-from study_app.protocol.instruments.scores import score
+from study_app.protocol.questionnaires import instrument, instruments, score
 
 MEASURES: Final[dict[str, Measure]] = {
     module.MEASURE.id: module.MEASURE for module in modules_of(measures) if hasattr(module, "MEASURE")

@@ -12,7 +12,7 @@ import numpy as np
 
 from study_app.analysis.power.plan import HIGHEST, LOWEST, Plan, Planned
 from study_app.analysis.tables.measures import Array
-from study_app.protocol.forms.simulated_observer import Rater, opinions, rater
+from study_app.protocol.simulated_observer import Rater, opinions, rater
 
 UNIFORM = 12
 """The answer model's noise is the sum of so many uniform numbers, less six."""

@@ -6,12 +6,9 @@ from typing import Any, Final
 
 from study_app.analysis.tables.compared_blocks import Setting, settings_in, spoken
 from study_app.errors import AnalysisError
-from study_app.protocol.forms.kinds import question_of
-from study_app.protocol.forms.scale import Scale
-from study_app.protocol.instruments.scores import Score
 from study_app.protocol.orders.block_orders import every_step_of
-from study_app.protocol.questions.question import Context, Question
-from study_app.protocol.questions.statement import Statement
+from study_app.protocol.questionnaires import Score
+from study_app.protocol.questions import Context, Question, Scale, Statement, question_of
 from study_app.protocol.texts import text_in
 from study_app.store.blinded.blinding import Key
 

@@ -27,7 +27,7 @@ from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.planned_analysis import Decided
 from study_app.analysis.tables.session_files import Session, estimators_of, mean_dynamics, read_session, read_tables
 from study_app.errors import AnalysisError, StoreError
-from study_app.protocol.forms.kinds import STATEMENT
+from study_app.protocol.questions import STATEMENT
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import Key
 from study_app.store.exclusions import Exclusion, exclusions

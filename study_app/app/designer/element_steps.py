@@ -16,7 +16,7 @@ from study_app.authoring.outline import title_of
 from study_app.authoring.writer.edits import Edit, Insert, Move, Set
 from study_app.authoring.writer.refused import Refused
 from study_app.ids import free_id
-from study_app.protocol.instruments.instrument import instrument
+from study_app.protocol.questionnaires import instrument
 from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.wording.languages import language_name
 from study_app.viewmodels.designer.element_facts import kind_and_title

@@ -9,7 +9,7 @@ from study_app.authoring.schema_nodes import Node, node_at, table_of
 from study_app.authoring.writer.refused import Refused
 from study_app.ids import free_id
 from study_app.number_text import counted
-from study_app.protocol.forms.scale import POINTS
+from study_app.protocol.questions import POINTS
 from study_app.protocol.source.document import Path, entries, value_at
 
 SINGULAR: Final = {"items": "question", "stimuli": "stimulus", "analysis": "analysis"}

@@ -8,11 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from study_app.protocol import formats
-from study_app.protocol.forms.kinds import question_of
-from study_app.protocol.forms.scale import POINTS, Scale
-from study_app.protocol.forms.show_if import ShowIf
-from study_app.protocol.questions.question import Context, Question
-from study_app.protocol.questions.statement import Statement
+from study_app.protocol.questions import POINTS, Context, Question, Scale, ShowIf, Statement, question_of
 from study_app.protocol.source.document import Path, entries
 from study_app.protocol.source.problems import Fault, did_you_mean
 

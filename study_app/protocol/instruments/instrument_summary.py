@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from study_app.protocol.forms.questionnaire import Questionnaire
-from study_app.protocol.instruments.instrument import instrument
 from study_app.protocol.model import Protocol
+from study_app.protocol.questionnaires import Questionnaire, instrument
 
 
 def sources(questionnaire: Questionnaire) -> Iterator[str]:

@@ -15,11 +15,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, Protocol,
 from pydantic import Field
 
 from study_app.haptics.model.ranges import within
-from study_app.protocol.forms.questionnaire import Questionnaire
-from study_app.protocol.questions.choice import Choice, Option
-from study_app.protocol.questions.number import Number
-from study_app.protocol.questions.question import Question
-from study_app.protocol.questions.rating import Rating
+from study_app.protocol.questionnaires import Questionnaire
+from study_app.protocol.questions import Choice, Number, Option, Question, Rating
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Id, Localised
 from study_app.protocol.wording.languages import words

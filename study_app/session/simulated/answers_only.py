@@ -16,10 +16,10 @@ from typing import Any
 
 from study_app.errors import SessionError
 from study_app.protocol.blocks import Block
-from study_app.protocol.forms.simulated_observer import NO_FEATURES, TrialFeatures
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Explore, Follow, Protocol
 from study_app.protocol.orders.schedule import build_schedule
+from study_app.protocol.simulated_observer import NO_FEATURES, TrialFeatures
 from study_app.protocol.trials.stimuli import DELAYS, Stimulated
 from study_app.protocol.trials.tasks import AnyTask
 from study_app.session.pages import DesignPage, FeedbackPage, Interval, PausePage, QuestionnairePage, TaskPage, TextPage

@@ -12,10 +12,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from study_app.devices.simulated.hand_commands import HandOrders
-from study_app.protocol.forms.show_if import Value, shown
-from study_app.protocol.forms.simulated_observer import Rater, TrialFeatures, judgements
 from study_app.protocol.model import Explore, Follow, Reach
-from study_app.protocol.questions.question import ItemView
+from study_app.protocol.questions import ItemView, Value, shown
+from study_app.protocol.simulated_observer import Rater, TrialFeatures, judgements
 from study_app.protocol.trials.tasks import AnyTask
 from study_app.psychophysics.delivery import lag
 from study_app.session.pages import DesignPage, QuestionnairePage, TextPage

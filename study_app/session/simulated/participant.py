@@ -4,10 +4,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 
 from study_app.protocol.blocks import Block
-from study_app.protocol.forms.show_if import Value
-from study_app.protocol.forms.simulated_observer import TrialFeatures, rater
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, stream
+from study_app.protocol.questions import Value
+from study_app.protocol.simulated_observer import TrialFeatures, rater
 from study_app.protocol.trials.tracks import design_of
 from study_app.session.pages import ChoicePage, DesignPage, Page, QuestionnairePage
 from study_app.session.simulated.adjusting_observer import AdjustingObserver

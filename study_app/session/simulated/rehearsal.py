@@ -17,10 +17,10 @@ from pathlib import Path
 from study_app.devices.registry import descriptor_of, discover
 from study_app.devices.rig import Rig
 from study_app.errors import SessionError
-from study_app.protocol.forms.simulated_observer import TrialFeatures
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule
+from study_app.protocol.simulated_observer import TrialFeatures
 from study_app.session.resume import FIRST, REHEARSED_SCREENS, Start, find_protocol, resume_at, source_to_resume
 from study_app.session.simulated.design_observer import OBSERVER, Observer
 from study_app.session.simulated.rehearsed_session import RehearsedSession, rehearsal_rig

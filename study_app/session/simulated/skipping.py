@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from study_app.errors import SessionError
-from study_app.protocol.forms.simulated_observer import NO_FEATURES
 from study_app.protocol.model import Protocol
+from study_app.protocol.simulated_observer import NO_FEATURES
 from study_app.session.simulated.answers_only import Answering, SimulatedTime
 from study_app.session.simulated.preview import preview
 from study_app.session.transitions.table import open_session

@@ -8,9 +8,9 @@ again for answers without a servo and for power analysis.
 from collections.abc import Callable, Mapping
 from typing import Final, TypeAlias
 
-from study_app.protocol.forms.simulated_observer import TrialFeatures
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule, draw_key, stream
+from study_app.protocol.simulated_observer import TrialFeatures
 from study_app.protocol.trials.keyed import Key
 from study_app.protocol.trials.presentation import next_level
 from study_app.session.simulated.rehearsed_session import RehearsedSession, rehearsal_rig

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 from study_app.errors import DeviceError, ServoFault, StudyError, VideoError
-from study_app.protocol.forms.show_if import Value
+from study_app.protocol.questions import Value
 from study_app.session.transitions.commands import Command
 
 

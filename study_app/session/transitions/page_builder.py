@@ -7,9 +7,7 @@ from dataclasses import replace
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import PageText, Protocol, Questionnaire
 from study_app.protocol.orders.schedule import FormStep, Trial
-from study_app.protocol.questions.choice import ChoiceView
-from study_app.protocol.questions.number import NumberView
-from study_app.protocol.questions.question import Context, Question
+from study_app.protocol.questions import ChoiceView, Context, NumberView, Question
 from study_app.protocol.trials.designs import ORDINALS
 from study_app.protocol.trials.tracks import design_of
 from study_app.protocol.wording.languages import Words, words

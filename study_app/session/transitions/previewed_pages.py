@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
-from study_app.protocol.forms.show_if import Value
 from study_app.protocol.orders.schedule import FormStep, PageStep, Trial
+from study_app.protocol.questions import Value
 from study_app.session.pages import FeedbackPage, Page, TextPage
 from study_app.session.simulated.preview import Preview
 from study_app.session.transitions import page_builder

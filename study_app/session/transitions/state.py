@@ -6,10 +6,9 @@ from enum import Enum
 from typing import Literal, TypeAlias
 
 from study_app.errors import SessionError
-from study_app.protocol.forms.show_if import Value, shown
 from study_app.protocol.model import Protocol, Questionnaire
 from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial
-from study_app.protocol.questions.question import Context, Question
+from study_app.protocol.questions import Context, Question, Value, shown
 from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.keyed import Key
 from study_app.protocol.trials.methods import Adjusting, Adjustment, Heard

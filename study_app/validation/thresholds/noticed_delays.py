@@ -13,9 +13,9 @@ from typing import Final
 import numpy as np
 
 from study_app.analysis.statistics.psychometrics.threshold import Threshold, noticed
-from study_app.protocol.forms.simulated_observer import NO_FEATURES, Draw, Rater, rate, rater
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
+from study_app.protocol.simulated_observer import NO_FEATURES, Draw, Rater, rate, rater
 from study_app.protocol.streams import stream
 from study_app.session.simulated.design_observer import Observer
 from study_app.validation.thresholds.methods_alone import simulate

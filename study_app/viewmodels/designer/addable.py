@@ -14,7 +14,7 @@ from study_app.authoring.names import named_at
 from study_app.authoring.outline import title_of
 from study_app.authoring.schema_nodes import node_at, tags
 from study_app.protocol.formats import TABLES, is_second
-from study_app.protocol.instruments.instrument import instrument, instruments
+from study_app.protocol.questionnaires import instrument, instruments
 from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.wording.languages import LANGUAGES
 from study_app.viewmodels.designer.finding import found_fields

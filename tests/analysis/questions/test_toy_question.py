@@ -19,10 +19,9 @@ from study_app.analysis.results.question_answers import QuestionFound
 from study_app.gui.participant.forms import fields
 from study_app.gui.participant.forms.question_field import QuestionField
 from study_app.gui.participant.window import ParticipantWindow
-from study_app.protocol.forms import kinds
-from study_app.protocol.forms.show_if import Value
+from study_app.protocol import questions
 from study_app.protocol.model import Protocol
-from study_app.protocol.questions.question import Context, Draw, ItemView, Question, ValueType
+from study_app.protocol.questions import Context, Draw, ItemView, Question, Value, ValueType
 from study_app.protocol.wording.languages import Words, words
 from study_app.session.pages import QuestionnairePage
 from study_app.session.simulated import answers_only
@@ -86,7 +85,7 @@ def sun(_asked: Any, found: QuestionFound, look: Look) -> Sheet:
 
 @pytest.fixture
 def study(monkeypatch: pytest.MonkeyPatch) -> Protocol:
-    monkeypatch.setitem(kinds.KINDS, "toy_mood", Mood)
+    monkeypatch.setitem(questions.KINDS, "toy_mood", Mood)
     monkeypatch.setitem(fields.FIELDS, "toy_mood", MoodField)
     measure = Measure("toy_sunny", sunny, lambda _asked, numbers: {"sunny": str(numbers["sunny"])})
     monkeypatch.setitem(measured.MEASURES, "toy_sunny", measure)

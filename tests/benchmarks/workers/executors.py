@@ -19,8 +19,8 @@ import psutil
 
 from study_app.analysis.power.batch_counts import BATCH, count
 from study_app.analysis.power.plan import Plan, plan
-from study_app.protocol.forms.simulated_observer import TrialFeatures
 from study_app.protocol.load import load
+from study_app.protocol.simulated_observer import TrialFeatures
 from study_app.workers.environment import environment
 from study_app.workers.executors import Workers, open_executor
 from study_app.workers.kept_cases import KeptCases

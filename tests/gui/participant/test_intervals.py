@@ -15,8 +15,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QLineEdit, 
 
 from study_app.gui.participant.intervals.setting_controls import STEP_MS
 from study_app.gui.participant.pointer_capture import PointerCapture
-from study_app.protocol.questions.choice import ChoiceView
-from study_app.protocol.questions.number import NumberView
+from study_app.protocol.questions import ChoiceView, NumberView
 from study_app.protocol.trials.tasks import lasting
 from study_app.protocol.wording.languages import LANGUAGES, words
 from study_app.session.pages import ChoicePage, FeedbackPage, Interval, NumberPage, Progress, TaskPage

@@ -10,13 +10,7 @@ import pytest
 from PySide6.QtCore import QPointF, QRectF, QTimer
 from PySide6.QtWidgets import QWidget
 
-from study_app.protocol.forms.show_if import ShowIf
-from study_app.protocol.questions.choice import ChoiceView
-from study_app.protocol.questions.number import NumberView
-from study_app.protocol.questions.question import ItemView
-from study_app.protocol.questions.rating import RatingView
-from study_app.protocol.questions.slider import SliderView
-from study_app.protocol.questions.text import TextView
+from study_app.protocol.questions import ChoiceView, ItemView, NumberView, RatingView, ShowIf, SliderView, TextView
 from study_app.protocol.trials.tasks import lasting
 from study_app.session.pages import (
     ChoicePage,

@@ -14,11 +14,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QLineEdit, 
 from study_app.gui.participant.forms.fields import FIELDS
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
-from study_app.protocol.questions.choice import ChoiceView
-from study_app.protocol.questions.number import NumberView
-from study_app.protocol.questions.question import ItemView
-from study_app.protocol.questions.rating import RatingView
-from study_app.protocol.questions.slider import SliderView
+from study_app.protocol.questions import ChoiceView, ItemView, NumberView, RatingView, SliderView
 from study_app.session.pages import QuestionnairePage
 from study_app.session.transitions.commands import ShowPage, Write
 from study_app.session.transitions.events import Begin, Chosen, ItemShown, PauseAsked, Retracted, Submitted, TaskDone

@@ -3,10 +3,9 @@
 import pytest
 
 from study_app.haptics.model.scene import Ewma, Kalman
-from study_app.protocol.forms.show_if import ShowIf, shown
-from study_app.protocol.instruments.instrument import instrument, instruments
 from study_app.protocol.load import parse
-from study_app.protocol.questions.number import NumberView
+from study_app.protocol.questionnaires import instrument, instruments
+from study_app.protocol.questions import NumberView, ShowIf, shown
 from tests.protocol.forms.mixed import MIXED
 from tests.protocol.sound import SOUND
 

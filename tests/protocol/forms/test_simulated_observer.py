@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.protocol.forms.simulated_observer import TrialFeatures, rate, rater
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import stream
+from study_app.protocol.simulated_observer import TrialFeatures, rate, rater
 
 REK = load("rek2024")
 LIQUID = tuple(item.id for item in REK.questionnaires["liquid"].items)

@@ -2,8 +2,7 @@
 
 import pytest
 
-from study_app.protocol.instruments.instrument import instrument, instruments
-from study_app.protocol.instruments.scores import Score, score
+from study_app.protocol.questionnaires import Score, instrument, instruments, score
 
 ITEMS = {"nasa-tlx": 6, "nasa-tlx-weighted": 21, "sus": 10, "ipq": 14, "panas": 20, "ssq": 16, "ueq": 26}
 WITH_TEXTS = {"nasa-tlx", "nasa-tlx-weighted", "sus"}

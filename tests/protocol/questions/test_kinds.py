@@ -6,9 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from study_app.protocol.forms.kinds import KINDS, question_of
 from study_app.protocol.load import parse
-from study_app.protocol.questions.question import Context, Question
+from study_app.protocol.questions import KINDS, Context, Question, question_of
 from tests.protocol.sound import SOUND
 
 CONTEXT = Context(parse(SOUND.encode(), "small").scales, "agreement", "nl")

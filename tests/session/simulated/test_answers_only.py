@@ -9,8 +9,8 @@ from click.testing import CliRunner
 from study_app.analysis.tables.study_tables import load_study
 from study_app.cli import commands
 from study_app.errors import StoreError
-from study_app.protocol.forms.simulated_observer import TrialFeatures
 from study_app.protocol.load import load
+from study_app.protocol.simulated_observer import TrialFeatures
 from study_app.session.simulated import answers_only
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import rehearse

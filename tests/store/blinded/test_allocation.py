@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from study_app.errors import StoreError, StudyError
-from study_app.protocol.forms.simulated_observer import NO_FEATURES
 from study_app.protocol.groups.own_protocol import own_protocol
 from study_app.protocol.orders.schedule import build_schedule, stream
+from study_app.protocol.simulated_observer import NO_FEATURES
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.trial_features import ConditionFeatures
 from study_app.store.blinded import allocation

@@ -13,8 +13,8 @@ from study_app.analysis.findings.other_assumptions import FINDING as AGAIN
 from study_app.analysis.findings.pair_comparison import FINDING as PAIRS
 from study_app.analysis.findings.settings_differ import FINDING as OMNIBUS
 from study_app.analysis.power.plan import plan
-from study_app.protocol.forms.simulated_observer import TrialFeatures
 from study_app.protocol.load import load
+from study_app.protocol.simulated_observer import TrialFeatures
 from study_app.validation.report_rates import known_effects as studies
 from study_app.validation.report_rates import single_test_rates
 from study_app.validation.report_rates.known_effects import (

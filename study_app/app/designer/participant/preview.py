@@ -28,9 +28,9 @@ from study_app.gui.designer.view import DesignerPlace
 from study_app.gui.display.screens import choose_screens
 from study_app.gui.widgets.main_view import make_shortcuts
 from study_app.number_text import counted
-from study_app.protocol.forms.show_if import Value
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial
+from study_app.protocol.questions import Value
 from study_app.protocol.source.document import Path, value_at
 from study_app.protocol.wording.languages import language_name
 from study_app.session.pages import DesignPage, TaskPage

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QButtonGroup
 from study_app.gui.participant.forms.option_button import OptionLook
 from study_app.gui.participant.forms.question_field import QuestionField
 from study_app.gui.participant.pages.screen_reader import point_at, say
-from study_app.protocol.forms.show_if import Value
+from study_app.protocol.questions import Value
 
 MOST_DIGITS = 9
 

@@ -13,8 +13,7 @@ from study_app.gui.participant.pages.page_widget import page_painter
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.accessible import give_role
-from study_app.protocol.forms.show_if import Value
-from study_app.protocol.questions.question import ItemView
+from study_app.protocol.questions import ItemView, Value
 
 if TYPE_CHECKING:
     from study_app.protocol.wording.languages import Words

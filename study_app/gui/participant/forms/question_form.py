@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from study_app.gui.participant.forms.fields import FIELDS
 from study_app.gui.participant.forms.question_field import QuestionField, target_px
 from study_app.gui.participant.forms.questions_page import QuestionsPage
-from study_app.protocol.questions.question import ItemView
+from study_app.protocol.questions import ItemView
 
 MOST_OVER = 0.2  # of the page's height that a part may be too high and still be tried with smaller words
 SHRINKING = (0.94, 0.88, 0.82)  # of words that are larger than they must be, where all questions then fit

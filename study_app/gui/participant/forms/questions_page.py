@@ -17,8 +17,7 @@ from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.accessible import HeadingLabel
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
-from study_app.protocol.forms.show_if import shown
-from study_app.protocol.questions.question import ItemView
+from study_app.protocol.questions import ItemView, shown
 from study_app.session.pages import QuestionnairePage
 from study_app.session.transitions.events import Chosen, ItemShown, Retracted, Submitted
 

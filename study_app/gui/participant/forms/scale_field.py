@@ -2,7 +2,7 @@
 
 from study_app.gui.participant.forms.option_button import RadioOption
 from study_app.gui.participant.forms.options_field import MOST_DIGITS, OptionsField
-from study_app.protocol.forms.show_if import Value
+from study_app.protocol.questions import Value
 
 
 class ScaleField(OptionsField):

@@ -13,7 +13,7 @@ from study_app.gui.participant.pages.page_widget import PageWidget
 from study_app.gui.participant.pages.progress_line import ProgressLine
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.boxes import STRETCH, vbox
-from study_app.protocol.forms.show_if import Value
+from study_app.protocol.questions import Value
 from study_app.session.pages import DesignPage
 from study_app.session.transitions.events import Chosen, ItemShown, Submitted
 

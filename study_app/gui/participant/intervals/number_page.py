@@ -16,7 +16,7 @@ from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import PARTICIPANT
 from study_app.gui.widgets.boxes import STRETCH, add_parts
 from study_app.gui.widgets.number_field import read_number
-from study_app.protocol.questions.question import plain_number
+from study_app.protocol.questions import plain_number
 from study_app.session.pages import NumberPage
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from study_app.gui.participant.pages.column_labels import Heading, label_height,
 from study_app.gui.participant.pages.questionnaire_grid import Asked, Grid, grid, parts
 from study_app.gui.participant.pages.statement_field import StatementField
 from study_app.gui.theme.theme import font
-from study_app.protocol.questions.question import ItemView
+from study_app.protocol.questions import ItemView
 from study_app.session.pages import QuestionnairePage
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from study_app.gui.participant.forms.scale_field import ScaleField
 from study_app.gui.participant.pages.questionnaire_grid import AFTER_STATEMENT, CELL_GAP, Grid
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.boxes import add_layout
-from study_app.protocol.questions.question import ItemView
+from study_app.protocol.questions import ItemView
 
 if TYPE_CHECKING:
     from study_app.protocol.wording.languages import Words

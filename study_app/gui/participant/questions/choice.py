@@ -10,9 +10,7 @@ from PySide6.QtWidgets import QGridLayout, QWidget
 from study_app.gui.participant.forms.option_button import CheckOption, RadioOption
 from study_app.gui.participant.forms.options_field import OptionsField
 from study_app.gui.participant.pages.screen_reader import point_at
-from study_app.protocol.forms.show_if import Value
-from study_app.protocol.questions.choice import ChoiceView
-from study_app.protocol.questions.question import ItemView
+from study_app.protocol.questions import ChoiceView, ItemView, Value
 
 if TYPE_CHECKING:
     from study_app.protocol.wording.languages import Words

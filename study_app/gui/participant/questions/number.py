@@ -13,9 +13,7 @@ from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.number_field import read_number, write_number
-from study_app.protocol.forms.show_if import Value
-from study_app.protocol.questions.number import NumberView
-from study_app.protocol.questions.question import ItemView, plain_number
+from study_app.protocol.questions import ItemView, NumberView, Value, plain_number
 
 if TYPE_CHECKING:
     from study_app.protocol.wording.languages import Words

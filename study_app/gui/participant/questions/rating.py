@@ -10,8 +10,7 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 from study_app.gui.participant.forms.scale_field import ScaleField
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.boxes import hbox
-from study_app.protocol.questions.question import ItemView
-from study_app.protocol.questions.rating import RatingView
+from study_app.protocol.questions import ItemView, RatingView
 
 if TYPE_CHECKING:
     from study_app.protocol.wording.languages import Words

@@ -12,9 +12,7 @@ from study_app.gui.participant.forms.question_field import QuestionField, questi
 from study_app.gui.participant.pages.page_widget import page_painter
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.boxes import hbox, vbox
-from study_app.protocol.forms.show_if import Value
-from study_app.protocol.questions.question import ItemView
-from study_app.protocol.questions.slider import SliderView
+from study_app.protocol.questions import ItemView, SliderView, Value
 
 if TYPE_CHECKING:
     from study_app.protocol.wording.languages import Words

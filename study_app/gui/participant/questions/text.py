@@ -12,9 +12,7 @@ from PySide6.QtWidgets import QPlainTextEdit, QWidget
 from study_app.gui.participant.forms.question_field import target_px
 from study_app.gui.participant.forms.typed_field import ENTER, EntryKeys, TypedField
 from study_app.gui.theme.theme import font
-from study_app.protocol.forms.show_if import Value
-from study_app.protocol.questions.question import ItemView
-from study_app.protocol.questions.text import TextView
+from study_app.protocol.questions import ItemView, TextView, Value
 from study_app.protocol.texts import UNPRINTABLE
 
 if TYPE_CHECKING:

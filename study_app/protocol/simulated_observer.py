@@ -16,7 +16,7 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from study_app.protocol.forms.scale import POINTS
+from study_app.protocol.questions import POINTS
 
 Draw = Callable[[], float]
 

@@ -1,1 +1,0 @@
-"""Questionnaires: their questions, scales, conditions and instruments, and the simulated observer who answers them."""

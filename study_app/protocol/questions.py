@@ -1,0 +1,682 @@
+"""The kinds of questions, the scales they are rated on, and when they are shown."""
+
+from __future__ import annotations
+
+import math
+import unicodedata
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import reduce
+from operator import or_
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Protocol, Self, TypeAlias
+
+from pydantic import ConfigDict, Discriminator, Field, SerializeAsAny, Tag, WrapValidator, model_validator
+from pydantic_core import PydanticCustomError
+
+from study_app.haptics.model.ranges import within
+from study_app.protocol.table import ExtendedTable, Table
+from study_app.protocol.texts import UNPRINTABLE, Id, Localised, Printable, text_in
+
+POINTS = 7
+"""Of the scale of statements."""
+
+FEWEST_POINTS, MOST_POINTS = 2, 11
+
+
+class Scale(Table):
+    """The points of an answer, lowest first: seven for statements, 2 to 11 for other ratings."""
+
+    labels: dict[str, Annotated[tuple[Printable, ...], Field(min_length=FEWEST_POINTS, max_length=MOST_POINTS)]] = (
+        Field(description="Per language the names of the points, lowest first: 7 in format 1, 2 to 11 in format 2.")
+    )
+    cannot_judge: Localised | None = Field(
+        default=None, description="Label of an answer off the scale; left out: none."
+    )
+
+    @property
+    def points(self) -> int:
+        """How many points the scale has."""
+        return max(map(len, self.labels.values()), default=0)
+
+
+Value: TypeAlias = int | float | str | tuple[str, ...] | None
+"""An answer: a number, a text, an option or several; None where the participant could not judge."""
+
+
+class ShowIf(Table):
+    """An answer to an earlier item: one of several values, or a number within bounds."""
+
+    model_config = ConfigDict(serialize_by_alias=True, validate_by_name=True)
+
+    item: Id = Field(description="The earlier item.")
+    values: int | float | str | tuple[int | float | str, ...] | None = Field(
+        default=None, alias="is", description="The answer, or a list of answers."
+    )
+    at_least: float | None = Field(default=None, description="Smallest number.")
+    at_most: float | None = Field(default=None, description="Largest number.")
+
+    @property
+    def permitted(self) -> tuple[int | float | str, ...]:
+        """The answers that show the question; empty where bounds do."""
+        if self.values is None:
+            return ()
+        return self.values if isinstance(self.values, tuple) else (self.values,)
+
+    def holds(self, answer: Value) -> bool:
+        """Return whether an answer shows the question."""
+        if self.values is not None:
+            given = answer if isinstance(answer, tuple) else (answer,)
+            return any(one in self.permitted for one in given)
+        if not isinstance(answer, int | float):
+            return False
+        return (self.at_least is None or answer >= self.at_least) and (self.at_most is None or answer <= self.at_most)
+
+    @model_validator(mode="after")
+    def _values_or_bounds(self) -> Self:
+        bounded = self.at_least is not None or self.at_most is not None
+        if (self.values is not None) == bounded:
+            raise PydanticCustomError("show_if", "needs either is, or at_least or at_most or both", {"place": "is"})
+        return self
+
+
+class Conditional(Protocol):
+    """A question, or its view."""
+
+    @property
+    def id(self) -> str:
+        """Its name."""
+
+    @property
+    def show_if(self) -> ShowIf | None:
+        """When it is shown."""
+
+
+def shown(items: Iterable[Conditional], answers: Mapping[str, Value]) -> tuple[str, ...]:
+    """Return the ids of the items that are shown, in their order.
+
+    Parameters
+    ----------
+    items : iterable of Conditional
+        The items of a form, in order.
+    answers : mapping of str to Value
+        The answers given so far; those to items that are not shown count for nothing.
+    """
+    found: list[str] = []
+    for item in items:
+        asked = item.show_if
+        if asked is None or (asked.item in found and asked.item in answers and asked.holds(answers[asked.item])):
+            found.append(item.id)
+    return tuple(found)
+
+
+Draw: TypeAlias = Callable[[], float]
+ValueType: TypeAlias = Literal["integer", "number", "text"]
+
+MOST: Final = 1e12
+"""No greater number can be given as an answer."""
+Bound: TypeAlias = Annotated[float, within(-MOST, MOST, "no greater number can be given as an answer")]
+
+OPINION_POINTS = 7
+"""Opinions of the simulated observer go from 1 to so many points."""
+
+
+@dataclass(frozen=True, slots=True)
+class ItemView:
+    """One question of a form as shown: ``number`` counts from 1 in the order of presentation.
+
+    ``show_if`` says when it is shown, None always.
+    """
+
+    widget: ClassVar[str] = ""
+
+    id: str
+    number: int
+    text: str
+    required: bool
+    show_if: ShowIf | None = field(default=None, kw_only=True)
+
+    @property
+    def keys(self) -> str:
+        """The keys that answer the question, as labelled on the keyboard."""
+        raise NotImplementedError
+
+    def simulated(self, opinion: float, draw: Draw) -> Value:
+        """Return the answer of a simulated observer whose opinion is from 1 to 7, or a little beyond."""
+        raise NotImplementedError
+
+    def nearby(self, answer: Value) -> Value:
+        """Return an answer that is chosen first by who then changes their mind; the same where there is none."""
+        return answer
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What a question is asked with: the protocol's scales, its questionnaire's own, and the participant's language."""
+
+    scales: Mapping[str, Scale]
+    scale: str | None
+    language: str
+
+    def text(self, value: str | dict[str, str]) -> str:
+        """Return a localised text in the language."""
+        return text_in(value, self.language)
+
+
+class Question(ExtendedTable):
+    """One question."""
+
+    LATER: ClassVar[frozenset[str]] = frozenset({"show_if"})
+
+    widget: ClassVar[str]
+    measure: ClassVar[str]
+    figure: ClassVar[str | None] = None
+    value_type: ClassVar[ValueType]
+
+    id: Id = Field(description="Name of the item in every table; never change it once data exist.")
+    text: Localised = Field(description="The statement as the participant reads it.")
+    short: Localised = Field(description="One to three words for figures and tables.")
+    required: bool = Field(default=True, description="Whether an answer is needed to continue.")
+    show_if: ShowIf | None = Field(
+        default=None, description="The answer to an earlier item that shows this one; left out: always shown."
+    )
+
+    @property
+    def kind_id(self) -> str:
+        """The id of its kind."""
+        return kind_id(type(self))
+
+    def view(self, number: int, context: Context) -> ItemView:
+        """Return what its page shows."""
+        raise NotImplementedError
+
+    def problem(self, answer: Value, context: Context) -> str | None:
+        """Return why a value is not an answer to it, as a sentence; None where it is one."""
+        raise NotImplementedError
+
+    def bounds(self, context: Context) -> tuple[float, float] | None:
+        """Return the smallest and the largest number that it can be answered with; None where it has none."""
+        return None
+
+    def levels(self, context: Context) -> dict[str, str]:
+        """Return all answers in their order, where these are few: as a table holds them, with their words."""
+        return {}
+
+    @property
+    def names_several(self) -> bool:
+        """Whether an answer names several of `levels`, with spaces between them in a table."""
+        return False
+
+    def counted(self, response: str) -> tuple[str, ...]:
+        """Return which of `levels` an answer counts for, as a table holds it: of a ranking, say, the first alone."""
+        return tuple(response.split()) if self.names_several else (response,)
+
+    def _shown(self, number: int, context: Context) -> tuple[str, int, str, bool]:
+        """Return the fields that the views of all kinds have."""
+        return self.id, number, context.text(self.text), self.required
+
+
+def plain_number(value: float) -> int | float:
+    """Return a number without the digits that binary fractions add, whole ones as integers."""
+    rounded = round(value, 9)
+    return int(rounded) if rounded == int(rounded) else rounded
+
+
+def kind_id(kind: type[Question]) -> str:
+    """Return the id of a kind; a question without a field ``kind`` is a statement."""
+    field_ = kind.model_fields.get("kind")
+    return "statement" if field_ is None else str(field_.default)
+
+
+@dataclass(frozen=True, slots=True)
+class RatingView(ItemView):
+    """A rating as shown: ``labels`` name the points, lowest first; ``cannot_judge`` the answer off the scale."""
+
+    widget: ClassVar[str] = "rating"
+
+    labels: tuple[str, ...] = field(default=(), kw_only=True)
+    cannot_judge: str | None = field(default=None, kw_only=True)
+
+    @property
+    def keys(self) -> str:
+        """The digits of its points; beyond 9 the arrows reach them."""
+        return f"1–{min(len(self.labels), 9)}"
+
+    def simulated(self, opinion: float, draw: Draw) -> Value:
+        """Return the nearest point."""
+        points = len(self.labels)
+        place = opinion if points == OPINION_POINTS else 1 + (opinion - 1) * (points - 1) / (OPINION_POINTS - 1)
+        return min(points, max(1, math.floor(place + 0.5)))
+
+    def nearby(self, answer: Value) -> Value:
+        """Return a neighbouring point."""
+        if not isinstance(answer, int):
+            return answer
+        return answer - 1 if answer == len(self.labels) else answer + 1
+
+
+class Rated(Question):
+    """What a statement and a rating have in common: a scale."""
+
+    widget: ClassVar[str] = "rating"
+    measure: ClassVar[str] = "rating"
+    figure: ClassVar[str | None] = "rating"
+    value_type: ClassVar[ValueType] = "integer"
+
+    def scale_of(self, context: Context) -> Scale:
+        """Return the scale that it is rated on."""
+        raise NotImplementedError
+
+    def view(self, number: int, context: Context) -> ItemView:
+        """Return the points with their names."""
+        scale = self.scale_of(context)
+        return RatingView(
+            *self._shown(number, context),
+            show_if=self.show_if,
+            labels=scale.labels[context.language],
+            cannot_judge=None if scale.cannot_judge is None else context.text(scale.cannot_judge),
+        )
+
+    def problem(self, answer: Value, context: Context) -> str | None:
+        """Return why something is not a point of the scale."""
+        scale = self.scale_of(context)
+        if answer is None:
+            if scale.cannot_judge is not None:
+                return None
+            return "this questionnaire has no answer off the scale: choose one of its points"
+        if isinstance(answer, int) and 1 <= answer <= scale.points:
+            return None
+        return f"answer {answer} is not on the scale: choose 1 to {scale.points}"
+
+    def bounds(self, context: Context) -> tuple[float, float] | None:
+        """Return the first and the last point."""
+        return 1, self.scale_of(context).points
+
+    def levels(self, context: Context) -> dict[str, str]:
+        """Return the points with their names."""
+        labels = self.scale_of(context).labels[context.language]
+        return {str(point): label for point, label in enumerate(labels, start=1)}
+
+
+class Rating(Rated):
+    """A rating on one of the protocol's scales."""
+
+    kind: Literal["rating"] = "rating"
+    scale: Id = Field(description="The scale, of 2 to 11 points.")
+
+    def scale_of(self, context: Context) -> Scale:
+        """Return its own scale."""
+        return context.scales[self.scale]
+
+
+class Statement(Rated):
+    """A statement; if a questionnaire has only statements, they form a grid."""
+
+    widget: ClassVar[str] = "rating"
+
+    def scale_of(self, context: Context) -> Scale:
+        """Return the questionnaire's scale."""
+        return context.scales[context.scale or ""]
+
+
+FEWEST_OPTIONS, MOST_OPTIONS = 2, 12
+
+
+@dataclass(frozen=True, slots=True)
+class ChoiceView(ItemView):
+    """Options as shown: their ids and words; of ``several`` any number can be chosen."""
+
+    widget: ClassVar[str] = "choice"
+
+    options: tuple[tuple[str, str], ...] = field(default=(), kw_only=True)
+    several: bool = field(default=False, kw_only=True)
+
+    @property
+    def keys(self) -> str:
+        """The digits of its options; beyond 9 the arrows reach them."""
+        return f"1–{min(len(self.options), 9)}"
+
+    def simulated(self, opinion: float, draw: Draw) -> Value:
+        """Return an option by chance; of several, each with probability one half, and the first where none is."""
+        if self.several:
+            chosen = tuple(option for option, _ in self.options if draw() < 0.5)
+            return chosen or (self.options[0][0],)
+        return self.options[int(len(self.options) * draw())][0]
+
+
+class Option(Table):
+    """One answer that can be chosen."""
+
+    id: Id = Field(description="Name of the option in every table.")
+    text: Localised = Field(description="The option as the participant reads it.")
+
+
+class Choice(Question):
+    """A choice between options."""
+
+    widget: ClassVar[str] = "choice"
+    measure: ClassVar[str] = "counts"
+    figure: ClassVar[str | None] = "counts"
+    value_type: ClassVar[ValueType] = "text"
+
+    kind: Literal["choice"] = "choice"
+    options: tuple[Option, ...] = Field(
+        min_length=FEWEST_OPTIONS, max_length=MOST_OPTIONS, description="The options, in the order shown."
+    )
+    several: bool = Field(default=False, description="Whether any number of options can be chosen.")
+
+    @model_validator(mode="after")
+    def _options_differ(self) -> Self:
+        ids = [option.id for option in self.options]
+        for number, name in enumerate(ids):
+            if name in ids[:number]:
+                raise PydanticCustomError(
+                    "options", 'option "{name}" is listed twice', {"name": name, "place": "options"}
+                )
+        return self
+
+    def view(self, number: int, context: Context) -> ItemView:
+        """Return the options."""
+        return ChoiceView(
+            *self._shown(number, context),
+            show_if=self.show_if,
+            options=tuple((option.id, context.text(option.text)) for option in self.options),
+            several=self.several,
+        )
+
+    def problem(self, answer: Value, context: Context) -> str | None:
+        """Return why something is not a choice of the options."""
+        ids = [option.id for option in self.options]
+        if self.several:
+            permitted = isinstance(answer, tuple) and 0 < len(set(answer)) == len(answer) and set(answer) <= set(ids)
+        else:
+            permitted = answer in ids
+        return None if permitted else f"answer {answer} is not among the options: choose {' or '.join(ids)}"
+
+    @property
+    def names_several(self) -> bool:
+        """Whether several options can be chosen."""
+        return self.several
+
+    def levels(self, context: Context) -> dict[str, str]:
+        """Return the options."""
+        return {option.id: context.text(option.text) for option in self.options}
+
+
+@dataclass(frozen=True, slots=True)
+class NumberView(ItemView):
+    """A field for a number as shown; ``least`` and ``most`` are None where nothing bounds it."""
+
+    widget: ClassVar[str] = "number"
+
+    least: float | None = field(default=None, kw_only=True)
+    most: float | None = field(default=None, kw_only=True)
+    whole: bool = field(default=False, kw_only=True)
+    unit: str = field(default="", kw_only=True)
+
+    @property
+    def keys(self) -> str:
+        """The digits."""
+        return "0–9"
+
+    def permits(self, number: float) -> bool:
+        """Return whether a number answers it."""
+        return (
+            (self.least is None or number >= self.least)
+            and (self.most is None or number <= self.most)
+            and abs(number) <= MOST
+            and (not self.whole or number == math.floor(number))
+        )
+
+    def simulated(self, opinion: float, draw: Draw) -> Value:
+        """Return a number within its bounds, or within 0 to 100 where it has none."""
+        least = self.least if self.least is not None else min(0.0, self.most if self.most is not None else 0.0)
+        most = self.most if self.most is not None else least + 100.0
+        share = min(1.0, max(0.0, (opinion - 1) / (OPINION_POINTS - 1)))
+        number = least + share * (most - least)
+        if self.whole:
+            return min(math.floor(most), max(math.ceil(least), round(number)))
+        return plain_number(min(most, max(least, round(number, 3))))
+
+
+class Number(Question):
+    """A number."""
+
+    model_config = ConfigDict(serialize_by_alias=True, validate_by_name=True)
+
+    widget: ClassVar[str] = "number"
+    measure: ClassVar[str] = "distribution"
+    figure: ClassVar[str | None] = "distribution"
+    value_type: ClassVar[ValueType] = "number"
+
+    kind: Literal["number"] = "number"
+    least: Bound | None = Field(default=None, alias="from", description="Smallest number; left out: any.")
+    most: Bound | None = Field(default=None, alias="to", description="Largest number; left out: any.")
+    whole: bool = Field(default=False, description="Whether only whole numbers are permitted.")
+    unit: Localised | None = Field(default=None, description="Unit, shown after the field.")
+
+    @model_validator(mode="after")
+    def _range_has_numbers(self) -> Self:
+        if self.least is not None and self.most is not None:
+            least = math.ceil(self.least) if self.whole else self.least
+            if self.most < least:
+                raise PydanticCustomError(
+                    "range",
+                    "{most} is less than from = {least}",
+                    {"most": f"{self.most:g}", "least": f"{self.least:g}", "place": "to"},
+                )
+        return self
+
+    def view(self, number: int, context: Context) -> ItemView:
+        """Return the field."""
+        return NumberView(
+            *self._shown(number, context),
+            show_if=self.show_if,
+            least=self.least,
+            most=self.most,
+            whole=self.whole,
+            unit="" if self.unit is None else context.text(self.unit),
+        )
+
+    def problem(self, answer: Value, context: Context) -> str | None:
+        """Return why something is not a permitted number."""
+        view = self.view(0, context)
+        if isinstance(view, NumberView) and isinstance(answer, int | float) and view.permits(answer):
+            return None
+        least = "" if self.least is None else f" from {self.least:g}"
+        most = "" if self.most is None else f" to {self.most:g}"
+        return f"answer {answer} is not permitted: give a {'whole ' if self.whole else ''}number{least}{most}"
+
+    def bounds(self, context: Context) -> tuple[float, float] | None:
+        """Return smallest and largest number, where both are given."""
+        return None if self.least is None or self.most is None else (self.least, self.most)
+
+
+MOST_STEPS = 10_000
+
+
+@dataclass(frozen=True, slots=True)
+class SliderView(ItemView):
+    """A slider as shown, from ``least`` at the end called ``low`` to ``most`` at the end called ``high``."""
+
+    widget: ClassVar[str] = "slider"
+
+    low: str = field(default="", kw_only=True)
+    high: str = field(default="", kw_only=True)
+    least: float = field(default=0.0, kw_only=True)
+    most: float = field(default=100.0, kw_only=True)
+    step: float = field(default=1.0, kw_only=True)
+
+    @property
+    def keys(self) -> str:
+        """The arrows."""
+        return "← →"
+
+    @property
+    def steps(self) -> int:
+        """How many steps lead from end to end."""
+        return round((self.most - self.least) / self.step)
+
+    def at(self, step: int) -> int | float:
+        """Return the number at a step, counted from 0."""
+        return plain_number(self.least + step * self.step)
+
+    def simulated(self, opinion: float, draw: Draw) -> Value:
+        """Return the nearest step."""
+        share = min(1.0, max(0.0, (opinion - 1) / (OPINION_POINTS - 1)))
+        return self.at(round(share * self.steps))
+
+
+class Slider(Question):
+    """A number on a line between two words."""
+
+    model_config = ConfigDict(serialize_by_alias=True, validate_by_name=True)
+
+    widget: ClassVar[str] = "slider"
+    measure: ClassVar[str] = "distribution"
+    figure: ClassVar[str | None] = "distribution"
+    value_type: ClassVar[ValueType] = "number"
+
+    kind: Literal["slider"] = "slider"
+    low: Localised = Field(description="Words at the lower end.")
+    high: Localised = Field(description="Words at the upper end.")
+    least: Bound = Field(default=0, alias="from", description="The number at the lower end.")
+    most: Bound = Field(default=100, alias="to", description="The number at the upper end.")
+    step: float = Field(default=1, gt=0, description="Difference between neighbouring numbers.")
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> Self:
+        if self.most <= self.least:
+            raise PydanticCustomError(
+                "range",
+                "{most} is not more than from = {least}",
+                {"most": f"{self.most:g}", "least": f"{self.least:g}", "place": "to"},
+            )
+        steps = (self.most - self.least) / self.step
+        if abs(steps - round(steps)) > 1e-6 or not 1 <= round(steps) <= MOST_STEPS:
+            raise PydanticCustomError(
+                "steps",
+                "is {step}: {steps} steps from end to end; it must be a whole number of 1 to {most}",
+                {"step": f"{self.step:g}", "steps": f"{steps:g}", "most": MOST_STEPS, "place": "step"},
+            )
+        return self
+
+    def view(self, number: int, context: Context) -> ItemView:
+        """Return the line with its ends."""
+        return SliderView(
+            *self._shown(number, context),
+            show_if=self.show_if,
+            low=context.text(self.low),
+            high=context.text(self.high),
+            least=self.least,
+            most=self.most,
+            step=self.step,
+        )
+
+    def problem(self, answer: Value, context: Context) -> str | None:
+        """Return why something is not a step of the slider."""
+        if isinstance(answer, int | float) and self.least <= answer <= self.most:
+            steps = (answer - self.least) / self.step
+            if abs(steps - round(steps)) <= 1e-6:
+                return None
+        return f"answer {answer} is not on the slider: choose {self.least:g} to {self.most:g} in steps of {self.step:g}"
+
+    def bounds(self, context: Context) -> tuple[float, float] | None:
+        """Return the numbers of both ends."""
+        return self.least, self.most
+
+
+SIMULATED: Final = "Simulated answer."
+
+
+@dataclass(frozen=True, slots=True)
+class TextView(ItemView):
+    """A field for a text as shown: ``lines`` high, for at most ``longest`` characters."""
+
+    widget: ClassVar[str] = "text"
+
+    lines: int = field(default=1, kw_only=True)
+    longest: int = field(default=500, kw_only=True)
+
+    @property
+    def keys(self) -> str:
+        """The letters."""
+        return "A–Z"
+
+    def simulated(self, opinion: float, draw: Draw) -> Value:
+        """Return a sentence that says what it is."""
+        return SIMULATED[: self.longest]
+
+
+class Text(Question):
+    """A free text."""
+
+    widget: ClassVar[str] = "text"
+    measure: ClassVar[str] = "texts"
+    value_type: ClassVar[ValueType] = "text"
+
+    kind: Literal["text"] = "text"
+    lines: int = Field(default=1, ge=1, le=10, description="Height of the field, in lines.")
+    longest: int = Field(default=500, ge=1, le=5000, description="Largest number of characters.")
+
+    def view(self, number: int, context: Context) -> ItemView:
+        """Return the field."""
+        return TextView(*self._shown(number, context), show_if=self.show_if, lines=self.lines, longest=self.longest)
+
+    def problem(self, answer: Value, context: Context) -> str | None:
+        """Return why something is not a text that can be kept."""
+        if not isinstance(answer, str) or not answer.strip():
+            return "the text is empty: write one, or leave the question open"
+        if len(answer) > self.longest:
+            return f"the text has {len(answer)} characters: write at most {self.longest}"
+        if any(unicodedata.category(letter) in UNPRINTABLE and letter != "\n" for letter in answer):
+            return "the text holds a character that cannot be printed: take it out"
+        return None
+
+
+STATEMENT: Final = "statement"
+
+KINDS: Final[dict[str, type[Question]]] = {
+    kind_id(kind): kind for kind in (Choice, Number, Rating, Slider, Statement, Text)
+}
+"""Every kind by its id; a question of a protocol file is of one of these."""
+
+
+def _kind_of(value: Any) -> str:
+    return str(value.get("kind", STATEMENT)) if isinstance(value, Mapping) else STATEMENT
+
+
+def _as_it_is(value: Any, validated: Callable[[Any], Question]) -> Question:
+    """Return a question that was made in Python as it is, of any kind."""
+    return value if isinstance(value, Question) else validated(value)
+
+
+if TYPE_CHECKING:
+    AnyQuestion: TypeAlias = Question
+else:
+    AnyQuestion = Annotated[
+        SerializeAsAny[
+            Annotated[
+                reduce(or_, [Annotated[kind, Tag(name)] for name, kind in KINDS.items()]),
+                Discriminator(
+                    _kind_of,
+                    custom_error_type="question_kind",
+                    custom_error_message="is not a kind of question",
+                    custom_error_context={"place": "kind", "permitted": ", ".join(KINDS)},
+                ),
+            ]
+        ],
+        WrapValidator(_as_it_is),
+    ]
+
+
+def question_of(table: Mapping[str, Any]) -> Question:
+    """Return a question of a receipt.
+
+    Raises
+    ------
+    KeyError
+        No kind has its name.
+    ValueError
+        It is not a question of its kind.
+    """
+    return KINDS[_kind_of(table)].model_validate(table)

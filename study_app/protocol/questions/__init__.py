@@ -1,1 +1,0 @@
-"""The kinds of questions, one module each; a new kind is a new module here and its widget."""
