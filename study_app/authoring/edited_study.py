@@ -14,9 +14,8 @@ from study_app.authoring.writer.splices import Splice, Splices, applied
 from study_app.errors import Problem, ProtocolError
 from study_app.protocol.load import examined, located, read_document
 from study_app.protocol.model import Protocol
-from study_app.protocol.source.document import Path, frozen
-from study_app.protocol.source.line_numbers import Places
-from study_app.protocol.source.liquid_files import TABLE, with_liquid_files
+from study_app.protocol.source.document import Path, Places, frozen
+from study_app.protocol.source.files import TABLE, with_liquid_files
 from study_app.protocol.source.problems import Fault
 
 _NOT_TOML: Final = "the file cannot be read: correct its text first"

@@ -7,7 +7,7 @@ from typing import Any, Final
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, rows
 from study_app.authoring.names import named_at
-from study_app.protocol.groups.group import sequences_in
+from study_app.protocol.groups import sequences_in
 from study_app.protocol.source.document import Path, entries, has, value_at
 
 TITLES: Final = ("title", "short", "text")

@@ -11,14 +11,13 @@ from study_app.number_text import counted
 from study_app.protocol import liquid_summary
 from study_app.protocol.checks.delay_warnings import delay_warnings
 from study_app.protocol.checks.level_warnings import level_warnings
-from study_app.protocol.groups.own_protocol import Variant, variants
-from study_app.protocol.groups.session_steps import sessions_differ
+from study_app.protocol.groups import sessions_differ
 from study_app.protocol.instruments.instrument_summary import sources
 from study_app.protocol.instruments.instrument_summary import warnings as from_memory
 from study_app.protocol.model import Block, Condition, Protocol, Questionnaire, Reach
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
-from study_app.protocol.orders.durations import block_duration_s, expected_duration_s
-from study_app.protocol.orders.latin_squares import row_count
+from study_app.protocol.orders.durations import Variant, block_duration_s, expected_duration_s, variants
+from study_app.protocol.orders.sequences import row_count
 from study_app.protocol.questions import Context, Question
 from study_app.protocol.trials.block_summary import design_rows
 from study_app.protocol.trials.presentation import link_words

@@ -19,11 +19,17 @@ from study_app.protocol.checks.pace import paced
 from study_app.protocol.checks.returned_energy import returned
 from study_app.protocol.model import Format, HandForceN, Named, Protocol, SceneDefaults
 from study_app.protocol.questionnaires import with_instruments
-from study_app.protocol.source.document import Path, entries, frozen
-from study_app.protocol.source.files import at_hand, protocol_hash, shipped, source_bytes
+from study_app.protocol.source.document import Path, Places, entries, frozen
+from study_app.protocol.source.files import (
+    FOOTAGE_TABLE,
+    TABLE,
+    at_hand,
+    is_footage,
+    protocol_hash,
+    shipped,
+    source_bytes,
+)
 from study_app.protocol.source.json_schema import schema
-from study_app.protocol.source.line_numbers import Places
-from study_app.protocol.source.liquid_files import FOOTAGE_TABLE, TABLE, is_footage
 from study_app.protocol.source.problems import Fault, did_you_mean, faults_of
 from study_app.protocol.table import Table
 

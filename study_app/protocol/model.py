@@ -27,8 +27,7 @@ from study_app.haptics.model.scene import (
 from study_app.protocol.analysis_plan import Analysis
 from study_app.protocol.blocks import Block, Compared, Kind
 from study_app.protocol.credits import Credits
-from study_app.protocol.groups.group import Group, Sequences, Steps
-from study_app.protocol.groups.session_steps import every_step
+from study_app.protocol.groups import Group, Sequences, Steps, every_step
 from study_app.protocol.questionnaires import Questionnaire
 from study_app.protocol.questions import Scale
 from study_app.protocol.table import ExtendedTable, Table

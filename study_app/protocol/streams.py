@@ -2,14 +2,24 @@
 
 A stream is a ``random.Random`` seeded by SHA-256 of (seed, name), of which only ``.random()`` is used (the one method
 Python promises never to change), under our own Fisher–Yates.
+
+Streams that only the sealed key can repeat draw what would reveal what an interval presented. They are seeded by
+HMAC-SHA256 under a sub-key of the key's nonce, so that neither seed nor protocol tells their numbers (RFC 2104).
+
+**Groups** are allocated in permuted blocks. The participant with entry k of a folder is in the group at place k of
+permuted blocks. A permuted block holds every group as often as its share says, shuffled by a stream of the secret. So
+groups of share 1 never differ by more than one participant, and without the secret the next allocation cannot be
+predicted.
 """
 
 from __future__ import annotations
 
 import hashlib
+import hmac
 import random
-from collections.abc import Callable, Iterable
-from typing import TypeAlias, TypeVar
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Final, TypeAlias, TypeVar
 
 T = TypeVar("T")
 
@@ -37,3 +47,54 @@ def shuffle(items: Iterable[T], draw: Draw) -> tuple[T, ...]:
         chosen = int(draw() * (last + 1))
         order[last], order[chosen] = order[chosen], order[last]
     return tuple(order)
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Key:
+    """The opened key of a study; never printed.
+
+    Attributes
+    ----------
+    codes : mapping
+        Block → code → what the code stands for: a condition, or a track such as "8/1".
+    secret : bytes
+        The nonce, from which sub-keys are derived.
+    """
+
+    codes: Mapping[str, Mapping[str, str]]
+    secret: bytes
+
+
+SECRET_BYTES: Final = 32
+
+
+def draw_secret(draw: Draw) -> bytes:
+    """Return a secret drawn with ``draw`` (uniform numbers in [0, 1)); a rehearsal's comes from its seed."""
+    return bytes(int(draw() * 256) for _ in range(SECRET_BYTES))
+
+
+def sub_key(secret: bytes, name: str) -> bytes:
+    """Return the sub-key of that name (32 bytes)."""
+    return hmac.digest(secret, name.encode(), "sha256")
+
+
+def keyed_stream(secret: bytes, name: str) -> random.Random:
+    """Return the stream of that name; use only its ``.random()``."""
+    return random.Random(int.from_bytes(sub_key(sub_key(secret, "levels"), name), "big"))  # noqa: S311 - seeded by a MAC
+
+
+def group_of(shares: Mapping[str, int], secret: bytes, entry: int) -> str:
+    """Return the group of the participant with an entry.
+
+    Parameters
+    ----------
+    shares : mapping of str to int
+        Group → how often it comes in each permuted block; the order of the groups does not matter.
+    secret : bytes
+        The nonce of the sealed key.
+    entry : int
+        Which participant of the folder it is, from 1.
+    """
+    groups = [name for name in sorted(shares) for _ in range(shares[name])]
+    block, place = divmod(entry - 1, len(groups))
+    return shuffle(groups, keyed_stream(secret, f"groups/{block + 1}").random)[place]

@@ -21,7 +21,7 @@ from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.checks.clipped_levels import beyond_slope_limit, by_stimulus
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import expected_duration_s
-from study_app.protocol.orders.latin_squares import enrolment
+from study_app.protocol.orders.sequences import enrolment
 from study_app.protocol.trials.presented_levels import highest_damping
 from study_app.video.sources import VideosFound
 

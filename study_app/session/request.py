@@ -11,8 +11,8 @@ from study_app.devices.registry import descriptor_of
 from study_app.errors import SessionError, StoreError
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.latin_squares import enrolment
 from study_app.protocol.orders.schedule import Schedule, build_schedule, stream
+from study_app.protocol.orders.sequences import enrolment
 from study_app.session.resume import find_protocol, source_to_resume
 from study_app.store.folders import ID_PATTERN, locate, study_folder
 from study_app.store.progress import progress

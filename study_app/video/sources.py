@@ -9,7 +9,7 @@ from typing import Any
 from study_app.errors import VideoError
 from study_app.number_text import counted
 from study_app.protocol.model import Protocol
-from study_app.protocol.source.liquid_files import file_hash
+from study_app.protocol.source.files import file_hash
 from study_app.protocol.trials.stimuli import DELAY, MOST_DELAY_MS
 from study_app.video.camera import USUAL, Camera, without_login
 from study_app.video.decoding import EXTRA, installed

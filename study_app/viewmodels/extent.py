@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from study_app.protocol.describe import spread
-from study_app.protocol.groups.own_protocol import variants
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
-from study_app.protocol.orders.durations import expected_duration_s
+from study_app.protocol.orders.durations import expected_duration_s, variants
 from study_app.viewmodels.number_words import duration_range
 
 

@@ -10,8 +10,7 @@ from random import Random
 from typing import Any
 
 from study_app.authoring.writer.edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset, meaning, same
-from study_app.protocol.source.document import Path
-from study_app.protocol.source.notation import Node, scan
+from study_app.protocol.source.document import Node, Path, scan
 
 _TOKENS = re.compile(
     r'"""(?:\\.|[^\\])*?"""(?!")'

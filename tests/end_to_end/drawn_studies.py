@@ -8,7 +8,7 @@ from typing import Any
 import tomlkit
 
 from study_app.errors import ProtocolError
-from study_app.protocol.groups.group import sequences_in
+from study_app.protocol.groups import sequences_in
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import frozen

@@ -16,7 +16,7 @@ from study_app.protocol.describe import describe
 from study_app.protocol.load import load, load_scene, parse, protocol_hash, source_bytes
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.scene_file import scene_text
-from study_app.protocol.source.liquid_files import bundled, unbundled
+from study_app.protocol.source.files import bundled, unbundled
 from tests.protocol.sound import EVERY_ORDER, SOUND
 
 

@@ -3,9 +3,9 @@
 import re
 from pathlib import Path
 
-from study_app.protocol.groups.own_protocol import variants
 from study_app.protocol.load import parse
 from study_app.protocol.orders.block_orders import orders_of
+from study_app.protocol.orders.durations import variants
 from study_app.protocol.questionnaires import instrument, instruments
 from study_app.protocol.questions import KINDS, STATEMENT
 from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS

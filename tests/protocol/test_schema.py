@@ -8,8 +8,7 @@ import jsonschema
 import pytest
 
 from study_app.protocol.load import SceneFile, shipped
-from study_app.protocol.source.json_schema import editor_schema, schema
-from study_app.protocol.source.schema_reference import format_markdown
+from study_app.protocol.source.json_schema import editor_schema, format_markdown, schema
 from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
 from tests.protocol.edited_studies import CASES, STUDIES, cases_of, text_of
 from tests.protocol.forms.mixed import MIXED

@@ -8,8 +8,8 @@ import pytest
 from study_app.errors import ProtocolError
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, parse, protocol_hash, source_bytes
+from study_app.protocol.source.files import bundled, hashes_in, unbundled
 from study_app.protocol.source.json_schema import schema
-from study_app.protocol.source.liquid_files import bundled, hashes_in, unbundled
 
 FOOTAGE = b"not decoded here"
 SEEN = '[conditions.{name}]\nliquid = "thin"\ndelay_ms = {delay}\n{keys}\n\n'

@@ -17,8 +17,8 @@ from study_app.protocol.liquid_summary import warnings
 from study_app.protocol.load import load, load_scenes, parse, protocol_hash, source_bytes
 from study_app.protocol.orders.block_orders import block_codes
 from study_app.protocol.orders.schedule import Trial, build_schedule, stream
+from study_app.protocol.source.files import unbundled
 from study_app.protocol.source.json_schema import schema
-from study_app.protocol.source.liquid_files import unbundled
 from study_app.session.pages import TaskPage
 from study_app.session.request import resumed
 from study_app.session.simulated import rehearsal

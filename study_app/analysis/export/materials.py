@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 from study_app.analysis.tables.study_tables import Study
 from study_app.errors import ProtocolError
-from study_app.protocol.source.files import at_hand, find, protocol_hash, source_bytes
-from study_app.protocol.source.liquid_files import bundled, file_hash, unbundled
+from study_app.protocol.source.files import at_hand, bundled, file_hash, find, protocol_hash, source_bytes, unbundled
 from study_app.store.atomic import cause, open_regular
 from study_app.store.blinded.blinding import revealed_key
 from study_app.store.output_files import FileCopy

@@ -9,7 +9,7 @@ from study_app.analysis.tables.compared_blocks import Item, Kind, spoken
 from study_app.analysis.tables.planned_analysis import Decided
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block
-from study_app.protocol.groups.session_steps import groups_with
+from study_app.protocol.groups import groups_with
 from study_app.protocol.model import Protocol
 from study_app.protocol.questions import POINTS, Question
 from study_app.protocol.simulated_observer import OPINIONS, TrialFeatures

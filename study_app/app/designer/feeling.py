@@ -18,7 +18,7 @@ from study_app.lab.ab_comparison import Setting, Side
 from study_app.lab.parameters import parameter
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import Path, has, value_at
-from study_app.protocol.source.liquid_files import file_of
+from study_app.protocol.source.files import file_of
 
 OF_THE_STUDY: Final = frozenset({"scene", "velocity", "knee", "body"})
 """Tables of the lab's parameters that a study has once for all of its liquids."""

@@ -20,8 +20,7 @@ from study_app.authoring.writer.edits import Set
 from study_app.authoring.writer.refused import Refused
 from study_app.errors import StoreError
 from study_app.protocol.source.document import value_at
-from study_app.protocol.source.files import shipped, shipped_file
-from study_app.protocol.source.liquid_files import file_hash, hashes_in, unbundled, with_liquid_files
+from study_app.protocol.source.files import file_hash, hashes_in, shipped, shipped_file, unbundled, with_liquid_files
 from study_app.store.atomic import cannot_write
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.folder_lock import is_open

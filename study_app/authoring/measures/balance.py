@@ -6,7 +6,7 @@ from typing import Final
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.balance import Evenness, balances, numbered
-from study_app.protocol.orders.latin_squares import row_count
+from study_app.protocol.orders.sequences import row_count
 
 SEED: Final = 1
 """Of orders that are drawn; those of a square do not depend on it."""

@@ -14,7 +14,7 @@ from study_app.authoring.writer.edits import Edit, Insert, Move, Set, Unset
 from study_app.protocol.differences import Difference, differences, document_differences
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import Path
-from study_app.protocol.source.liquid_files import TABLE, unbundled, with_liquid_files
+from study_app.protocol.source.files import TABLE, unbundled, with_liquid_files
 from study_app.store.receipt import without_conditions
 
 Effect: TypeAlias = Literal["comparable", "measured", "tables"]

@@ -11,7 +11,7 @@ from study_app.authoring.versions.contents import content_hash, keep_content, ke
 from study_app.authoring.writer.refused import Refused
 from study_app.errors import StoreError
 from study_app.number_text import counted
-from study_app.protocol.source.liquid_files import with_liquid_files
+from study_app.protocol.source.files import with_liquid_files
 from study_app.store import receipt
 from study_app.store.folders import StudyFolder
 

@@ -8,8 +8,7 @@ from study_app.authoring.writer.refused import Refused
 from study_app.authoring.writer.spans import Piece, Spans
 from study_app.authoring.writer.splices import Editor
 from study_app.authoring.writer.values import WIDTH, inline, key_text, tables, written
-from study_app.protocol.source.document import Path
-from study_app.protocol.source.notation import Node
+from study_app.protocol.source.document import Node, Path
 
 _PADDING: Final = re.compile(r"([ \t]+)#")
 _COMMA: Final = re.compile(r"[ \t]*,[ \t]*")

@@ -12,8 +12,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 from typing import Final, NamedTuple
 
-from study_app.protocol.source.document import Path
-from study_app.protocol.source.notation import Node, scan
+from study_app.protocol.source.document import Node, Path, scan
 
 _RULER: Final = re.compile(r"\s*#\s*[-=*#~]{3,}")
 _COMMENT: Final = re.compile(r"[ \t]*#")

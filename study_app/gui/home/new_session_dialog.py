@@ -20,7 +20,7 @@ from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox, vbox
 from study_app.gui.widgets.cards import Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, Number
 from study_app.gui.widgets.labels import label, set_ink
-from study_app.protocol.groups.session_steps import refuse_beyond_last
+from study_app.protocol.groups import refuse_beyond_last
 from study_app.protocol.wording.languages import language_name
 from study_app.session.request import NewSession, check_row, draw_seed, study_results
 from study_app.store.sessions.participant_ids import MAX_SESSION, check_participant

@@ -9,7 +9,7 @@ import unicodedata
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
-from study_app.protocol.groups.group import SEQUENCES, sequences_in
+from study_app.protocol.groups import SEQUENCES, sequences_in
 from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.source.problems import ALIKE, ONE_LANGUAGE, Fault, did_you_mean
 from study_app.protocol.wording.languages import LANGUAGES, language_name

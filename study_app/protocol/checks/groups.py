@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from study_app.protocol.groups.group import sequences_in
+from study_app.protocol.groups import sequences_in
 from study_app.protocol.source.document import entries, names
 from study_app.protocol.source.problems import Fault
 

@@ -13,15 +13,12 @@ from itertools import count, pairwise
 from typing import Literal, TypeAlias
 
 from study_app.errors import StudyError
-from study_app.protocol.groups.allocation import group_of
-from study_app.protocol.groups.own_protocol import variants
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import BlockOrder, CodeOrder, orders_of
-from study_app.protocol.orders.latin_squares import borders_even, enrolment, row_count
-from study_app.protocol.orders.order_constraint import longest_run, shortest_distance
+from study_app.protocol.orders.durations import variants
 from study_app.protocol.orders.schedule import codes_of
-from study_app.protocol.streams import stream
-from study_app.protocol.trials.keyed import draw_secret
+from study_app.protocol.orders.sequences import borders_even, enrolment, longest_run, row_count, shortest_distance
+from study_app.protocol.streams import draw_secret, group_of, stream
 
 Table: TypeAlias = tuple[tuple[int, ...], ...]
 

@@ -12,10 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from study_app.errors import StudyError
 from study_app.protocol.blocks import Block, Order, Phase
-from study_app.protocol.groups.group import Group
-from study_app.protocol.groups.session_steps import every_step, numbered_parts, sessions_differ, steps_of
+from study_app.protocol.groups import Group, every_step, numbered_parts, sessions_differ, steps_of
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.order_constraint import Constraint
+from study_app.protocol.orders.sequences import Constraint
 from study_app.protocol.trials.methods import TrackOrder
 from study_app.protocol.trials.tracks import method_of, tracks_of
 

@@ -1,14 +1,145 @@
-"""Where protocol files are: a path, or a name from the workspace and then from those that ship with the program."""
+"""Where protocol files are, and the files that a study names: liquid files and footage, both in the study's folder.
+
+``[liquids.syrup] file = "syrup.toml"`` names a scene file with one liquid, ``[conditions.seen] view = "waves.mp4"`` a
+video. A study's source is its file, followed by the SHA-256 of its footage in a table ``[footage_files]``, and by its
+liquid files as texts in a last table ``[liquid_files]``. So the source's hash covers all that is presented, and
+the lines of the study's own file keep their numbers. A file that names none of these is its own source, byte for byte.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import json
+import re
+import tomllib
+from collections.abc import Callable, Mapping
+from functools import lru_cache
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
 
 from study_app.errors import Problem, ProtocolError
-from study_app.protocol.source.liquid_files import with_liquid_files
 from study_app.protocol.source.problems import did_you_mean
 from study_app.workspace import workspace
+
+TABLE: Final = "liquid_files"
+FOOTAGE_TABLE: Final = "footage_files"
+_FOOTAGE_HEADER: Final = f"\n\n# The SHA-256 of the footage of this study.\n[{FOOTAGE_TABLE}]\n".encode()
+_HEADER: Final = f"\n\n# The liquid files of this study, as they were read.\n[{TABLE}]\n".encode()
+DRAWN_OR_LIVE: Final = ("tank", "camera")
+"""Views of a condition that are no file."""
+
+
+def with_liquid_files(study: bytes, folder: Path) -> bytes:
+    """Return a study's source: its file ``study``, and the files it names, relative to ``folder``.
+
+    One that cannot be read is left out; `load.parse` reports it. A source is returned as it is.
+    """
+    if _HEADER in study or _FOOTAGE_HEADER in study:
+        return study
+    hashes = {name: digest for name in footage_names(study) if (digest := file_hash(folder / name)) is not None}
+    return bundled(study, lambda name: _read(folder / name), hashes)
+
+
+def bundled(
+    study: bytes, text_of: Callable[[str], str | None], hashes: Mapping[str, str] = MappingProxyType({})
+) -> bytes:
+    """Return a study's file followed by what it names.
+
+    Parameters
+    ----------
+    study : bytes
+        The study's file.
+    text_of : callable
+        Gives the text of a liquid file, None if it is lost.
+    hashes : mapping of str to str
+        The SHA-256 of its footage, by name.
+    """
+    texts = {name: text for name in _named(study) if (text := text_of(name)) is not None}
+    return study + _table(_FOOTAGE_HEADER, hashes) + _table(_HEADER, texts)
+
+
+def unbundled(source: bytes) -> tuple[bytes, dict[str, str]]:
+    """Return the study's file in a source, and the texts of its liquid files by their names."""
+    rest, texts = _split(source, _HEADER)
+    return _split(rest, _FOOTAGE_HEADER)[0], texts
+
+
+def hashes_in(source: bytes) -> dict[str, str]:
+    """Return the SHA-256 of the footage in a source, by name."""
+    return _split(_split(source, _HEADER)[0], _FOOTAGE_HEADER)[1]
+
+
+def _split(source: bytes, header: bytes) -> tuple[bytes, dict[str, str]]:
+    """Return what stands before a header, and the table after it."""
+    before, found, table = source.rpartition(header)
+    return (before, tomllib.loads(table.decode())) if found else (source, {})
+
+
+def _table(header: bytes, texts: Mapping[str, str]) -> bytes:
+    rows = "".join(f"{_quoted(name)} = {_quoted(text)}\n" for name, text in texts.items())
+    return header + rows.encode() if texts else b""
+
+
+def file_of(liquid: Any) -> Any:
+    """Return what a liquid's table names as its file; None where it names none."""
+    return liquid.get("file") if isinstance(liquid, Mapping) else None
+
+
+def footage_names(study: bytes) -> list[str]:
+    """Return the names of the footage of a study, sorted; none where it is not TOML (`load.parse` reports it)."""
+    return [name for name in _values(study, "conditions", "view") if is_footage(name)]
+
+
+def is_footage(view: object) -> bool:
+    """Return whether a condition's view is a file of footage."""
+    return isinstance(view, str) and view not in DRAWN_OR_LIVE
+
+
+def file_hash(path: Path) -> str | None:
+    """Return the SHA-256 of a file, in hexadecimal; None where it cannot be read."""
+    try:
+        held = path.stat()
+        return _hash(path, held.st_size, held.st_mtime_ns) if path.is_file() else None
+    except (OSError, ValueError):
+        return None
+
+
+@lru_cache(maxsize=64)
+def _hash(path: Path, size: int, changed_ns: int) -> str:
+    """Return the hash; ``size`` and ``changed_ns`` see to it that a changed file is read again."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _named(study: bytes) -> list[str]:
+    """Return the names of the liquid files of a study, sorted; none where it is not TOML (`load.parse` reports it)."""
+    return _values(study, "liquids", "file")
+
+
+def _values(study: bytes, section: str, key: str) -> list[str]:
+    """Return the texts that the tables of a section hold under a key, each once, sorted."""
+    if not re.search(rf"""\b{key}["']?[ \t]*=""".encode(), study):
+        return []
+    try:
+        tables = tomllib.loads(study.decode()).get(section)
+    except (ValueError, RecursionError):
+        return []
+    found = (one.get(key) for one in tables.values() if isinstance(one, Mapping)) if isinstance(tables, Mapping) else ()
+    return sorted({value for value in found if isinstance(value, str)})
+
+
+def _read(path: Path) -> str | None:
+    try:
+        return path.read_bytes().decode() if path.is_file() else None  # never a device or a pipe, which may not end
+    except (OSError, ValueError):
+        return None
+
+
+def _quoted(text: str) -> str:
+    """Return a text as a TOML string of one line."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
 
 _PACKAGE = Path(__file__).resolve().parents[2]
 # A checkout is offered as the workspace: then the folder of these protocols also holds the studies made there.

@@ -1,10 +1,13 @@
-"""The JSON Schema of a protocol file."""
+"""The JSON Schema of a protocol file, and the tables of its keys for the documentation."""
 
 from __future__ import annotations
 
+import json
+import re
+from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from functools import cache
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema
@@ -65,3 +68,158 @@ def editor_schema() -> dict[str, Any]:
     items["anyOf"] = [*whole, *partial]
     questions["then"]["properties"] = {"items": {"items": {"anyOf": whole}}}
     return described
+
+
+Node: TypeAlias = Mapping[str, Any]
+
+_TYPES: Final = {"integer": "whole number", "number": "number", "string": "text", "boolean": "`true` or `false`"}
+_BOUNDS: Final = {
+    "minimum": "at least {}",
+    "exclusiveMinimum": "more than {}",
+    "maximum": "at most {}",
+    "exclusiveMaximum": "less than {}",
+    "minItems": "at least {} entries",
+    "maxItems": "at most {} entries",
+    "maxLength": "at most {} characters",
+}
+
+
+def format_markdown() -> str:
+    """Return every table of a protocol file, with each key's values, default and meaning, as Markdown."""
+    root = schema()
+    places = _places(root)
+    headings = _headings(root, places)
+    lines = ["## Top of the file", "", *_table(root, root, headings)]
+    for name, heading in headings.items():
+        node = root["$defs"][name]
+        lines += ["", f"## {heading}", "", _plain(node.get("description", "")), ""]
+        if len(places[name]) > 1:
+            lines += [f"In {', '.join(f'`{place}`' for place in places[name])}.", ""]
+        lines += _table(node, root, headings)
+    return "\n".join(lines) + "\n"
+
+
+def _places(root: Node) -> dict[str, list[str]]:
+    """Return where each model stands in the file, in the order of the file, such as ``blocks.NAME.catch``."""
+    places: dict[str, list[str]] = {}
+
+    def visit(node: Node, place: str) -> None:
+        for key, below in node.get("properties", {}).items():
+            for name, inside in _models(below, f"{place}.{key}" if place else key):
+                found = places.setdefault(name, [])
+                if inside not in found:
+                    found.append(inside)
+                    if len(found) == 1:
+                        visit(root["$defs"][name], inside)
+
+    visit(root, "")
+    return places
+
+
+def _models(node: Node, place: str) -> Iterator[tuple[str, str]]:
+    if "$ref" in node:
+        yield node["$ref"].rsplit("/", 1)[-1], place
+    for branch in (*node.get("anyOf", ()), *node.get("oneOf", ())):
+        yield from _models(branch, place)
+    if isinstance(node.get("items"), Mapping):
+        yield from _models(node["items"], f"{place}[]")
+    for below in (*node.get("patternProperties", {}).values(), node.get("additionalProperties")):
+        if isinstance(below, Mapping):
+            yield from _models(below, f"{place}.NAME")
+
+
+def _headings(root: Node, places: Mapping[str, list[str]]) -> dict[str, str]:
+    """Return the heading of each model: its first place, with what tells it from others at that place."""
+    firsts = [found[0] for found in places.values()]
+    return {
+        name: found[0] if firsts.count(found[0]) == 1 else f"{found[0]}, {_apart(root['$defs'][name])}"
+        for name, found in places.items()
+    }
+
+
+def _apart(node: Node) -> str:
+    for key in ("kind", "law", "instrument"):
+        part = node.get("properties", {}).get(key, {})
+        values = [part["const"]] if "const" in part else part.get("enum", [])
+        if values:
+            return f"{key} = {' or '.join(values)}"
+    return str(node["title"])
+
+
+def _table(node: Node, root: Node, headings: Mapping[str, str]) -> list[str]:
+    rows = [
+        f"| `{key}` | {_values(part, headings)} | {_default(key, part, node)} | {_plain(_meaning(part, root))} |"
+        for key, part in node.get("properties", {}).items()
+    ]
+    return ["| key | value | default | meaning |", "| --- | --- | --- | --- |", *rows]
+
+
+def _values(node: Node, headings: Mapping[str, str]) -> str:
+    """Return what a key may be given, as words."""
+    found = dict.fromkeys(_alternatives(node, headings))
+    return " or ".join(words for words in found if words)
+
+
+def _alternatives(node: Node, headings: Mapping[str, str]) -> Iterator[str]:
+    if "$ref" in node:
+        heading = headings[node["$ref"].rsplit("/", 1)[-1]]
+        yield f"table [{heading}](#{_slug(heading)})".replace("[]", "\\[\\]", 1)
+    elif branches := node.get("anyOf") or node.get("oneOf"):
+        for branch in branches:
+            yield from _alternatives(branch, headings)
+    elif "const" in node or "enum" in node:
+        yield ", ".join(f"`{json.dumps(value)}`" for value in node.get("enum", [node.get("const")]))
+    elif node.get("type") == "array":
+        yield _list(node, headings)
+    elif node.get("type") == "object":
+        below = [*node.get("patternProperties", {}).values(), node.get("additionalProperties")]
+        inside = [_values(one, headings) for one in below if isinstance(one, Mapping)]
+        yield (
+            f"tables by name, each {inside[0]}" if "patternProperties" in node else f"by language or name: {inside[0]}"
+        )
+    elif node.get("type") != "null":
+        yield ", ".join((_TYPES.get(node.get("type", ""), "any"), *_bounds(node)))
+
+
+def _list(node: Node, headings: Mapping[str, str]) -> str:
+    inside = node.get("items")
+    of = _values(inside, headings) if isinstance(inside, Mapping) else ""
+    if "prefixItems" in node:
+        of = ", ".join(dict.fromkeys(_values(part, headings) for part in node["prefixItems"]))
+        return f"list of {len(node['prefixItems'])}: {of}"
+    return ", ".join((f"list of: {of}", *_bounds(node)))
+
+
+def _bounds(node: Node) -> Iterator[str]:
+    return (words.format(f"{node[key]:g}") for key, words in _BOUNDS.items() if key in node)
+
+
+def _default(key: str, part: Node, node: Node) -> str:
+    if key in node.get("required", ()):
+        return "required"
+    value = part.get("default")
+    return (
+        "" if value is None or value in ([], {}) else f"`{json.dumps(value, ensure_ascii=False)}`".replace("|", "\\|")
+    )
+
+
+def _meaning(part: Node, root: Node) -> str:
+    """Return the description of a key, or of its only alternative to null, or of the only model that it holds."""
+    alternatives = [branch for branch in part.get("anyOf", ()) if branch.get("type") != "null"]
+    meant = (part, *alternatives) if len(alternatives) == 1 else (part,)
+    described = next((one for one in meant if "description" in one), None)
+    models = list(dict.fromkeys(name for name, _ in _models(part, "")))
+    if described or len(models) != 1:
+        return str((described or {}).get("description", ""))
+    return str(root["$defs"][models[0]].get("description", "")).split("\n\n", maxsplit=1)[0]
+
+
+def _plain(text: str) -> str:
+    """Return a description without the marks of reStructuredText, safe in a cell of a table."""
+    text = re.sub(r":\w+:`([^`]+)`", r"`\1`", text).replace("``", "`").replace("\n", " ")
+    return text.replace("|", "\\|").replace("*", "\\*").replace("<", "\\<").replace("[", "\\[")
+
+
+def _slug(heading: str) -> str:
+    """Return the anchor of a heading, as GitHub and MyST make it."""
+    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")

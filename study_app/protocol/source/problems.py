@@ -12,8 +12,7 @@ from pydantic_core import ErrorDetails
 
 from study_app.errors import Problem
 from study_app.haptics.model.ranges import REASON
-from study_app.protocol.source.document import Path, has
-from study_app.protocol.source.line_numbers import Places
+from study_app.protocol.source.document import Path, Places, has
 
 Schema = Mapping[str, Any]
 

@@ -11,9 +11,8 @@ from study_app.haptics.model.scene import Scene
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Condition, Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial
-from study_app.protocol.streams import Draw, shuffle, stream
+from study_app.protocol.streams import Draw, Key, keyed_stream, shuffle, stream
 from study_app.protocol.trials.designs import Design
-from study_app.protocol.trials.keyed import Key, keyed_stream
 from study_app.protocol.trials.methods import Heard, TrackSetting
 from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulated
 from study_app.protocol.trials.tracks import (

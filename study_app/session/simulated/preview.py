@@ -7,11 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from study_app.protocol.groups.allocation import group_of
-from study_app.protocol.groups.own_protocol import own_protocol
 from study_app.protocol.model import Protocol
+from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule, draw_key, stream
-from study_app.protocol.trials.keyed import draw_secret
+from study_app.protocol.streams import draw_secret, group_of
 
 PARTICIPANT: Final = "P001"
 SEED: Final = 1

@@ -11,7 +11,7 @@ from typing import Final, TypeAlias
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule, draw_key, stream
 from study_app.protocol.simulated_observer import TrialFeatures
-from study_app.protocol.trials.keyed import Key
+from study_app.protocol.streams import Key
 from study_app.protocol.trials.presentation import next_level
 from study_app.session.simulated.rehearsed_session import RehearsedSession, rehearsal_rig
 from study_app.session.unkept import Unkept

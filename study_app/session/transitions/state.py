@@ -9,8 +9,8 @@ from study_app.errors import SessionError
 from study_app.protocol.model import Protocol, Questionnaire
 from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial
 from study_app.protocol.questions import Context, Question, Value, shown
+from study_app.protocol.streams import Key
 from study_app.protocol.trials.designs import Design
-from study_app.protocol.trials.keyed import Key
 from study_app.protocol.trials.methods import Adjusting, Adjustment, Heard
 from study_app.protocol.trials.presentation import Due, next_level
 from study_app.protocol.trials.tasks import AnyTask, lasting

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from study_app.errors import StoreError
-from study_app.protocol.groups.allocation import group_of
-from study_app.protocol.groups.own_protocol import own_protocol
-from study_app.protocol.groups.session_steps import refuse_beyond_last
+from study_app.protocol.groups import refuse_beyond_last
 from study_app.protocol.model import Protocol
+from study_app.protocol.orders.durations import own_protocol
+from study_app.protocol.streams import group_of
 from study_app.store.atomic import cannot_write, is_there, open_regular, read_own, sync_folder, write_through
 from study_app.store.blinded.blinding import Key, read_key
 from study_app.store.blinded.sealing import open_text, seal

@@ -22,7 +22,7 @@ from typing import Any, Final, Literal, TypeAlias
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import block_codes, draw_key
-from study_app.protocol.trials.keyed import draw_secret
+from study_app.protocol.streams import draw_secret
 from study_app.store import receipt
 from study_app.store.atomic import append_line, create_folder, is_there, read_own
 from study_app.store.folders import SessionFolder, StudyFolder

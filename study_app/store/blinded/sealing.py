@@ -15,7 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 from study_app.errors import StoreError
-from study_app.protocol.groups.allocation import group_of
+from study_app.protocol.streams import group_of
 from study_app.store.blinded.blinding import Key, read_key, reveals
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal import Line, plain

@@ -9,11 +9,11 @@ from typing import Any
 
 import study_app
 from study_app.errors import StoreError
-from study_app.protocol.groups.own_protocol import own_protocol
 from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
+from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import stream
-from study_app.protocol.source.liquid_files import unbundled
+from study_app.protocol.source.files import unbundled
 from study_app.store import receipt
 from study_app.store.atomic import cannot_write, is_there, sweep_old, sync_folder, temporary_path
 from study_app.store.blinded.allocation import Allocation, allocate, check_session

@@ -15,7 +15,7 @@ from study_app.protocol.differences import CONDITIONS_DIFFER, differences
 from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
-from study_app.protocol.source.liquid_files import bundled, hashes_in, unbundled
+from study_app.protocol.source.files import bundled, hashes_in, unbundled
 from study_app.store import receipt
 from study_app.store.atomic import is_there, sweep
 from study_app.store.blinded.blinding import Key, open_or_draw_key, read_key, same_conditions

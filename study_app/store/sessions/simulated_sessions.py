@@ -14,10 +14,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from study_app.protocol.groups.own_protocol import own_protocol
 from study_app.protocol.model import Protocol
+from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import stream
-from study_app.protocol.source.liquid_files import unbundled
+from study_app.protocol.source.files import unbundled
 from study_app.store.atomic import cannot_write, create_folder
 from study_app.store.blinded.allocation import allocate
 from study_app.store.blinded.blinding import open_or_draw_key, reveals

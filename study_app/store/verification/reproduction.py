@@ -12,13 +12,11 @@ from typing import Any
 
 from study_app.errors import StoreError
 from study_app.protocol.blocks import Block
-from study_app.protocol.groups.allocation import group_of
-from study_app.protocol.groups.own_protocol import own_protocol
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of_receipt
-from study_app.protocol.orders.reproduce import recorded_trials, reproduce
-from study_app.protocol.orders.schedule import Schedule, build_schedule
-from study_app.protocol.trials.keyed import Key
+from study_app.protocol.orders.durations import own_protocol
+from study_app.protocol.orders.schedule import Schedule, build_schedule, recorded_trials, reproduce
+from study_app.protocol.streams import Key, group_of
 from study_app.protocol.trials.presentation import arrangement_text, heard_in, next_level
 from study_app.protocol.trials.tracks import adjusting_of, design_of
 from study_app.store import receipt

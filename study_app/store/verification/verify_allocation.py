@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Collection
 
-from study_app.protocol.groups.allocation import group_of
+from study_app.protocol.streams import group_of
 from study_app.store.atomic import is_there
 from study_app.store.blinded.allocation import claims, entries_begun, group_in
 from study_app.store.blinded.blinding import Key

@@ -19,8 +19,7 @@ from study_app.haptics.model.steady_state import steady
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key
-from study_app.protocol.streams import stream
-from study_app.protocol.trials.keyed import Key, draw_secret
+from study_app.protocol.streams import Key, draw_secret, stream
 from study_app.protocol.trials.presentation import next_level
 from study_app.protocol.trials.stimuli import DELAYS
 from study_app.protocol.trials.tracks import condition_of, design_of, method_of, stimulus_of

@@ -16,8 +16,7 @@ from study_app.analysis.designs.weber_exponents import jnd_slope
 from study_app.analysis.results.level_results import ThresholdFound
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.protocol.orders.schedule import build_schedule, draw_key
-from study_app.protocol.streams import stream
-from study_app.protocol.trials.keyed import Key, draw_secret
+from study_app.protocol.streams import Key, draw_secret, stream
 from study_app.protocol.trials.methods import Heard
 from study_app.protocol.trials.presentation import Due, arrangement_text, heard_of, next_level
 from study_app.protocol.trials.stimuli import DELAYS

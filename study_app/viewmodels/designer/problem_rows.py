@@ -8,8 +8,7 @@ from typing import Final
 
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, row_at
-from study_app.protocol.source.document import Path, has, names
-from study_app.protocol.source.line_numbers import places_of
+from study_app.protocol.source.document import Path, has, names, places_of
 from study_app.protocol.source.problems import Fault
 from study_app.viewmodels.designer.element_facts import kind_and_title, place_words
 from study_app.viewmodels.designer.outline_rows import FIRST, icon_of

@@ -14,7 +14,7 @@ from study_app.authoring.study_facts import facts
 from study_app.authoring.undo_stack import History
 from study_app.authoring.writer.edits import Set, Unset
 from study_app.authoring.writer.refused import Refused
-from study_app.protocol.groups.group import sequences_in
+from study_app.protocol.groups import sequences_in
 from study_app.protocol.source.document import entries
 from tests.authoring.grown import PROTOCOLS, texts
 from tests.authoring.random_edits import at, owners

@@ -6,16 +6,14 @@ from collections import Counter
 import pytest
 
 from study_app.errors import StudyError
-from study_app.protocol.groups.allocation import group_of
-from study_app.protocol.groups.own_protocol import own_protocol, variants
-from study_app.protocol.groups.session_steps import every_step, refuse_beyond_last, steps_of
+from study_app.protocol.groups import every_step, refuse_beyond_last, steps_of
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.balance import balances, numbered
 from study_app.protocol.orders.block_orders import orders_of, orders_of_receipt
-from study_app.protocol.orders.durations import expected_duration_s
+from study_app.protocol.orders.durations import expected_duration_s, own_protocol, variants
 from study_app.protocol.orders.schedule import build_schedule, draw_key
-from study_app.protocol.streams import stream
+from study_app.protocol.streams import group_of, stream
 from study_app.store.receipt import without_conditions
 from tests.protocol.groups.grouped import grouped
 

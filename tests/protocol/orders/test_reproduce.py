@@ -11,8 +11,7 @@ from study_app.errors import StudyError
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import BlockOrder, orders_of, orders_of_receipt
-from study_app.protocol.orders.reproduce import RecordedTrial, recorded_trials, reproduce
-from study_app.protocol.orders.schedule import Trial, build_schedule
+from study_app.protocol.orders.schedule import RecordedTrial, Trial, build_schedule, recorded_trials, reproduce
 from study_app.store.receipt import without_conditions
 from tests.protocol.sound import EVERY_ORDER, ORDER, SOUND
 

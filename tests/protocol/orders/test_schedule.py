@@ -9,8 +9,6 @@ from hypothesis import strategies as st
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import order_of, orders_of
-from study_app.protocol.orders.latin_squares import Square, assigned_row, borders_even, enrolment, row, row_count
-from study_app.protocol.orders.order_constraint import Constraint
 from study_app.protocol.orders.schedule import (
     PageStep,
     Schedule,
@@ -20,6 +18,15 @@ from study_app.protocol.orders.schedule import (
     draw_key,
     shuffle,
     stream,
+)
+from study_app.protocol.orders.sequences import (
+    Constraint,
+    Square,
+    assigned_row,
+    borders_even,
+    enrolment,
+    row,
+    row_count,
 )
 from tests.protocol.sound import ORDER, SOUND
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from study_app.protocol.source.line_numbers import Places
+from study_app.protocol.source.document import Places
 
 TRICKY = '''\
 # comment with = and [brackets]

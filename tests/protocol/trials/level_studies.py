@@ -3,8 +3,7 @@
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule, draw_key
-from study_app.protocol.streams import stream
-from study_app.protocol.trials.keyed import Key
+from study_app.protocol.streams import Key, stream
 from study_app.protocol.trials.methods import Heard
 from study_app.protocol.trials.presentation import Due, heard_of, next_level
 from study_app.protocol.trials.tracks import design_of

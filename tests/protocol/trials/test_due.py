@@ -3,8 +3,7 @@ from collections import Counter
 import pytest
 
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.streams import shuffle, stream
-from study_app.protocol.trials.keyed import Key
+from study_app.protocol.streams import Key, shuffle, stream
 from study_app.protocol.trials.presentation import arrangement_text, longest_delay_s, next_level
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tracks import design_of

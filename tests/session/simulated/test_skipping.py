@@ -8,7 +8,7 @@ from study_app.errors import SessionError
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial
-from study_app.protocol.trials.keyed import Key
+from study_app.protocol.streams import Key
 from study_app.protocol.trials.presentation import next_level
 from study_app.session.resume import Start, resume_at
 from study_app.session.simulated.preview import preview

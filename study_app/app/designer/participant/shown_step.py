@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal, NamedTuple, TypeAlias
 
 from study_app.app.designer.play.first_step import first_step
-from study_app.protocol.groups.own_protocol import variants
 from study_app.protocol.model import Protocol
+from study_app.protocol.orders.durations import variants
 from study_app.protocol.orders.schedule import FormStep, PageStep, Step, Trial, build_schedule
 from study_app.protocol.source.document import Path
 from study_app.session.simulated.preview import PARTICIPANT, SEED, Preview, preview

@@ -16,7 +16,7 @@ from study_app.errors import ProtocolError
 from study_app.protocol.load import examined, read_document
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import Path, entries, has
-from study_app.protocol.source.liquid_files import unbundled, with_liquid_files
+from study_app.protocol.source.files import unbundled, with_liquid_files
 from study_app.protocol.source.problems import Fault
 
 ROUNDS: Final = 12

@@ -9,7 +9,7 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.versions.changes import NOTATION, changes, changes_from_receipt
 from study_app.authoring.versions.contents import content_hash, kept_content
 from study_app.authoring.versions.runs import Run, source_of
-from study_app.protocol.source.liquid_files import unbundled, with_liquid_files
+from study_app.protocol.source.files import unbundled, with_liquid_files
 from study_app.viewmodels.designer.versions.change_rows import ChangeGroup, change_groups
 
 NO_COPY: Final = (

@@ -11,9 +11,8 @@ from study_app.authoring.fields import Choice, Row, label_of, refused_at, row_at
 from study_app.authoring.measures.participant_texts import copied_texts, texts_by_language
 from study_app.authoring.names import named_at
 from study_app.authoring.outline import title_of
-from study_app.protocol.groups.group import sequences_in
-from study_app.protocol.source.document import Path, entries, value_at
-from study_app.protocol.source.line_numbers import Places, places_of
+from study_app.protocol.groups import sequences_in
+from study_app.protocol.source.document import Path, Places, entries, places_of, value_at
 from study_app.protocol.wording.languages import LANGUAGES, language_name
 from study_app.viewmodels.designer.element_facts import brief, kind_of, place_words, used_by
 from study_app.viewmodels.designer.outline_rows import FIRST, icon_of

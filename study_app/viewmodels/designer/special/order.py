@@ -6,7 +6,7 @@ from typing import Any, Final, Literal
 
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Row
-from study_app.protocol.orders.latin_squares import borders_even, row_count
+from study_app.protocol.orders.sequences import borders_even, row_count
 from study_app.protocol.source.document import value_at
 from study_app.viewmodels.designer.form.row_facts import RowFacts
 from study_app.viewmodels.tones import Tone

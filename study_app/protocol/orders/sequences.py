@@ -1,0 +1,244 @@
+"""Orders of the codes of a block: rows of a square, and random orders within a constraint.
+
+**Squares.** A Williams design (Williams 1949, Australian Journal of Scientific Research A 2, 149) of n codes is the
+sequence 0, 1, n − 1, 2, n − 2, … with each of 0 … n − 1 added modulo n; for odd n also with every row reversed. Once
+through its rows, n or 2n, each code comes in each position equally often and follows each other one equally often. A
+cyclic Latin square is 0, 1, …, n − 1 with each shift: even in positions alone.
+
+**Repetitions** go on in the same square. Where a row ends and the next begins, the new row is chosen by how far its
+first code lies from the last one shown: 1, 2, …, n − 1 and round again (backwards in a reversed square). So no code
+follows itself, each repetition is as even as the first, and after as many repetitions as `borders_even` says the
+borders between them are even too.
+
+**Rows** are assigned by enrolment: the last number in the participant's id (P007 is number 7). Numbers 1 … rows are the
+first round, the next as many the second; each round assigns all rows in an order of its own. That order comes from a
+stream of the *study*, not of the session, because sessions have seeds of their own and would not fill a round. So a
+session's row depends on the study's name, the block's name and the id alone. It is predictable, which does no harm:
+rows are rows of codes, and what a code stands for is sealed. An id without a number takes a row drawn from the id
+itself: even on average only. Who replaces a participant can be given that participant's rows: the session then takes
+the rows of that id.
+
+**Constrained orders.** All trials of a block are shuffled together: n codes, each r times. With ``max_repeats`` m a
+code comes at most m times in a row. With ``min_distance`` d two of its presentations are at least d trials apart: 2 is
+never twice in a row, 3 leaves two others in between.
+
+**What is possible.** Round and round in one order of the codes, distances are n and runs are 1. If d > n, two of the
+first n + 1 trials are alike and too near. So with r > 1 and n > 1, every m ≥ 1 and every d ≤ n is possible, and no
+larger d. With a single code only m ≥ r and d = 1 are.
+
+**How an order is drawn.** From left to right, among the codes that may come now without making the rest impossible. The
+last k·d trials hold each code at most k times, so Σ min(left, k) ≥ k·d must stay true for every k; with m, j of a code
+need j ≤ m·(others left + 1). A search through every state of small blocks (a test) finds no dead end. The chance of an
+order drawn in this way is known, and not the same for all. So ``PROPOSALS`` are drawn and go through Metropolis' rule
+for independent proposals, which tends to all possible orders being equally likely; all arithmetic in it is exact. The
+chain starts with the codes round and round, so there is an order after that many steps for any draw. In small
+blocks the exact chances are within 10⁻⁴ of uniform in total variation (a test); of a single proposal, within 0.3.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal, TypeAlias, TypeVar
+
+from study_app.protocol.streams import Draw, shuffle, study_stream
+
+
+@dataclass(frozen=True, slots=True)
+class Constraint:
+    """At most ``max_repeats`` of a kind in a row, at least ``min_distance`` from one to the next; None: any."""
+
+    max_repeats: int | None = None
+    min_distance: int | None = None
+
+    def holds(self, order: Sequence[object]) -> bool:
+        """Return whether an order keeps it."""
+        nearest = shortest_distance(order)
+        near = nearest is not None and nearest < (self.min_distance or 1)
+        return not near and (self.max_repeats is None or longest_run(order) <= self.max_repeats)
+
+    def impossible(self, codes: int, repetitions: int) -> tuple[str, str] | None:
+        """Return which key no order of ``codes`` codes, each ``repetitions`` times, can keep, and what it could."""
+        if repetitions == 1:
+            return None
+        if self.min_distance is not None and self.min_distance > codes:
+            possible = "one condition only 1" if codes == 1 else f"{codes} conditions only 1 to {codes}"
+            return "min_distance", f"is {self.min_distance}, but with {possible} is possible"
+        if self.max_repeats is not None and codes == 1 and self.max_repeats < repetitions:
+            possible = f"one condition {repetitions} times only {repetitions} or more"
+            return "max_repeats", f"is {self.max_repeats}, but with {possible} is possible"
+        return None
+
+
+def longest_run(order: Sequence[object]) -> int:
+    """Return how many of a kind come in a row at most."""
+    longest = run = 0
+    for index, code in enumerate(order):
+        run = run + 1 if index and code == order[index - 1] else 1
+        longest = max(longest, run)
+    return longest
+
+
+def shortest_distance(order: Sequence[object]) -> int | None:
+    """Return the least number of trials from one of a kind to the next; None if all are different."""
+    latest: dict[object, int] = {}
+    distances = []
+    for index, code in enumerate(order):
+        if code in latest:
+            distances.append(index - latest[code])
+        latest[code] = index
+    return min(distances, default=None)
+
+
+Square: TypeAlias = Literal["williams", "latin"]
+
+
+def row_count(square: Square, codes: int) -> int:
+    """Return how many rows there are: as many participants fill a round."""
+    return 2 * codes if square == "williams" and codes % 2 and codes > 1 else codes
+
+
+def row(square: Square, codes: int, number: int, repetitions: int = 1) -> tuple[int, ...]:
+    """Return row ``number`` (from 0): codes as numbers from 0, each once in every repetition."""
+    if codes == 1:
+        return (0,) * repetitions
+    reversed_square, shift = divmod(number, codes)
+    base = _williams(codes) if square == "williams" else tuple(range(codes))
+    if reversed_square:
+        base = base[::-1]
+    shown = tuple((code + shift) % codes for code in base)
+    for border in range(repetitions - 1):
+        distance = 1 + border % (codes - 1)
+        first = shown[-1] + (-distance if reversed_square else distance)
+        shown += tuple((code - base[0] + first) % codes for code in base)
+    return shown
+
+
+def _williams(codes: int) -> tuple[int, ...]:
+    """Return 0, 1, n − 1, 2, n − 2, …: its n − 1 steps from one to the next are all different."""
+    return tuple((step + 1) // 2 if step % 2 else -(step // 2) % codes for step in range(codes))
+
+
+def borders_even(codes: int, repetitions: int) -> bool:
+    """Return whether a Williams design's carry-over is even across the borders of its repetitions too."""
+    period = (codes - 1) // 2 if codes % 2 else codes - 1
+    return codes == 1 or (repetitions - 1) % period == 0
+
+
+def enrolment(participant: str) -> int | None:
+    """Return the number in a participant's id, the last one if there are several; None if there is none."""
+    numbers = re.findall(r"[0-9]+", participant)
+    return int(numbers[-1]) if numbers else None
+
+
+def assigned_row(study: str, block: str, rows: int, participant: str) -> int:
+    """Return the row (from 0) that a participant takes in a block of a study."""
+    number = enrolment(participant)
+    if number is None:
+        return int(study_stream(study, f"row/{block}/{participant}").random() * rows)
+    rounds, place = divmod(number - 1, rows)
+    return shuffle(range(rows), study_stream(study, f"rows/{block}/{rounds}").random)[place]
+
+
+T = TypeVar("T")
+
+Proposal: TypeAlias = tuple[tuple[int, ...], Fraction]
+
+PROPOSALS = 32
+_STEEPEST = 6
+
+
+def arrange(codes: Sequence[T], repetitions: int, constraint: Constraint, draw: Draw) -> tuple[T, ...]:
+    """Return every code ``repetitions`` times in a random order that keeps a constraint.
+
+    ``draw`` gives uniform numbers in [0, 1); at most (len(codes) · repetitions + 1) · ``PROPOSALS`` + len(codes) of
+    them are drawn.
+
+    Raises
+    ------
+    ValueError
+        No order keeps the constraint.
+    """
+    if (impossible := constraint.impossible(len(codes), repetitions)) is not None:
+        raise ValueError(" ".join(impossible))
+    chosen, weight = shuffle(range(len(codes)), draw) * repetitions, Fraction(0)
+    for _ in range(PROPOSALS):
+        proposal = propose(len(codes), repetitions, constraint, draw)
+        if proposal is not None and Fraction(draw()) * weight < proposal[1]:
+            chosen, weight = proposal
+    return tuple(codes[code] for code in chosen)
+
+
+def propose(codes: int, repetitions: int, constraint: Constraint, draw: Draw) -> Proposal | None:
+    """Draw an order from left to right, and return it with one over its chance; None in a dead end."""
+    apart = max(constraint.min_distance or 1, 2 if constraint.max_repeats == 1 else 1)
+    left = Remaining(codes, repetitions, apart, constraint.max_repeats or codes * repetitions)
+    steepness = _steepness(codes, repetitions, apart)
+    masses = chosen_weights = 1
+    for _ in range(codes * repetitions):
+        weights = [(code, left.count[code] ** steepness) for code in left.may_come()]
+        mass = sum(weight for _, weight in weights)
+        if not mass:
+            return None
+        place = int(draw() * mass)
+        for code, weight in weights:
+            place -= weight
+            if place < 0:
+                left.take(code)
+                chosen_weights *= weight
+                break
+        masses *= mass
+    return tuple(left.taken), Fraction(masses, chosen_weights)
+
+
+def _steepness(codes: int, repetitions: int, apart: int) -> int:
+    """Return the power of what is left that weighs the codes; any is right, a good one needs few proposals.
+
+    The nearer the distance to the number of codes, the less may one code get ahead of another. In the long run the
+    ratio of the variances of a code's gaps, free to constrained, is n (n − 1) / ((n − d) (n − d + 1)); half way between
+    1 and that does best in blocks of usual length **[measured]**.
+    """
+    room = (codes - apart) * (codes - apart + 1)
+    if room <= 0:
+        return 1
+    return min((2 * room + codes * (codes - 1)) // (2 * room), 1 + repetitions // 2, _STEEPEST)
+
+
+class Remaining:
+    """What is left to come, and what of it may come next: ``apart`` trials after its like, ``run`` in a row."""
+
+    def __init__(self, codes: int, repetitions: int, apart: int, run: int) -> None:
+        self.count = [repetitions] * codes
+        self.taken: list[int] = []
+        self._total = codes * repetitions
+        self._apart = apart
+        self._run = run
+        self._in_a_row = 0
+        # Σ min(left, k) − k · apart for k = 0, 1, …: how many more the last k · apart trials could hold.
+        self._slack = [k * (codes - apart) for k in range(repetitions + 1)]
+
+    def may_come(self) -> list[int]:
+        """Return the codes that may come next without making the rest impossible."""
+        if self._apart > 1:
+            recent = self.taken[-(self._apart - 1) :]
+            least = self._tight() + 1
+            return [code for code, left in enumerate(self.count) if left >= least and code not in recent]
+        spent = self.taken[-1:] if self._in_a_row >= self._run else []
+        urgent = [code for code, left in enumerate(self.count) if left > self._run * (self._total - left)]
+        return [code for code in urgent or range(len(self.count)) if self.count[code] and code not in spent]
+
+    def take(self, code: int) -> None:
+        """Let a code come."""
+        self._in_a_row = self._in_a_row + 1 if self.taken[-1:] == [code] else 1
+        for k in range(self.count[code], len(self._slack)):
+            self._slack[k] -= 1
+        self.count[code] -= 1
+        self.taken.append(code)
+        self._total -= 1
+
+    def _tight(self) -> int:
+        """Return the largest k whose last k · apart trials need all that is left of every code with up to k."""
+        most = min(len(self._slack) - 1, (self._total - 1) // self._apart)
+        return next((k for k in range(most, 0, -1) if self._slack[k] <= 0), 0)
