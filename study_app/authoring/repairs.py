@@ -15,7 +15,7 @@ from study_app.authoring.names import choices_at
 from study_app.authoring.writer.edits import Edit, Insert, Rename, Set, Unset
 from study_app.authoring.writer.refused import Refused
 from study_app.number_text import number_of
-from study_app.protocol.checks.pace import paced
+from study_app.protocol.checks.force_limits import paced
 from study_app.protocol.source.document import value_at
 from study_app.protocol.source.problems import Fault, shown
 from study_app.protocol.wording.languages import language_name

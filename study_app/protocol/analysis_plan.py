@@ -11,8 +11,7 @@ from pydantic import Field
 from study_app.haptics.model.ranges import within
 from study_app.protocol.source.document import Path, entries
 from study_app.protocol.source.problems import Fault, did_you_mean
-from study_app.protocol.table import ExtendedTable, Table
-from study_app.protocol.texts import Brief, Id
+from study_app.protocol.table import Brief, ExtendedTable, Id, Table
 
 Reported = Annotated[float, within(-1e9, 1e9, "no published value is larger")]
 LISTS = ("primary", "names", "rising", "falling")

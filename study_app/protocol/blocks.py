@@ -8,8 +8,7 @@ from pydantic_core import PydanticCustomError
 from study_app.haptics.model.ranges import within
 from study_app.ids import MAX_ID
 from study_app.protocol.orders.sequences import Constraint
-from study_app.protocol.table import ExtendedTable, Table
-from study_app.protocol.texts import Id, Localised
+from study_app.protocol.table import ExtendedTable, Id, Localised, Table
 
 Phase: TypeAlias = Literal["main", "practice", "baseline"]
 Order: TypeAlias = Literal["fixed", "shuffled", "constrained", "williams", "latin"]

@@ -3,25 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import product
 
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
 from study_app.haptics.model.gate import describe_gate, resolve
+from study_app.haptics.model.overrides import override
 from study_app.haptics.model.scene import Scene
+from study_app.haptics.model.slope_limits import slope_limit
+from study_app.haptics.model.steady_state import steady
 from study_app.number_text import counted
-from study_app.protocol import liquid_summary
-from study_app.protocol.checks.delay_warnings import delay_warnings
-from study_app.protocol.checks.level_warnings import level_warnings
+from study_app.protocol.checks.expected_precision import precision_rows
+from study_app.protocol.checks.warnings import warnings
 from study_app.protocol.groups import sessions_differ
-from study_app.protocol.instruments.instrument_summary import sources
-from study_app.protocol.instruments.instrument_summary import warnings as from_memory
-from study_app.protocol.model import Block, Condition, Protocol, Questionnaire, Reach
+from study_app.protocol.model import Block, Condition, Limits, Protocol, Questionnaire
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
 from study_app.protocol.orders.durations import Variant, block_duration_s, expected_duration_s, variants
 from study_app.protocol.orders.sequences import row_count
+from study_app.protocol.quantities import quantity
+from study_app.protocol.questionnaires import instrument
 from study_app.protocol.questions import Context, Question
-from study_app.protocol.trials.block_summary import design_rows
+from study_app.protocol.trials.methods import Adjustment
 from study_app.protocol.trials.presentation import link_words
-from study_app.protocol.trials.trial_limits import Limits
+from study_app.protocol.trials.presented_levels import FASTER, highest_damping
+from study_app.protocol.trials.stimuli import DELAY, OF_LINK
+from study_app.protocol.trials.tasks import Follow
+from study_app.protocol.trials.tracks import (
+    condition_of,
+    design_of,
+    has_correct_answer,
+    method_of,
+    standards_of,
+    stimulus_of,
+    success_name,
+    tracks_of,
+)
+
+LEVELS = {"weber": "Weber fraction", "difference": "difference", "value": "value"}
+
 
 BLINDINGS = {
     "double": "double-blind: the operator sees no force",
@@ -37,7 +55,7 @@ def describe(protocol: Protocol, delay_ticks: int = BELIEVED_TICKS) -> str:
         *(_titled(_title(one), _session(one.protocol, language)) for one in variants(protocol)),
         *(_block(protocol, block, language, delay_ticks) for block in protocol.blocks_in_order),
         _titled("Liquids", _liquids(protocol)),
-        ("Effects in each liquid", *(f"  {line}".rstrip() for line in liquid_summary.effects(protocol))),
+        ("Effects in each liquid", *(f"  {line}".rstrip() for line in _effects(protocol))),
         _titled("Conditions", _conditions(protocol)),
         *(_statements(protocol, name, language) for name in protocol.questionnaires),
         _titled("Decided about the analysis", _analysis(protocol)),
@@ -143,7 +161,7 @@ def _block(protocol: Protocol, block: Block, language: str, delay_ticks: int) ->
         ("Recorded as", ", ".join(block_codes(protocol, block))),
         ("Conditions", ", ".join(protocol.conditions_in(block.id))),
         *([] if block.design is not None or compared is None else [("Compared", compared)]),
-        *(design_rows(protocol, block, delay_ticks) if block.design is not None else ()),
+        *(_design_rows(protocol, block, delay_ticks) if block.design is not None else ()),
         *(
             [("Duration", f"about {block_duration_s(protocol, block, language) / 60:.0f} min")]
             if block.design is not None
@@ -154,6 +172,60 @@ def _block(protocol: Protocol, block: Block, language: str, delay_ticks: int) ->
     if block.design is None:
         rows.append(("Asked", "nothing" if questionnaire is None else _asked(questionnaire, str(block.questionnaire))))
     return _titled(f"{part}{protocol.text(block.title, language)} (block {block.id}, {block.phase})", rows)
+
+
+def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator[tuple[str, str]]:
+    """Yield the rows that describe the design of a block, its levels and its comparisons."""
+    design = design_of(protocol, block)
+    kind = design.kind.upper()
+    intervals = "1 interval" if design.intervals == 1 else f"{design.intervals} intervals, {design.pause_s:g} s apart"
+    if block.stimulus is None:
+        yield "Design", f"{kind} against {block.standard}: {intervals}"
+        yield from precision_rows(protocol, block)
+        return
+    stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
+    standards = [one for one in standards_of(protocol, block) if one is not None]
+    levels = sorted(method.asked(stimulus))
+    against = f", standard {', '.join(f'{one:g}' for one in standards)}" if standards else ""
+    yield "Design", f"{kind} of {stimulus.vary}{against}: {intervals}"
+    name = LEVELS[stimulus.level_kind]
+    of_each = " per standard" if standards else ""
+    slots = [track.slots for track in tracks_of(protocol, block)]
+    guess = design.guess_rate if has_correct_answer(design, stimulus) else 0.0
+    target = method.target(guess, success_name(design, stimulus))
+    aimed = "" if target is None else f": {target}"
+    trials = slots[0] * method.tracks
+    tracks = "" if method.tracks == 1 else f" in {method.tracks} tracks"
+    yield (
+        "Levels",
+        f"{name} {levels[0]:.3g} to {levels[-1]:.3g} ({method.name}{aimed}), {trials} trials{of_each}{tracks}",
+    )
+    if isinstance(method, Adjustment):
+        low, high = stimulus.domain
+        steps = round((high - low) / method.step(stimulus))
+        yield "Settings", f"{steps} steps from end to end, started near either, at most {method.most_s:g} s each"
+    pairs = product(standards_of(protocol, block), levels)
+    compared = [stimulus.comparison(standard, level) for standard, level in pairs]
+    unit = quantity(stimulus.vary).unit
+    yield "Comparisons", f"{stimulus.vary} from {min(compared):.4g} to {max(compared):.4g} {unit}".rstrip()
+    task = protocol.tasks[block.task]
+    if isinstance(task, Follow) and stimulus.vary != DELAY:
+        pace_mps = task.fastest_stroke(protocol.device.workspace_m).speed_mps
+        scene = protocol.scene_for(condition_of(protocol, stimulus))
+        values = (*standards, *compared)
+        scenes = [scene] if stimulus.vary in OF_LINK else [override(scene, stimulus.vary, one) for one in values]
+        felt_n = [steady(one, pace_mps).drag_n for one in scenes]
+        fast_n = max(steady(one, FASTER * pace_mps).drag_n for one in scenes[-len(compared) :])
+        yield (
+            "Force at the pace",
+            f"{min(felt_n):.1f} to {max(felt_n):.1f} N at {pace_mps:.3g} m/s, at most {fast_n:.1f} N at {FASTER:g} "
+            "times the pace",
+        )
+    if (highest_nspm := highest_damping(protocol, block)) > 0:
+        scene = protocol.scene_for(condition_of(protocol, stimulus))
+        limit_nspm = slope_limit(1 / scene.rate_hz, delay_ticks, scene.velocity)
+        yield "Damping", f"at most {highest_nspm:.4g} N·s/m at the hand; the slope limit is {limit_nspm:.4g}"
+    yield from precision_rows(protocol, block)
 
 
 def _presentation(protocol: Protocol, block: Block) -> str:
@@ -219,6 +291,14 @@ def _liquids(protocol: Protocol) -> list[tuple[str, ...]]:
     return rows
 
 
+def _effects(protocol: Protocol) -> tuple[str, ...]:
+    """Return which effects act in each liquid, and why, as lines of text."""
+    lines: list[str] = []
+    for name in protocol.liquids:
+        lines += [*describe_gate(protocol.scene_of(name)), ""]
+    return tuple(lines[:-1])
+
+
 def _conditions(protocol: Protocol) -> list[tuple[str, str, str]]:
     return [
         (name, " + ".join(condition.liquid_ids), ", ".join(_drawn(condition)))
@@ -257,7 +337,15 @@ def _statements(protocol: Protocol, name: str, language: str) -> Iterable[str]:
         for item in questionnaire.items
     ]
     scores = f"  Scores: {', '.join(questionnaire.scores)}" if questionnaire.scores else ""
-    return (title, *_aligned(rows), *([scores] if scores else []), *(f"  {line}" for line in sources(questionnaire)))
+    return (title, *_aligned(rows), *([scores] if scores else []), *(f"  {line}" for line in _sources(questionnaire)))
+
+
+def _sources(questionnaire: Questionnaire) -> Iterator[str]:
+    """Yield where a questionnaire's items and scores come from, and what these were compared with."""
+    if questionnaire.instrument is not None:
+        found = instrument(questionnaire.instrument)
+        yield f"Source: {found['source']}"
+        yield f"Compared: {found['compared']}"
 
 
 def _kind(item: Question, context: Context) -> str:
@@ -282,37 +370,6 @@ def _warned(protocol: Protocol) -> Iterator[Iterable[str]]:
     """Yield what to think over, if there is anything."""
     if sentences := warnings(protocol):
         yield "Warnings", *(f"  {sentence}" for sentence in sentences)
-
-
-def warnings(protocol: Protocol, *, simulates: bool = True) -> tuple[str, ...]:
-    """Return what is permitted and may still be a mistake, a sentence each.
-
-    Parameters
-    ----------
-    protocol : Protocol
-        The study.
-    simulates : bool
-        Whether what takes simulated observers, up to a second a block, is among it.
-    """
-    return (
-        *liquid_summary.warnings(protocol),
-        *level_warnings(protocol, simulates=simulates),
-        *delay_warnings(protocol),
-        *_incomplete(protocol),
-        *from_memory(protocol),
-    )
-
-
-def _incomplete(protocol: Protocol) -> Iterator[str]:
-    """Yield the reaching tasks whose trials are valid without any target reached; format 1 is frozen."""
-    if protocol.format == 1 or protocol.limits.targets_percent is not None:
-        return
-    for name in dict.fromkeys(block.task for block in protocol.main_blocks):
-        if isinstance(protocol.tasks[name], Reach):
-            yield (
-                f"tasks.{name}: a trial that ends without any target reached is valid: set limits.targets_percent to "
-                "the least share of targets that counts"
-            )
 
 
 def _delivered(limits: Limits) -> Iterator[tuple[str, str]]:

@@ -11,8 +11,7 @@ from pydantic_core import PydanticCustomError
 from study_app.errors import StudyError
 from study_app.haptics.model.ranges import within
 from study_app.protocol.source.document import Path, entries
-from study_app.protocol.table import ExtendedTable
-from study_app.protocol.texts import Id
+from study_app.protocol.table import ExtendedTable, Id
 
 MOST_SHARE: Final = 20
 SEQUENCES: Final = ("sequence", "sequences.*", "groups.*.sequence", "groups.*.sequences.*")

@@ -15,8 +15,7 @@ from study_app.haptics.model.scene import Liquid, RateHz, Scene
 from study_app.protocol import formats
 from study_app.protocol.checks.consistency import check
 from study_app.protocol.checks.designs import designs
-from study_app.protocol.checks.pace import paced
-from study_app.protocol.checks.returned_energy import returned
+from study_app.protocol.checks.force_limits import paced, returned
 from study_app.protocol.model import Format, HandForceN, Named, Protocol, SceneDefaults
 from study_app.protocol.questionnaires import with_instruments
 from study_app.protocol.source.document import Path, Places, entries, frozen

@@ -1,7 +1,7 @@
 """A study as a frozen, validated value; field names are the keys of the TOML file.
 
 Each class is one table of the file (blocks, tasks and questionnaires have modules of their own). What a single table
-can decide by itself is checked by its class; what needs two tables is in ``references`` and ``checks``.
+can decide by itself is checked by its class; what needs two tables is in ``checks``.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,18 +26,67 @@ from study_app.haptics.model.scene import (
 )
 from study_app.protocol.analysis_plan import Analysis
 from study_app.protocol.blocks import Block, Compared, Kind
-from study_app.protocol.credits import Credits
 from study_app.protocol.groups import Group, Sequences, Steps, every_step
 from study_app.protocol.questionnaires import Questionnaire
 from study_app.protocol.questions import Scale
-from study_app.protocol.table import ExtendedTable, Table
-from study_app.protocol.texts import Body as PageBody
-from study_app.protocol.texts import Description, Id, Language, Localised, text_in
+from study_app.protocol.table import Body as PageBody
+from study_app.protocol.table import Description, ExtendedTable, Id, Language, Localised, Printable, Table, text_in
 from study_app.protocol.trials.designs import AnyDesign, asked, default_design
 from study_app.protocol.trials.methods import AnyMethod
 from study_app.protocol.trials.stimuli import Condition, Stimulus
 from study_app.protocol.trials.tasks import Explore, Follow, Reach, Seconds, Task
-from study_app.protocol.trials.trial_limits import Limits
+
+
+class Credits(Table):
+    """Names, licence and citation that an export to share states."""
+
+    authors: tuple[Printable, ...] = Field(default=(), max_length=200, description="Names of the authors, in order.")
+    license: Printable | None = Field(
+        default=None, description="Licence of the data: an SPDX identifier such as CC-BY-4.0, or an address."
+    )
+    citation: Printable | None = Field(default=None, description="How to cite the data or the paper.")
+    funder: Printable | None = Field(default=None, description="Who paid for the study.")
+    url: Printable | None = Field(default=None, description="Address of the study, such as its preregistration.")
+
+
+class Limits(ExtendedTable):
+    """Limits within which a trial is valid."""
+
+    LATER: ClassVar[frozenset[str]] = frozenset(
+        {"targets_percent", "level_error_percent", "level_error_ms", "pace_error_percent", "attempts"}
+    )
+
+    lateness_ms: Annotated[float, within(0.01, 1000, "no servo is more punctual, and 1 s is a failure")] = Field(
+        default=2, description="99th percentile of the lateness of ticks [ms]."
+    )
+    worst_gap_ms: Annotated[float, within(0.25, 1000, "from a tick at 4 kHz to a second, which is a failure")] = Field(
+        default=20, description="Longest time between two ticks [ms]."
+    )
+    delay_error_ms: Annotated[float, within(1, 1000, "no screen is more punctual, and 1 s is a failure")] = Field(
+        default=25, description="95th percentile of achieved − requested delay [ms]."
+    )
+    frame_gap_ms: Annotated[float, within(1, 1000, "no screen is faster, and 1 s is a failure")] = Field(
+        default=250, description="Longest time before the first frame or between two, or before the trial's end [ms]."
+    )
+    withheld_percent: Annotated[float, within(0.01, 100, "a share of the force; none withheld at all is rare")] = Field(
+        default=5, description="Share of the force that slope limits, passivity controller and slew limit withhold [%]."
+    )
+    targets_percent: Annotated[float, within(0.01, 100, "a share of the targets; left out, any is enough")] | None = (
+        Field(default=None, description="Least share of a reaching task's targets that must be reached [%].")
+    )
+    level_error_percent: Annotated[float, within(0.1, 100, "encoder counts alone give 0.2 %")] | None = Field(
+        default=None, description="Error of an interval's delivered level [%]; default: 2."
+    )
+    level_error_ms: Annotated[float, within(0.1, 100, "frames of 120 Hz last 8 ms")] | None = Field(
+        default=None, description="Error of a trial's delivered difference of delays [ms]; default: 2."
+    )
+    pace_error_percent: Annotated[float, within(1, 1000, "no hand keeps a pace to 1 %")] | None = Field(
+        default=None, description="Error of the hand's RMS speed against a followed target's [%]; default: 40."
+    )
+    attempts: Annotated[int, Field(ge=1, le=100)] | None = Field(
+        default=None, description="How often a trial of intervals is presented until it is delivered; default: 3."
+    )
+
 
 __all__ = [
     "Analysis",

@@ -15,8 +15,7 @@ from study_app.haptics.model.ranges import within
 from study_app.protocol.questions import KINDS, STATEMENT, AnyQuestion, Context, Question, Scale, Statement
 from study_app.protocol.source.document import entries
 from study_app.protocol.source.problems import Fault, did_you_mean
-from study_app.protocol.table import ExtendedTable, Table
-from study_app.protocol.texts import Id, Localised
+from study_app.protocol.table import ExtendedTable, Id, Localised, Table
 
 Weight = Annotated[float, within(-1e6, 1e6, "no instrument has larger weights")]
 

@@ -14,8 +14,7 @@ from pydantic import ConfigDict, Discriminator, Field, SerializeAsAny, Tag, Wrap
 from pydantic_core import PydanticCustomError
 
 from study_app.haptics.model.ranges import within
-from study_app.protocol.table import ExtendedTable, Table
-from study_app.protocol.texts import UNPRINTABLE, Id, Localised, Printable, text_in
+from study_app.protocol.table import UNPRINTABLE, ExtendedTable, Id, Localised, Printable, Table, text_in
 
 POINTS = 7
 """Of the scale of statements."""

@@ -1,17 +1,118 @@
-"""The base of everything that is a table of a protocol file."""
+"""The base of every table of a study file, and the texts in it that people read, in one language or in several.
 
-from typing import Any, ClassVar, Final, Self
+A text is a string (a study in one language) or a table from language to string. Where lines break in the file does not
+matter: a blank line divides paragraphs, every other run of white space becomes one space.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Annotated, Any, ClassVar, Final, Self, TypeAlias
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
+    Field,
     GetJsonSchemaHandler,
     SerializerFunctionWrapHandler,
+    StringConstraints,
     model_serializer,
     model_validator,
 )
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError
+
+from study_app.ids import MAX_ID
+
+Id: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$", max_length=MAX_ID)]
+Language: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[a-z]{2}$")]
+
+MAX_TEXT: Final = 500
+MAX_BODY: Final = 20_000
+UNPRINTABLE: Final = ("Cc", "Cs", "Co", "Cn")  # control, surrogate, private use, unassigned
+VISIBLE: Final = "LNPS"  # letters, numbers, punctuation, symbols
+DIRECTIONS: Final = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
+"""Characters that change the direction of what follows, and so can make a text read as another one."""
+
+
+_APART: Final = re.compile(r"\n[ \t]*\n")
+
+
+def tidy(text: str) -> str:
+    """Return ``text`` with single spaces, and one blank line between paragraphs."""
+    parts = _APART.split(text) if "\n" in text else (text,)
+    return "\n\n".join(" ".join(part.split()) for part in parts if part.strip())
+
+
+def _tidy_each(value: Any) -> Any:
+    if isinstance(value, str):
+        return _tidied(value)
+    if isinstance(value, dict) and value and all(isinstance(text, str) for text in value.values()):
+        return {language: _tidied(text) for language, text in value.items()}
+    raise PydanticCustomError("text_type", 'a text is a string, or one string per language: {en = "…", nl = "…"}')
+
+
+@lru_cache(maxsize=16_384)  # a study that is edited is validated after each change
+def _tidied(text: str) -> str:
+    return tidy(_printable(text))
+
+
+def _printable(text: str) -> str:
+    """Return ``text`` if a person can read it: something visible, and nothing that hides or reorders what is there."""
+    for letter in text:
+        if (unicodedata.category(letter) in UNPRINTABLE and letter not in "\t\n\r") or letter in DIRECTIONS:
+            raise PydanticCustomError(
+                "text_unprintable",
+                "holds the character U+{code}, which cannot be printed: take it out",
+                {"code": f"{ord(letter):04X}"},
+            )
+    if not any(unicodedata.category(letter)[0] in VISIBLE for letter in text):
+        raise PydanticCustomError("text_empty", "the text is empty: write one that can be read")
+    return text
+
+
+def _not_longer(most: int) -> AfterValidator:
+    def checked(value: str | dict[str, str]) -> str | dict[str, str]:
+        longest = max(map(len, value.values() if isinstance(value, dict) else (value,)))
+        if longest > most:
+            raise PydanticCustomError(
+                "text_long",
+                "has {longest} characters, more than {most}: shorten it",
+                {"longest": longest, "most": most},
+            )
+        return value
+
+    return AfterValidator(checked)
+
+
+Description: TypeAlias = Annotated[
+    str, AfterValidator(lambda text: _printable(text) if text else text), StringConstraints(max_length=MAX_BODY)
+]
+Brief: TypeAlias = Annotated[
+    str, AfterValidator(lambda text: _printable(text) if text else text), StringConstraints(max_length=MAX_TEXT)
+]
+"""What may be left empty, and fits in a line or two."""
+Printable: TypeAlias = Annotated[str, AfterValidator(_printable), StringConstraints(max_length=MAX_TEXT)]
+_Text: TypeAlias = Annotated[
+    str | dict[str, str],
+    BeforeValidator(_tidy_each),
+    Field(description="A text: one string, or one string per language of the study."),
+]
+Localised: TypeAlias = Annotated[_Text, _not_longer(MAX_TEXT)]
+"""A title, a statement, a label: what fits on a page with others."""
+Body: TypeAlias = Annotated[_Text, _not_longer(MAX_BODY), Field(json_schema_extra={"lines": "several"})]
+"""What fills a page or several; its schema says so to the study designer."""
+
+
+def text_in(value: str | Mapping[str, str], language: str) -> str:
+    """Return a localised text in one of the study's languages (KeyError in any other)."""
+    return value if isinstance(value, str) else value[language]
+
 
 ALTERNATIVES: Final = "alternatives"
 """Where the JSON Schema of a table keeps `Table.ONE_OF`, for forms."""

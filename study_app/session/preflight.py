@@ -18,7 +18,7 @@ from study_app.haptics.model.slope_limits import refuses
 from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
 from study_app.number_text import counted
 from study_app.outlets.session_outlets import OutletStatus
-from study_app.protocol.checks.clipped_levels import beyond_slope_limit, by_stimulus
+from study_app.protocol.checks.force_limits import beyond_slope_limit, by_stimulus
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import expected_duration_s
 from study_app.protocol.orders.sequences import enrolment

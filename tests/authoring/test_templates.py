@@ -13,7 +13,7 @@ from study_app.authoring.templates import FOLDER, QUESTIONS, templates
 from study_app.authoring.writer.refused import Refused
 from study_app.cli import commands
 from study_app.errors import StudyError
-from study_app.protocol.checks.level_warnings import level_warnings
+from study_app.protocol.checks.warnings import level_warnings
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load
 from study_app.session.simulated.rehearsal import rehearse

@@ -14,8 +14,7 @@ from study_app.protocol.describe import describe
 from study_app.protocol.load import load, parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity, quantity_words
-from study_app.protocol.table import Table
-from study_app.protocol.texts import tidy
+from study_app.protocol.table import Table, tidy
 from study_app.store.receipt import without_conditions
 from tests.protocol.sound import SOUND
 

@@ -12,8 +12,8 @@ import pytest
 
 from study_app.errors import ProtocolError, StoreError
 from study_app.evaluation.replay import replay
+from study_app.protocol.checks.warnings import liquid_warnings
 from study_app.protocol.describe import describe
-from study_app.protocol.liquid_summary import warnings
 from study_app.protocol.load import load, load_scenes, parse, protocol_hash, source_bytes
 from study_app.protocol.orders.block_orders import block_codes
 from study_app.protocol.orders.schedule import Trial, build_schedule, stream
@@ -147,11 +147,11 @@ def test_a_drag_coefficient_may_be_a_liquids_own_and_the_rest_the_scenes() -> No
 
 
 def test_a_ball_of_its_own_is_drawn_as_large_as_it_is_and_warned_of_where_it_tells_a_condition(study: Path) -> None:
-    assert not any("sizes" in one for one in warnings(load(study)))
+    assert not any("sizes" in one for one in liquid_warnings(load(study)))
     syrup = study.parent / "liquids" / "syrup.toml"
     syrup.write_text(SYRUP.replace("diameter_m = 0.068", "diameter_m = 0.04"))
     protocol = load(study)
-    (warned,) = (one for one in warnings(protocol) if "sizes" in one)
+    (warned,) = (one for one in liquid_warnings(protocol) if "sizes" in one)
     assert "block liquids shows balls of different sizes (40, 68 mm)" in warned
     schedule = build_schedule(protocol, "P001", 1)
     codes = {

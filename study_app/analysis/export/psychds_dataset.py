@@ -12,7 +12,7 @@ from study_app.analysis.export.materials import materials
 from study_app.analysis.export.stated_credits import credit_lines, stated_credits
 from study_app.analysis.tables.compared_blocks import spoken
 from study_app.analysis.tables.study_tables import Study
-from study_app.protocol.texts import text_in
+from study_app.protocol.table import text_in
 from study_app.store.output_files import FileCopy
 from study_app.store.tables.column import Column
 

@@ -13,7 +13,7 @@ from study_app.protocol.groups import groups_with
 from study_app.protocol.model import Protocol
 from study_app.protocol.questions import POINTS, Question
 from study_app.protocol.simulated_observer import OPINIONS, TrialFeatures
-from study_app.protocol.texts import text_in
+from study_app.protocol.table import text_in
 
 ConditionFeatures: TypeAlias = Mapping[tuple[str, str], Sequence[TrialFeatures]]
 """(Block, condition) → what was felt there in rehearsed trials."""

@@ -18,8 +18,7 @@ from study_app.analysis.statistics.random_effects import FEWEST, group_mean
 from study_app.analysis.statistics.student_interval import student_interval
 from study_app.analysis.tables.measures import Array
 from study_app.errors import AnalysisError
-from study_app.protocol.checks.expected_means import MeanPlan
-from study_app.protocol.checks.expected_precision import ThresholdPlan, precision_plan
+from study_app.protocol.checks.expected_precision import MeanPlan, ThresholdPlan, precision_plan
 from study_app.protocol.model import Protocol
 from study_app.psychophysics.precision import BETWEEN_PEOPLE
 

@@ -9,10 +9,9 @@ from study_app import __version__
 from study_app.analysis.power.power_curves import interval
 from study_app.analysis.power.threshold_studies import Found, Plan, plans
 from study_app.analysis.tables.compared_blocks import spoken
-from study_app.protocol.checks.expected_means import RatingPlan, SensitivityPlan
-from study_app.protocol.checks.expected_precision import ThresholdPlan
+from study_app.protocol.checks.expected_precision import RatingPlan, SensitivityPlan, ThresholdPlan
 from study_app.protocol.model import Protocol
-from study_app.protocol.texts import text_in
+from study_app.protocol.table import text_in
 from study_app.psychophysics.precision import BETWEEN_PEOPLE, ESTIMATE_NOISE
 from study_app.store.tables.column import Column, optional
 from study_app.store.tables.csv_files import csv_bytes

@@ -9,7 +9,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import threshold_plan
 from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity, quantity_words
-from study_app.protocol.texts import text_in
+from study_app.protocol.table import text_in
 from study_app.protocol.trials.stimuli import Family, family_of
 from study_app.protocol.trials.tracks import design_of, method_of, standards_of, stimulus_of
 

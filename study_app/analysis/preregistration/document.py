@@ -11,7 +11,7 @@ from study_app.analysis.tables.compared_blocks import spoken
 from study_app.protocol.checks.expected_precision import expected_of, precision_plan, precision_rows
 from study_app.protocol.describe import describe, limit_rows
 from study_app.protocol.model import Protocol
-from study_app.protocol.texts import text_in
+from study_app.protocol.table import text_in
 from study_app.psychophysics.precision import BETWEEN_PEOPLE
 
 

@@ -9,7 +9,7 @@ from study_app.errors import AnalysisError
 from study_app.protocol.orders.block_orders import every_step_of
 from study_app.protocol.questionnaires import Score
 from study_app.protocol.questions import Context, Question, Scale, Statement, question_of
-from study_app.protocol.texts import text_in
+from study_app.protocol.table import text_in
 from study_app.store.blinded.blinding import Key
 
 

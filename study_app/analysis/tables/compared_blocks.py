@@ -10,7 +10,7 @@ from typing import Any, Final, TypeAlias, get_args
 
 from study_app.protocol.blocks import Compared
 from study_app.protocol.orders.block_orders import every_step_of
-from study_app.protocol.texts import text_in
+from study_app.protocol.table import text_in
 from study_app.protocol.trials.presentation import link_words
 from study_app.protocol.trials.stimuli import OF_LINK
 from study_app.store.blinded.blinding import Key

@@ -9,7 +9,7 @@ from study_app.protocol.analysis_plan import Published
 from study_app.protocol.blocks import Phase
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import every_step_of
-from study_app.protocol.texts import text_in
+from study_app.protocol.table import text_in
 from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
 from study_app.protocol.trials.designs import Design, default_design
 from study_app.protocol.trials.methods import Method

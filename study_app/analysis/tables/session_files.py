@@ -15,7 +15,7 @@ from study_app.analysis.tables.compared_blocks import Block, main_blocks, spoken
 from study_app.analysis.tables.level_blocks import LevelBlock, level_blocks
 from study_app.analysis.tables.typed_files import Whole
 from study_app.errors import AnalysisError
-from study_app.protocol.texts import text_in
+from study_app.protocol.table import text_in
 from study_app.store.blinded.blinding import Key
 from study_app.store.folders import SessionFolder
 from study_app.store.journals.parsing import check_study_name

@@ -1,4 +1,4 @@
-"""Names that must fit together: references to tables, the sequence, lists without repeats, items, languages.
+"""Names that must fit together: references to tables, sequences, groups, items and their scales, languages.
 
 These checks read the document itself, so that they also see the sound keys of tables that are broken elsewhere.
 """
@@ -6,10 +6,14 @@ These checks read the document itself, so that they also see the sound keys of t
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
+from pydantic import ValidationError
+
+from study_app.protocol import formats
 from study_app.protocol.groups import SEQUENCES, sequences_in
+from study_app.protocol.questions import POINTS, Context, Question, Scale, ShowIf, Statement, question_of
 from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.source.problems import ALIKE, ONE_LANGUAGE, Fault, did_you_mean
 from study_app.protocol.wording.languages import LANGUAGES, language_name
@@ -208,3 +212,119 @@ def _translations(path: Path, text: Any, wanted: tuple[str, ...]) -> Iterator[Fa
         for language in text:
             if language not in wanted:
                 yield Fault((*path, language), "is not a language of the study", f"these are: {', '.join(wanted)}")
+
+
+OWN = ("sequence", "sequences")
+
+
+def groups(document: Mapping[str, Any]) -> Iterator[Fault]:
+    """Check that there are several groups, that each block is in a sequence of one, and that no sequence is unused."""
+    if all(key in document for key in OWN):
+        yield Fault(("sequences",), "give either sequence or sequences, one of the two")
+    tables = [table for _, table in entries(document, "groups.*") if isinstance(table, Mapping)]
+    if not tables:
+        return
+    if len(names(document, "groups")) == 1:
+        yield Fault(("groups",), "there is only one group", "add another group, or leave groups out")
+    own = [any(key in table for key in OWN) for table in tables]
+    for key in OWN:
+        if key in document and all(own):
+            yield Fault((key,), "is used by no group: each has its own", f"remove {key}, or the one of a group")
+    used = {step for _, steps in sequences_in(document) for step in steps if isinstance(step, str)}
+    for block in names(document, "blocks"):
+        if used and block not in used:
+            yield Fault(("groups",), f'block "{block}" is in no group\'s sequence', "add it to one, or take it out")
+
+
+def questions(document: Document) -> Iterator[Fault]:
+    """Check the items of every questionnaire: their scales, when they are shown, and what is computed of them."""
+    scales = {str(path[1]): scale for path, table in entries(document, "scales.*") if (scale := _scale(table))}
+    for name, scale in scales.items():
+        if formats.is_second(document) and len(counts := {len(labels) for labels in scale.labels.values()}) > 1:
+            listed = " and ".join(map(str, sorted(counts)))
+            yield Fault(("scales", name, "labels"), f"has {listed} points", "every language has the same points")
+    languages = [name for _, name in entries(document, "study.languages.*") if isinstance(name, str)]
+    for path, table in entries(document, "questionnaires.*"):
+        if isinstance(table, Mapping):
+            items = [(place, _question(item)) for place, item in entries(table, "items.*")]
+            context = Context(scales, table.get("scale"), languages[0] if languages else "en")
+            sound = [((*path, *place), item) for place, item in items if item is not None]
+            rated = scales if formats.is_second(document) else {}  # format 1 has one length, checked before
+            yield from _statements(path, table, [item for _, item in sound], rated)
+            yield from _show_ifs(table, sound, context)
+            yield from _scores(path, table, [item for _, item in sound])
+
+
+def _scale(table: Any) -> Scale | None:
+    try:
+        return Scale.model_validate(table)
+    except ValidationError:
+        return None
+
+
+def _question(table: Any) -> Question | None:
+    """Return a question that is sound by itself."""
+    try:
+        return question_of(table) if isinstance(table, Mapping) else None
+    except (KeyError, ValidationError):
+        return None
+
+
+def _statements(path: Path, table: Document, items: Sequence[Question], scales: Mapping[str, Scale]) -> Iterator[Fault]:
+    if not any(isinstance(item, Statement) for item in items):
+        return
+    if "scale" not in table:
+        yield Fault((*path, "scale"), "is missing", "statements are rated on it; other items have a kind")
+    elif (scale := scales.get(str(table["scale"]))) is not None and scale.points != POINTS:
+        message = f"has {scale.points} points, and statements need {POINTS}"
+        yield Fault((*path, "scale"), message, f'write kind = "rating" and scale = "{table["scale"]}" in the items')
+
+
+def _show_ifs(table: Document, items: Sequence[tuple[Path, Question]], context: Context) -> Iterator[Fault]:
+    earlier: dict[str, Question] = {}
+    ids = [item.id for _, item in items]
+    for path, item in items:
+        if (asked := item.show_if) is not None:
+            place = (*path, "show_if")
+            if asked.item not in earlier:
+                yield _not_earlier(place, asked.item, ids, tuple(earlier))
+            elif table.get("item_order", "fixed") != "fixed":
+                hint = 'item_order = "fixed": an item comes after the one that it depends on'
+                yield Fault(place, "item_order is shuffled", hint)
+            else:
+                yield from _answers(place, asked, earlier[asked.item], context)
+        earlier[item.id] = item
+
+
+def _not_earlier(place: Path, name: str, ids: Sequence[str], earlier: tuple[str, ...]) -> Fault:
+    if name in ids:
+        return Fault(place, f'"{name}" comes later', "name an earlier item")
+    return Fault(place, f'there is no item "{name}" in this questionnaire', did_you_mean(name, earlier))
+
+
+def _answers(place: Path, asked: ShowIf, earlier: Question, context: Context) -> Iterator[Fault]:
+    """Check that the earlier item can be answered so."""
+    try:
+        levels = list(earlier.levels(context))
+    except KeyError:  # its scale, or a text in the language, is missing: another check says so
+        levels = []
+    for value in asked.permitted:
+        if levels and str(value) not in levels:
+            yield Fault(place, f'"{value}" is not one of its answers', f"these are: {', '.join(levels)}")
+        elif earlier.value_type != "text" and isinstance(value, str):
+            yield Fault(place, f'"{value}" is not one of its answers', "give a number")
+    if not asked.permitted and earlier.value_type == "text":
+        yield Fault(place, f'the answer to "{asked.item}" is not a number', 'write is = "…"')
+
+
+def _scores(path: Path, table: Document, items: Sequence[Question]) -> Iterator[Fault]:
+    """Check that scores are computed of items there are, whose answers are numbers."""
+    numbers = [item.id for item in items if item.value_type != "text"]
+    choices = [item.id for item in items if item.value_type == "text"]
+    for key, known in (("items", numbers), ("weights_from", choices)):
+        for place, name in entries(table, f"scores.*.{key}.*"):
+            if isinstance(name, str) and name not in known:
+                message = (
+                    f'there is no item "{name}" that is answered with {"a number" if key == "items" else "a choice"}'
+                )
+                yield Fault((*path, *place), message, did_you_mean(name, known))

@@ -1,14 +1,24 @@
-"""The table of what the passivity controller leaves of a force that a study delays, as it ships.
+"""Conditions whose delayed force the passivity controller withholds in part, and the table that tells how much.
 
-It is ``delayed_force.csv`` in this folder, measured by ``validation.stability.force_delay`` on the servo's own tick.
+The table is ``delayed_force.csv`` in this folder, measured by ``validation.stability.force_delay`` on the servo's own
+tick.
 """
 
 from __future__ import annotations
 
 import csv
+from collections.abc import Iterator
 from functools import cache
 from importlib import resources
 from typing import Final, NamedTuple
+
+from study_app.haptics.model.steady_state import steady
+from study_app.protocol.checks.consistency import numbers
+from study_app.protocol.checks.force_limits import LIMIT_J, damping_nspm, returned_j
+from study_app.protocol.checks.force_limits import longest_ms as longest_returned_ms
+from study_app.protocol.load import load
+from study_app.protocol.model import Follow, Protocol
+from study_app.protocol.trials.tasks import Stroke
 
 WITHHELD_PERCENT: Final = 5.0
 """A trial in which more is withheld does not present the force that was asked for."""
@@ -79,3 +89,90 @@ def longest_ms(liquid: str, estimator: str, hand: str = "light", withheld_percen
             break
         longest = delay_ms
     return longest
+
+
+STIRRED: Final = Stroke(frequency_hz=1.061, amplitude_m=0.03)
+"""The motion of the stored table: ±30 mm with at most 0.2 m/s."""
+SHIPPED: Final = (("rek2024", ""), ("physical2", "physical2_"))
+"""The studies whose liquids the table has, and how it calls them."""
+
+
+def delay_warnings(protocol: Protocol) -> Iterator[str]:
+    """Yield the conditions that are presented with a force later than the passivity controller leaves it."""
+    presented = {name for block in protocol.blocks.values() for name in protocol.conditions_in(block.id)}
+    for name, condition in protocol.conditions.items():
+        delay_ms = 1000 * condition.link().mean_delay_s(protocol.device.rate_hz)
+        if name not in presented or delay_ms == 0 or len(condition.liquid_ids) > 1:
+            continue
+        listed = _in_table(protocol, condition.liquid_ids[0])
+        found = _of_energy(protocol, name, delay_ms) if listed is None else _of_table(protocol, name, listed, delay_ms)
+        if found is not None:
+            yield f"conditions.{name}.force_delay_ms: {found}, or delay the picture"
+
+
+def _of_table(protocol: Protocol, name: str, liquid: str, delay_ms: float) -> str | None:
+    """Return what the stored table says of a shipped liquid, in a light hand; None if hardly anything is withheld."""
+    estimator = protocol.scene.velocity.kind if protocol.scene.velocity.kind == "kalman" else "ewma"
+    most_ms = longest_ms(liquid, estimator)
+    if delay_ms <= most_ms:
+        return None
+    percent = _withheld_percent(liquid, estimator, delay_ms)
+    if percent <= WITHHELD_PERCENT:
+        return None
+    force_n = steady(protocol.scene_for(name), STIRRED.speed_mps).drag_n
+    return (
+        f"with {delay_ms:.3g} ms the passivity controller withholds about {percent:.0f} % of the force from a light "
+        f"hand ({percent / 100 * force_n:.2g} of {force_n:.2g} N at {STIRRED.speed_mps:.2g} m/s): choose at most "
+        f"{most_ms:g} ms"
+    )
+
+
+def _withheld_percent(liquid: str, estimator: str, delay_ms: float) -> float:
+    """Return the share that is withheld [%], interpolated in the stored table."""
+    rows = [it for it in table() if (it.liquid, it.estimator, it.hand) == (liquid, estimator, "light")]
+    before = max((it for it in rows if it.delay_ms <= delay_ms), key=_delay_ms)
+    after = min((it for it in rows if it.delay_ms >= delay_ms), key=_delay_ms, default=before)
+    if after.delay_ms == before.delay_ms:
+        return before.withheld_percent
+    share = (delay_ms - before.delay_ms) / (after.delay_ms - before.delay_ms)
+    return before.withheld_percent + share * (after.withheld_percent - before.withheld_percent)
+
+
+def _delay_ms(entry: Entry) -> float:
+    return entry.delay_ms
+
+
+def _of_energy(protocol: Protocol, name: str, delay_ms: float) -> str | None:
+    """Return that a liquid that the table lacks returns more than the limit in the motion of its tasks."""
+    scene, workspace_m = protocol.scene_for(name), protocol.device.workspace_m
+    tasks = [
+        protocol.tasks[block.task] for block in protocol.blocks.values() if name in protocol.conditions_in(block.id)
+    ]
+    strokes = [one.fastest_stroke(workspace_m) if isinstance(one, Follow) else STIRRED for one in tasks]
+    energy_j, stroke = max((returned_j(damping_nspm(scene, one), one, delay_ms / 1000), one) for one in strokes)
+    if energy_j <= LIMIT_J:
+        return None
+    damping = damping_nspm(scene, stroke)
+    return (
+        f"with {delay_ms:.3g} ms a force of {damping * stroke.speed_mps:.2g} N at {stroke.speed_mps:.2g} m/s returns "
+        f"{1000 * energy_j:.1f} mJ per motion reversal, and the passivity controller withholds part of it: choose at "
+        f"most {longest_returned_ms(damping, stroke)} ms"
+    )
+
+
+def _in_table(protocol: Protocol, liquid: str) -> str | None:
+    """Return what the table calls a liquid; None if it has none with the same numbers at the same scale."""
+    for study, prefix in SHIPPED:
+        shipped = _shipped(study)
+        if shipped.scene.scale != protocol.scene.scale:
+            continue
+        for name, known in shipped.liquids.items():
+            listed = any(entry.liquid == prefix + name for entry in table())
+            if listed and numbers(known) == numbers(protocol.liquids[liquid]):
+                return prefix + name
+    return None
+
+
+@cache
+def _shipped(study: str) -> Protocol:
+    return load(study)

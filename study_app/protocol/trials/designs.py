@@ -17,8 +17,7 @@ from pydantic import Field
 from study_app.haptics.model.ranges import within
 from study_app.protocol.questionnaires import Questionnaire
 from study_app.protocol.questions import Choice, Number, Option, Question, Rating
-from study_app.protocol.table import Table
-from study_app.protocol.texts import Id, Localised
+from study_app.protocol.table import Id, Localised, Table
 from study_app.protocol.wording.languages import words
 
 if TYPE_CHECKING:

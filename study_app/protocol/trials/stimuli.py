@@ -16,8 +16,7 @@ from pydantic_core import PydanticCustomError
 from study_app.haptics.model import force_link
 from study_app.haptics.model.force_link import ForceLink
 from study_app.haptics.model.ranges import within
-from study_app.protocol.table import ExtendedTable, Table
-from study_app.protocol.texts import Id
+from study_app.protocol.table import ExtendedTable, Id, Table
 from study_app.protocol.trials.designs import Design
 
 if TYPE_CHECKING:

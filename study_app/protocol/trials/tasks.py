@@ -10,8 +10,7 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from study_app.haptics.model.ranges import within
-from study_app.protocol.table import Table
-from study_app.protocol.texts import Localised
+from study_app.protocol.table import Localised, Table
 
 Seconds: TypeAlias = Annotated[float, within(0.1, 3600, "a hand moves within 0.1 s, no trial takes an hour")]
 Radius: TypeAlias = Annotated[float, within(0.5, 100, "a hand at rest trembles by a few tenths of a millimetre")]

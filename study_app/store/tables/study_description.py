@@ -11,7 +11,7 @@ from typing import Any
 
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
-from study_app.protocol.texts import text_in
+from study_app.protocol.table import text_in
 from study_app.store.atomic import is_there, read_own, write_file
 from study_app.store.blinded.blinding import reveals
 from study_app.store.folders import StudyFolder

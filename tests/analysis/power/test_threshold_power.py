@@ -11,7 +11,7 @@ from study_app.analysis.power.threshold_studies import BATCH, plans, sweep
 from study_app.analysis.power.threshold_tables import Precisions, threshold_markdown
 from study_app.cli import commands
 from study_app.errors import AnalysisError
-from study_app.protocol.checks.expected_means import expected_mean, mean_plan
+from study_app.protocol.checks.expected_precision import expected_mean, mean_plan
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 

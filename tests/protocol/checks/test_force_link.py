@@ -3,8 +3,8 @@
 import pytest
 
 from study_app.haptics.model.force_link import PROMPT, ForceLink
-from study_app.protocol.checks.delay_warnings import STIRRED, delay_warnings
-from study_app.protocol.checks.returned_energy import longest_ms, returned_j
+from study_app.protocol.checks.delayed_force import STIRRED, delay_warnings
+from study_app.protocol.checks.force_limits import longest_ms, returned_j
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol

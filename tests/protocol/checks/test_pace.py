@@ -9,7 +9,7 @@ from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Ewma, Foaw, Given, Kalman, Line, Raw, Scene
 from study_app.haptics.model.steady_state import steady
 from study_app.haptics.runtime.offline import simulate
-from study_app.protocol.checks.estimator_response import fastest_hz, passed_share
+from study_app.protocol.checks.force_limits import fastest_hz, passed_share
 from study_app.protocol.load import parse
 from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.trials.presented_levels import FASTER

@@ -13,7 +13,7 @@ from study_app.gui.participant.forms.question_field import target_px
 from study_app.gui.participant.forms.typed_field import ENTER, EntryKeys, TypedField
 from study_app.gui.theme.theme import font
 from study_app.protocol.questions import ItemView, TextView, Value
-from study_app.protocol.texts import UNPRINTABLE
+from study_app.protocol.table import UNPRINTABLE
 
 if TYPE_CHECKING:
     from study_app.protocol.wording.languages import Words

@@ -10,7 +10,7 @@ from study_app.authoring.measures.planned import ENOUGH, GroupPrecision
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
 from study_app.number_text import counted
 from study_app.protocol.blocks import Block
-from study_app.protocol.checks.clipped_levels import clipped, clipped_unpaced
+from study_app.protocol.checks.force_limits import clipped, clipped_unpaced
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import BlockOrder
 from study_app.protocol.trials.presented_levels import (

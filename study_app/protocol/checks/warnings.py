@@ -1,0 +1,237 @@
+"""What is permitted in a study and may still be a mistake, a sentence each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import combinations
+
+from study_app.haptics.model.bounds import met_mps
+from study_app.haptics.model.effects.drag import REFERENCE, resistance_n
+from study_app.haptics.model.steady_state import HAND_MPS, Steady, steady
+from study_app.protocol.blocks import Block
+from study_app.protocol.checks.delayed_force import delay_warnings
+from study_app.protocol.checks.expected_precision import imprecise
+from study_app.protocol.checks.force_limits import PACED, clipped_unpaced, fastest_hz
+from study_app.protocol.model import Follow, Protocol, Reach
+from study_app.protocol.questionnaires import instrument
+from study_app.protocol.trials.presented_levels import highest_damping
+from study_app.protocol.trials.tracks import design_of, method_of, tracks_of
+
+TELLING = 0.39
+"""Twice the difference of viscosity that people just tell, 19 % (Jones, Hunter & Lafontaine 1997): what two liquids
+need for reliable discrimination; the thesis' water and honey differ by 40 %."""
+
+
+def warnings(protocol: Protocol, *, simulates: bool = True) -> tuple[str, ...]:
+    """Return what is permitted and may still be a mistake, a sentence each.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The study.
+    simulates : bool
+        Whether what takes simulated observers, up to a second a block, is among it.
+    """
+    return (
+        *liquid_warnings(protocol),
+        *level_warnings(protocol, simulates=simulates),
+        *delay_warnings(protocol),
+        *_incomplete(protocol),
+        *_from_memory(protocol),
+    )
+
+
+def liquid_warnings(protocol: Protocol) -> tuple[str, ...]:
+    """Return what is permitted and may still be a mistake, a sentence each."""
+    felt = {name: steady(protocol.scene_of(name)) for name in protocol.liquids}
+    return (
+        *_alike(protocol, felt),
+        *_clipped(felt),
+        *_ignoring_viscosity(protocol, felt),
+        *_practised(protocol),
+        *_of_different_sizes(protocol),
+    )
+
+
+def _alike(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
+    """Yield the pairs of liquids of a block that are hard to tell apart."""
+    seen: set[frozenset[str]] = set()
+    for block in protocol.main_blocks:
+        names = dict.fromkeys(
+            name for it in protocol.conditions_in(block.id) for name in protocol.conditions[it].liquid_ids
+        )
+        for one, other in combinations(names, 2):
+            pair = frozenset((one, other))
+            if _differ(felt[one].force_n, felt[other].force_n) or pair in seen:
+                continue
+            seen.add(pair)
+            yield (
+                f"{one} and {other} of block {block.id} are hard to tell apart: {felt[one].force_n:.2f} and "
+                f"{felt[other].force_n:.2f} N at {HAND_MPS:g} m/s of the hand, less than {TELLING:.0%} of the smaller "
+                "between them"
+            )
+
+
+def _differ(one_n: float, other_n: float) -> bool:
+    """Return whether two forces differ by at least 39 % of the smaller."""
+    smaller_n, greater_n = sorted((one_n, other_n))
+    return greater_n > 0 and greater_n - smaller_n >= TELLING * smaller_n
+
+
+def _clipped(felt: dict[str, Steady]) -> Iterator[str]:
+    """Yield the liquids whose drag the safety limits shorten."""
+    for name, it in felt.items():
+        if it.limit is not None:
+            limit = "the force limit" if it.limit == "norm" else "the slope limit, which keeps the servo stable,"
+            yield (
+                f"{name} is clipped: at {HAND_MPS:g} m/s of the hand {limit} lets {it.force_n:.2f} of its "
+                f"{it.drag_n:.2f} N through"
+            )
+
+
+def _ignoring_viscosity(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
+    """Yield the liquids with a viscosity whose drag does not depend on it, and how wrong that is."""
+    for name in protocol.liquids:
+        scene = protocol.scene_of(name)
+        (liquid,) = scene.liquids
+        if liquid.viscosity_pa_s is None:
+            continue
+        speed_mps = met_mps(scene, liquid, scene.scale * HAND_MPS)
+        named_n, true_n = (resistance_n(scene, liquid, speed_mps, law) for law in ("constant", REFERENCE))
+        if "drag" in liquid.effects and liquid.drag.law == "constant":
+            why, instead = "its constant drag coefficient ignores it", f'drag = {{ law = "{REFERENCE}" }}'
+        elif felt[name].drag_n == 0.0:
+            named_n, why, instead = 0.0, "its effects leave out drag", 'name "drag" among them'
+        else:
+            continue
+        if abs(named_n - true_n) > max(scene.accuracy.relative * true_n, scene.accuracy.absolute_n):
+            yield (
+                f"{name} has a viscosity, but {why}: at {HAND_MPS:g} m/s of the hand its drag is {named_n:.2f} instead "
+                f'of {true_n:.2f} N, an error of {abs(named_n - true_n):.2f} N: write effects = "auto" or {instead}'
+            )
+
+
+def _practised(protocol: Protocol) -> Iterator[str]:
+    """Yield the liquids that are practised in and judged in another block; levels are practised for their task."""
+    used = {
+        block.id: dict.fromkeys(
+            name for it in protocol.conditions_in(block.id) for name in protocol.conditions[it].liquid_ids
+        )
+        for block in protocol.blocks_in_order
+    }
+    judged = {name: block.id for block in reversed(protocol.main_blocks) for name in used[block.id]}
+    for block in protocol.blocks_in_order:
+        if block.phase != "practice" or block.stimulus is not None:
+            continue
+        for name in used[block.id]:
+            if name in judged:
+                yield (
+                    f"practice {block.id} is in {name}, which block {judged[name]} presents too: participants know it "
+                    "from the practice when they judge it"
+                )
+
+
+def _of_different_sizes(protocol: Protocol) -> Iterator[str]:
+    """Yield the blocks whose conditions show balls of different sizes, by which participants can tell them apart."""
+    for block in protocol.main_blocks:
+        sizes = {1000 * protocol.scene_for(it).body.diameter_m for it in protocol.conditions_in(block.id)}
+        if len(sizes) > 1:
+            listed = ", ".join(f"{size:g}" for size in sorted(sizes))
+            yield (
+                f"block {block.id} shows balls of different sizes ({listed} mm): participants can tell its conditions "
+                "apart by sight"
+            )
+
+
+def level_warnings(protocol: Protocol, *, simulates: bool = True) -> Iterator[str]:
+    """Yield what to think over of the blocks with a design; ``simulates``: also what takes simulated observers."""
+    yielded: set[str] = set()
+    for block in protocol.blocks_in_order:
+        if block.design is not None:
+            for sentence in (
+                *_unbalanced(protocol, block),
+                *_converging(protocol, block),
+                *_without_catch(protocol, block),
+                *_seen(protocol, block),
+                *_unpaced(protocol, block),
+                *(imprecise(protocol, block) if simulates else ()),
+            ):
+                if sentence not in yielded:
+                    yielded.add(sentence)
+                    yield sentence
+
+
+def _unbalanced(protocol: Protocol, block: Block) -> Iterator[str]:
+    """Yield that the trials of a track cannot present every arrangement equally often."""
+    count = len(design_of(protocol, block).arrangements)
+    track = tracks_of(protocol, block)[0]
+    trials = track.slots - len(track.catch)
+    if not design_of(protocol, block).has_noise and trials % count:
+        place = f"blocks.{block.id}.repetitions" if block.stimulus is None else f"methods.{block.method}"
+        wanted = "an even number" if count == 2 else f"a multiple of {count}"
+        yield f"{place}: {trials} trials cannot balance {count} arrangements: choose {wanted}"
+
+
+def _converging(protocol: Protocol, block: Block) -> Iterator[str]:
+    """Yield what a block's method has to say of itself."""
+    if block.stimulus is not None:
+        for key, sentence in method_of(protocol, block).warnings():
+            yield f"methods.{block.method}.{key}: {sentence}"
+
+
+def _without_catch(protocol: Protocol, block: Block) -> Iterator[str]:
+    """Yield that a track is too short for the share of catch trials."""
+    track = tracks_of(protocol, block)[0]
+    if block.catch is not None and not track.catch:
+        share = math.ceil(100 / track.slots) / 100
+        yield (
+            f"blocks.{block.id}.catch.share: {block.catch.share:g} of {track.slots} trials gives no catch trial: "
+            f"choose {share:g}"
+        )
+
+
+def _seen(protocol: Protocol, block: Block) -> Iterator[str]:
+    """Yield that a double-blind study shows its operator which answers were correct."""
+    if design_of(protocol, block).feedback == "always" and protocol.study.blinding == "double":
+        yield (
+            f'designs.{block.design}.feedback: "always" in a double-blind study: anyone who sees the participant\'s '
+            'screen sees which answers were correct: choose feedback = "practice"'
+        )
+
+
+def _unpaced(protocol: Protocol, block: Block) -> Iterator[str]:
+    """Yield that fast motions of a task without a pace are not delivered as requested."""
+    task = protocol.tasks[block.task]
+    if isinstance(task, Follow) or block.stimulus is None:
+        return
+    alike = [one for one in protocol.blocks.values() if (one.stimulus, one.task) == (block.stimulus, block.task)]
+    if (said := clipped_unpaced(protocol, alike)) is not None:
+        yield said
+    error_percent = protocol.limits.level_error_percent
+    if highest_damping(protocol, block) > 0 and error_percent is not None:
+        fast_hz = fastest_hz(protocol.scene.velocity, protocol.device.rate_hz, 1 - error_percent / 100)
+        yield (
+            f"tasks.{block.task}: in motions above {fast_hz:.1f} Hz the velocity estimator takes more than "
+            f"{error_percent:g} % of a damper's force: such trials are repeated: {PACED}"
+        )
+
+
+def _incomplete(protocol: Protocol) -> Iterator[str]:
+    """Yield the reaching tasks whose trials are valid without any target reached; format 1 is frozen."""
+    if protocol.format == 1 or protocol.limits.targets_percent is not None:
+        return
+    for name in dict.fromkeys(block.task for block in protocol.main_blocks):
+        if isinstance(protocol.tasks[name], Reach):
+            yield (
+                f"tasks.{name}: a trial that ends without any target reached is valid: set limits.targets_percent to "
+                "the least share of targets that counts"
+            )
+
+
+def _from_memory(protocol: Protocol) -> Iterator[str]:
+    """Yield what is reproduced from memory in a questionnaire that the study uses."""
+    for name, questionnaire in protocol.questionnaires.items():
+        of = questionnaire.instrument
+        if of is not None and (recalled := instrument(of).get("from_memory")) is not None:
+            yield f"questionnaires.{name}: from memory, compared with no source: {recalled}: compare it with your copy"
