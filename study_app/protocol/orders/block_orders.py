@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from study_app.errors import StudyError
 from study_app.protocol.blocks import Block, Order, Phase
 from study_app.protocol.groups import Group, every_step, numbered_parts, sessions_differ, steps_of
-from study_app.protocol.model import Protocol
+from study_app.protocol.model import Protocol, Questionnaire
 from study_app.protocol.orders.sequences import Constraint
 from study_app.protocol.trials.methods import TrackOrder
 from study_app.protocol.trials.tracks import method_of, tracks_of
@@ -97,8 +97,7 @@ def block_codes(protocol: Protocol, block: Block) -> tuple[str, ...]:
 def orders_of(protocol: Protocol) -> Orders:
     """Return what scheduling needs of a protocol."""
     steps: dict[str, BlockOrder | FormOrder] = {
-        name: FormOrder(name, tuple(item.id for item in form.items), form.item_order)
-        for name, form in protocol.forms.items()
+        name: FormOrder(name, **_items(form)) for name, form in protocol.forms.items()
     }
     steps |= {name: order_of(protocol, block) for name, block in protocol.blocks.items()}
     return Orders(protocol.study.name, tuple(steps.get(step, step) for step in protocol.steps))
@@ -106,29 +105,13 @@ def orders_of(protocol: Protocol) -> Orders:
 
 def order_of(protocol: Protocol, block: Block) -> BlockOrder:
     """Return a block as scheduling sees it."""
-    questionnaire = protocol.questionnaire_of(block.id)
-    codes = block_codes(protocol, block)
-    items = () if questionnaire is None else tuple(item.id for item in questionnaire.items)
     order: CodeOrder = block.order
     slots: tuple[int, ...] = ()
     if block.design is not None:
         order = "interleaved" if block.stimulus is None else method_of(protocol, block).order
         slots = tuple(track.slots for track in tracks_of(protocol, block))
-    return BlockOrder(
-        id=block.id,
-        phase=block.phase,
-        part=block.part,
-        codes=codes,
-        order=order,
-        max_repeats=block.max_repeats,
-        min_distance=block.min_distance,
-        repetitions=block.repetitions,
-        slots=slots,
-        break_every=block.break_every,
-        break_page=block.break_page,
-        items=items,
-        item_order="fixed" if questionnaire is None else questionnaire.item_order,
-    )
+    codes, asked = block_codes(protocol, block), protocol.questionnaire_of(block.id)
+    return BlockOrder(id=block.id, codes=codes, order=order, slots=slots, **_same(block), **_items(asked))
 
 
 class _Kept(BaseModel):
@@ -231,31 +214,29 @@ def orders_of_receipt(protocol: Mapping[str, Any], *, group: str | None = None, 
             key, sentence = impossible
             raise _untold(f"blocks.{block.id}.{key}", sentence)
     steps: dict[str, BlockOrder | FormOrder] = {
-        name: FormOrder(name, tuple(item.id for item in form.items), form.item_order)
-        for name, form in kept.questionnaires.items()
+        name: FormOrder(name, **_items(form)) for name, form in kept.questionnaires.items()
     }
     steps |= blocks
     return Orders(kept.study.name, tuple(steps.get(step, step) for step in shown))
 
 
 def _of_kept(protocol: _KeptProtocol, name: str, block: _KeptBlock) -> BlockOrder:
-    questionnaire = None if block.questionnaire is None else protocol.questionnaires[block.questionnaire]
-    items = () if questionnaire is None else tuple(item.id for item in questionnaire.items)
-    return BlockOrder(
-        id=name,
-        phase=block.phase,
-        part=block.part,
-        codes=block.codes,
-        order=block.order,
-        max_repeats=block.max_repeats,
-        min_distance=block.min_distance,
-        repetitions=block.repetitions,
-        slots=block.slots,
-        break_every=block.break_every,
-        break_page=block.break_page,
-        items=items,
-        item_order="fixed" if questionnaire is None else questionnaire.item_order,
-    )
+    asked = None if block.questionnaire is None else protocol.questionnaires[block.questionnaire]
+    own: dict[str, Any] = {"codes": block.codes, "order": block.order, "slots": block.slots}
+    return BlockOrder(id=name, **own, **_same(block), **_items(asked))
+
+
+def _same(block: Block | _KeptBlock) -> dict[str, Any]:
+    """Return what a block states as scheduling sees it."""
+    keys = ("phase", "part", "max_repeats", "min_distance", "repetitions", "break_every", "break_page")
+    return {key: getattr(block, key) for key in keys}
+
+
+def _items(asked: Questionnaire | _KeptQuestionnaire | None) -> dict[str, Any]:
+    """Return the ids of what is asked, and their order."""
+    if asked is None:
+        return {"items": (), "item_order": "fixed"}
+    return {"items": tuple(item.id for item in asked.items), "item_order": asked.item_order}
 
 
 def _untold(place: str, what: str) -> StudyError:

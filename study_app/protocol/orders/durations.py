@@ -74,34 +74,26 @@ def expected_duration_s(protocol: Protocol) -> float:
 
 def duration_range_s(protocol: Protocol) -> tuple[float, float]:
     """Return how long the shortest and the longest session will take [s]: tasks end early, or by their limit."""
+
+    def session_s(own: Protocol, task_s: Callable[[AnyTask], float]) -> float:
+        return sum(step_duration_s(own, step, own.study.languages[0], task_s) for step in own.steps)
+
     kinds = [one.protocol for one in variants(protocol)]
     least_s = min(
-        _session_s(one, lambda task: task.min_s if isinstance(task, Explore) else task.expected_s) for one in kinds
+        session_s(one, lambda task: task.min_s if isinstance(task, Explore) else task.expected_s) for one in kinds
     )
-    return least_s, max(_session_s(one, lambda task: task.limit_s) for one in kinds)
+    return least_s, max(session_s(one, lambda task: task.limit_s) for one in kinds)
 
 
-def _session_s(protocol: Protocol, task_s: Callable[[AnyTask], float]) -> float:
-    language = protocol.study.languages[0]
-    return sum(
-        block_duration_s(protocol, protocol.blocks[step], language, task_s)
-        if step in protocol.blocks
-        else step_duration_s(protocol, step, language)
-        for step in protocol.steps
-    )
-
-
-def _expected_s(task: AnyTask) -> float:
-    return task.expected_s
-
-
-def step_duration_s(protocol: Protocol, step: str, language: str) -> float:
+def step_duration_s(
+    protocol: Protocol, step: str, language: str, of_task: Callable[[AnyTask], float] | None = None
+) -> float:
     """Return how long a page, form or block will take [s], read in one of the study's languages."""
     if step in protocol.pages:
         return _reading_s(protocol, step, language)
     if step in protocol.forms:
         return answering_s(protocol.forms[step])
-    return block_duration_s(protocol, protocol.blocks[step], language)
+    return block_duration_s(protocol, protocol.blocks[step], language, of_task)
 
 
 def answering_s(questionnaire: Questionnaire) -> float:
@@ -115,14 +107,15 @@ def _reading_s(protocol: Protocol, page_id: str, language: str) -> float:
 
 
 def block_duration_s(
-    protocol: Protocol, block: Block, language: str, of_task: Callable[[AnyTask], float] = _expected_s
+    protocol: Protocol, block: Block, language: str, of_task: Callable[[AnyTask], float] | None = None
 ) -> float:
-    """Return how long a block will take [s]; ``of_task`` says how long one of its tasks takes."""
+    """Return how long a block will take [s]; ``of_task`` says how long one of its tasks takes, if not as expected."""
     questionnaire = protocol.questionnaire_of(block.id)
     answering = 0.0 if questionnaire is None else answering_s(questionnaire)
     order = order_of(protocol, block)
     resting = 0.0 if block.break_page is None else order.breaks * _reading_s(protocol, block.break_page, language)
-    task_s = of_task(protocol.tasks[block.task])
+    task = protocol.tasks[block.task]
+    task_s = task.expected_s if of_task is None else of_task(task)
     if block.design is not None:
         design = design_of(protocol, block)
         answer_s = CHOICE_S if design.reply == "choice" else ANSWER_S

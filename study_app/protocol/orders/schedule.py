@@ -20,7 +20,7 @@ williams latin  a row of a square, assigned by the number in the participant's i
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
@@ -122,14 +122,15 @@ def build_schedule(protocol: Protocol | Orders, participant: str, seed: int, row
             steps.append(PageStep(step))
             continue
         if isinstance(step, FormOrder):
-            steps.append(FormStep(step.id, _form_items(step, participant, seed)))
+            steps.append(FormStep(step.id, _shuffled(step, seed, f"{participant}/form/{step.id}")))
             continue
         codes = codes_of(orders.study, step, participant, seed, row_of)
-        for trial in _trials(step, codes, participant, seed, number):
-            steps.append(trial)
-            if step.break_page is not None and step.break_after(trial.index):
+        for index, code in enumerate(codes, start=1):
+            items = _shuffled(step, seed, f"{participant}/{step.id}/{index}")
+            steps.append(Trial(number, step.id, step.phase, step.part, index, step.trials, code, items))
+            number += 1
+            if step.break_page is not None and step.break_after(index):
                 steps.append(PageStep(step.break_page))
-        number += step.trials
     return Schedule(participant, seed, tuple(steps))
 
 
@@ -160,32 +161,9 @@ def codes_of(study: str, block: BlockOrder, participant: str, seed: int, row_of:
             return tuple(codes[number] for number in row(square, len(codes), taken, times))
 
 
-def _trials(block: BlockOrder, codes: Sequence[str], participant: str, seed: int, first: int) -> list[Trial]:
-    return [
-        Trial(
-            number=first + index - 1,
-            block=block.id,
-            phase=block.phase,
-            part=block.part,
-            index=index,
-            of=block.trials,
-            code=code,
-            items=_items(block, participant, seed, index),
-        )
-        for index, code in enumerate(codes, start=1)
-    ]
-
-
-def _items(block: BlockOrder, participant: str, seed: int, index: int) -> tuple[str, ...]:
-    if block.item_order == "fixed":
-        return block.items
-    return shuffle(block.items, stream(seed, f"items/{participant}/{block.id}/{index}").random)
-
-
-def _form_items(form: FormOrder, participant: str, seed: int) -> tuple[str, ...]:
-    if form.item_order == "fixed":
-        return form.items
-    return shuffle(form.items, stream(seed, f"items/{participant}/form/{form.id}").random)
+def _shuffled(asked: BlockOrder | FormOrder, seed: int, name: str) -> tuple[str, ...]:
+    """Return the ids of what is asked in the order of presentation."""
+    return asked.items if asked.item_order == "fixed" else shuffle(asked.items, stream(seed, f"items/{name}").random)
 
 
 def draw_key(protocol: Protocol, draw: Draw) -> Key:

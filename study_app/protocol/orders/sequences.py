@@ -105,7 +105,9 @@ def row(square: Square, codes: int, number: int, repetitions: int = 1) -> tuple[
     if codes == 1:
         return (0,) * repetitions
     reversed_square, shift = divmod(number, codes)
-    base = _williams(codes) if square == "williams" else tuple(range(codes))
+    base = tuple(range(codes))
+    if square == "williams":  # 0, 1, n − 1, 2, n − 2, …: its n − 1 steps from one to the next are all different
+        base = tuple((step + 1) // 2 if step % 2 else -(step // 2) % codes for step in base)
     if reversed_square:
         base = base[::-1]
     shown = tuple((code + shift) % codes for code in base)
@@ -114,11 +116,6 @@ def row(square: Square, codes: int, number: int, repetitions: int = 1) -> tuple[
         first = shown[-1] + (-distance if reversed_square else distance)
         shown += tuple((code - base[0] + first) % codes for code in base)
     return shown
-
-
-def _williams(codes: int) -> tuple[int, ...]:
-    """Return 0, 1, n − 1, 2, n − 2, …: its n − 1 steps from one to the next are all different."""
-    return tuple((step + 1) // 2 if step % 2 else -(step // 2) % codes for step in range(codes))
 
 
 def borders_even(codes: int, repetitions: int) -> bool:
