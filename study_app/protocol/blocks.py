@@ -3,12 +3,11 @@
 from typing import Annotated, ClassVar, Final, Literal, Self, TypeAlias
 
 from pydantic import Field, StringConstraints, model_validator
-from pydantic_core import PydanticCustomError
 
 from study_app.haptics.model.ranges import within
 from study_app.ids import MAX_ID
 from study_app.protocol.orders.sequences import Constraint
-from study_app.protocol.table import ExtendedTable, Id, Localised, Table
+from study_app.protocol.table import ExtendedTable, Id, Localised, Table, invalid
 
 Phase: TypeAlias = Literal["main", "practice", "baseline"]
 Order: TypeAlias = Literal["fixed", "shuffled", "constrained", "williams", "latin"]
@@ -33,11 +32,7 @@ class Criterion(Table):
     @model_validator(mode="after")
     def _can_be_met(self) -> Self:
         if self.right > self.of:
-            raise PydanticCustomError(
-                "criterion",
-                "{right} of {of} answers cannot be correct: at most {of}",
-                {"right": self.right, "of": self.of, "place": "right"},
-            )
+            raise invalid(f"{self.right} of {self.of} answers cannot be correct: at most {self.of}", "right")
         return self
 
 
@@ -159,48 +154,30 @@ class Block(ExtendedTable):
     def _presents_in_one_way(self) -> Self:
         ways = zip(WAYS, self.NOT_WITH, strict=True)
         what, refused = next((what, keys) for what, (given, keys) in ways if all(getattr(self, key) for key in given))
-        self._refuse(what, *refused)
-        if what == "conditions" and (self.standard not in self.conditions or len(self.conditions) < 2):
-            raise PydanticCustomError(
-                "standard",
-                "must be one of at least two conditions, which the others are compared with",
-                _at("standard"),
-            )
-        return self
-
-    def _refuse(self, what: str, *names: str) -> None:
-        for name in names:
+        for name in refused:
             if name in self.model_fields_set:
-                instead = (
-                    "give it in the method's table" if (what, name) == ("a stimulus", "repetitions") else "omit it"
-                )
-                message = "does not belong to a block with {what}: {instead}"
-                raise PydanticCustomError("design", message, _at(name, what=what, instead=instead))
+                elsewhere = (what, name) == ("a stimulus", "repetitions")
+                instead = "give it in the method's table" if elsewhere else "omit it"
+                raise invalid(f"does not belong to a block with {what}: {instead}", name)
+        if what == "conditions" and (self.standard not in self.conditions or len(self.conditions) < 2):
+            raise invalid("must be one of at least two conditions, which the others are compared with", "standard")
+        return self
 
     @model_validator(mode="after")
     def _codes_where_blinded(self) -> Self:
         if self.phase == "main":
             if self.code_prefix is None:
-                raise PydanticCustomError(
-                    "codes", "a main block needs a code_prefix, a capital letter", {"place": "code_prefix"}
-                )
+                raise invalid("a main block needs a code_prefix, a capital letter", "code_prefix")
             if self.part is None:
-                raise PydanticCustomError("part", "a main block needs a part: 1, 2, …", {"place": "part"})
+                raise invalid("a main block needs a part: 1, 2, …", "part")
         elif self.compares is not None:
-            raise PydanticCustomError(
-                "compares", "a {phase} block compares nothing: leave it out", {"phase": self.phase, "place": "compares"}
-            )
+            raise invalid(f"a {self.phase} block compares nothing: leave it out", "compares")
         elif self.code_prefix is not None:
-            raise PydanticCustomError(
-                "codes",
-                "a {phase} block is not blinded and has no code_prefix",
-                {"phase": self.phase, "place": "code_prefix"},
-            )
+            raise invalid(f"a {self.phase} block is not blinded and has no code_prefix", "code_prefix")
         elif len(self.conditions) > 1 and self.design is None:
-            raise PydanticCustomError(
-                "codes",
-                "a {phase} block has one condition, this one {count}: use one block for each",
-                {"phase": self.phase, "count": len(self.conditions), "place": "conditions"},
+            count = len(self.conditions)
+            raise invalid(
+                f"a {self.phase} block has one condition, this one {count}: use one block for each", "conditions"
             )
         return self
 
@@ -209,26 +186,22 @@ class Block(ExtendedTable):
         given = [name for name in ("max_repeats", "min_distance") if getattr(self, name) is not None]
         if self.order != "constrained":
             if given:
-                raise PydanticCustomError(
-                    "constraint",
-                    'belongs to order = "constrained", this is "{order}"',
-                    _at(given[0], order=self.order, hint='write order = "constrained", or omit the key'),
+                raise invalid(
+                    f'belongs to order = "constrained", this is "{self.order}"',
+                    given[0],
+                    'write order = "constrained", or omit the key',
                 )
             return self
         if not given:
-            raise PydanticCustomError(
-                "constraint", '"constrained" needs max_repeats, min_distance or both', _at("order")
-            )
+            raise invalid('"constrained" needs max_repeats, min_distance or both', "order")
         if self.repetitions == 1:
-            raise PydanticCustomError(
-                "constraint",
-                'is 1: every condition comes once and none can come again, which order = "shuffled" says',
-                _at("repetitions"),
+            raise invalid(
+                'is 1: every condition comes once and none can come again, which order = "shuffled" says', "repetitions"
             )
         constraint = Constraint(self.max_repeats, self.min_distance)
         if (impossible := constraint.impossible(len(self.conditions), self.repetitions)) is not None:
             key, sentence = impossible
-            raise PydanticCustomError("constraint", "{sentence}", _at(key, sentence=sentence))
+            raise invalid(sentence, key)
         return self
 
     @model_validator(mode="after")
@@ -236,17 +209,9 @@ class Block(ExtendedTable):
         keys = {"break_every": self.break_every, "break_page": self.break_page}
         missing = [name for name, value in keys.items() if value is None]
         if len(missing) == 1:
-            raise PydanticCustomError("breaks", "is missing: break_every and break_page need each other", _at(*missing))
+            raise invalid("is missing: break_every and break_page need each other", *missing)
         trials = len(self.conditions) * self.repetitions
         if self.break_every is not None and self.design is None and trials <= self.break_every:
             counted = "1 trial" if trials == 1 else f"{trials} trials"
-            raise PydanticCustomError(
-                "breaks",
-                "is {every}, and the block has {trials}: no break would come",
-                _at("break_every", every=self.break_every, trials=counted),
-            )
+            raise invalid(f"is {self.break_every}, and the block has {counted}: no break would come", "break_every")
         return self
-
-
-def _at(place: str, **values: str | int) -> dict[str, str | int]:
-    return {"place": place, **values}

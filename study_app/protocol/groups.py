@@ -6,12 +6,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Final, Protocol, Self, TypeAlias
 
 from pydantic import Field, model_validator
-from pydantic_core import PydanticCustomError
 
 from study_app.errors import StudyError
 from study_app.haptics.model.ranges import within
 from study_app.protocol.source.document import Path, entries
-from study_app.protocol.table import ExtendedTable, Id
+from study_app.protocol.table import ExtendedTable, Id, invalid
 
 MOST_SHARE: Final = 20
 SEQUENCES: Final = ("sequence", "sequences.*", "groups.*.sequence", "groups.*.sequences.*")
@@ -36,7 +35,7 @@ class Group(ExtendedTable):
     def _one_of(self) -> Self:
         if self.sequence and self.sequences:
             message = "give either sequence or sequences, one of the two"
-            raise PydanticCustomError("one_of", message, {"place": "sequences"})
+            raise invalid(message, "sequences")
         return self
 
 

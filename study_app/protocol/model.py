@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
-from pydantic_core import PydanticCustomError
 
 from study_app.haptics.model.ranges import DensityKgM3, DiameterM, DragCoefficient, FadeS, Metres, within
 from study_app.haptics.model.scene import (
@@ -30,7 +29,17 @@ from study_app.protocol.groups import Group, Sequences, Steps, every_step
 from study_app.protocol.questionnaires import Questionnaire
 from study_app.protocol.questions import Scale
 from study_app.protocol.table import Body as PageBody
-from study_app.protocol.table import Description, ExtendedTable, Id, Language, Localised, Printable, Table, text_in
+from study_app.protocol.table import (
+    Description,
+    ExtendedTable,
+    Id,
+    Language,
+    Localised,
+    Printable,
+    Table,
+    invalid,
+    text_in,
+)
 from study_app.protocol.trials.designs import AnyDesign, asked, default_design
 from study_app.protocol.trials.methods import AnyMethod
 from study_app.protocol.trials.stimuli import Condition, Stimulus
@@ -61,7 +70,7 @@ HandForceN: TypeAlias = Annotated[
 
 def _whole(value: Any) -> Any:
     if type(value) is not int:
-        raise PydanticCustomError("format", "must be 1 or 2, the number of this format")
+        raise invalid("must be 1 or 2, the number of this format")
     return value
 
 
@@ -126,7 +135,7 @@ class DeviceNeeds(Table):
     @model_validator(mode="after")
     def _workspace_has_room(self) -> Self:
         if not all(10 <= size <= 1000 for size in self.workspace_mm):
-            raise PydanticCustomError("range", "every size must be from 10 to 1000 mm", {"place": "workspace_mm"})
+            raise invalid("every size must be from 10 to 1000 mm", "workspace_mm")
         return self
 
 
@@ -171,9 +180,7 @@ class PageText(Table):
     @model_validator(mode="after")
     def _only_breaks_last(self) -> Self:
         if self.min_s is not None and self.kind != "break":
-            raise PydanticCustomError(
-                "break", "belongs to a page of kind break, not {kind}", {"kind": self.kind, "place": "min_s"}
-            )
+            raise invalid(f"belongs to a page of kind break, not {self.kind}", "min_s")
         return self
 
 

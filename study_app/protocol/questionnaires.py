@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import Field, model_validator
-from pydantic_core import PydanticCustomError
 
 from study_app.haptics.model.ranges import within
 from study_app.protocol.questions import KINDS, STATEMENT, AnyQuestion, Context, Question, Scale, Statement
 from study_app.protocol.source.document import entries
 from study_app.protocol.source.problems import Fault, did_you_mean
-from study_app.protocol.table import ExtendedTable, Id, Localised, Table
+from study_app.protocol.table import ExtendedTable, Id, Localised, Table, invalid
 
 Weight = Annotated[float, within(-1e6, 1e6, "no instrument has larger weights")]
 
@@ -43,9 +42,7 @@ class Score(Table):
         for key in ("reverse", "weights"):
             for name in getattr(self, key):
                 if name not in self.items:
-                    raise PydanticCustomError(
-                        "score", '"{name}" is not among the items of the score', {"name": name, "place": key}
-                    )
+                    raise invalid(f'"{name}" is not among the items of the score', key)
         return self
 
 
@@ -200,7 +197,8 @@ def _filled(name: str, table: Mapping[str, Any], languages: tuple[str, ...]) -> 
             made["scale"] = scale_name(of, item["scale"])
         if "options" in item and "options" not in own.get(item["id"], {}):
             made["options"] = tuple(_in_languages(option, languages) for option in item["options"])
-        if any(key not in made for key in _needed(item)):
+        fields = KINDS[item.get("kind", STATEMENT)].model_fields
+        if any(key in fields and fields[key].is_required() and key not in made for key in _TEXTS):
             missing.append(item["id"])
         items.append(made)
     if missing:
@@ -213,20 +211,17 @@ def _filled(name: str, table: Mapping[str, Any], languages: tuple[str, ...]) -> 
         for key in ("title", "intro")
         if all(language in source.get(key, {}) for language in languages)
     }
-    scores = {"scores": {key: _as_tuples(value) for key, value in source["scores"].items()}}
-    return {**texts, **scores, **table, "items": tuple(items)}, faults
+    scores = {
+        name: {key: tuple(value) if isinstance(value, list) else value for key, value in score.items()}
+        for name, score in source["scores"].items()
+    }
+    return {**texts, "scores": scores, **table, "items": tuple(items)}, faults
 
 
 def _own_items(table: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
     for _, item in entries(table, "items.*"):
         if isinstance(item, Mapping) and isinstance(item.get("id"), str):
             yield item
-
-
-def _needed(item: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the texts that a question of its kind cannot do without."""
-    fields = KINDS[item.get("kind", STATEMENT)].model_fields
-    return tuple(name for name in _TEXTS if name in fields and fields[name].is_required())
 
 
 def _in_languages(item: Mapping[str, Any], languages: tuple[str, ...]) -> dict[str, Any]:
@@ -238,7 +233,3 @@ def _in_languages(item: Mapping[str, Any], languages: tuple[str, ...]) -> dict[s
         elif all(language in value for language in languages):
             found[key] = {language: value[language] for language in languages}
     return found
-
-
-def _as_tuples(score: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: tuple(value) if isinstance(value, list) else value for key, value in score.items()}

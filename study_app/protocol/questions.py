@@ -11,10 +11,9 @@ from operator import or_
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Protocol, Self, TypeAlias
 
 from pydantic import ConfigDict, Discriminator, Field, SerializeAsAny, Tag, WrapValidator, model_validator
-from pydantic_core import PydanticCustomError
 
 from study_app.haptics.model.ranges import within
-from study_app.protocol.table import UNPRINTABLE, ExtendedTable, Id, Localised, Printable, Table, text_in
+from study_app.protocol.table import UNPRINTABLE, ExtendedTable, Id, Localised, Printable, Table, invalid, text_in
 
 POINTS = 7
 """Of the scale of statements."""
@@ -74,7 +73,7 @@ class ShowIf(Table):
     def _values_or_bounds(self) -> Self:
         bounded = self.at_least is not None or self.at_most is not None
         if (self.values is not None) == bounded:
-            raise PydanticCustomError("show_if", "needs either is, or at_least or at_most or both", {"place": "is"})
+            raise invalid("needs either is, or at_least or at_most or both", "is")
         return self
 
 
@@ -368,9 +367,7 @@ class Choice(Question):
         ids = [option.id for option in self.options]
         for number, name in enumerate(ids):
             if name in ids[:number]:
-                raise PydanticCustomError(
-                    "options", 'option "{name}" is listed twice', {"name": name, "place": "options"}
-                )
+                raise invalid(f'option "{name}" is listed twice', "options")
         return self
 
     def view(self, number: int, context: Context) -> ItemView:
@@ -406,16 +403,12 @@ class NumberView(ItemView):
     """A field for a number as shown; ``least`` and ``most`` are None where nothing bounds it."""
 
     widget: ClassVar[str] = "number"
+    keys: ClassVar[str] = "0–9"
 
     least: float | None = field(default=None, kw_only=True)
     most: float | None = field(default=None, kw_only=True)
     whole: bool = field(default=False, kw_only=True)
     unit: str = field(default="", kw_only=True)
-
-    @property
-    def keys(self) -> str:
-        """The digits."""
-        return "0–9"
 
     def permits(self, number: float) -> bool:
         """Return whether a number answers it."""
@@ -458,11 +451,7 @@ class Number(Question):
         if self.least is not None and self.most is not None:
             least = math.ceil(self.least) if self.whole else self.least
             if self.most < least:
-                raise PydanticCustomError(
-                    "range",
-                    "{most} is less than from = {least}",
-                    {"most": f"{self.most:g}", "least": f"{self.least:g}", "place": "to"},
-                )
+                raise invalid(f"{self.most:g} is less than from = {self.least:g}", "to")
         return self
 
     def view(self, number: int, context: Context) -> ItemView:
@@ -498,17 +487,13 @@ class SliderView(ItemView):
     """A slider as shown, from ``least`` at the end called ``low`` to ``most`` at the end called ``high``."""
 
     widget: ClassVar[str] = "slider"
+    keys: ClassVar[str] = "← →"
 
     low: str = field(default="", kw_only=True)
     high: str = field(default="", kw_only=True)
     least: float = field(default=0.0, kw_only=True)
     most: float = field(default=100.0, kw_only=True)
     step: float = field(default=1.0, kw_only=True)
-
-    @property
-    def keys(self) -> str:
-        """The arrows."""
-        return "← →"
 
     @property
     def steps(self) -> int:
@@ -545,18 +530,11 @@ class Slider(Question):
     @model_validator(mode="after")
     def _whole_steps(self) -> Self:
         if self.most <= self.least:
-            raise PydanticCustomError(
-                "range",
-                "{most} is not more than from = {least}",
-                {"most": f"{self.most:g}", "least": f"{self.least:g}", "place": "to"},
-            )
+            raise invalid(f"{self.most:g} is not more than from = {self.least:g}", "to")
         steps = (self.most - self.least) / self.step
         if abs(steps - round(steps)) > 1e-6 or not 1 <= round(steps) <= MOST_STEPS:
-            raise PydanticCustomError(
-                "steps",
-                "is {step}: {steps} steps from end to end; it must be a whole number of 1 to {most}",
-                {"step": f"{self.step:g}", "steps": f"{steps:g}", "most": MOST_STEPS, "place": "step"},
-            )
+            permitted = f"a whole number of 1 to {MOST_STEPS}"
+            raise invalid(f"is {self.step:g}: {steps:g} steps from end to end; it must be {permitted}", "step")
         return self
 
     def view(self, number: int, context: Context) -> ItemView:
@@ -592,14 +570,10 @@ class TextView(ItemView):
     """A field for a text as shown: ``lines`` high, for at most ``longest`` characters."""
 
     widget: ClassVar[str] = "text"
+    keys: ClassVar[str] = "A–Z"
 
     lines: int = field(default=1, kw_only=True)
     longest: int = field(default=500, kw_only=True)
-
-    @property
-    def keys(self) -> str:
-        """The letters."""
-        return "A–Z"
 
     def simulated(self, opinion: float, draw: Draw) -> Value:
         """Return a sentence that says what it is."""
@@ -644,11 +618,6 @@ def _kind_of(value: Any) -> str:
     return str(value.get("kind", STATEMENT)) if isinstance(value, Mapping) else STATEMENT
 
 
-def _as_it_is(value: Any, validated: Callable[[Any], Question]) -> Question:
-    """Return a question that was made in Python as it is, of any kind."""
-    return value if isinstance(value, Question) else validated(value)
-
-
 if TYPE_CHECKING:
     AnyQuestion: TypeAlias = Question
 else:
@@ -664,7 +633,8 @@ else:
                 ),
             ]
         ],
-        WrapValidator(_as_it_is),
+        # a question that was made in Python stays as it is, of any kind
+        WrapValidator(lambda value, validated: value if isinstance(value, Question) else validated(value)),
     ]
 
 

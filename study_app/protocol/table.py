@@ -54,7 +54,7 @@ def _tidy_each(value: Any) -> Any:
         return _tidied(value)
     if isinstance(value, dict) and value and all(isinstance(text, str) for text in value.values()):
         return {language: _tidied(text) for language, text in value.items()}
-    raise PydanticCustomError("text_type", 'a text is a string, or one string per language: {en = "…", nl = "…"}')
+    raise invalid('a text is a string, or one string per language: {en = "…", nl = "…"}')
 
 
 @lru_cache(maxsize=16_384)  # a study that is edited is validated after each change
@@ -66,13 +66,9 @@ def _printable(text: str) -> str:
     """Return ``text`` if a person can read it: something visible, and nothing that hides or reorders what is there."""
     for letter in text:
         if (unicodedata.category(letter) in UNPRINTABLE and letter not in "\t\n\r") or letter in DIRECTIONS:
-            raise PydanticCustomError(
-                "text_unprintable",
-                "holds the character U+{code}, which cannot be printed: take it out",
-                {"code": f"{ord(letter):04X}"},
-            )
+            raise invalid(f"holds the character U+{ord(letter):04X}, which cannot be printed: take it out")
     if not any(unicodedata.category(letter)[0] in VISIBLE for letter in text):
-        raise PydanticCustomError("text_empty", "the text is empty: write one that can be read")
+        raise invalid("the text is empty: write one that can be read")
     return text
 
 
@@ -80,11 +76,7 @@ def _not_longer(most: int) -> AfterValidator:
     def checked(value: str | dict[str, str]) -> str | dict[str, str]:
         longest = max(map(len, value.values() if isinstance(value, dict) else (value,)))
         if longest > most:
-            raise PydanticCustomError(
-                "text_long",
-                "has {longest} characters, more than {most}: shorten it",
-                {"longest": longest, "most": most},
-            )
+            raise invalid(f"has {longest} characters, more than {most}: shorten it")
         return value
 
     return AfterValidator(checked)
@@ -123,6 +115,12 @@ NOT_WITH: Final = "not with"
 """Where it keeps `Table.NOT_WITH`, for forms."""
 
 
+def invalid(message: str, key: str = "", hint: str = "") -> PydanticCustomError:
+    """Return the error of a table that is not valid: a sentence, the key that it is about, and what to do."""
+    stated = {"message": message, "place": key, "hint": hint}
+    return PydanticCustomError("invalid", "{message}", {name: text for name, text in stated.items() if text})
+
+
 class Table(BaseModel):
     """A table of the file: unknown keys are errors, numbers are finite, values never change."""
 
@@ -141,7 +139,7 @@ class Table(BaseModel):
             given: list[Any] = [getattr(self, name) for name in (one, other)]
             if sum(value is not None and value != () for value in given) != 1:
                 message = f"give either {one} or {other}, one of the two"
-                raise PydanticCustomError("one_of", message, {"place": one})
+                raise invalid(message, one)
         return self
 
     @classmethod

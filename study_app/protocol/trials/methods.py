@@ -390,6 +390,7 @@ class Constant(Method):
     """Every round presents every level once, in a random order of its own."""
 
     kind: Literal["constant"] = "constant"
+    paper_name: ClassVar = "the method of constant stimuli"
     adaptive: ClassVar[bool] = False
     levels: Count | Listed = Field(
         default=CONSTANT_LEVELS, description="The levels, or how many, evenly spaced over the stimulus' range."
@@ -397,11 +398,6 @@ class Constant(Method):
     repetitions: Annotated[int, Field(ge=1, le=1000)] = Field(
         default=20, description="How often each level is presented."
     )
-
-    @property
-    def paper_name(self) -> str:
-        """What a paper calls it."""
-        return "the method of constant stimuli"
 
     def asked(self, stimulus: Stimulus) -> tuple[float, ...]:
         """Return the levels that are presented, in the order written."""

@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, Self, Typ
 
 from pydantic import Field, model_validator
 from pydantic.json_schema import SkipJsonSchema
-from pydantic_core import PydanticCustomError
 
 from study_app.haptics.model import force_link
 from study_app.haptics.model.force_link import ForceLink
 from study_app.haptics.model.ranges import within
-from study_app.protocol.table import ExtendedTable, Id, Table
+from study_app.protocol.table import ExtendedTable, Id, Table, invalid
 from study_app.protocol.trials.designs import Design
 
 if TYPE_CHECKING:
@@ -195,35 +194,19 @@ class Stimulus(Table):
     def _levels_ascend(self) -> Self:
         low, high = self.levels
         if not low < high:
-            raise PydanticCustomError(
-                "levels",
-                "{low} and {high}: the first level must be the smaller",
-                {"low": f"{low:g}", "high": f"{high:g}", "place": "levels"},
-            )
+            raise invalid(f"{low:g} and {high:g}: the first level must be the smaller", "levels")
         if self.spacing == "log" and low <= 0:
-            raise PydanticCustomError(
-                "levels",
-                "{low} has no logarithm",
-                {"low": f"{low:g}", "place": "levels", "hint": 'spacing = "linear", or a level above 0'},
-            )
+            raise invalid(f"{low:g} has no logarithm", "levels", 'spacing = "linear", or a level above 0')
         if low < 0 and self.level_kind != "value":
-            raise PydanticCustomError(
-                "levels",
-                "{low} is below 0",
-                {"low": f"{low:g}", "place": "levels", "hint": 'direction = "down" for comparisons below the standard'},
-            )
+            raise invalid(f"{low:g} is below 0", "levels", 'direction = "down" for comparisons below the standard')
         return self
 
     @model_validator(mode="after")
     def _standards_make_sense(self) -> Self:
         if self.level_kind == "weber" and any(standard == 0 for standard in self.standards):
-            raise PydanticCustomError(
-                "weber",
-                "a Weber fraction of a standard of 0 does not exist",
-                {"place": "level", "hint": 'level = "difference"'},
-            )
+            raise invalid("a Weber fraction of a standard of 0 does not exist", "level", 'level = "difference"')
         if len(set(self.standards)) < len(self.standards):
-            raise PydanticCustomError("standards", "a standard is listed twice", {"place": "standards"})
+            raise invalid("a standard is listed twice", "standards")
         return self
 
 

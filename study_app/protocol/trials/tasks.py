@@ -7,10 +7,9 @@ from itertools import pairwise
 from typing import Annotated, ClassVar, Final, Literal, NamedTuple, Self, TypeAlias
 
 from pydantic import Field, model_validator
-from pydantic_core import PydanticCustomError
 
 from study_app.haptics.model.ranges import within
-from study_app.protocol.table import Localised, Table
+from study_app.protocol.table import Localised, Table, invalid
 
 Seconds: TypeAlias = Annotated[float, within(0.1, 3600, "a hand moves within 0.1 s, no trial takes an hour")]
 Radius: TypeAlias = Annotated[float, within(0.5, 100, "a hand at rest trembles by a few tenths of a millimetre")]
@@ -73,11 +72,7 @@ class Explore(Table):
     @model_validator(mode="after")
     def _least_before_most(self) -> Self:
         if self.min_s > self.max_s:
-            raise PydanticCustomError(
-                "order",
-                "min_s = {low} is more than max_s = {high}",
-                {"low": f"{self.min_s:g}", "high": f"{self.max_s:g}", "place": "min_s"},
-            )
+            raise invalid(f"min_s = {self.min_s:g} is more than max_s = {self.max_s:g}", "min_s")
         return self
 
 
@@ -232,10 +227,8 @@ class Reach(Table):
     @model_validator(mode="after")
     def _ends_before_its_timeout(self) -> Self:
         if self.duration_s is not None and self.duration_s > self.timeout_s:
-            raise PydanticCustomError(
-                "order",
-                "duration_s = {duration} is longer than timeout_s = {timeout}",
-                {"duration": f"{self.duration_s:g}", "timeout": f"{self.timeout_s:g}", "place": "duration_s"},
+            raise invalid(
+                f"duration_s = {self.duration_s:g} is longer than timeout_s = {self.timeout_s:g}", "duration_s"
             )
         return self
 
@@ -243,16 +236,9 @@ class Reach(Table):
     def _time_for_every_target(self) -> Self:
         limit, targets = self.duration_s or self.timeout_s, self.count or 1
         if targets * self.dwell_s >= limit:
-            raise PydanticCustomError(
-                "order",
-                "dwell_s = {dwell} in {targets} takes as long as the {limit} s that the task lasts at most: shorten it",
-                {
-                    "dwell": f"{self.dwell_s:g}",
-                    "targets": "a target" if targets == 1 else f"each of {targets} targets",
-                    "limit": f"{limit:g}",
-                    "place": "dwell_s",
-                },
-            )
+            each = "a target" if targets == 1 else f"each of {targets} targets"
+            lasting_s = f"takes as long as the {limit:g} s that the task lasts at most"
+            raise invalid(f"dwell_s = {self.dwell_s:g} in {each} {lasting_s}: shorten it", "dwell_s")
         return self
 
     @model_validator(mode="after")
@@ -260,16 +246,8 @@ class Reach(Table):
         for index, (one, other) in enumerate(pairwise((*self.targets_mm, self.targets_mm[0])), start=1):
             distance = math.dist(one, other)
             if distance <= 2 * self.radius_mm:
-                raise PydanticCustomError(
-                    "overlap",
-                    "target {index} and the next are {distance} mm apart and overlap at radius_mm = {radius}",
-                    {
-                        "index": index,
-                        "distance": f"{distance:g}",
-                        "radius": f"{self.radius_mm:g}",
-                        "place": "targets_mm",
-                    },
-                )
+                apart = f"target {index} and the next are {distance:g} mm apart"
+                raise invalid(f"{apart} and overlap at radius_mm = {self.radius_mm:g}", "targets_mm")
         return self
 
 
