@@ -3,7 +3,7 @@
 Nothing here changes what a participant meets. It stands in every receipt, so that it cannot be decided afterwards.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
@@ -109,10 +109,14 @@ def _points(points: float) -> str:
 
 def decisions(document: Mapping[str, Any]) -> Iterator[Fault]:
     """Check that what is decided is about statements there are, each once, and that liquids are named by such items."""
-    found = (item for _, item in entries(document, "questionnaires.*.items.*") if isinstance(item, Mapping))
-    items = {item["id"] for item in found if isinstance(item.get("id"), str) and "kind" not in item}
+    asked = (item for _, item in entries(document, "questionnaires.*.items.*") if isinstance(item, Mapping))
+    items = {item["id"] for item in asked if isinstance(item.get("id"), str) and "kind" not in item}
     for key in LISTS:
-        yield from _listed(list(entries(document, f"analysis.{key}.*")), items)
+        found = list(entries(document, f"analysis.{key}.*"))
+        yield from _unknown(found, items)
+        for place, (path, name) in enumerate(found):
+            if name in [earlier for _, earlier in found[:place]]:
+                yield Fault(path, f'"{name}" is listed twice', "remove one")
     yield from _unknown(entries(document, "analysis.noticed"), items)
     falling = [name for _, name in entries(document, "analysis.falling.*")]
     for path, name in entries(document, "analysis.rising.*"):
@@ -124,14 +128,7 @@ def decisions(document: Mapping[str, Any]) -> Iterator[Fault]:
             yield Fault(path, f'"{name}" is not among analysis.names', "add it there, or leave the label out")
 
 
-def _listed(found: list[tuple[Path, Any]], items: set[str]) -> Iterator[Fault]:
-    yield from _unknown(iter(found), items)
-    for place, (path, name) in enumerate(found):
-        if name in [earlier for _, earlier in found[:place]]:
-            yield Fault(path, f'"{name}" is listed twice', "remove one")
-
-
-def _unknown(found: Iterator[tuple[Path, Any]], items: set[str]) -> Iterator[Fault]:
+def _unknown(found: Iterable[tuple[Path, Any]], items: set[str]) -> Iterator[Fault]:
     for path, name in found:
         if isinstance(name, str) and name not in items:
             yield Fault(path, f'there is no item "{name}"', did_you_mean(name, items))

@@ -15,7 +15,7 @@ from study_app.number_text import counted
 from study_app.protocol.checks.expected_precision import precision_rows
 from study_app.protocol.checks.warnings import warnings
 from study_app.protocol.groups import sessions_differ
-from study_app.protocol.model import Block, Condition, Limits, Protocol, Questionnaire
+from study_app.protocol.model import Block, Condition, Protocol, Questionnaire
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
 from study_app.protocol.orders.durations import Variant, block_duration_s, expected_duration_s, variants
 from study_app.protocol.orders.sequences import row_count
@@ -39,8 +39,19 @@ from study_app.protocol.trials.tracks import (
 )
 
 LEVELS = {"weber": "Weber fraction", "difference": "difference", "value": "value"}
-
-
+LIMITS = {
+    "lateness_ms": "lateness of ticks (99th percentile)",
+    "worst_gap_ms": "between two ticks",
+    "delay_error_ms": "error of the delay (95th percentile)",
+    "frame_gap_ms": "before the first frame, and between two",
+    "withheld_percent": "of the force withheld by slope limits, passivity controller and slew limit",
+    "targets_percent": "of the targets reached, at least",
+    "level_error_percent": "error of an interval's delivered level",
+    "level_error_ms": "error of a trial's delivered difference of delays",
+    "pace_error_percent": "error of the hand's RMS speed against the target's",
+    "attempts": "attempts at a trial of intervals, until it is delivered as requested",
+}
+"""What each key of the table of limits is a limit of."""
 BLINDINGS = {
     "double": "double-blind: the operator sees no force",
     "single": "single-blind: the operator sees force and wake",
@@ -50,17 +61,23 @@ BLINDINGS = {
 def describe(protocol: Protocol, delay_ticks: int = BELIEVED_TICKS) -> str:
     """Return the whole study in words, in its first language; ``delay_ticks`` is how many ticks late a force acts."""
     language = protocol.study.languages[0]
+    effects = [line for name in protocol.liquids for line in (*describe_gate(protocol.scene_of(name)), "")]
+    conditions = [
+        (name, " + ".join(condition.liquid_ids), ", ".join(_drawn(condition)))
+        for name, condition in protocol.conditions.items()
+    ]
+    warned = [f"  {sentence}" for sentence in warnings(protocol)]
     sections = (
         _head(protocol, language),
         *(_titled(_title(one), _session(one.protocol, language)) for one in variants(protocol)),
         *(_block(protocol, block, language, delay_ticks) for block in protocol.blocks_in_order),
         _titled("Liquids", _liquids(protocol)),
-        ("Effects in each liquid", *(f"  {line}".rstrip() for line in _effects(protocol))),
-        _titled("Conditions", _conditions(protocol)),
+        ("Effects in each liquid", *(f"  {line}".rstrip() for line in effects[:-1])),
+        _titled("Conditions", conditions),
         *(_statements(protocol, name, language) for name in protocol.questionnaires),
         _titled("Decided about the analysis", _analysis(protocol)),
         _titled("A trial is valid up to", limit_rows(protocol)),
-        *_warned(protocol),
+        *([("Warnings", *warned)] if warned else []),
     )
     return "\n\n".join("\n".join(section) for section in sections)
 
@@ -129,22 +146,17 @@ def _title(one: Variant) -> str:
 
 def _session(protocol: Protocol, language: str) -> list[tuple[str, str, str]]:
     rows: list[tuple[str, str, str]] = []
+    kind: str
     for number, step in enumerate(protocol.steps, start=1):
         if step in protocol.pages:
-            page = protocol.pages[step]
-            rows.append((f"{number:>2}", page.kind, protocol.text(page.title, language)))
+            kind, words = protocol.pages[step].kind, protocol.text(protocol.pages[step].title, language)
         elif step in protocol.forms:
-            rows.append((f"{number:>2}", "form", f"{step}: {counted(len(protocol.forms[step].items), 'question')}"))
+            kind, words = "form", f"{step}: {counted(len(protocol.forms[step].items), 'question')}"
         else:
             block = protocol.blocks[step]
-            title = protocol.text(block.title, language)
-            rows.append(
-                (
-                    f"{number:>2}",
-                    f"{block.phase} trials",
-                    f"{title}: {counted(order_of(protocol, block).trials, 'trial')}",
-                )
-            )
+            kind, trials = f"{block.phase} trials", counted(order_of(protocol, block).trials, "trial")
+            words = f"{protocol.text(block.title, language)}: {trials}"
+        rows.append((f"{number:>2}", kind, words))
     return rows
 
 
@@ -291,21 +303,6 @@ def _liquids(protocol: Protocol) -> list[tuple[str, ...]]:
     return rows
 
 
-def _effects(protocol: Protocol) -> tuple[str, ...]:
-    """Return which effects act in each liquid, and why, as lines of text."""
-    lines: list[str] = []
-    for name in protocol.liquids:
-        lines += [*describe_gate(protocol.scene_of(name)), ""]
-    return tuple(lines[:-1])
-
-
-def _conditions(protocol: Protocol) -> list[tuple[str, str, str]]:
-    return [
-        (name, " + ".join(condition.liquid_ids), ", ".join(_drawn(condition)))
-        for name, condition in protocol.conditions.items()
-    ]
-
-
 def _drawn(condition: Condition) -> Iterator[str]:
     """Yield what is unusual of how a condition is drawn, and its force sent."""
     if condition.delay_ms:
@@ -366,37 +363,12 @@ def _analysis(protocol: Protocol) -> list[tuple[str, str]]:
     return list(decided.described([f"{name} by {one.label}" for name, one in protocol.conditions.items() if one.label]))
 
 
-def _warned(protocol: Protocol) -> Iterator[Iterable[str]]:
-    """Yield what to think over, if there is anything."""
-    if sentences := warnings(protocol):
-        yield "Warnings", *(f"  {sentence}" for sentence in sentences)
-
-
-def _delivered(limits: Limits) -> Iterator[tuple[str, str]]:
-    """Yield what an interval must deliver."""
-    for value, unit, what in (
-        (limits.level_error_percent, " %", "error of an interval's delivered level"),
-        (limits.level_error_ms, " ms", "error of a trial's delivered difference of delays"),
-        (limits.pace_error_percent, " %", "error of the hand's RMS speed against the target's"),
-        (limits.attempts, "", "attempts at a trial of intervals, until it is delivered as requested"),
-    ):
-        if value is not None:
-            yield f"{value:g}{unit}", what
-
-
 def limit_rows(protocol: Protocol) -> list[tuple[str, str]]:
     """Return the limits up to which a trial is valid: each value, and what it is of."""
-    limits = protocol.limits
-    least = limits.targets_percent
+    units = {"ms": " ms", "percent": " %"}
+    values = {key: getattr(protocol.limits, key) for key in LIMITS}
     return [
-        (f"{limits.lateness_ms:g} ms", "lateness of ticks (99th percentile)"),
-        (f"{limits.worst_gap_ms:g} ms", "between two ticks"),
-        (f"{limits.delay_error_ms:g} ms", "error of the delay (95th percentile)"),
-        (f"{limits.frame_gap_ms:g} ms", "before the first frame, and between two"),
-        (
-            f"{limits.withheld_percent:g} %",
-            "of the force withheld by slope limits, passivity controller and slew limit",
-        ),
-        *([] if least is None else [(f"{least:g} %", "of the targets reached, at least")]),
-        *_delivered(limits),
+        (f"{value:g}{units.get(key.rpartition('_')[2], '')}", LIMITS[key])
+        for key, value in values.items()
+        if value is not None
     ]

@@ -93,7 +93,11 @@ def _differences(place: Place, old: Any, new: Any) -> Iterator[Difference]:
         for key in dict.fromkeys((*old, *new)):
             yield from _differences((*place, key), old.get(key), new.get(key))
     elif isinstance(old, list) and isinstance(new, list):
-        yield from _entries(place, old, new)
+        if len(old) != len(new):
+            yield Difference(place, f"{len(old)} entries before, {len(new)} now")
+        else:
+            for index, (before, after) in enumerate(zip(old, new, strict=True)):
+                yield from _differences((*place, index), before, after)
     elif old is None and new is not None:
         yield Difference(place, f"new, {shown(new)}")
     elif new is None and old is not None:
@@ -118,11 +122,3 @@ def _listed(place: Place, old: Sequence[Mapping[str, Any]], new: Sequence[Mappin
     stayed = before.keys() & after.keys()
     if [name for name in before if name in stayed] != [name for name in after if name in stayed]:
         yield Difference(place, "in another order")
-
-
-def _entries(place: Place, old: Sequence[Any], new: Sequence[Any]) -> Iterator[Difference]:
-    if len(old) == len(new):
-        for index, (before, after) in enumerate(zip(old, new, strict=True)):
-            yield from _differences((*place, index), before, after)
-    else:
-        yield Difference(place, f"{len(old)} entries before, {len(new)} now")

@@ -182,12 +182,8 @@ def _with_density(liquid: Any) -> Any:
     if not isinstance(liquid, dict):
         return liquid
     drag = liquid.get("drag")
-    damper = isinstance(drag, Mapping) and drag.get("law") == "linear"
-    return _with(liquid, density_kg_m3=DENSITY_KG_M3) if damper and _only_drag(liquid) else liquid
-
-
-def _only_drag(liquid: Mapping[str, Any]) -> bool:
-    return bool(liquid.get("effects", ("drag",)) == ("drag",))
+    damper = isinstance(drag, Mapping) and drag.get("law") == "linear" and liquid.get("effects", ("drag",)) == ("drag",)
+    return _with(liquid, density_kg_m3=DENSITY_KG_M3) if damper else liquid
 
 
 def _with_numbers(blocks: Mapping[str, Any], tasks: tuple[str, ...], languages: tuple[str, ...]) -> dict[str, Any]:

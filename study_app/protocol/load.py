@@ -208,8 +208,10 @@ def is_scene_file(name_or_path: str | File) -> bool:
 def _with_liquids_of_files(document: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
     """Return a study's document with the liquids of its liquid files in their places, and what is wrong with these."""
     liquids = document.get("liquids")
-    named = {name for name, table in liquids.items() if _is_file(table)} if isinstance(liquids, Mapping) else set()
-    if not named or not isinstance(liquids, Mapping):
+    if not isinstance(liquids, Mapping):
+        return document, []
+    named = {name for name, table in liquids.items() if isinstance(table, Mapping) and "file" in table}
+    if not named:
         return document, []
     texts = document.get(TABLE, {})
     resolved: dict[str, Any] = dict(liquids)
@@ -248,10 +250,6 @@ def _with_footage(document: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]
             message = f'there is no file "{view}" in this folder'
             faults.append(Fault(path, message, "give the path of a video file, relative to this file"))
     return {key: value for key, value in document.items() if key != FOOTAGE_TABLE} | {"conditions": conditions}, faults
-
-
-def _is_file(liquid: Any) -> bool:
-    return isinstance(liquid, Mapping) and "file" in liquid
 
 
 class _LiquidFileFault(Exception):

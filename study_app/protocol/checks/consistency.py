@@ -63,13 +63,11 @@ def force_n(scene: Scene, stroke: Stroke) -> float:
         depth_m=scene.motion.depth_m,
     )
     moved = scene.model_copy(update={"motion": motion})
-    strongest_n = max((_liquid_n(moved, liquid) for liquid in resolve(scene).liquids), default=0.0)
+    strongest_n = 0.0
+    for liquid in resolve(scene).liquids:
+        exerted_n = Extremes(moved, liquid).exerted_n
+        strongest_n = max(strongest_n, sum(exerted_n[effect] for effect in exerted_n if effect in liquid.effects))
     return min(strongest_n, scene.force_limit_n)
-
-
-def _liquid_n(scene: Scene, liquid: Liquid) -> float:
-    exerted_n = Extremes(scene, liquid).exerted_n
-    return sum(newtons for effect, newtons in exerted_n.items() if effect in liquid.effects)
 
 
 def _in_range(value: float) -> float:

@@ -171,19 +171,21 @@ def alike(document: Document) -> Iterator[Fault]:
 
 
 def _alike(found: list[tuple[Path, Any]], kind: str) -> Iterator[Fault]:
-    """Yield a fault for every text that reads as an earlier one does; an entry may hold a text per language."""
+    """Yield a fault for every text that reads as an earlier one does; an entry may hold a text per language.
+
+    People do not tell texts apart by case, width or white space.
+    """
     seen: set[tuple[str, str]] = set()
     for path, entry in found:
         texts = entry if isinstance(entry, Mapping) else {"": entry}
-        read = {(language, _read(text)) for language, text in texts.items() if isinstance(text, str)}
+        read = {
+            (language, " ".join(unicodedata.normalize("NFKC", text).casefold().split()))
+            for language, text in texts.items()
+            if isinstance(text, str)
+        }
         if read & seen:
             yield Fault(path, f"{ALIKE} {kind} does", "people could not tell the two apart: change one")
         seen |= read
-
-
-def _read(text: str) -> str:
-    """Return a text as people tell texts apart: not by case, width or white space."""
-    return " ".join(unicodedata.normalize("NFKC", text).casefold().split())
 
 
 def languages(document: Document) -> Iterator[Fault]:
@@ -286,20 +288,17 @@ def _show_ifs(table: Document, items: Sequence[tuple[Path, Question]], context: 
     for path, item in items:
         if (asked := item.show_if) is not None:
             place = (*path, "show_if")
-            if asked.item not in earlier:
-                yield _not_earlier(place, asked.item, ids, tuple(earlier))
+            if asked.item not in ids:
+                missing = f'there is no item "{asked.item}" in this questionnaire'
+                yield Fault(place, missing, did_you_mean(asked.item, earlier))
+            elif asked.item not in earlier:
+                yield Fault(place, f'"{asked.item}" comes later', "name an earlier item")
             elif table.get("item_order", "fixed") != "fixed":
                 hint = 'item_order = "fixed": an item comes after the one that it depends on'
                 yield Fault(place, "item_order is shuffled", hint)
             else:
                 yield from _answers(place, asked, earlier[asked.item], context)
         earlier[item.id] = item
-
-
-def _not_earlier(place: Path, name: str, ids: Sequence[str], earlier: tuple[str, ...]) -> Fault:
-    if name in ids:
-        return Fault(place, f'"{name}" comes later', "name an earlier item")
-    return Fault(place, f'there is no item "{name}" in this questionnaire', did_you_mean(name, earlier))
 
 
 def _answers(place: Path, asked: ShowIf, earlier: Question, context: Context) -> Iterator[Fault]:

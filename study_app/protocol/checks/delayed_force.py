@@ -10,6 +10,7 @@ import csv
 from collections.abc import Iterator
 from functools import cache
 from importlib import resources
+from operator import attrgetter
 from typing import Final, NamedTuple
 
 from study_app.haptics.model.steady_state import steady
@@ -56,14 +57,7 @@ def table() -> tuple[Entry, ...]:
     """Return the table as it ships."""
     with (resources.files("study_app.protocol.checks") / "delayed_force.csv").open(encoding="utf-8") as file:
         return tuple(
-            Entry(
-                row["liquid"],
-                row["estimator"],
-                row["hand"],
-                float(row["delay_ms"]),
-                float(row["left_percent"]),
-                float(row["withheld_percent"]),
-            )
+            Entry(row["liquid"], row["estimator"], row["hand"], *(float(row[key]) for key in Entry._fields[3:]))
             for row in csv.DictReader(file)
         )
 
@@ -95,6 +89,7 @@ STIRRED: Final = Stroke(frequency_hz=1.061, amplitude_m=0.03)
 """The motion of the stored table: ±30 mm with at most 0.2 m/s."""
 SHIPPED: Final = (("rek2024", ""), ("physical2", "physical2_"))
 """The studies whose liquids the table has, and how it calls them."""
+_load: Final = cache(load)
 
 
 def delay_warnings(protocol: Protocol) -> Iterator[str]:
@@ -130,16 +125,12 @@ def _of_table(protocol: Protocol, name: str, liquid: str, delay_ms: float) -> st
 def _withheld_percent(liquid: str, estimator: str, delay_ms: float) -> float:
     """Return the share that is withheld [%], interpolated in the stored table."""
     rows = [it for it in table() if (it.liquid, it.estimator, it.hand) == (liquid, estimator, "light")]
-    before = max((it for it in rows if it.delay_ms <= delay_ms), key=_delay_ms)
-    after = min((it for it in rows if it.delay_ms >= delay_ms), key=_delay_ms, default=before)
+    before = max((it for it in rows if it.delay_ms <= delay_ms), key=attrgetter("delay_ms"))
+    after = min((it for it in rows if it.delay_ms >= delay_ms), key=attrgetter("delay_ms"), default=before)
     if after.delay_ms == before.delay_ms:
         return before.withheld_percent
     share = (delay_ms - before.delay_ms) / (after.delay_ms - before.delay_ms)
     return before.withheld_percent + share * (after.withheld_percent - before.withheld_percent)
-
-
-def _delay_ms(entry: Entry) -> float:
-    return entry.delay_ms
 
 
 def _of_energy(protocol: Protocol, name: str, delay_ms: float) -> str | None:
@@ -163,7 +154,7 @@ def _of_energy(protocol: Protocol, name: str, delay_ms: float) -> str | None:
 def _in_table(protocol: Protocol, liquid: str) -> str | None:
     """Return what the table calls a liquid; None if it has none with the same numbers at the same scale."""
     for study, prefix in SHIPPED:
-        shipped = _shipped(study)
+        shipped = _load(study)
         if shipped.scene.scale != protocol.scene.scale:
             continue
         for name, known in shipped.liquids.items():
@@ -171,8 +162,3 @@ def _in_table(protocol: Protocol, liquid: str) -> str | None:
             if listed and numbers(known) == numbers(protocol.liquids[liquid]):
                 return prefix + name
     return None
-
-
-@cache
-def _shipped(study: str) -> Protocol:
-    return load(study)

@@ -234,7 +234,9 @@ def mean_plan(protocol: Protocol, block: Block) -> MeanPlan | None:
     if design.reply == "number":
         levels = tuple(sorted({one for one in method.asked(stimulus) if one > 0}))
         repetitions = method.tracks * method.presentations(stimulus) // len(method.asked(stimulus))
-        return EstimationPlan(levels, repetitions, _published(protocol, block)) if len(levels) > 1 else None
+        decided = () if protocol.analysis is None else protocol.analysis.published
+        exponents = (one.value for one in decided if (one.block, one.measure) == (block.id, "exponent"))
+        return EstimationPlan(levels, repetitions, next(exponents, EXPONENT)) if len(levels) > 1 else None
     if isinstance(design, Rated) and len(method.asked(stimulus)) > 1 and len(standards_of(protocol, block)) == 1:
         repetitions = method.tracks * method.presentations(stimulus) // len(method.asked(stimulus))
         return RatingPlan(protocol.scales[design.scale].points, repetitions)
@@ -242,12 +244,6 @@ def mean_plan(protocol: Protocol, block: Block) -> MeanPlan | None:
         roving = len(standards_of(protocol, block)) > 1 and method.order == "interleaved"
         return SensitivityPlan(design, slots * method.tracks, roving, of_each="standard")
     return None
-
-
-def _published(protocol: Protocol, block: Block) -> float:
-    """Return the exponent that the protocol compares a block's with, else `EXPONENT`."""
-    published = () if protocol.analysis is None else protocol.analysis.published
-    return next((one.value for one in published if (one.block, one.measure) == (block.id, "exponent")), EXPONENT)
 
 
 def expected_mean(plan: MeanPlan) -> Expected:

@@ -307,7 +307,8 @@ def _lagging(protocol: Protocol) -> Iterator[Fault]:
         felt.setdefault(block.task, []).extend(protocol.scene_for(name) for name in protocol.conditions_in(block.id))
     for name, scenes in felt.items():
         task = protocol.tasks[name]
-        if not isinstance(task, Follow) or not any(_is_damper(scene) for scene in scenes):
+        laws = {liquid.drag.law for scene in scenes for liquid in scene.liquids}
+        if not isinstance(task, Follow) or "linear" not in laws:
             continue
         if (share := passed_share(velocity, rate_hz, task.frequency_hz)) < LEAST_SHARE:
             most_hz = floored(fastest_hz(velocity, rate_hz, LEAST_SHARE), 1)
@@ -316,10 +317,6 @@ def _lagging(protocol: Protocol) -> Iterator[Fault]:
                 f"at {task.frequency_hz:g} Hz the velocity estimator passes {100 * share:.1f} % of a damper's force",
                 f"at most {most_hz:g} Hz, where it passes {100 * LEAST_SHARE:g} %",
             )
-
-
-def _is_damper(scene: Scene) -> bool:
-    return any(liquid.drag.law == "linear" for liquid in scene.liquids)
 
 
 LIMIT_J: Final = 0.5e-3

@@ -63,7 +63,8 @@ def _alike(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
         )
         for one, other in combinations(names, 2):
             pair = frozenset((one, other))
-            if _differ(felt[one].force_n, felt[other].force_n) or pair in seen:
+            smaller_n, greater_n = sorted((felt[one].force_n, felt[other].force_n))
+            if (greater_n > 0 and greater_n - smaller_n >= TELLING * smaller_n) or pair in seen:
                 continue
             seen.add(pair)
             yield (
@@ -71,12 +72,6 @@ def _alike(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
                 f"{felt[other].force_n:.2f} N at {HAND_MPS:g} m/s of the hand, less than {TELLING:.0%} of the smaller "
                 "between them"
             )
-
-
-def _differ(one_n: float, other_n: float) -> bool:
-    """Return whether two forces differ by at least 39 % of the smaller."""
-    smaller_n, greater_n = sorted((one_n, other_n))
-    return greater_n > 0 and greater_n - smaller_n >= TELLING * smaller_n
 
 
 def _clipped(felt: dict[str, Steady]) -> Iterator[str]:

@@ -55,7 +55,7 @@ def bundled(
     hashes : mapping of str to str
         The SHA-256 of its footage, by name.
     """
-    texts = {name: text for name in _named(study) if (text := text_of(name)) is not None}
+    texts = {name: text for name in _values(study, "liquids", "file") if (text := text_of(name)) is not None}
     return study + _table(_FOOTAGE_HEADER, hashes) + _table(_HEADER, texts)
 
 
@@ -112,13 +112,8 @@ def _hash(path: Path, size: int, changed_ns: int) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _named(study: bytes) -> list[str]:
-    """Return the names of the liquid files of a study, sorted; none where it is not TOML (`load.parse` reports it)."""
-    return _values(study, "liquids", "file")
-
-
 def _values(study: bytes, section: str, key: str) -> list[str]:
-    """Return the texts that the tables of a section hold under a key, each once, sorted."""
+    """Return the texts that the tables of a section hold under a key, each once, sorted; none where it is not TOML."""
     if not re.search(rf"""\b{key}["']?[ \t]*=""".encode(), study):
         return []
     try:
@@ -204,7 +199,7 @@ def _not_found(name_or_path: str | Path, message: str, hint: str) -> ProtocolErr
 
 
 def source_bytes(name_or_path: str | Path) -> bytes:
-    """Return a protocol's file as it is on disk, followed by the liquid files it names (see ``liquid_files``).
+    """Return a protocol's file as it is on disk, followed by the liquid files it names (`with_liquid_files`).
 
     Raises
     ------

@@ -163,7 +163,8 @@ def _values(node: Node, headings: Mapping[str, str]) -> str:
 def _alternatives(node: Node, headings: Mapping[str, str]) -> Iterator[str]:
     if "$ref" in node:
         heading = headings[node["$ref"].rsplit("/", 1)[-1]]
-        yield f"table [{heading}](#{_slug(heading)})".replace("[]", "\\[\\]", 1)
+        anchor = re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")  # as GitHub and MyST make it
+        yield f"table [{heading}](#{anchor})".replace("[]", "\\[\\]", 1)
     elif branches := node.get("anyOf") or node.get("oneOf"):
         for branch in branches:
             yield from _alternatives(branch, headings)
@@ -218,8 +219,3 @@ def _plain(text: str) -> str:
     """Return a description without the marks of reStructuredText, safe in a cell of a table."""
     text = re.sub(r":\w+:`([^`]+)`", r"`\1`", text).replace("``", "`").replace("\n", " ")
     return text.replace("|", "\\|").replace("*", "\\*").replace("<", "\\<").replace("[", "\\[")
-
-
-def _slug(heading: str) -> str:
-    """Return the anchor of a heading, as GitHub and MyST make it."""
-    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")

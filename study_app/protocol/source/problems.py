@@ -116,13 +116,12 @@ def _near(word: str, permitted: str) -> str:
 def faults_of(error: ValidationError, document: Mapping[str, Any], schema: Schema) -> list[Fault]:
     """Return pydantic's findings about ``document``; ``schema`` is the JSON Schema of what it should be."""
     found = [_fault(details, document, schema) for details in error.errors(include_url=False)]
-    return [fault for fault in found if not (fault.counts_entries and _has_inner(fault, found))]
-
-
-def _has_inner(fault: Fault, found: Sequence[Fault]) -> bool:
-    """Return whether an entry of the array is broken: pydantic then counts the sound ones only."""
-    depth = len(fault.path)
-    return any(len(other.path) > depth and other.path[:depth] == fault.path for other in found)
+    paths = [fault.path for fault in found]
+    return [  # where an entry of an array is broken, pydantic counts the sound ones only
+        fault
+        for fault in found
+        if not (fault.counts_entries and any(path[:-1][: len(fault.path)] == fault.path for path in paths))
+    ]
 
 
 def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -> Fault:
@@ -134,7 +133,8 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
         last = path[-1]
         return Fault(path, f"entry {last + 1} is missing" if isinstance(last, int) else "is missing")
     if kind == "extra_forbidden":
-        return Fault(path, "unknown key", did_you_mean(str(path[-1]), _keys_at(document, path[:-1], schema)))
+        permitted = {key for node in _nodes_at(document, path[:-1], schema) for key in node.get("properties", {})}
+        return Fault(path, "unknown key", did_you_mean(str(path[-1]), permitted))
     if kind == "union_tag_not_found":
         return Fault((*path, _tag_key(context)), "is missing", f"one of {context.get('expected_tags', '')}".strip())
     if kind == "union_tag_invalid":
@@ -188,11 +188,6 @@ def _path_in(document: Any, loc: tuple[str | int, ...], *, keep_last: bool) -> P
             continue
         path.append(step)
     return tuple(path)
-
-
-def _keys_at(document: Any, path: Path, schema: Schema) -> set[str]:
-    """Return the keys that the schema permits in the table at ``path``."""
-    return {key for node in _nodes_at(document, path, schema) for key in node.get("properties", {})}
 
 
 def _nodes_at(document: Any, path: Path, schema: Schema) -> list[Schema]:
