@@ -12,7 +12,6 @@ from study_app.errors import AnalysisError
 from study_app.store.atomic import read_regular
 from study_app.store.journals.parsing import parse_json
 from study_app.store.tables.column import MISSING, Column, header
-from study_app.store.tables.columns import LATER, columns_held
 from study_app.store.tables.csv_files import cells
 
 DTYPES: Final[dict[str, Any]] = {
@@ -62,7 +61,7 @@ def _texts(path: Path, columns: tuple[Column, ...]) -> tuple[Mapping[str, Sequen
         raise unreadable(path, error, _again(path)) from error
     except ValueError as error:
         raise AnalysisError(f"{path} {error}: it was cut off or changed; {_again(path)}") from error
-    held = columns_held(names, columns, LATER | {column.name for column in columns if column.sealed})
+    held = tuple(column for column in columns if column.name in names or not (column.later or column.sealed))
     if tuple(names) != header(held):
         raise AnalysisError(
             f"{path} does not begin with the columns of this table: it was changed, or written by another version of "

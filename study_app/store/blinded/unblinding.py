@@ -4,7 +4,7 @@ If the program ends meanwhile, the journals contain everything, and opening the 
 """
 
 import contextlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from study_app.errors import StoreError
@@ -20,7 +20,6 @@ from study_app.store.journals import journal
 from study_app.store.journals.journal import Line
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.store.sessions.open_session import Place, table_files
-from study_app.store.tables.columns import LATER
 from study_app.store.tables.csv_files import in_columns_of
 from study_app.store.tables.participants import write_participants
 from study_app.store.tables.session_tables import table_columns
@@ -96,8 +95,8 @@ def _rewrite(place: Place, lines: list[Line], key: Key) -> list[str]:
     before, after = (dict(table_files(place, lines, one)) for one in (None, key))
     for path, columns in zip(after, table_columns(lines, opened=True).values(), strict=True):
         held = path.read_bytes() if is_there(path) else b""
-        may_lack = LATER - {column.name for column in columns if column.sealed}
-        sealed, content = (in_columns_of(held, whole[path], columns, may_lack)[0] for whole in (before, after))
+        written = [replace(column, later=False) if column.sealed else column for column in columns]
+        sealed, content = (in_columns_of(held, whole[path], written)[0] for whole in (before, after))
         if held not in (sealed, content):
             left.append(
                 f"{path} differs from the journal, so it was not changed: "

@@ -42,7 +42,8 @@ class Column:
 
     ``kind``: flags are ``true`` or ``false``, times ISO 8601 with zone. ``levels`` are all permitted values where
     these are few, each with its meaning. Where ``may_miss``, a cell can be ``n/a``. A ``sealed`` column can tell the
-    condition: no table has it before the study's key was opened.
+    condition: no table has it before the study's key was opened. Earlier versions did not write a ``later`` column:
+    a table without them is read as if they held ``n/a``.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Column:
     maximum: float | None = None
     may_miss: bool = False
     sealed: bool = False
+    later: bool = False
 
     def value(self, cell: str) -> Any:
         """Return what a cell holds, None where it is missing.

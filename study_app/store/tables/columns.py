@@ -4,7 +4,6 @@ Headers, ``dataset_description.json`` and every check of a finished folder are m
 name mean the same in every table.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from study_app.haptics.model.layout import LIMITER_NAMES
@@ -12,16 +11,16 @@ from study_app.store.tables.column import Column, optional
 from study_app.store.tables.identity_columns import CODE, PARTICIPANT, SESSION, SESSION_COLUMNS, TRIAL, TRIAL_COLUMNS
 
 
-def _measure(name: str, description: str, unit: str = "", *, sealed: bool = False) -> Column:
-    return optional(name, "number", description, unit, minimum=0, sealed=sealed)
+def _measure(name: str, description: str, unit: str = "", *, sealed: bool = False, later: bool = False) -> Column:
+    return optional(name, "number", description, unit, minimum=0, sealed=sealed, later=later)
 
 
 def _signed(name: str, description: str, unit: str = "") -> Column:
-    return optional(name, "number", description, unit, sealed=True)
+    return optional(name, "number", description, unit, sealed=True, later=True)
 
 
-def _count(name: str, description: str, *, sealed: bool = False) -> Column:
-    return optional(name, "integer", description, minimum=0, sealed=sealed)
+def _count(name: str, description: str, *, sealed: bool = False, later: bool = False) -> Column:
+    return optional(name, "integer", description, minimum=0, sealed=sealed, later=later)
 
 
 def _delay_error(name: str, which: str) -> Column:
@@ -124,17 +123,28 @@ TRIALS: tuple[Column, ...] = (
         "withheld_share",
         "Share of the force that limits, passivity controller and device withheld during the task; 0.05 is 5 %.",
         sealed=True,
+        later=True,
     ),
     _measure(
         "delivered_error",
         "Error of the force sent against the force model on the motion itself, RMS over RMS, 0.2 s after the fade-in "
         "and later; 0.05 is 5 %; n/a if the participant set the force, the study delays it, or it is below 0.05 N.",
         sealed=True,
+        later=True,
     ),
-    _count("loop_delay_ticks", "Ticks from a command of the servo until its force acts; maximum during the task."),
-    _count("loop_delay_changes", "How often that delay changed during the task."),
+    _count(
+        "loop_delay_ticks",
+        "Ticks from a command of the servo until its force acts; maximum during the task.",
+        later=True,
+    ),
+    _count("loop_delay_changes", "How often that delay changed during the task.", later=True),
     *(
-        _count(f"limiter_{name}", f"Ticks of the servo in which {_LIMITERS[name]}.", sealed=True)
+        _count(
+            f"limiter_{name}",
+            f"Ticks of the servo in which {_LIMITERS[name]}.",
+            sealed=True,
+            later=name in {"estimator", "saturated"},
+        )
         for name in LIMITER_NAMES
     ),
     _count("frames", "Frames shown to the participant.", sealed=True),
@@ -146,6 +156,7 @@ TRIALS: tuple[Column, ...] = (
         "first_frame_gap_ms",
         "Time from the start of the trial to its first painted frame, when force and task begin.",
         "ms",
+        later=True,
     ),
     _measure(
         "worst_frame_gap_ms",
@@ -166,6 +177,7 @@ TRIALS: tuple[Column, ...] = (
         "recording_lost",
         "text",
         "Why the trial's recording could not be stored; n/a if it was stored or not requested.",
+        later=True,
     ),
     Column("marked", "flag", "true if the operator marked the trial."),
     optional(
@@ -201,17 +213,25 @@ DELIVERED: tuple[Column, ...] = (
         "Share of the force model's force that was sent to the hand, after the lead and any lag; 1 is all of it.",
     ),
     _signed("apparent_mass_kg", "Apparent mass of the fitted force, in addition to its damping.", "kg"),
-    _measure("pace_mps", "RMS speed of the hand, after the lead.", "m/s", sealed=True),
+    _measure("pace_mps", "RMS speed of the hand, after the lead.", "m/s", sealed=True, later=True),
     _signed("setting", "The level that the participant set; n/a in intervals that were not adjusted."),
 )
 """What an interval delivered."""
 
 VIDEO: tuple[Column, ...] = (
-    _count("video_frames", "Frames of the video that were shown; n/a without a video.", sealed=True),
+    _count("video_frames", "Frames of the video that were shown; n/a without a video.", sealed=True, later=True),
     _count(
-        "video_frames_late", "Frames of the video shown more than one of its frames later than requested.", sealed=True
+        "video_frames_late",
+        "Frames of the video shown more than one of its frames later than requested.",
+        sealed=True,
+        later=True,
     ),
-    _count("video_frames_lost", "Frames of the video between the first and the last shown that were not.", sealed=True),
+    _count(
+        "video_frames_lost",
+        "Frames of the video between the first and the last shown that were not.",
+        sealed=True,
+        later=True,
+    ),
     _signed("video_delay_error_max_ms", "Delay of the video, achieved minus requested: largest.", "ms"),
     _signed(
         "video_age_mean_ms",
@@ -236,12 +256,13 @@ INTERVALS: tuple[Column, ...] = (
     ),
     optional("standard", "number", "The trial's standard, in the unit of the varied number.", sealed=True),
     optional("level", "number", f"The trial's level: {_LEVEL}.", sealed=True),
-    optional("catch", "flag", "true in a catch trial, which presents the largest level.", sealed=True),
+    optional("catch", "flag", "true in a catch trial, which presents the largest level.", sealed=True, later=True),
     optional(
         "invalid_reasons",
         "text",
         "Keys of the protocol's limits that the interval breaks, with spaces between; n/a if it was delivered as "
         "requested.",
+        later=True,
     ),
     *DELIVERED,
     *(column for column in TRIALS[_OUTCOME:] if column.name not in _NOT_OF_INTERVALS),
@@ -279,11 +300,11 @@ PARTICIPANTS: tuple[Column, ...] = (
     ),
 )
 
-GROUP = optional("group", "text", "The participant's group; n/a in a study without groups.", sealed=True)
+GROUP = optional("group", "text", "The participant's group; n/a in a study without groups.", sealed=True, later=True)
 TRIALS_2: tuple[Column, ...] = (
     *_TRIALS_BY_NAME.values(),
     *VIDEO,
-    _count("intervals", "Number of intervals that this attempt presented; n/a if its block has no design."),
+    _count("intervals", "Number of intervals that this attempt presented; n/a if its block has no design.", later=True),
     GROUP,
 )
 """Columns of trials in a study whose protocol has format 2."""
@@ -318,35 +339,11 @@ def tables_of(protocol_format: int) -> dict[str, tuple[Column, ...]]:
     return {"responses": RESPONSES_2, "trials": TRIALS_2, "intervals": INTERVALS, "participants": PARTICIPANTS_2}
 
 
-LATER = frozenset(
-    {
-        "first_frame_gap_ms",
-        "withheld_share",
-        "delivered_error",
-        "loop_delay_ticks",
-        "loop_delay_changes",
-        "limiter_estimator",
-        "limiter_saturated",
-        "recording_lost",
-        "group",
-        "intervals",
-        "catch",
-        "invalid_reasons",
-        *(column.name for column in (*DELIVERED, *VIDEO)),
-    }
-)
-"""Columns that earlier versions did not write: a table without them is read as if they held n/a."""
-
+LATER = frozenset(column.name for column in (*TRIALS_2, *INTERVALS) if column.later)
+"""Columns that earlier versions did not write."""
 
 SEALED = frozenset(column.name for column in (*TRIALS_2, *DELIVERED) if column.sealed)
 """Columns of a trial that no table has before the key was opened (see ``sealing``)."""
-
-
-def columns_held(
-    names: Sequence[str], columns: Sequence[Column], may_lack: frozenset[str] = LATER
-) -> tuple[Column, ...]:
-    """Return the columns that a table with these names must hold: all but those of ``may_lack`` that it lacks."""
-    return tuple(column for column in columns if column.name in names or column.name not in may_lack)
 
 
 def every_column(protocol_format: int = 1, *, intervals: bool = False) -> tuple[Column, ...]:

@@ -15,7 +15,6 @@ import numpy as np
 from study_app.errors import StudyError
 from study_app.store.atomic import write_file
 from study_app.store.tables.column import MISSING, Column, header
-from study_app.store.tables.columns import LATER, columns_held
 from study_app.store.tables.formulas import guarded, unguarded
 
 Row: TypeAlias = dict[str, Any]
@@ -114,17 +113,15 @@ def problems(table: bytes, columns: Sequence[Column]) -> Iterator[str]:
                 break
 
 
-def in_columns_of(
-    held: bytes, table: bytes, columns: Sequence[Column], may_lack: frozenset[str] = LATER
-) -> tuple[bytes, tuple[Column, ...]]:
+def in_columns_of(held: bytes, table: bytes, columns: Sequence[Column]) -> tuple[bytes, tuple[Column, ...]]:
     """Return ``table``, whose columns are ``columns``, with those that the table ``held`` must have; and these columns.
 
-    ``held`` may lack ``may_lack``, columns that its version did not write, and ``table`` those that are sealed. Where
+    ``held`` may lack later columns, which its version did not write, and ``table`` those that are sealed. Where
     ``held`` has the same texts without apostrophes, as earlier versions wrote them, it is returned itself.
     """
     names, ours = (one.partition(b"\n")[0].decode("utf-8", "replace").split(",") for one in (held, table))
     there = tuple(column for column in columns if column.name in ours)
-    kept = columns_held(names, there, may_lack)
+    kept = tuple(column for column in there if column.name in names or not column.later)
     if kept != there:
         places = [ours.index(column.name) for column in kept]
         table = _lines([row[place] for place in places] for row in cells(table))
