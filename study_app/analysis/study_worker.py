@@ -29,10 +29,10 @@ from study_app.analysis.worker_messages import (
 from study_app.errors import StoreError
 from study_app.store import receipt
 from study_app.store.atomic import cannot_read
+from study_app.store.blinded.unblinding import all_opened, reveals_of, unblind_folder
 from study_app.store.exclusions import exclude, include
 from study_app.store.sites.merged import all_exclusions, folders_of, own_place, sessions_in
-from study_app.store.sites.merged_rows import participants_of, study_folders
-from study_app.store.sites.unblind_sites import all_opened, reveals_of, unblind_folder
+from study_app.store.tables.study_files import participants_of, study_folders
 from study_app.workers.messages import Stopped
 
 if TYPE_CHECKING:

@@ -30,7 +30,7 @@ from study_app.protocol.orders.schedule import Schedule, Trial
 from study_app.session.request import NewSession
 from study_app.session.resume import FIRST
 from study_app.session.start import open_store
-from study_app.store.recording_files import read_frames
+from study_app.store.recordings import read_frames
 from study_app.store.sessions.open_session import SessionStore
 from study_app.validation.computer import machine as machine_here
 from study_app.validation.timing.delay_results import BESIDE, DELAYS_S, VIRTUAL_HZ, Delayed, Shown

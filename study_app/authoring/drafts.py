@@ -13,7 +13,7 @@ from typing import Any, Final, TypeAlias
 
 from study_app.authoring.versions.contents import file_key, keep_version, write_whole
 from study_app.errors import StoreError
-from study_app.store.journals.parsing import parse_json
+from study_app.store.atomic import parse_json
 from study_app.user_folder import data_folder
 
 REST_S: Final = 0.25

@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeAlias
 
 from study_app.authoring.versions.contents import file_key, write_whole
 from study_app.errors import StoreError
-from study_app.store.journals.parsing import parse_json
+from study_app.store.atomic import parse_json
 from study_app.user_folder import data_folder
 
 Setting: TypeAlias = Literal["participants", "language", "copy_of"]

@@ -120,8 +120,8 @@ def unblind(results: Path, by: str, reason: str) -> None:
 
     In a merged study the key of each site is opened; for one site name its folder, such as pooled/sites/A.
     """
+    from study_app.store.blinded.unblinding import unblind_folder
     from study_app.store.exclusions import named
-    from study_app.store.sites.unblind_sites import unblind_folder
 
     for prefix, found in unblind_folder(results, by=by, reason=reason).items():
         for block, codes in found.codes.items():
@@ -184,7 +184,7 @@ def include(results: Path, participant: str, session: int, trial: int | None, by
 def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[Path, ...]) -> None:
     """Erase the data of a participant; date, operator, reason and checksums remain."""
     from study_app.store.sites.merged import own_place
-    from study_app.store.withdrawals.withdraw import withdraw as withdraw_from
+    from study_app.store.withdrawals import withdraw as withdraw_from
 
     done = withdraw_from(*own_place(results, participant), by=by, reason=reason, also=also)
     for folder in done.folders:
@@ -246,7 +246,7 @@ def merge(sites: dict[str, Path], to: Path) -> None:
 @takes_session
 def rebuild(session: Path) -> None:
     """Rebuild a session's tables from its journal."""
-    from study_app.store.sessions.rebuild import rebuild as rebuild_session
+    from study_app.store.sessions.recovery import rebuild as rebuild_session
 
     made = rebuild_session(session)
     for path in made.rewritten:
@@ -284,7 +284,7 @@ def reproduce(session: Path) -> None:
 )
 def verify(results: Path, fingerprints: Path | None) -> None:
     """Check everything in a study's folder: columns, checksums, receipts, journals, key, recordings, Psych-DS."""
-    from study_app.store.sites.verify_sites import verify_folder
+    from study_app.store.verification.verify_study import verify_folder
 
     with progress() as show:
         show("checking every file")

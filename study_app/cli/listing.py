@@ -66,7 +66,7 @@ def sessions(named: str | None, results: Path | None) -> None:
     """List the sessions of a study, or of every study in the workspace, with the names that commands accept."""
     from study_app.errors import StoreError
     from study_app.store.sites.merged import all_exclusions, session_in
-    from study_app.store.sites.merged_rows import participants_of
+    from study_app.store.tables.study_files import participants_of
     from study_app.workspace import workspace as workspace_here
 
     at = workspace_here().results
@@ -86,7 +86,7 @@ def sessions(named: str | None, results: Path | None) -> None:
 
 def _studies(results: Path) -> Iterator[Path]:
     """Yield the studies' folders, sorted."""
-    from study_app.store.sites.merged_rows import study_folders
+    from study_app.store.tables.study_files import study_folders
 
     if results.is_dir():
         yield from study_folders(results)

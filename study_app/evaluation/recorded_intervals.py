@@ -15,8 +15,8 @@ from study_app.protocol.trials.presentation import presented_by, scene_of
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tracks import adjusting_of, design_of
 from study_app.store.blinded.blinding import Key
+from study_app.store.delivered import Delivered, delivered, delivered_error, judged
 from study_app.store.journals.journal import Line
-from study_app.store.tables.delivered import Delivered, delivered, delivered_error, judged
 
 TOLERANCE: Final = 1e-9
 

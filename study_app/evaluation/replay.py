@@ -38,13 +38,12 @@ from study_app.haptics.model.scene import FADE_S, Scene
 from study_app.haptics.runtime.pack import adjust_into, pack
 from study_app.haptics.runtime.recompute import take_sample, was_lost_at_read
 from study_app.protocol.model import Protocol
-from study_app.protocol.trials.presentation import link_seed, presented_by
-from study_app.store import receipt, recording_files
+from study_app.protocol.trials.answered import presented_by
+from study_app.protocol.trials.presentation import link_seed
+from study_app.store import receipt, recordings
 from study_app.store.atomic import is_there
 from study_app.store.blinded import blinding
-from study_app.store.blinded.resolved_model import as_recorded
-from study_app.store.blinded.sealing import opened
-from study_app.store.blinded.whole_protocol import whole_protocol
+from study_app.store.blinded.blinding import as_recorded, opened, whole_protocol
 from study_app.store.folders import locate
 from study_app.store.journals import journal
 from study_app.store.journals.journal import Line
@@ -127,7 +126,7 @@ def replay(session_folder: Path) -> Replayed:
             continue
         seed = link_seed(drawn_from, participant, *_which(started))
         scene, steps = scene_presented(protocol, key, started, seed), steps_of(protocol, key, started, lines)
-        recorded, checks = recording_files.read_samples(path), recording_files.read_checks(path)
+        recorded, checks = recordings.read_samples(path), recordings.read_checks(path)
         start = time.perf_counter()
         samples = as_one_scene(recorded, steps)
         before = _again(samples, scene, devices[resumed], before, places_of(recorded, steps))
@@ -285,7 +284,7 @@ class _Found:
             tuple(self.uncompared),
         )
 
-    def compare(self, name: str, samples: Any, again: _Before, checks: recording_files.Checks) -> None:
+    def compare(self, name: str, samples: Any, again: _Before, checks: recordings.Checks) -> None:
         """Compare one recording's checks with those of the forces computed again."""
         if len(samples) == 0:
             self.uncompared.append(f"{name}: holds no sample")
@@ -310,26 +309,26 @@ class _Found:
                 self.differences.append(f"{name}: the {what} differs in {_listed(seconds)} of {lasted} seconds")
 
 
-def _other_sums(checks: recording_files.Checks, again: Any) -> dict[str, list[int]]:
+def _other_sums(checks: recordings.Checks, again: Any) -> dict[str, list[int]]:
     """Return the seconds whose exact forces have another CRC."""
     found = {}
     for what, kept, forces in (
         ("force on the hand", checks.device_force, again.device_force_n),
         ("force of the liquids", checks.effect_force, again.force_n),
     ):
-        sums = recording_files.crcs(forces, checks.rows)
+        sums = recordings.crcs(forces, checks.rows)
         found[what] = [second for second, (one, other) in enumerate(zip(kept, sums, strict=True)) if one != other]
     return found
 
 
-def _other_columns(checks: recording_files.Checks, samples: Any, again: Any) -> dict[str, list[int]]:
+def _other_columns(checks: recordings.Checks, samples: Any, again: Any) -> dict[str, list[int]]:
     """Return the seconds in which a recorded column is further from what is recomputed than its rounding.
 
     Of the samples before the trial's own scene nothing but the forces is known.
     """
     found = {}
     own = samples.scene == samples.scene[-1]
-    for name, step in recording_files.ROUNDED_TO.items():
+    for name, step in recordings.ROUNDED_TO.items():
         recorded, computed = (np.nan_to_num(it[name].reshape(len(samples), -1)) for it in (samples, again))
         permitted = step * (0.5 + _ROUNDING) + np.abs(computed) * _FLOAT32
         known = True if name in _FORCES else own

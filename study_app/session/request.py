@@ -16,8 +16,8 @@ from study_app.protocol.orders.sequences import enrolment
 from study_app.session.resume import find_protocol, source_to_resume
 from study_app.store.folders import ID_PATTERN, locate, study_folder
 from study_app.store.progress import progress
-from study_app.store.sessions.participant_ids import refuse_never_begun
-from study_app.store.sessions.reopen import check_can_go_on
+from study_app.store.sessions.begin import refuse_never_begun
+from study_app.store.sessions.recovery import check_can_go_on
 
 MAX_SEED = 999_999
 

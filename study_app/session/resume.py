@@ -11,13 +11,12 @@ from study_app.errors import ProtocolError, SessionError
 from study_app.protocol.load import at_hand, parse, protocol_hash, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial, build_schedule
-from study_app.protocol.trials.methods import Heard
-from study_app.protocol.trials.presentation import heard_in
-from study_app.store.blinded.blinding import Key
-from study_app.store.blinded.sealing import opened
+from study_app.protocol.trials.answered import heard_in
+from study_app.protocol.trials.method import Heard
+from study_app.store.blinded.blinding import Key, opened
 from study_app.store.journals.journal import Line
 from study_app.store.progress import Progress, progress_of
-from study_app.store.sessions.reopen import sealed_source
+from study_app.store.sessions.recovery import sealed_source
 from study_app.store.workstation import recent_protocols
 
 REHEARSED_SCREENS: dict[str, Any] = {"participant": "simulated", "refresh_hz": 60}

@@ -62,8 +62,7 @@ from study_app.session.transitions.state import FINAL, Phase, SessionState, Stal
 from study_app.session.transitions.table import advance, open_session
 from study_app.session.trial import RunningTrial, TankView, ball_is_back, resting_view
 from study_app.session.trial_recording import Recording
-from study_app.store.broken_limits import broken_limits
-from study_app.store.tables.delivered import delivered, undelivered
+from study_app.store.delivered import broken_limits, delivered, undelivered
 
 RETRY_S = 1.0  # a disk that took nothing is tried again so often
 

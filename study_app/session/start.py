@@ -19,13 +19,12 @@ from study_app.session.request import NewSession, check_row
 from study_app.store import workstation
 from study_app.store.blinded.allocation import check_session
 from study_app.store.blinded.blinding import check_conditions
-from study_app.store.clock import SessionClock
 from study_app.store.folders import StudyFolder
-from study_app.store.sessions.begin import SessionStart, begin
+from study_app.store.journals.journal import SessionClock
+from study_app.store.sessions.begin import SessionStart, begin, check_participant, check_unused
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.participant_ids import check_participant, check_unused
-from study_app.store.sessions.reopen import reopen
-from study_app.store.tables.study_description import check_study
+from study_app.store.sessions.recovery import reopen
+from study_app.store.tables.study_files import check_study
 from study_app.store.workstation import MachineSettings
 from study_app.video.sources import Videos
 

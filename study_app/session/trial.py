@@ -20,7 +20,7 @@ from study_app.session.tasks import Outcome, TargetReached, TaskView, track
 from study_app.session.transitions.commands import StartTrial
 from study_app.session.trial_recording import Recording
 from study_app.session.trial_statistics import TrialStatistics
-from study_app.store.tables.delivered import JUDGED, delivered_error, judged
+from study_app.store.delivered import JUDGED, delivered_error, judged
 from study_app.video.frames import VideoFrame, VideoSource
 
 # Everything is drawn this much later than the trial asks. Then the moment to draw lies between two samples at every

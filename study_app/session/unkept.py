@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from study_app.store.blinded.blinding import Key
-from study_app.store.clock import SessionClock
+from study_app.store.journals.journal import SessionClock
 
 
 class Unkept:

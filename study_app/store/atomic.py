@@ -1,7 +1,11 @@
-"""Atomic writing: neither a reader nor the next start after a power cut ever finds a partial file."""
+"""Atomic writing: neither a reader nor the next start after a power cut ever finds a partial file.
+
+Reading: regular files alone, within the study's folder, and JSON that users may have changed.
+"""
 
 import contextlib
 import errno
+import json
 import os
 import re
 import secrets
@@ -12,12 +16,13 @@ import time
 from collections.abc import Iterator, Mapping
 from io import BufferedReader
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from study_app.errors import StoreError
 
 OLD_S = 3600.0  # longer than from the last write of a temporary file to its renaming
 _NO_FLUSH = (errno.EINVAL, errno.EBADF, errno.ENOTSUP)  # of a folder that cannot be flushed
+_MOST_LEVELS = 64  # of JSON, so that code may process a value recursively
 _TEMPORARY = re.compile(r"\.[^.].*\.[0-9a-f]{8}\.tmp")  # without those of hidden files: markers are created and removed
 
 
@@ -63,11 +68,6 @@ def create_folder(path: Path, files: Mapping[str, bytes], *, waits: bool = True,
     empty: of two programs exactly one succeeds, and the other finds complete files. Without ``waits`` nothing is
     flushed: for files that can be recreated, since a power cut may then lose them. ``mode`` limits the files'
     permissions.
-
-    Raises
-    ------
-    StoreError
-        The folder is neither there nor can be created.
     """
     half = temporary_path(path)
     try:
@@ -138,11 +138,6 @@ def replace_end(path: Path, start: int, content: bytes) -> None:
     """Replace everything after the first ``start`` bytes of ``path`` by ``content``, without a flush.
 
     A program killed meanwhile leaves the first ``start`` bytes and the beginning of ``content``.
-
-    Raises
-    ------
-    StoreError
-        The file cannot be written; the old end is restored as far as the system permits.
     """
     try:
         with path.open("r+b", buffering=0) as file:
@@ -199,11 +194,6 @@ def sweep(folder: Path) -> tuple[Path, ...]:
     """Remove temporary files of killed programs from ``folder`` itself; return them.
 
     Only for a folder that no other program writes into now.
-
-    Raises
-    ------
-    StoreError
-        A file cannot be removed.
     """
     found = temporaries(folder)
     for path in found:
@@ -234,13 +224,7 @@ def probe(folder: Path) -> int:
 
 
 def disk_time_ns(folder: Path) -> int:
-    """Return the present time by the clock of the disk that ``folder`` is on, which stamps its files [ns since 1970].
-
-    Raises
-    ------
-    StoreError
-        Nothing can be written there.
-    """
+    """Return the present time by the clock of the disk of ``folder``, which stamps its files [ns since 1970]."""
     with _passing_file(folder / "time", folder) as path:
         path.touch(exist_ok=False)
         return path.stat().st_mtime_ns
@@ -309,13 +293,7 @@ def read_regular(path: Path) -> bytes:
 
 
 def read_own(path: Path, root: Path) -> bytes:
-    """Return the content of a file that must lie under ``root``, wherever links lead.
-
-    Raises
-    ------
-    StoreError
-        It lies elsewhere, is no file (a device has no end), or cannot be read.
-    """
+    """Return the content of a file that must lie under ``root``, wherever links lead."""
     try:
         real = path.resolve(strict=True)
         if not real.is_relative_to(root.resolve()):
@@ -325,6 +303,31 @@ def read_own(path: Path, root: Path) -> bytes:
         raise cannot_read(path, error) from error
     except RuntimeError as error:  # a loop of links
         raise StoreError(f"{path} cannot be read ({error}): replace the link by the file itself") from error
+
+
+def parse_json(content: bytes | str) -> Any:
+    """Return the value in ``content``.
+
+    Raises
+    ------
+    ValueError
+        It is not JSON, which excludes NaN and Infinity, or is nested too deeply.
+    """
+    try:
+        value = json.loads(content, parse_constant=_refuse)
+    except RecursionError as error:
+        raise ValueError("it is nested too deeply") from error
+    level = [value]
+    for _ in range(_MOST_LEVELS):
+        containers = (one for one in level if isinstance(one, dict | list))
+        level = [inner for one in containers for inner in (one.values() if isinstance(one, dict) else one)]
+        if not level:
+            return value
+    raise ValueError("it is nested too deeply")
+
+
+def _refuse(constant: str) -> None:
+    raise ValueError(f"{constant} is not JSON")
 
 
 def study_root(path: Path) -> Path:

@@ -1,28 +1,40 @@
-"""``checksums.sha256``: SHA-256 of every file at the session's end, in the format of ``sha256sum -c``."""
+"""The proofs that a session is as it ended: ``checksums.sha256``, and the study's list of fingerprints.
 
+``checksums.sha256`` has the SHA-256 of every file at the session's end, in the format of ``sha256sum -c``. The
+fingerprint of a session is the beginning of a SHA-256 over its checksums, but for those of its tables, which are made
+from the journal and compared with it by `verify`. Each study's ``fingerprints.txt`` has a line for every session that
+ended; a copy of it that is kept elsewhere proves that none of them was changed, added or removed since.
+"""
+
+import base64
 import hashlib
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from datetime import datetime
 from pathlib import Path
 
 import study_app
 from study_app.errors import StoreError
-from study_app.store.atomic import append_line, cannot_read, open_regular, paths_in, read_own, study_root, write_file
-from study_app.store.folders import REBUILT, SessionFolder
+from study_app.store.atomic import (
+    append_line,
+    cannot_read,
+    open_regular,
+    paths_in,
+    read_own,
+    read_regular,
+    study_root,
+    write_file,
+)
+from study_app.store.folders import REBUILT, SessionFolder, StudyFolder
 
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
+_FINGERPRINT = re.compile(r"([a-z2-7]{4}-[a-z2-7]{4}-[a-z2-7]{4})\s+(data/sub-[A-Za-z0-9]{1,32}/ses-[0-9]{2})\s*")
 
 
 def write_checksums(session: SessionFolder, known: Mapping[str, str]) -> dict[str, str]:
     """Write the SHA-256 of every file of the session, and return them by path in its folder.
 
     Those of ``known`` are taken as they are.
-
-    Raises
-    ------
-    StoreError
-        A file cannot be read, or the list not written.
     """
     sums = {name: known.get(name) or hashed(session, name) for name in files(session)}
     write_file(session.checksums, checksum_bytes(sums))
@@ -34,11 +46,6 @@ def renew_checksums(session: SessionFolder, rewritten: Collection[Path], known: 
 
     Other entries stay, so that the list only covers files as they were when the session ended; a missing or invalid
     list is made again. Every change is noted in ``rebuilt.txt``, which is listed, too.
-
-    Raises
-    ------
-    StoreError
-        A file cannot be read, or the list not written.
     """
     try:
         listed = read_checksums(session)
@@ -61,11 +68,6 @@ def replace_checksums(session: SessionFolder, contents: Mapping[str, tuple[bytes
 
     ``contents`` are the old and the new by path in the session's folder. A file with another SHA-256 in the list was
     changed since the session ended, which must stay visible.
-
-    Raises
-    ------
-    StoreError
-        The list cannot be read, or not written.
     """
     listed = read_checksums(session)
     new = {
@@ -78,13 +80,7 @@ def replace_checksums(session: SessionFolder, contents: Mapping[str, tuple[bytes
 
 
 def note_rebuilt(session: SessionFolder, what: str) -> None:
-    """Note permanently which proofs of a session `rebuild` made again: they prove nothing about earlier changes.
-
-    Raises
-    ------
-    StoreError
-        The note cannot be written.
-    """
+    """Note permanently which proofs of a session `rebuild` made again: they prove nothing about earlier changes."""
     at = datetime.now().astimezone().isoformat(timespec="seconds")
     append_line(session.rebuilt, f"{at} liquid-study {study_app.__version__} rebuild: {what}\n".encode())
 
@@ -100,13 +96,7 @@ def hashed(session: SessionFolder, name: str) -> str:
 
 
 def read_checksums(session: SessionFolder) -> dict[str, str]:
-    """Return path in the folder → SHA-256.
-
-    Raises
-    ------
-    StoreError
-        The list cannot be read, or is none.
-    """
+    """Return path in the folder → SHA-256."""
     try:
         text = read_own(session.checksums, study_root(session.checksums)).decode("utf-8")
     except UnicodeDecodeError as error:
@@ -148,3 +138,59 @@ def sha256(path: Path) -> str:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise cannot_read(path, error) from error
+
+
+def fingerprint(sums: Mapping[str, str]) -> str:
+    """Return the fingerprint of a session whose files (by path in its folder) have these SHA-256.
+
+    60 bits of the SHA-256 of their list, without tables and the note of `rebuild`, in the letters and digits of base32.
+    """
+    proved = {name: sums[name] for name in sums if not name.endswith("_data.csv") and name != REBUILT}
+    letters = base64.b32encode(hashlib.sha256(checksum_bytes(proved)).digest()).decode().lower()
+    return "-".join(letters[at : at + 4] for at in (0, 4, 8))
+
+
+def note_fingerprint(study: StudyFolder, session: SessionFolder, found: str, *, waits: bool = True) -> None:
+    """Add a session's fingerprint to the study's list; without ``waits`` nothing is flushed."""
+    append_line(study.fingerprints, f"{found}  {place_of(study, session)}\n".encode(), waits=waits)
+
+
+def place_of(study: StudyFolder, session: SessionFolder) -> str:
+    """Return how a list of fingerprints names a session: its folder in the study's."""
+    return session.path.relative_to(study.path).as_posix()
+
+
+def listed(path: Path) -> tuple[tuple[str, str], ...]:
+    """Return fingerprint and session of every line of a list, none without a list; others are left out."""
+    return tuple((match[1], match[2]) for _, match in _matches(path) if match is not None)
+
+
+def unreadable(path: Path) -> tuple[int, ...]:
+    """Return the numbers of the lines of a list that hold no fingerprint."""
+    return tuple(number for number, match in _matches(path) if match is None)
+
+
+def read_copy(path: Path) -> tuple[tuple[str, str], ...]:
+    """Return fingerprint and session of every line of a copy, which holds nothing else."""
+    if not path.is_file():
+        raise StoreError(f"{path} is not a file: name a copy of a study's fingerprints.txt")
+    if wrong := unreadable(path):
+        raise StoreError(
+            f"{path}, line {wrong[0]} is not a fingerprint: a line must be such as "
+            "'k3vq-7m2p-xw4d  data/sub-P007/ses-01'; name a copy of a study's fingerprints.txt"
+        )
+    if not (found := listed(path)):
+        raise StoreError(f"{path} has no fingerprint: name a copy of a study's fingerprints.txt")
+    return found
+
+
+def _matches(path: Path) -> Iterator[tuple[int, re.Match[str] | None]]:
+    try:
+        text = read_regular(path).decode("utf-8-sig", "replace")
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.strip():
+            yield number, _FINGERPRINT.fullmatch(line.lower() if line.isupper() else line)

@@ -10,16 +10,13 @@ from datetime import datetime
 from pathlib import Path
 
 from study_app.errors import StoreError
-from study_app.store.atomic import append_line, cannot_read, read_regular, write_file
+from study_app.store.atomic import append_line, cannot_read, parse_json, read_regular, write_file
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.journals.parsing import parse_json
 from study_app.store.progress import progress_of
 from study_app.store.sessions.folder_lock import open_alone
-from study_app.store.tables.column import MISSING, header
 from study_app.store.tables.columns import EXCLUSIONS
-from study_app.store.tables.csv_files import csv_bytes
-from study_app.store.tables.formulas import unguarded
+from study_app.store.tables.csv_files import MISSING, csv_bytes, header, unguarded
 
 NAMED_IDS = 6
 
@@ -157,13 +154,7 @@ def exclusions(folder: Path) -> tuple[Exclusion, ...]:
 
 
 def reversals(folder: Path) -> tuple[Exclusion, ...]:
-    """Return the reversed exclusions of the study in ``folder``, in the order of the reversals.
-
-    Raises
-    ------
-    StoreError
-        The list cannot be read, or a line of it is not a reversed exclusion.
-    """
+    """Return the reversed exclusions of the study in ``folder``, in the order of the reversals."""
     path = StudyFolder(folder).reversed_exclusions
     try:
         lines = read_regular(path).split(b"\n")  # a reason may contain other line endings
@@ -209,7 +200,10 @@ def _check_there(study: StudyFolder, participant: str, session: int, trial: int 
     place = study.session(participant, session)
     if place not in study.sessions():
         known = [str(one.number) for one in study.sessions() if one.participant == participant]
-        its = f"sessions of that participant: {', '.join(known)}" if known else f"participants: {_few(study.ids())}"
+        ids = study.ids()
+        more = f" … {ids[-1]}" if len(ids) > NAMED_IDS else ""
+        participants = f"participants: {', '.join(ids[:NAMED_IDS]) or 'none'}{more}"
+        its = f"sessions of that participant: {', '.join(known)}" if known else participants
         raise StoreError(f"{study.path} has no session {session} of participant {participant}; {its}")
     if trial is None:
         return
@@ -217,11 +211,6 @@ def _check_there(study: StudyFolder, participant: str, session: int, trial: int 
     if trial not in presented:
         listed = ", ".join(map(str, sorted(presented))) or "none"
         raise StoreError(f"participant {participant}, session {session} has no trial {trial}: it has {listed}")
-
-
-def _few(ids: tuple[str, ...]) -> str:
-    shown = ", ".join(ids[:NAMED_IDS]) or "none"
-    return f"{shown} … {ids[-1]}" if len(ids) > NAMED_IDS else shown
 
 
 def named(row: Exclusion) -> str:

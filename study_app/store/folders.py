@@ -29,7 +29,20 @@ REBUILT = "rebuilt.txt"
 FINGERPRINTS = "fingerprints.txt"
 
 ID_PATTERN = re.compile(r"[A-Za-z0-9]+")
+PARTICIPANT_ID = re.compile(r"[A-Za-z0-9]{1,32}")
+STUDY_NAME = re.compile(r"[a-z][a-z0-9]{0,39}")  # as in a protocol
+RECORDING_NAME = re.compile(r"recordings/trial-[0-9]{3,}(_attempt-[0-9]+)?(_interval-[0-9]+)?(_frames)?\.parquet")
 _SESSION_FOLDER = re.compile(r"ses-([0-9]{2})")
+
+
+class _Within:
+    """A file or folder of a fixed name in the folder ``path`` of its owner."""
+
+    def __init__(self, *names: str) -> None:
+        self._names = names
+
+    def __get__(self, owner: SessionFolder | StudyFolder, kind: type | None = None) -> Path:
+        return owner.path.joinpath(*self._names)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,35 +53,18 @@ class SessionFolder:
     participant: str
     number: int
 
-    @property
-    def journal(self) -> Path:
-        """What happened, line by line."""
-        return self.path / "journal.jsonl"
-
-    @property
-    def receipt(self) -> Path:
-        """What ran: protocol, seed, versions, device, hashes."""
-        return self.path / "receipt.json"
-
-    @property
-    def checksums(self) -> Path:
-        """SHA-256 of every file, when the session had ended."""
-        return self.path / "checksums.sha256"
-
-    @property
-    def rebuilt(self) -> Path:
-        """When and why checksums or fingerprint were made again after the session had ended."""
-        return self.path / REBUILT
-
-    @property
-    def crash(self) -> Path:
-        """Where the program stood when it crashed; there while the session runs, and after a crash."""
-        return self.path / "crash.txt"
-
-    @property
-    def recordings(self) -> Path:
-        """Samples and frames of the trials."""
-        return self.path / "recordings"
+    journal = _Within("journal.jsonl")
+    """What happened, line by line."""
+    receipt = _Within("receipt.json")
+    """What ran: protocol, seed, versions, device, hashes."""
+    checksums = _Within("checksums.sha256")
+    """SHA-256 of every file, when the session had ended."""
+    rebuilt = _Within(REBUILT)
+    """When and why checksums or fingerprint were made again after the session had ended."""
+    crash = _Within("crash.txt")
+    """Where the program stood when it crashed; there while the session runs, and after a crash."""
+    recordings = _Within("recordings")
+    """Samples and frames of the trials."""
 
     def table(self, study: str, name: str) -> Path:
         """Return the file of table ``name`` (responses or trials)."""
@@ -83,64 +79,33 @@ class StudyFolder:
 
     path: Path
 
-    @property
-    def description(self) -> Path:
-        """The Psych-DS description of every column."""
-        return self.path / "dataset_description.json"
-
-    @property
-    def ignore(self) -> Path:
-        """What a validator of Psych-DS need not look at."""
-        return self.path / ".psychds-ignore"
-
-    @property
-    def exclusions(self) -> Path:
-        """What is left out of the analysis, by whom and why."""
-        return self.path / "exclusions.csv"
-
-    @property
-    def reversed_exclusions(self) -> Path:
-        """The exclusions that were taken back, by whom and why."""
-        return self.path / "exclusions_reversed.jsonl"
-
-    @property
-    def fingerprints(self) -> Path:
-        """A line for every session that ended: what tells it from any other."""
-        return self.path / FINGERPRINTS
-
-    @property
-    def withdrawals(self) -> Path:
-        """A tombstone for each participant whose data were erased."""
-        return self.path / "withdrawals.jsonl"
-
-    @property
-    def blinding(self) -> Path:
-        """The folder of key and reveals."""
-        return self.path / "blinding"
-
-    @property
-    def key(self) -> Path:
-        """The sealed key: which code stands for which condition."""
-        return self.blinding / "key.sealed"
-
-    @property
-    def allocated(self) -> Path:
-        """The folder of the participants' entries in the allocation to groups."""
-        return self.blinding / "allocated"
+    description = _Within("dataset_description.json")
+    """The Psych-DS description of every column."""
+    ignore = _Within(".psychds-ignore")
+    """What a validator of Psych-DS need not look at."""
+    exclusions = _Within("exclusions.csv")
+    """What is left out of the analysis, by whom and why."""
+    reversed_exclusions = _Within("exclusions_reversed.jsonl")
+    """The exclusions that were taken back, by whom and why."""
+    fingerprints = _Within(FINGERPRINTS)
+    """A line for every session that ended: what tells it from any other."""
+    withdrawals = _Within("withdrawals.jsonl")
+    """A tombstone for each participant whose data were erased."""
+    blinding = _Within("blinding")
+    """The folder of key and reveals."""
+    key = _Within("blinding", "key.sealed")
+    """The sealed key: which code stands for which condition."""
+    allocated = _Within("blinding", "allocated")
+    """The folder of the participants' entries in the allocation to groups."""
 
     def allocation(self, entry: int) -> Path:
         """Return the file of an entry in the allocation."""
         return self.allocated / f"{entry:03d}.json"
 
-    @property
-    def reveals(self) -> Path:
-        """Who opened the key, when and why."""
-        return self.blinding / "reveals.jsonl"
-
-    @property
-    def data(self) -> Path:
-        """The folder of all tables."""
-        return self.path / "data"
+    reveals = _Within("blinding", "reveals.jsonl")
+    """Who opened the key, when and why."""
+    data = _Within("data")
+    """The folder of all tables."""
 
     def participants(self, study: str) -> Path:
         """Return the table of all sessions."""
@@ -162,6 +127,19 @@ class StudyFolder:
     def ids(self) -> tuple[str, ...]:
         """Return the participant ids that were used, sorted."""
         return tuple(sorted({session.participant for session in self.sessions()}))
+
+
+def check_study_name(name: object) -> str:
+    """Return the name of a study in a file of the results, if a protocol can have it.
+
+    Raises
+    ------
+    ValueError
+        No protocol has such a name, and no file may be called by it.
+    """
+    if not isinstance(name, str) or not STUDY_NAME.fullmatch(name):
+        raise ValueError("no study has this name")
+    return name
 
 
 def locate(path: Path) -> tuple[StudyFolder, SessionFolder]:

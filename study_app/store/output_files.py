@@ -1,16 +1,35 @@
-"""Files and folders written for the user, all or none."""
+"""Files and folders written for the user, all or none, and the list of outputs made from a study's results.
+
+A withdrawal must reach what this machine's user made from the results: ``outputs.jsonl`` of the program's data folder
+has a line for every output. Results folders hold no such list: reading them never changes them.
+"""
 
 import contextlib
 import hashlib
+import json
 import os
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Final, NamedTuple
 
 from study_app.errors import AnalysisError, StoreError
-from study_app.store.atomic import cause, open_regular, sweep_old, temporary_path, write_through, write_whole
+from study_app.store.atomic import (
+    append_line,
+    cannot_write,
+    cause,
+    open_regular,
+    parse_json,
+    sweep_old,
+    temporary_path,
+    write_through,
+    write_whole,
+)
+from study_app.user_folder import data_folder
 
 _CHUNK_BYTES: Final = 1 << 20
+NAME: Final = "outputs.jsonl"
 
 
 class FileCopy(NamedTuple):
@@ -44,7 +63,7 @@ def write_files(to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, 
             folder.mkdir(exist_ok=True)
         for name, content in files.items():
             if isinstance(content, FileCopy):
-                _copy(content, staged[name])
+                _copied(content, staged[name])
             else:
                 write_through(staged[name], content)
         for name, path in staged.items():
@@ -68,7 +87,7 @@ def write_files(to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, 
     return tuple(to / name for name in files)
 
 
-def _copy(copied: FileCopy, to: Path) -> None:
+def _copied(copied: FileCopy, to: Path) -> None:
     """Write a new file ``to``, and flush it to the disk."""
     with to.open("xb", buffering=0) as file:
         for part in _parts(copied):
@@ -106,3 +125,72 @@ def make_folder(to: Path) -> None:
     except OSError as error:
         why = "it is a file, not a folder" if to.is_file() else error.strerror or error
         raise StoreError(f"cannot make the folder {to} ({why}): choose another with --to") from error
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """Files of a study's results, written into the folder ``to`` at ``at`` (wall time with its zone)."""
+
+    to: Path
+    at: str
+    files: tuple[str, ...]
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """Those of its files that are still there."""
+        return tuple(path for name in self.files if (path := self.to / name).is_file())
+
+
+def write_output(study: Path, to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, ...]:
+    """Write ``files`` of the results in ``study`` into the folder ``to`` (as `write_files`), and note where they are.
+
+    Raises
+    ------
+    AnalysisError
+        They cannot be written; nothing was.
+    """
+    written = write_files(to, files)
+    at = datetime.now().astimezone().isoformat(timespec="seconds")
+    line = {"study": str(study.resolve()), "to": str(to.resolve()), "at": at, "files": [*files]}
+    with contextlib.suppress(StoreError, OSError):  # the files are there; a list that cannot be written stops nobody
+        data_folder().mkdir(parents=True, exist_ok=True)
+        append_line(data_folder() / NAME, json.dumps(line, ensure_ascii=False).encode() + b"\n", waits=False)
+    return written
+
+
+def outputs(study: Path) -> tuple[Output, ...]:
+    """Return the noted outputs of a study's results, one for each folder and set of files, the newest last."""
+    found: dict[tuple[str, tuple[str, ...]], Output] = {}
+    for line in _lines():
+        try:
+            held = parse_json(line)
+            if held["study"] == str(study.resolve()):
+                names = tuple(map(str, held["files"]))
+                found[held["to"], names] = Output(Path(held["to"]), str(held["at"]), names)
+        except (ValueError, KeyError, TypeError):  # a torn line
+            continue
+    return tuple(found.values())
+
+
+def erase_outputs(study: Path, within: Path) -> tuple[tuple[Path, ...], tuple[Output, ...]]:
+    """Delete the noted outputs of a study below the folder ``within``; return the files, and the outputs elsewhere."""
+    erased: list[Path] = []
+    elsewhere: list[Output] = []
+    for output in outputs(study):
+        if not output.to.is_relative_to(within.resolve()):
+            elsewhere.append(output)
+            continue
+        for path in output.paths:
+            try:
+                path.unlink()
+            except OSError as error:
+                raise cannot_write(path, error) from error
+            erased.append(path)
+    return tuple(erased), tuple(elsewhere)
+
+
+def _lines() -> list[bytes]:
+    try:
+        return (data_folder() / NAME).read_bytes().splitlines()
+    except OSError:
+        return []

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from study_app.errors import StoreError
-from study_app.store.broken_limits import Broken, beyond_limits
+from study_app.store.delivered import Broken, beyond_limits
 from study_app.store.folders import locate
 from study_app.store.journals import journal
 from study_app.store.journals.journal import Line
@@ -113,7 +113,8 @@ class Progress:
     def unconfirmed(self) -> dict[tuple[int, int], dict[str, Given]]:
         """The choices without a confirmation, by trial and attempt."""
         found = dict(self._left_open)
-        if self.trial is not None and (chosen := _chosen(self.answers)):
+        chosen = {item: given for item, given in self.answers.items() if given.first_s is not None}
+        if self.trial is not None and chosen:
             found[self.trial, self.attempt] = chosen
         return found
 
@@ -146,7 +147,10 @@ class Progress:
             case "responses" | "form_answered":
                 self.answered[line["form"] if "form" in line else line["trial"]] = len(line["items"])
                 if self.of_intervals is not None and line.get("trial") == self.of_intervals:
-                    self.trial_answers[self.of_intervals] = _timed(line["items"][0])
+                    item = line["items"][0]
+                    onset_s, first_s = item.get("onset_s"), item.get("first_s")
+                    seconds = None if onset_s is None or first_s is None else first_s - onset_s
+                    self.trial_answers[self.of_intervals] = TrialAnswer(item.get("value"), seconds)
                 self.answers = {}
                 self._leave()
             case "passed_over":
@@ -283,10 +287,6 @@ def progress_of(lines: Sequence[Line]) -> Progress:
     return now
 
 
-def _chosen(answers: Mapping[str, Given]) -> dict[str, Given]:
-    return {item: given for item, given in answers.items() if given.first_s is not None}
-
-
 def _answered(given: Given, line: Line) -> Given:
     at_s = line["t_s"]
     if line["event"] == "item_shown":
@@ -296,11 +296,6 @@ def _answered(given: Given, line: Line) -> Given:
     if given.value == line["value"]:
         return given
     return replace(given, last_s=at_s, value=line["value"], changes=given.changes + 1)
-
-
-def _timed(item: Mapping[str, Any]) -> TrialAnswer:
-    onset_s, first_s = item.get("onset_s"), item.get("first_s")
-    return TrialAnswer(item.get("value"), None if onset_s is None or first_s is None else first_s - onset_s)
 
 
 def is_of_intervals(started: Mapping[str, Any]) -> bool:

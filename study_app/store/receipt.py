@@ -18,10 +18,9 @@ import study_app
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import block_codes, order_of
-from study_app.store.atomic import read_own, study_root, write_file
+from study_app.store.atomic import parse_json, read_own, study_root, write_file
 from study_app.store.journals.journal import plain
 from study_app.store.journals.journal_events import holds, shortened
-from study_app.store.journals.parsing import parse_json
 
 GENERATOR = (
     "random.Random (Mersenne Twister), one per named stream, seeded by SHA-256 of (seed, name); only .random() is "
@@ -86,13 +85,7 @@ def library_version(library: str) -> str:
 
 
 def write(path: Path, receipt: Mapping[str, Any]) -> None:
-    """Write the receipt in one step.
-
-    Raises
-    ------
-    StoreError
-        It cannot be written.
-    """
+    """Write the receipt in one step."""
     text = json.dumps(plain(dict(receipt)), indent=2, ensure_ascii=False, allow_nan=False)
     write_file(path, f"{text}\n".encode("utf-8", "backslashreplace"))
 

@@ -24,8 +24,7 @@ from study_app.store.atomic import cause, sync_folder
 from study_app.store.journals.journal import Line
 
 if TYPE_CHECKING:
-    from study_app.store.recording_files import Written
-    from study_app.store.recording_writer import SamplesFile
+    from study_app.store.recordings import SamplesFile, Written
     from study_app.video.frames import VideoFrame
 
 ROOM = 120_000  # capacity of the queue in samples: two minutes at 1 kHz, 37 MB
@@ -105,9 +104,9 @@ class Recorder:
 
     def __init__(self, folder: Path, facts: Mapping[str, Any], *, waits: bool = False, room: int = ROOM) -> None:
         # The Parquet library takes a while to load: now, before a participant sits down, and only where it is needed.
-        from study_app.store import recording_writer  # noqa: PLC0415
+        from study_app.store import recordings  # noqa: PLC0415
 
-        self._files = recording_writer
+        self._files = recordings
         self._folder = folder
         self._facts = dict(facts)
         self._waits = waits
@@ -163,8 +162,8 @@ class Recorder:
     def frame(self, painted_ns: int, sample_ns: int, video: VideoFrame | None = None) -> None:
         """Record the times when a frame was painted and that it shows [ns, the servo's clock], with a ``video``."""
         if self._underway is not None:
-            seen = (-1, 0, -1) if video is None else (video.number, video.due_ns, _known(video.age_ns))
-            self._frames.extend((painted_ns, sample_ns, *seen))
+            seen = (-1, 0, None) if video is None else (video.number, video.due_ns, video.age_ns)
+            self._frames.extend((painted_ns, sample_ns, *seen[:2], -1 if seen[2] is None else seen[2]))
 
     def stop(self) -> None:
         """End the running recording, if any; `kept` reports when it is on the disk."""
@@ -348,10 +347,6 @@ class _Coming:
         if isinstance(thing, _End):
             self.end = thing
         return None if self._ended else thing
-
-
-def _known(age_ns: int | None) -> int:
-    return -1 if age_ns is None else age_ns
 
 
 def event_of(kept: Kept) -> tuple[str, dict[str, Any]]:

@@ -12,7 +12,7 @@ from study_app.protocol.model import Explore, Protocol, Reach
 from study_app.protocol.orders.schedule import FormStep, Schedule, Trial
 from study_app.protocol.trials.tracks import design_of
 from study_app.protocol.wording.languages import words
-from study_app.store.broken_limits import Broken
+from study_app.store.delivered import Broken
 from study_app.store.progress import NoteLine, Progress
 from study_app.store.tables.columns import SEALED
 from study_app.viewmodels.force_traces import ForceFigures, force_rows

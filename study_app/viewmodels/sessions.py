@@ -15,7 +15,7 @@ from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sites.merged import session_in
-from study_app.store.tables.participants import participants_at_once
+from study_app.store.tables.study_files import participants_at_once
 
 Kind: TypeAlias = Literal["", "pilot", "simulated", "sample"]
 KINDS: dict[Kind, str] = {"": "Participants", "pilot": "Pilot", "simulated": "Simulated", "sample": "Sample"}

@@ -17,9 +17,8 @@ from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import Key
 from study_app.store.exclusions import Exclusion, exclusion_bytes, exclusions
 from study_app.store.folders import SessionFolder, StudyFolder
-from study_app.store.tables.column import Column
 from study_app.store.tables.columns import RESPONSES, TRIALS
-from study_app.store.tables.csv_files import csv_bytes
+from study_app.store.tables.csv_files import Column, csv_bytes
 
 SMALL = """
 format = 1

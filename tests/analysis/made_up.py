@@ -10,8 +10,8 @@ import pandas as pd
 from study_app.analysis.tables.compared_blocks import Block, Item, Setting
 from study_app.analysis.tables.planned_analysis import NOTHING, Decided
 from study_app.analysis.tables.study_tables import Study
-from study_app.store.tables.column import Column
 from study_app.store.tables.columns import RESPONSES, TRIALS
+from study_app.store.tables.csv_files import Column
 
 TYPES = {"text": "string", "time": "string", "integer": "Int64", "number": "Float64", "flag": "boolean"}
 ITEMS = ("different", "harder")

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from study_app.store import receipt
-from study_app.store.blinded.blinding import read_key
-from study_app.store.blinded.sealing import opened
+from study_app.store.blinded.blinding import opened, read_key
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.tables.columns import LATER

@@ -11,9 +11,8 @@ from study_app.analysis.tables.study_tables import load_study
 from study_app.protocol.load import load, parse
 from study_app.protocol.simulated_observer import NO_FEATURES
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.blinded.unblinding import unblind
+from study_app.store.blinded.unblinding import unblind, unblind_folder
 from study_app.store.sites.merge import merge
-from study_app.store.sites.unblind_sites import unblind_folder
 from tests.analysis.conftest import CANNOT_JUDGE, SMALL, Results, make_results
 from tests.analysis.levels.level_studies import ADAPTIVE, matching_file
 from tests.analysis.outputs import ELSEWHERE, GOLDEN, figures_as_lines, report_lines

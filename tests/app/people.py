@@ -19,7 +19,7 @@ from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.load import parse, source_bytes
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage, TroublePage
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.reopen import check_can_go_on
+from study_app.store.sessions.recovery import check_can_go_on
 
 
 def window(kind):

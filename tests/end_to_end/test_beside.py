@@ -17,7 +17,7 @@ from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.resume import REHEARSED_SCREENS
 from study_app.session.simulated.answers_only import DEVICE, Answering, SimulatedTime
 from study_app.session.transitions.table import open_session
-from study_app.store.clock import SessionClock
+from study_app.store.journals.journal import SessionClock
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.verify_study import verify

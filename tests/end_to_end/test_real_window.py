@@ -24,7 +24,7 @@ from study_app.gui.preflight.window import FULL as PREFLIGHT
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
 from study_app.protocol.wording.languages import words
-from study_app.store.sessions.reopen import check_can_go_on
+from study_app.store.sessions.recovery import check_can_go_on
 from tests.compiled import needs_servo
 from tests.end_to_end.real_windows import Program, needs_display, virtual_display, wait_for
 from tests.gui.small import ManualClock, questionnaire

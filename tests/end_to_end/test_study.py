@@ -18,8 +18,7 @@ from study_app.protocol.load import load, shipped
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import build_schedule, stream
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.blinded.blinding import open_or_draw_key, read_key
-from study_app.store.blinded.sealing import opened
+from study_app.store.blinded.blinding import open_or_draw_key, opened, read_key
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.verification.verify_study import verify

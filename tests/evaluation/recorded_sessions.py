@@ -27,8 +27,8 @@ from study_app.session.transitions.events import (
     RepeatAsked,
     ResumeAsked,
 )
-from study_app.store.clock import SessionClock
 from study_app.store.folders import StudyFolder
+from study_app.store.journals.journal import SessionClock
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
 from tests.session import small

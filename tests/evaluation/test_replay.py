@@ -21,12 +21,11 @@ from study_app.haptics.runtime.servo import Servo
 from study_app.protocol import formats
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.session.transitions.events import Begin, Continue, EndAsked, PauseAsked, ResumeAsked
-from study_app.store import recording_files
-from study_app.store.blinded.blinding import read_key
-from study_app.store.blinded.sealing import opened
+from study_app.store import recordings
+from study_app.store.blinded.blinding import opened, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.sessions.reopen import reopen
+from study_app.store.sessions.recovery import reopen
 from tests.compiled import needs_servo
 from tests.evaluation.recorded_sessions import STRESSED, begun, held, rewrite, session, stressed, troubled
 from tests.faults.support import short
@@ -105,7 +104,7 @@ def test_a_rehearsed_session_comes_out_to_the_last_bit(rehearsed: Path) -> None:
     found = comes_out(session(rehearsed), 4)
     assert found.lasted_s > 3
     assert found.seconds == sum(
-        len(recording_files.read_checks(path).device_force)
+        len(recordings.read_checks(path).device_force)
         for path in session(rehearsed).glob("recordings/trial-00?.parquet")
     )
     assert 0 < found.computed_s < found.took_s
@@ -151,7 +150,7 @@ def test_repeats_pauses_stops_and_fades_come_out_to_the_last_bit(tmp_path: Path)
 @pytest.mark.parametrize("liquid", STRESSED)
 def test_forces_that_limits_change_come_out_to_the_last_bit(tmp_path: Path, liquid: str) -> None:
     place = stressed(tmp_path / "results", liquid)
-    limiters = recording_files.read_samples(place / "recordings" / "trial-001.parquet").limiters
+    limiters = recordings.read_samples(place / "recordings" / "trial-001.parquet").limiters
     assert all((limiters & bit).any() for bit in (LIMITER_SLOPE, LIMITER_ENERGY, LIMITER_SLEW))
     comes_out(place, 1)
 

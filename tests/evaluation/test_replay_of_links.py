@@ -15,8 +15,7 @@ from study_app.evaluation.replay import replay
 from study_app.protocol.load import parse
 from study_app.protocol.trials.presentation import presented_by
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.blinded.blinding import read_key
-from study_app.store.blinded.sealing import opened
+from study_app.store.blinded.blinding import opened, read_key
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal

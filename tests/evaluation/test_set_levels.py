@@ -9,9 +9,7 @@ import pytest
 
 from study_app.evaluation.replay import replay
 from study_app.session.simulated.rehearsal import rehearse, resume
-from study_app.store.blinded.blinding import read_key
-from study_app.store.blinded.sealing import opened
-from study_app.store.blinded.whole_protocol import whole_protocol
+from study_app.store.blinded.blinding import opened, read_key, whole_protocol
 from study_app.store.journals import journal
 from study_app.store.receipt import read
 from study_app.store.verification.leaks import certain_telltales, find_leaks, recorded_numbers

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from study_app.session.transitions.state import Phase
-from study_app.store import clock
+from study_app.store.journals import journal
 from study_app.store.verification.verify_study import verify
 from tests.faults.support.worlds import StoredWorld
 
@@ -28,7 +28,7 @@ def test_within_a_session_times_go_on(tmp_path: Path, monkeypatch: pytest.Monkey
     world = StoredWorld(tmp_path / "study")
     world.start()
     world.until(Phase.ANSWERING)
-    monkeypatch.setattr(clock, "datetime", Slow)
+    monkeypatch.setattr(journal, "datetime", Slow)
     world.until(Phase.COMPLETE)
     assert all(one["t_s"] <= two["t_s"] and one["at"] <= two["at"] for one, two in pairwise(world.lines))
     assert verify(tmp_path / "study").sound

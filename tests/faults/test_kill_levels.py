@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-from study_app.store.blinded.blinding import read_key
-from study_app.store.blinded.sealing import opened
+from study_app.store.blinded.blinding import opened, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.tables.columns import DELIVERED, TRIALS

@@ -18,8 +18,7 @@ from study_app.protocol.load import load
 from study_app.session import start
 from study_app.session.pages import TaskPage
 from study_app.store import receipt
-from study_app.store.blinded.blinding import read_key
-from study_app.store.blinded.sealing import opened
+from study_app.store.blinded.blinding import opened, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.verification.leaks import Telltales, find_leaks, presented_numbers, recorded_numbers, telltales

@@ -20,7 +20,7 @@ from study_app.session.transitions.state import Phase
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions import folder_lock
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.reopen import reopen
+from study_app.store.sessions.recovery import reopen
 from study_app.store.verification.verify_study import verify
 from tests.faults.support.worlds import StoredWorld
 from tests.session import small

@@ -9,8 +9,7 @@ from study_app.protocol.formats import newer_keys
 from study_app.protocol.load import parse
 from study_app.protocol.orders.durations import expected_duration_s
 from study_app.protocol.streams import stream
-from study_app.store.blinded.blinding import open_or_draw_key, read_key
-from study_app.store.blinded.whole_protocol import whole_protocol
+from study_app.store.blinded.blinding import open_or_draw_key, read_key, whole_protocol
 from study_app.store.receipt import without_conditions
 from tests.protocol.sound import ORDER, SOUND
 from tests.protocol.trials.level_studies import study

@@ -13,7 +13,7 @@ import pytest
 from study_app.haptics.model.layout import LIMITER_NAMES, SAMPLE
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.store.clock import SessionClock
+from study_app.store.journals.journal import SessionClock
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
 

@@ -7,15 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from study_app.store.blinded.blinding import read_key
-from study_app.store.blinded.sealing import opened, sealed
-from study_app.store.checksums import write_checksums
+from study_app.store.blinded.blinding import opened, read_key, sealed
+from study_app.store.checksums import fingerprint, note_fingerprint, write_checksums
 from study_app.store.folders import StudyFolder
-from study_app.store.journals.journal import read
-from study_app.store.journals.journal_writer import line_bytes
+from study_app.store.journals.journal import line_bytes, read
 from study_app.store.sessions.open_session import Place, table_files
-from study_app.store.tables.participants import write_participants
-from study_app.store.verification.fingerprints import fingerprint, note_fingerprint
+from study_app.store.tables.study_files import write_participants
 
 Lines = list[dict[str, Any]]
 

@@ -11,8 +11,7 @@ from typing import Any
 
 import pytest
 
-from study_app.store.blinded.blinding import Key, read_key
-from study_app.store.blinded.sealing import opened, sealed
+from study_app.store.blinded.blinding import Key, opened, read_key, sealed
 from study_app.store.folders import StudyFolder
 from study_app.store.tables.columns import TABLES
 

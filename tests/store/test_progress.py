@@ -11,8 +11,7 @@ from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import PageStep, build_schedule
 from study_app.protocol.streams import stream
-from study_app.store.blinded.blinding import open_or_draw_key, read_key
-from study_app.store.blinded.whole_protocol import whole_protocol
+from study_app.store.blinded.blinding import open_or_draw_key, read_key, whole_protocol
 from study_app.store.progress import Given, Progress, progress, progress_of
 from study_app.store.receipt import without_conditions
 from tests.protocol.trials.level_studies import text_of

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.store import recording_writer
+from study_app.store import recordings
 from study_app.store.recorder import Lost, Recorded, Recorder
-from study_app.store.recording_files import read_facts, read_frames, read_samples
-from study_app.store.recording_writer import SamplesFile
+from study_app.store.recordings import SamplesFile, read_facts, read_frames, read_samples
 from tests.store.conftest import FullDisk, Make
 
 pytestmark = pytest.mark.slow
@@ -40,7 +39,7 @@ class Disk:
                 assert disk.works.wait(20)
                 super().write(samples)
 
-        monkeypatch.setattr(recording_writer, "SamplesFile", SlowFile)
+        monkeypatch.setattr(recordings, "SamplesFile", SlowFile)
 
 
 @pytest.fixture
@@ -211,7 +210,7 @@ def test_a_thread_that_ends_loses_its_trial_at_once_and_the_next_trial_starts_an
         raise Ended("pulled")
 
     with monkeypatch.context() as patched:
-        patched.setattr(recording_writer, "SamplesFile", ends)
+        patched.setattr(recordings, "SamplesFile", ends)
         patched.setattr(threading, "excepthook", lambda _arguments: None)
         recorder.start(1, 1, 1000.0)
         with recorder.changed:

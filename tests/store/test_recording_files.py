@@ -13,8 +13,15 @@ from pyarrow import parquet
 
 from study_app.errors import StoreError
 from study_app.haptics.model.layout import SAMPLE
-from study_app.store.recording_files import Written, read_checks, read_facts, read_frames, read_samples
-from study_app.store.recording_writer import SamplesFile, write_frames
+from study_app.store.recordings import (
+    SamplesFile,
+    Written,
+    read_checks,
+    read_facts,
+    read_frames,
+    read_samples,
+    write_frames,
+)
 from tests.store.conftest import FullDisk, Make
 
 EXACT = ("tick", "time_ns", "lateness_ns", "fresh", "buttons", "limiters", "scene", "status", "position_m")

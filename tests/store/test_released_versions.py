@@ -16,7 +16,7 @@ from study_app.session.simulated import rehearsal
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.sessions.rebuild import rebuild
+from study_app.store.sessions.recovery import rebuild
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 

@@ -7,9 +7,9 @@ import pytest
 
 from study_app.protocol.model import Limits
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.store.broken_limits import beyond_limits
-from study_app.store.tables.column import header
+from study_app.store.delivered import beyond_limits
 from study_app.store.tables.columns import TRIALS
+from study_app.store.tables.csv_files import header
 from study_app.viewmodels.force_traces import ForceFigures
 from study_app.viewmodels.number_words import duration, duration_range, duration_words, grouped, minutes
 from study_app.viewmodels.operator import MEASURES

@@ -12,10 +12,9 @@ from study_app.analysis.tables.compared_blocks import Block
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.measures import AGREEMENT, LEVELS, QUARTILES
 from study_app.analysis.tables.study_tables import Study
-from study_app.store.sites.unblind_sites import reveals_of
-from study_app.store.tables.column import MISSING, Column
+from study_app.store.blinded.unblinding import reveals_of
 from study_app.store.tables.columns import SEALED
-from study_app.store.tables.formulas import COMPUTED
+from study_app.store.tables.csv_files import COMPUTED, MISSING, Column
 
 
 def codebook_bytes(study: Study, files: Mapping[str, Iterable[Column]]) -> bytes:

@@ -6,8 +6,8 @@ from typing import Final
 import pandas as pd
 
 from study_app.analysis.tables.study_tables import Study
-from study_app.store.tables.column import Column, header, optional
 from study_app.store.tables.columns import PARTICIPANTS
+from study_app.store.tables.csv_files import Column, header, optional
 
 _STATUS: Final = next(column for column in PARTICIPANTS if column.name == "status")
 

@@ -10,8 +10,7 @@ from study_app.analysis.export.typed_tables import deliver
 from study_app.analysis.export.wide_table import wide
 from study_app.analysis.results.section_failures import Failure, Progress, silent
 from study_app.analysis.tables.study_tables import Study, load_study
-from study_app.store.output_files import FileCopy
-from study_app.store.withdrawals.output_log import write_output
+from study_app.store.output_files import FileCopy, write_output
 
 
 def export(

@@ -11,9 +11,8 @@ from study_app.analysis.export.delivered import JUDGED, Delivered, delivered
 from study_app.analysis.results.level_results import ExponentFound, LevelsFound, SettingFound
 from study_app.analysis.tables.study_tables import Study
 from study_app.analysis.tables.tracks import OF_INTERVALS, tracks
-from study_app.store.tables.column import Column, header, unsealed
-from study_app.store.tables.columns import INTERVALS, TRIALS_2, tables_of
-from study_app.store.tables.level_columns import EXPONENTS, OF_TRACKS, SETTINGS, THRESHOLDS
+from study_app.store.tables.columns import EXPONENTS, INTERVALS, OF_TRACKS, SETTINGS, THRESHOLDS, TRIALS_2, tables_of
+from study_app.store.tables.csv_files import Column, header, unsealed
 
 _OF_TRIAL: Final = ("study", "participant", "session", "simulated", "pilot", "group", "trial", "attempt", "block")
 _OF_BLOCK: Final = ("phase", "part", "index", "code")

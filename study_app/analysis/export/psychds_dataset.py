@@ -14,7 +14,7 @@ from study_app.analysis.tables.compared_blocks import spoken
 from study_app.analysis.tables.study_tables import Study
 from study_app.protocol.table import text_in
 from study_app.store.output_files import FileCopy
-from study_app.store.tables.column import Column
+from study_app.store.tables.csv_files import Column
 
 FOLDER: Final = "psych-ds"
 KEYWORDS: Final = ("haptics", "psychophysics", "liquids", "Likert scale")

@@ -23,7 +23,7 @@ from study_app.analysis.tables.asked_questions import AskedScore
 from study_app.analysis.tables.measures import LEVELS
 from study_app.analysis.tables.study_tables import Study
 from study_app.errors import AnalysisError
-from study_app.store.tables.column import Column
+from study_app.store.tables.csv_files import Column
 
 CANNOT_JUDGE: Final = 98
 NOT_ANSWERED: Final = 99

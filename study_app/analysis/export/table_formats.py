@@ -3,8 +3,7 @@
 import io
 
 from study_app.analysis.export.delivered import Delivered
-from study_app.store.tables.column import header
-from study_app.store.tables.csv_files import csv_bytes
+from study_app.store.tables.csv_files import csv_bytes, header
 
 
 def table_bytes(table: Delivered) -> bytes:

@@ -15,8 +15,8 @@ from study_app.analysis.export.level_tables import level_tables
 from study_app.analysis.tables.compared_blocks import Setting
 from study_app.analysis.tables.measures import AGREEMENT, LEVELS, QUARTILES
 from study_app.analysis.tables.study_tables import Study
-from study_app.store.tables.column import Column, header, optional, unsealed
 from study_app.store.tables.columns import RESPONSES, TRIALS_2, tables_of
+from study_app.store.tables.csv_files import Column, header, optional, unsealed
 
 OF_A_FORM: Final = Setting("")
 """Stands for the setting of an answer in a form, which has none."""

@@ -12,8 +12,8 @@ from study_app.analysis.tables.asked_questions import AskedQuestion, AskedScore
 from study_app.analysis.tables.compared_blocks import Block, Item, Setting, setting_name
 from study_app.analysis.tables.measures import Array, by_participant
 from study_app.analysis.tables.study_tables import Study
-from study_app.store.tables.column import Column, Kind, optional
 from study_app.store.tables.columns import RESPONSES
+from study_app.store.tables.csv_files import Column, Kind, optional
 
 _PARTICIPANT = next(column for column in RESPONSES if column.name == "participant")
 _SIMULATED = next(column for column in RESPONSES if column.name == "simulated")

@@ -16,7 +16,7 @@ from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.tables.compared_blocks import KINDS
 from study_app.analysis.tables.study_tables import Study, load_study
 from study_app.errors import AnalysisError
-from study_app.store.withdrawals.output_log import write_output
+from study_app.store.output_files import write_output
 
 
 def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None) -> tuple[Path, ...]:

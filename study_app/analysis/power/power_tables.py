@@ -10,8 +10,7 @@ from study_app.analysis.power.batch_counts import EFFECTS
 from study_app.analysis.power.permutation_tests import DRAWS
 from study_app.analysis.power.power_curves import WANTED, Curve, Powers, Question, interval
 from study_app.analysis.results.words import enough
-from study_app.store.tables.column import Column, optional
-from study_app.store.tables.csv_files import csv_bytes
+from study_app.store.tables.csv_files import Column, csv_bytes, optional
 
 COLUMNS: Final = (
     Column("study", "text", "Short name of the study, from its protocol."),

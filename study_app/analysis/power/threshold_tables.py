@@ -13,8 +13,7 @@ from study_app.protocol.checks.expected_precision import RatingPlan, Sensitivity
 from study_app.protocol.model import Protocol
 from study_app.protocol.table import text_in
 from study_app.psychophysics.precision import BETWEEN_PEOPLE, ESTIMATE_NOISE
-from study_app.store.tables.column import Column, optional
-from study_app.store.tables.csv_files import csv_bytes
+from study_app.store.tables.csv_files import Column, csv_bytes, optional
 
 COLUMNS: Final = (
     Column("study", "text", "Short name of the study, from its protocol."),

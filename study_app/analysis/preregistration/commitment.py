@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from study_app.errors import AnalysisError
 from study_app.protocol.model import Protocol
-from study_app.store.journals.parsing import parse_json
+from study_app.store.atomic import parse_json
 
 FILE: Final = "preregistration.md"
 """Its name in a study's folder."""

@@ -19,12 +19,11 @@ from study_app.analysis.results.block_results import Results
 from study_app.analysis.results.section_failures import Failure, Failures
 from study_app.analysis.results.words import name
 from study_app.analysis.tables.study_tables import Study
+from study_app.store.blinded.unblinding import reveals_of
 from study_app.store.checksums import sha256
 from study_app.store.folders import StudyFolder
 from study_app.store.sites.merged import MANIFEST, folders_of
-from study_app.store.sites.unblind_sites import reveals_of
-from study_app.store.tables.column import Column, optional
-from study_app.store.tables.csv_files import csv_bytes
+from study_app.store.tables.csv_files import Column, csv_bytes, optional
 
 FORMAT: Final = 1
 LIBRARIES: Final = ("numpy", "scipy", "pandas", "matplotlib", "pyarrow")

@@ -6,7 +6,7 @@ from study_app.analysis.designs.verdicts import ALONE
 from study_app.analysis.results.block_results import BlockFound
 from study_app.analysis.results.item_test import Tested
 from study_app.analysis.statistics.outcome import Outcome
-from study_app.store.tables.column import Column, optional
+from study_app.store.tables.csv_files import Column, optional
 
 TESTS: Final = (
     Column("block", "text", "Id of the block."),

@@ -29,8 +29,8 @@ from study_app.analysis.results.section_failures import Failure, Failures, Progr
 from study_app.analysis.results.words import counted
 from study_app.analysis.tables.study_tables import Study, load_study
 from study_app.errors import AnalysisError
-from study_app.store.sites.unblind_sites import reveals_of
-from study_app.store.withdrawals.output_log import write_output
+from study_app.store.blinded.unblinding import reveals_of
+from study_app.store.output_files import write_output
 
 HASHES_SHOWN = 12
 """Of so few files the page shows the hashes one by one; of more, one over all of them."""

@@ -15,8 +15,7 @@ from study_app.protocol.trials.designs import Design, default_design
 from study_app.protocol.trials.methods import Method
 from study_app.protocol.trials.stimuli import Assumed, Stimulus, assumed_for, rises
 from study_app.protocol.trials.tracks import design_of, has_correct_answer, method_of, stimulus_of, success_name
-from study_app.store.blinded.blinding import Key
-from study_app.store.blinded.whole_protocol import whole_protocol
+from study_app.store.blinded.blinding import Key, whole_protocol
 
 
 @dataclass(frozen=True, slots=True)

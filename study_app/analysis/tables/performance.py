@@ -18,7 +18,7 @@ from study_app.analysis.tables.reaches import Reach, Targets, reaches, targets_o
 from study_app.analysis.tables.study_tables import Study
 from study_app.errors import StoreError
 from study_app.haptics.model.layout import LIMITER_NAMES
-from study_app.store.recording_files import read_samples
+from study_app.store.recordings import read_samples
 from study_app.store.sites.merged import session_in
 
 OF_TRIALS: Final = ("duration_s", "path_m", "force_mean_n", "force_peak_n", "at_limit_percent")

@@ -17,8 +17,7 @@ from study_app.analysis.tables.typed_files import Whole
 from study_app.errors import AnalysisError
 from study_app.protocol.table import text_in
 from study_app.store.blinded.blinding import Key
-from study_app.store.folders import SessionFolder
-from study_app.store.journals.parsing import check_study_name
+from study_app.store.folders import SessionFolder, check_study_name
 from study_app.store.tables.columns import tables_of
 
 

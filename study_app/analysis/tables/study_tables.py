@@ -30,16 +30,16 @@ from study_app.errors import AnalysisError, StoreError
 from study_app.protocol.questions import STATEMENT
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import Key
+from study_app.store.blinded.unblinding import all_opened
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.sessions.folder_lock import never_begun
 from study_app.store.sessions.open_session import Place
-from study_app.store.sessions.unstarted_sessions import never_begun
 from study_app.store.sites.merged import DASH, Merged, read_merged
-from study_app.store.sites.unblind_sites import all_opened
 from study_app.store.tables.columns import INTERVALS, SEALED
-from study_app.store.tables.study_description import has_intervals
-from study_app.store.verification.integrity import Doubt, doubts
-from study_app.store.withdrawals.tombstones import tombstones
+from study_app.store.tables.study_files import has_intervals
+from study_app.store.verification.verify_session import Doubt, doubts
+from study_app.store.withdrawals import tombstones
 
 COMPLETED: Final = "completed"
 _TRIAL: Final = ["participant", "session", "trial"]

@@ -9,10 +9,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from study_app.errors import AnalysisError
-from study_app.store.atomic import read_regular
-from study_app.store.journals.parsing import parse_json
-from study_app.store.tables.column import MISSING, Column, header
-from study_app.store.tables.csv_files import cells
+from study_app.store.atomic import parse_json, read_regular
+from study_app.store.tables.csv_files import MISSING, Column, cells, header
 
 DTYPES: Final[dict[str, Any]] = {
     "text": "string",

@@ -19,7 +19,7 @@ from study_app.session.resume import is_rehearsal
 from study_app.session.start import check
 from study_app.store import receipt
 from study_app.store.folders import locate
-from study_app.store.sessions.participant_ids import refuse_never_begun
+from study_app.store.sessions.begin import refuse_never_begun
 from study_app.store.workstation import remember_protocol
 from study_app.workspace import workspace
 

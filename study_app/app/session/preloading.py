@@ -7,6 +7,6 @@ def load_windows() -> None:
     import study_app.app.session.preflight_controller  # noqa: PLC0415
     import study_app.app.session.session_windows  # noqa: PLC0415
     import study_app.store.receipt  # noqa: PLC0415
-    import study_app.store.recording_writer  # noqa: PLC0415 - and pyarrow, which the recorder is made with
+    import study_app.store.recordings  # noqa: PLC0415 - and pyarrow, which the recorder is made with
 
     study_app.store.receipt.versions()

@@ -26,7 +26,7 @@ from study_app.session.pages import Page, TaskPage
 from study_app.session.resume import FIRST, Start, resume_at
 from study_app.session.simulated.observers import Hand, hand_for, rest
 from study_app.store.blinded.allocation import session_protocol
-from study_app.store.blinded.sealing import opened
+from study_app.store.blinded.blinding import opened
 from study_app.store.exclusions import exclude
 from study_app.store.folders import StudyFolder
 from study_app.store.progress import progress_of

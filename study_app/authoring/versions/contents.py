@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Final, Literal, TypeAlias
 
 from study_app.errors import StoreError
-from study_app.store.atomic import append_line, write_file
-from study_app.store.journals.parsing import parse_json
+from study_app.store.atomic import append_line, parse_json, write_file
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.user_folder import data_folder
 

@@ -7,8 +7,8 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.store.blinded.blinding import check_conditions
 from study_app.store.folders import StudyFolder
-from study_app.store.sessions.participant_ids import UsedIds, used_ids
-from study_app.store.tables.study_description import check_study
+from study_app.store.sessions.begin import UsedIds, used_ids
+from study_app.store.tables.study_files import check_study
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,8 +33,8 @@ from study_app.session.transitions.commands import Adjust, Command, Finish, Show
 from study_app.session.transitions.events import Begin, Continue, Event, ResumeAsked, Stepped, TaskDone, TimeUp
 from study_app.session.transitions.state import FINAL, SessionState
 from study_app.session.transitions.table import advance, open_session
-from study_app.store.clock import SessionClock
 from study_app.store.folders import rehearsal_folder
+from study_app.store.journals.journal import SessionClock
 from study_app.store.sessions.simulated_sessions import SimulatedStudy
 from study_app.workspace import workspace
 

@@ -20,7 +20,7 @@ from study_app.psychophysics.delivery import lag
 from study_app.session.pages import DesignPage, QuestionnairePage, TextPage
 from study_app.session.simulated.exploration import exploration
 from study_app.session.trial import TankView
-from study_app.store.tables.delivered import LONGEST_S
+from study_app.store.delivered import LONGEST_S
 
 Draw = Callable[[], float]
 

@@ -26,15 +26,14 @@ from study_app.session.simulated.design_observer import OBSERVER, Observer
 from study_app.session.simulated.rehearsed_session import RehearsedSession, rehearsal_rig
 from study_app.session.unkept import Unkept
 from study_app.store.blinded.allocation import session_protocol
-from study_app.store.clock import SessionClock
 from study_app.store.folders import StudyFolder, locate, rehearsal_folder
 from study_app.store.journals import journal
+from study_app.store.journals.journal import SessionClock
 from study_app.store.progress import progress_of
-from study_app.store.sessions.begin import SessionStart, begin
+from study_app.store.sessions.begin import SessionStart, begin, check_unused
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.participant_ids import check_unused
-from study_app.store.sessions.reopen import reopen
-from study_app.store.tables.study_description import check_study
+from study_app.store.sessions.recovery import reopen
+from study_app.store.tables.study_files import check_study
 from study_app.workspace import workspace
 
 

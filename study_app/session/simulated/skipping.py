@@ -16,7 +16,7 @@ from study_app.protocol.simulated_observer import NO_FEATURES
 from study_app.session.simulated.answers_only import Answering, SimulatedTime
 from study_app.session.simulated.preview import preview
 from study_app.session.transitions.table import open_session
-from study_app.store.clock import SessionClock
+from study_app.store.journals.journal import SessionClock
 from study_app.store.sessions.begin import SessionStart, begin
 
 BEGINS: Final = frozenset({"page_shown", "form_shown", "trial_started"})

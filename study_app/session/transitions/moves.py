@@ -56,8 +56,8 @@ from study_app.session.transitions.steps import (
     start_trial,
     which,
 )
+from study_app.store.delivered import delay_error_ms, missed
 from study_app.store.journals.journal_events import CAUSE_WITHHELD
-from study_app.store.tables.delivered import delay_error_ms, missed
 
 STOPPABLE = {Phase.READING, Phase.TASK, Phase.RESTING, Phase.ANSWERING, Phase.FEEDBACK, Phase.PAUSED}
 

@@ -13,13 +13,17 @@ from pathlib import Path
 from study_app.errors import StoreError
 from study_app.protocol.groups import refuse_beyond_last
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.durations import own_protocol
-from study_app.protocol.streams import group_of
-from study_app.store.atomic import cannot_write, is_there, open_regular, read_own, sync_folder, write_through
-from study_app.store.blinded.blinding import Key, read_key
-from study_app.store.blinded.sealing import open_text, seal
+from study_app.store.atomic import (
+    cannot_write,
+    is_there,
+    open_regular,
+    parse_json,
+    read_own,
+    sync_folder,
+    write_through,
+)
+from study_app.store.blinded.blinding import Key, open_text, read_key, seal
 from study_app.store.folders import StudyFolder
-from study_app.store.journals.parsing import parse_json
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,24 +46,7 @@ class Claim:
 
 
 def allocate(study: StudyFolder, key: Key, participant: str, *, waits: bool = True) -> Allocation | None:
-    """Return the allocation of a participant; claim the next entry for a new one. None in a study without groups.
-
-    Parameters
-    ----------
-    study : StudyFolder
-        The folder of the study.
-    key : Key
-        Its key.
-    participant : str
-        The participant's ID.
-    waits : bool
-        Whether the entry is on the disk when this returns.
-
-    Raises
-    ------
-    StoreError
-        The participant's entry was removed or changed, or none can be written.
-    """
+    """Return the allocation of a participant; claim the next entry for a new one. None in a study without groups."""
     if not key.groups:
         return None
     if (known := allocated(study, key, participant)) is not None:
@@ -84,13 +71,7 @@ def allocate(study: StudyFolder, key: Key, participant: str, *, waits: bool = Tr
 
 
 def allocated(study: StudyFolder, key: Key, participant: str) -> Allocation | None:
-    """Return the allocation of a participant, None where there is none yet.
-
-    Raises
-    ------
-    StoreError
-        The participant's entry was removed or changed.
-    """
+    """Return the allocation of a participant, None where there is none yet."""
     for claim in claims(study):
         if claim.participant != participant:
             continue

@@ -1,18 +1,30 @@
-"""The key of codes to conditions: drawn once per study, sealed, and opened only with a name and a reason.
+"""The key of codes to conditions, and what is encrypted with it until it is opened.
 
 ``blinding/key.sealed`` is base64 of a JSON object with the codes, the conditions' and liquids' tables and a 256-bit
-nonce. It is encoded, not encrypted: that prevents accidental reading, and its SHA-256 in every receipt proves that it
-is unchanged; only its owner may read the file. The nonce prevents guessing the key from the hash among few possible
-keys, and encrypts data in the journals that reveal a condition (see ``sealing``). A real study's key comes from the
-operating system's randomness, a rehearsal's from its seed, and a folder holds one or the other.
+nonce. It is drawn once per study, and opened only with a name and a reason. It is encoded, not encrypted: that prevents
+accidental reading, and its SHA-256 in every receipt proves that it is unchanged; only its owner may read the file. The
+nonce prevents guessing the key from the hash among few possible keys. A real study's key comes from the operating
+system's randomness, a rehearsal's from its seed, and a folder holds one or the other.
+
+Measures of a trial that can reveal its condition are encrypted with the nonce: a line ``trial_ended`` or
+``interval_ended`` of a journal holds these columns, a line ``trial_started`` of a trial with a design what it presents,
+as one text, ``sealed``: in hexadecimal digits a tag, and their JSON encrypted. The tag is the HMAC-SHA256 of session,
+trial and JSON; the JSON is combined with SHAKE-256 of nonce and tag by exclusive or. So equal numbers of two trials look
+different, and a changed or moved text is detected (a synthetic initialisation vector as in RFC 5297, with the standard
+library's hashes). Spaces make all texts equally long.
+
+A file may leave the choice of effects and laws to the program (``effects = "auto"``) and its estimator to the format's
+default; another version may choose otherwise. So a receipt's protocol names the estimator, and effects and laws of each
+liquid, which reveal a condition, as one encrypted text, ``resolved``: resume and replay do not resolve them again.
 """
 
 import base64
 import contextlib
 import hashlib
+import hmac
 import json
 import secrets
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -20,22 +32,36 @@ from types import MappingProxyType
 from typing import Any, Final, Literal, TypeAlias
 
 from study_app.errors import StoreError
-from study_app.protocol.model import Protocol
+from study_app.haptics.model.effects import EFFECTS
+from study_app.haptics.model.gate import resolve
+from study_app.protocol.groups.allocation import group_of
+from study_app.protocol.model import Protocol, SceneDefaults, StudyLiquid
 from study_app.protocol.orders.schedule import block_codes, draw_key
 from study_app.protocol.streams import draw_secret
 from study_app.store import receipt
-from study_app.store.atomic import append_line, create_folder, is_there, read_own
+from study_app.store.atomic import append_line, create_folder, is_there, parse_json, read_own
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
+from study_app.store.journals.journal import Line, plain
 from study_app.store.journals.journal_events import holds
-from study_app.store.journals.parsing import parse_json
+from study_app.store.tables.columns import SEALED
 
 Codes: TypeAlias = dict[str, dict[str, str]]
-
 NO_FILES: Final[Mapping[str, str]] = MappingProxyType({})
 _FORMATS: Final = (1, 2)
 """Keys of studies with designs are of format 2: they also hold what is varied and how levels are chosen."""
 _OF_DESIGNS: Final = ("conditions", "standard", "stimulus", "standards", "method")
+_OF_RECEIPT: Final = ("codes", "slots", "order", "compares")
+"""Keys that a receipt adds to a block with a design."""
+_SEALED_IN: Final[Mapping[str, frozenset[str]]] = {
+    "trial_started": frozenset({"level", "standard", "arrangement", "catch"}),
+    "interval_ended": SEALED,
+    "allocated": frozenset({"group"}),
+    "trial_ended": SEALED,
+}
+"""The fields that each event's lines hold sealed."""
+_TAG_BYTES = 16
+_BLOCK_BYTES = 1024
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,23 +117,6 @@ def open_or_draw_key(
     """Return the study's key; draw and seal it if there is none.
 
     If two programs start at the same time, one draws the key and the other reads it.
-
-    Parameters
-    ----------
-    folder : Path
-        The study folder.
-    protocol : Protocol
-        Its conditions are drawn and must be the key's.
-    random : callable, optional
-        Uniform numbers in [0, 1): a seeded stream's for a rehearsal. By default the operating system's randomness.
-    files : mapping of str to str
-        The texts of the protocol's liquid files by their names.
-
-    Raises
-    ------
-    StoreError
-        The key is missing though sessions ran under it, unreadable, changed, of a rehearsal where this is none (or the
-        other way round), or of a protocol with other conditions.
     """
     study = StudyFolder(folder)
     drawn: Literal["system", "seed"] = "system" if random is None else "seed"
@@ -148,13 +157,7 @@ def _refuse_other_conditions(study: StudyFolder, key: Key, protocol: Protocol) -
 
 
 def same_conditions(folder: Path, protocol: Protocol) -> bool:
-    """Return whether ``protocol`` has the liquids, conditions, stimuli and blocks that the key was sealed for.
-
-    Raises
-    ------
-    StoreError
-        The key is missing, unreadable or not the one the sessions ran under.
-    """
+    """Return whether ``protocol`` has the liquids, conditions, stimuli and blocks that the key was sealed for."""
     return verified_key(StudyFolder(folder)).tables_hash == _tables_hash(protocol)
 
 
@@ -366,3 +369,172 @@ def _refuse_if_lost(study: StudyFolder) -> None:
             f"{study.key} is missing, though {len(under)} sessions ran under it: restore it from a copy; without it no "
             "code can be translated"
         )
+
+
+def whole_protocol(published: Mapping[str, Any], key: Key) -> Protocol:
+    """Return the protocol of a receipt completed from the key.
+
+    Raises
+    ------
+    KeyError, TypeError, AttributeError, ValueError
+        They give no protocol that this version knows.
+    """
+    blocks = {name: dict(block) for name, block in published["blocks"].items()}
+    questionnaires = dict(published["questionnaires"])
+    for name, block in blocks.items():
+        if (design := key.tables.get("blocks", {}).get(name)) is not None:
+            questionnaires.pop(block.pop("questionnaire"), None)
+            for written in (*_OF_RECEIPT, *(("repetitions",) if design.get("stimulus") else ())):
+                block.pop(written, None)
+            block |= {what: value for what, value in design.items() if value}
+        else:
+            block["conditions"] = [key.condition(name, code) for code in block.pop("codes")]
+    tables = {name: table for name, table in key.tables.items() if name != "blocks"}
+    if "analysis" in tables:
+        tables["analysis"] = {**published["analysis"], **tables["analysis"]}
+    whole = {**published, **tables, "questionnaires": questionnaires, "blocks": blocks}
+    if not whole.get("sequence"):  # each group has its own, or each session
+        whole.pop("sequence", None)
+    return Protocol.model_validate(whole)
+
+
+def sealed(start: Mapping[str, Any], event: str, fields: dict[str, Any], key: Key) -> dict[str, Any]:
+    """Return the fields of a line as the journal of a session that began with the line ``start`` holds them."""
+    names = _SEALED_IN.get(event, frozenset())
+    measured = {name: value for name, value in fields.items() if name in names}
+    if not start.get("measures_sealed") or not measured:
+        return fields
+    text = seal(_whose(start, {**fields, "event": event}), measured, key)
+    return {**{name: value for name, value in fields.items() if name not in names}, "sealed": text}
+
+
+def seal(whose: Sequence[object], values: Mapping[str, Any], key: Key) -> str:
+    """Return values as a sealed text; ``whose`` identifies their owner, and is needed to open it."""
+    said = json.dumps(plain(values), allow_nan=False, separators=(",", ":")).encode()
+    said = said.ljust(-(-len(said) // _BLOCK_BYTES) * _BLOCK_BYTES)
+    tag = _tag(whose, said, key)
+    return (tag + _combined(said, tag, key)).hex()
+
+
+def open_text(whose: Sequence[object], text: str, key: Key, names: frozenset[str]) -> dict[str, Any] | None:
+    """Return the values of these names from `seal`; None if the text was changed, or has another owner or key."""
+    try:
+        content = bytes.fromhex(text)
+    except ValueError:
+        content = b""
+    tag = content[:_TAG_BYTES]
+    said = _combined(content[_TAG_BYTES:], tag, key)
+    return _measured(said, names) if hmac.compare_digest(tag, _tag(whose, said, key)) else None
+
+
+def opened(lines: Iterable[Line], key: Key | None) -> list[Line]:
+    """Return a journal's lines with their sealed values; unchanged without a ``key``.
+
+    Raises
+    ------
+    StoreError
+        What is sealed was changed, is of another trial, or was sealed with another key.
+    """
+    lines = list(lines)
+    if key is None or not lines:
+        return lines
+    start, *rest = lines
+    if "entry" in start:
+        start = start | {"group": group_of(key.groups, key.nonce, start["entry"])}
+    return [start, *(_opened(start, line, key) if "sealed" in line else line for line in rest)]
+
+
+def opened_key(folder: StudyFolder) -> Key | None:
+    """Return the study's key if it was opened, None while it is sealed.
+
+    Raises
+    ------
+    StoreError
+        It was opened, and is now missing or unreadable.
+    """
+    return read_key(folder.path) if reveals(folder.path) else None
+
+
+def _opened(start: Line, line: Line, key: Key) -> Line:
+    measured = open_text(_whose(start, line), line["sealed"], key, _SEALED_IN.get(line["event"], frozenset()))
+    if measured is None:
+        raise StoreError(
+            f"line {line['n']} of the journal cannot be decrypted with the study's key: it was changed; restore it "
+            "from a copy"
+        )
+    return {**{name: value for name, value in line.items() if name != "sealed"}, **measured}
+
+
+def _measured(said: bytes, names: frozenset[str]) -> dict[str, Any]:
+    """Return the columns in a text with a valid tag, without any that a holder of the key has forged."""
+    try:
+        measured = parse_json(said)
+    except ValueError:
+        return {}
+    items = measured.items() if isinstance(measured, dict) else ()
+    return {name: value for name, value in items if name in names and holds(name, value)}
+
+
+def _whose(start: Mapping[str, Any], line: Mapping[str, Any]) -> list[object]:
+    """Return the owner of a line's sealed text: an attempt at a trial, or a participant's entry."""
+    if "entry" in line:
+        return ["allocated", line["entry"], start["participant"]]
+    whose = [start["participant"], start["session"], line["trial"], line["attempt"]]
+    return whose if line["event"] == "trial_ended" else [*whose, line["event"], line.get("interval")]
+
+
+def _tag(whose: Sequence[object], said: bytes, key: Key) -> bytes:
+    return hmac.digest(key.nonce, json.dumps(whose).encode() + said, "sha256")[:_TAG_BYTES]
+
+
+def _combined(text: bytes, tag: bytes, key: Key) -> bytes:
+    stream = hashlib.shake_256(key.nonce + tag).digest(len(text))
+    return (int.from_bytes(text) ^ int.from_bytes(stream)).to_bytes(len(text))
+
+
+def sealed_model(protocol: Protocol, participant: str, session: int, key: Key) -> str:
+    """Return effects and chosen laws of each liquid, sealed for one session."""
+    return seal(_session_owner(participant, session), {"liquids": _resolved(protocol)}, key)
+
+
+def as_recorded(protocol: Protocol, receipt: Mapping[str, Any], key: Key) -> Protocol:
+    """Return the protocol with the estimator, effects and laws that a session's receipt records.
+
+    Receipts of earlier versions record the estimator alone.
+
+    Raises
+    ------
+    StoreError
+        What is sealed in the receipt was changed, or is of another session.
+    """
+    recorded: dict[str, Any] = {}
+    if (text := receipt.get("resolved")) is not None:
+        whose = _session_owner(receipt["participant"], receipt["session"])
+        opened = open_text(whose, str(text), key, frozenset({"liquids"}))
+        if not opened:
+            raise StoreError(
+                f"the receipt of {receipt['participant']} cannot be decrypted with the study's key (resolved): it was "
+                "changed; restore it from a copy"
+            )
+        recorded = opened["liquids"]
+    liquids = {
+        name: StudyLiquid.model_validate(liquid.model_dump() | recorded[name]) if recorded.get(name) else liquid
+        for name, liquid in protocol.liquids.items()
+    }
+    velocity = receipt["protocol"]["scene"]["velocity"]
+    scene = SceneDefaults.model_validate(protocol.scene.model_dump() | {"velocity": velocity})
+    return protocol.model_copy(update={"liquids": liquids, "scene": scene})
+
+
+def _resolved(protocol: Protocol) -> dict[str, Any]:
+    chosen = [effect.name for effect in EFFECTS if effect.choose is not None]
+    found = {}
+    for name in sorted(protocol.liquids):
+        (liquid,) = resolve(protocol.scene_of(name)).liquids
+        laws = {table: getattr(liquid, table).model_dump(mode="json") for table in chosen}
+        found[name] = {"effects": list(liquid.effects), **laws}
+    return found
+
+
+def _session_owner(participant: str, session: int) -> list[object]:
+    return ["resolved", participant, session]

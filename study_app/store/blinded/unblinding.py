@@ -1,29 +1,35 @@
 """Opening a study: the reveal is recorded, and what was sealed appears in tables, their checksums and the description.
 
-If the program ends meanwhile, the journals contain everything, and opening the study again completes it.
+Then the rule `catch` excludes sessions with too many incorrect answers to catch trials: before that, the count would
+reveal which answers were correct. If the program ends meanwhile, the journals contain everything, and opening the study
+again completes it. In a merged study the key of each site is opened, every one recorded in its own folder.
 """
 
 import contextlib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Final
 
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
+from study_app.protocol.trials.answered import heard_in
 from study_app.store import receipt
 from study_app.store.atomic import is_there, write_file
-from study_app.store.blinded.blinding import Codes, Key, read_key, reveal
-from study_app.store.blinded.catch_trials import exclude_inattentive
+from study_app.store.blinded.blinding import Codes, Key, opened, read_key, reveal, reveals, verified_key, whole_protocol
 from study_app.store.checksums import replace_checksums
-from study_app.store.exclusions import Exclusion
+from study_app.store.exclusions import Exclusion, exclude, exclusions, reversals
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import Line
-from study_app.store.sessions.folder_lock import open_alone
+from study_app.store.sessions.folder_lock import is_open, open_alone
 from study_app.store.sessions.open_session import Place, table_files
+from study_app.store.sites.merged import folders_of
 from study_app.store.tables.csv_files import in_columns_of
-from study_app.store.tables.participants import write_participants
 from study_app.store.tables.session_tables import table_columns
-from study_app.store.tables.study_description import described_study, has_intervals, write_description
+from study_app.store.tables.study_files import described_study, has_intervals, write_description, write_participants
+
+RULE: Final = "catch"
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +81,93 @@ def unblind(folder: Path, by: str, reason: str) -> Unblinded:
     except (StoreError, ValueError, KeyError, TypeError) as error:
         left.append(f"the rule catch was not applied: {error}; then unblind again")
     return Unblinded(codes, tuple(left), excluded)
+
+
+def unblind_folder(folder: Path, by: str, reason: str) -> dict[str, Unblinded]:
+    """Open the key of a study, or of each site of a merged one, by what precedes the site's participants ("A-" or "").
+
+    Raises
+    ------
+    StoreError
+        ``by`` or ``reason`` is empty, or a key is missing, unreadable or not the one the sessions ran under; none was
+        opened then.
+    """
+    folders = folders_of(folder)
+    if "" not in folders:
+        for place in folders.values():
+            verified_key(StudyFolder(place))
+    found: dict[str, Unblinded] = {}
+    for prefix, place in folders.items():
+        of_site = unblind(place, by, reason)
+        excluded = tuple(replace(row, participant=f"{prefix}{row.participant}") for row in of_site.excluded)
+        found[prefix] = replace(of_site, excluded=excluded)
+    return found
+
+
+def reveals_of(folder: Path) -> tuple[dict[str, str], ...]:
+    """Return the recorded reveals of a study; those of a merged one say of which ``site`` they are.
+
+    Raises
+    ------
+    StoreError
+        They cannot be read.
+    """
+    found: list[dict[str, str]] = []
+    for prefix, place in folders_of(folder).items():
+        named: Mapping[str, str] = {"site": prefix[:-1]} if prefix else {}
+        found += [{**named, **one} for one in reveals(place)]
+    return tuple(found)
+
+
+def all_opened(folder: Path) -> bool:
+    """Return whether the key of a study, or the keys of all sites of a merged one, were opened.
+
+    Raises
+    ------
+    StoreError
+        A list of reveals cannot be read.
+    """
+    return all(reveals(place) for place in folders_of(folder).values())
+
+
+def exclude_inattentive(folder: Path) -> tuple[Exclusion, ...]:
+    """Exclude the sessions that answered too many catch trials incorrectly; return what was added.
+
+    A session that is excluded already, or was included again by a person, keeps that decision; one that runs is not
+    judged. The study's key must be open.
+    """
+    study, key = StudyFolder(folder), read_key(folder)
+    decided = {row.what[:2] for row in exclusions(folder) if row.trial is None}
+    decided |= {row.what[:2] for row in reversals(folder) if row.rule_or_person == RULE}
+    added: list[Exclusion] = []
+    for session in study.sessions():
+        if (session.participant, session.number) in decided or is_open(session.path):
+            continue
+        reason = ""
+        with contextlib.suppress(StoreError, KeyError, TypeError, ValueError, AttributeError):  # `verify` names damage
+            reason = "; ".join(_missed(session, key))
+        if reason:
+            added.append(exclude(folder, session.participant, session.number, by=RULE, reason=reason))
+    return tuple(added)
+
+
+def _missed(session: SessionFolder, key: Key) -> Iterator[str]:
+    """Yield the number of incorrect answers to catch trials of each block with too many."""
+    published = receipt.read(session.receipt)["protocol"]
+    if not any("catch" in block for block in published["blocks"].values()):
+        return
+    protocol = whole_protocol(published, key)
+    lines = opened(journal.read(session.journal), key)
+    blocks = {line["trial"]: line["block"] for line in lines if line["event"] == "trial_started"}
+    heard = [one for one in heard_in(protocol, lines) if one.catch]
+    for block in protocol.blocks.values():
+        answered = [one for one in heard if blocks[one.trial] == block.id]
+        wrong = sum(not one.correct for one in answered)
+        if block.catch is not None and answered and wrong / len(answered) > block.catch.wrong_most:
+            yield (
+                f'block "{block.id}": {wrong} of {len(answered)} catch trials answered incorrectly, '
+                f"at most {100 * block.catch.wrong_most:g} % are permitted"
+            )
 
 
 def _open_tables(study: StudyFolder, session: SessionFolder, key: Key) -> list[str]:

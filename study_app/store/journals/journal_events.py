@@ -1,12 +1,13 @@
 """The journal's dictionary: every event, its meaning, and its fields besides ``n``, ``event``, ``t_s`` and ``at``."""
 
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from study_app.store.journals.parsing import PARTICIPANT_ID, RECORDING_NAME, STUDY_NAME
+from study_app.store.folders import PARTICIPANT_ID, RECORDING_NAME, STUDY_NAME
 from study_app.store.tables.columns import DELIVERED, TRIALS, VIDEO
 
 SHOWN = 200  # characters of a bad value shown in messages
@@ -131,26 +132,6 @@ _MOST_SECONDS = 1e9  # of a session's clock
 _MOST = 10**30  # greatest integer that the program writes
 
 
-def _is_text(value: object) -> bool:
-    return isinstance(value, str)
-
-
-def _is_study(value: object) -> bool:
-    return isinstance(value, str) and STUDY_NAME.fullmatch(value) is not None
-
-
-def _is_participant(value: object) -> bool:
-    return isinstance(value, str) and PARTICIPANT_ID.fullmatch(value) is not None
-
-
-def _is_recording(value: object) -> bool:
-    return isinstance(value, str) and RECORDING_NAME.fullmatch(value) is not None
-
-
-def _is_flag(value: object) -> bool:
-    return isinstance(value, bool)
-
-
 def _is_integer(value: object) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and abs(value) <= _MOST
 
@@ -169,24 +150,8 @@ def _is_time(value: object) -> bool:
     return moment.tzinfo is not None and 1 < moment.year < 9999  # in any zone
 
 
-def _is_object(value: object) -> bool:
-    return isinstance(value, dict)
-
-
-def _are_objects(value: object) -> bool:
-    return isinstance(value, list) and all(map(_is_object, value))
-
-
-def _are_limits(value: object) -> bool:
-    return isinstance(value, dict) and all(map(_is_number, value.values()))
-
-
-def _is_answer(value: object) -> bool:
-    return _is_number(value) or _is_text(value) or _are_texts(value)
-
-
 def _are_texts(value: object) -> bool:
-    return isinstance(value, list) and all(map(_is_text, value))
+    return isinstance(value, list) and all(isinstance(text, str) for text in value)
 
 
 def _are_answers(value: object) -> bool:
@@ -197,20 +162,24 @@ def _are_answers(value: object) -> bool:
     )
 
 
+def _matches(pattern: re.Pattern[str]) -> Callable[[object], bool]:
+    return lambda value: isinstance(value, str) and pattern.fullmatch(value) is not None
+
+
 _ANSWER = ("item", "number", "value", "onset_s", "first_s", "last_s", "changes")
 _KINDS: Mapping[str, Callable[[object], bool]] = {
-    "text": _is_text,
-    "study's name": _is_study,
-    "participant's id": _is_participant,
-    "recording's name": _is_recording,
-    "flag": _is_flag,
+    "text": lambda value: isinstance(value, str),
+    "study's name": _matches(STUDY_NAME),
+    "participant's id": _matches(PARTICIPANT_ID),
+    "recording's name": _matches(RECORDING_NAME),
+    "flag": lambda value: isinstance(value, bool),
     "integer": _is_integer,
     "number": _is_number,
     "time": _is_time,
-    "object": _is_object,
-    "list of objects": _are_objects,
-    "table of numbers": _are_limits,
-    "answer": _is_answer,
+    "object": lambda value: isinstance(value, dict),
+    "list of objects": lambda value: isinstance(value, list) and all(isinstance(one, dict) for one in value),
+    "table of numbers": lambda value: isinstance(value, dict) and all(map(_is_number, value.values())),
+    "answer": lambda value: isinstance(value, str) or _is_number(value) or _are_texts(value),
     "list of answers": _are_answers,
     "list of texts": _are_texts,
 }

@@ -3,6 +3,10 @@
 Every opening has a marker with a unique name, which contains machine, process and start of the process; so the marker
 of a killed program differs from that of a running one, and can be removed without affecting a newer one. A program
 writes its marker first and then searches for others: of two simultaneous programs at most one continues.
+
+A session that was claimed and never begun, because its program ended before the journal's first line, contains no data:
+its number is free again. A program that takes it over locks it first. A program that ends while it claims or releases
+a session leaves a hidden folder next to it.
 """
 
 import contextlib
@@ -11,17 +15,32 @@ import os
 import platform
 import re
 import secrets
+import shutil
+import time
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Self
 
 from study_app.errors import StoreError
-from study_app.store.atomic import cannot_write, create_folder, is_there, sync_folder, write_file
-from study_app.store.journals.parsing import parse_json
+from study_app.store import receipt
+from study_app.store.atomic import (
+    cannot_read,
+    cannot_write,
+    create_folder,
+    is_there,
+    parse_json,
+    sweep,
+    sync_folder,
+    temporaries,
+    write_file,
+)
+from study_app.store.journals import journal
 
 _MARKER = re.compile(r"\.open-[0-9a-f]{8}\.json")
 SAME_S = 0.05  # processes of one number that began within this time are the same one
+_BEFORE_THE_FIRST_LINE = ("receipt.json", "journal.jsonl")
+_NO_PROGRAM_TAKES_S = 3600.0  # to put its marker into a folder that it has created, or to take that folder away
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +74,9 @@ def open_alone(folder: Path) -> Opening:
     try:
         for marker in markers(folder):
             if marker != opening.marker:
-                _pass(marker)
+                if _lives(holder := _holder(marker)):
+                    raise _is_open(marker, holder)
+                marker.unlink(missing_ok=True)
         sync_folder(folder)
     except OSError as error:
         opening.release()
@@ -67,13 +88,7 @@ def open_alone(folder: Path) -> Opening:
 
 
 def create_opened(folder: Path) -> Opening | None:
-    """Create ``folder``, locked for this program from the start; None if it exists and is not empty.
-
-    Raises
-    ------
-    StoreError
-        It is not there and cannot be created.
-    """
+    """Create ``folder``, locked for this program from the start; None if it exists and is not empty."""
     opening = Opening(folder / f".open-{secrets.token_hex(4)}.json")
     try:
         created = create_folder(folder, {opening.marker.name: json.dumps(_this_program()).encode()})
@@ -95,25 +110,78 @@ def is_open(folder: Path) -> bool:
 
 
 def refuse_if_open(folder: Path) -> None:
-    """Reject a folder that a program, perhaps this one, has open; nothing is changed.
-
-    Raises
-    ------
-    StoreError
-        Says which program, and since when.
-    """
+    """Reject a folder that a program, perhaps this one, has open; nothing is changed."""
     for marker in markers(folder):
         holder = _holder(marker)
         if _lives(holder):
             raise _is_open(marker, holder)
 
 
-def _pass(marker: Path) -> None:
-    """Remove the marker of a program that has ended; refuse if it still runs."""
-    holder = _holder(marker)
-    if _lives(holder):
-        raise _is_open(marker, holder)
-    marker.unlink(missing_ok=True)
+def never_begun(path: Path) -> bool:
+    """Return whether the session's folder ``path`` is there without a line of a journal, or anything later than that.
+
+    A receipt that tells of the session's end, or that it was resumed, is later than that.
+
+    Raises
+    ------
+    StoreError
+        The system does not let us look.
+    """
+    if not is_there(path):
+        return False
+    try:
+        early = {path / name for name in _BEFORE_THE_FIRST_LINE}
+        if set(path.iterdir()) - early - {*markers(path), *temporaries(path)}:
+            return False
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    with contextlib.suppress(StoreError):
+        held = receipt.read(path / "receipt.json")
+        if held.get("status") != receipt.UNFINISHED or held.get("resumed"):
+            return False
+    first = path / "journal.jsonl"
+    if not is_there(first):
+        return True
+    contents = journal.scan(first)
+    return not contents.lines and contents.damage is None
+
+
+def abandoned(path: Path) -> bool:
+    """Return whether the session's folder ``path`` was claimed and never begun, by a program that is gone."""
+    return never_begun(path) and not is_open(path)
+
+
+def take_over(path: Path) -> Opening | None:
+    """Have the session's folder ``path`` for this program alone and empty it; None where it was begun, or is open."""
+    if not abandoned(path):
+        return None
+    opening = open_alone(path)
+    try:
+        if not never_begun(path):
+            opening.release()
+            return None
+        sweep(path)
+        for name in _BEFORE_THE_FIRST_LINE:
+            (path / name).unlink(missing_ok=True)
+    except OSError as error:
+        opening.release()
+        raise cannot_write(path, error) from error
+    except StoreError:
+        opening.release()
+        raise
+    return opening
+
+
+def sweep_claims(participant: Path) -> None:
+    """Take away what programs that are gone left in a participant's folder as they claimed a session or let go of it.
+
+    Without a program's marker its owner is unknown; then only what is older than any such moment.
+    """
+    for half in temporaries(participant):
+        with contextlib.suppress(OSError):  # it has just become a session, or is gone
+            old = time.time() - half.stat().st_mtime > _NO_PROGRAM_TAKES_S
+            if half.is_dir() and (old or markers(half)) and not is_open(half):  # in this order: markers come
+                shutil.rmtree(half, ignore_errors=True)
 
 
 def _is_open(marker: Path, holder: dict[str, Any]) -> StoreError:
@@ -157,24 +225,7 @@ def _lives(holder: dict[str, Any]) -> bool:
 
 
 def process_began(process: int) -> float | None:
-    """Return when the running process of that number began; None if none runs.
-
-    Parameters
-    ----------
-    process : int
-        Its number.
-
-    Returns
-    -------
-    float or None
-        [s], since the computer was started on Linux, where setting the clock moves the wall time of every process;
-        elsewhere since the epoch.
-
-    Raises
-    ------
-    PermissionError
-        It runs, and belongs to another account, which hides it.
-    """
+    """Return when the running process of that number began; None if none runs."""
     import psutil  # noqa: PLC0415 - slow to load: only where a folder is locked
 
     try:

@@ -18,19 +18,15 @@ from study_app.outlets.marker import Marker, marker_of
 from study_app.outlets.session_outlets import Outlets
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
-from study_app.store.blinded.blinding import Key
-from study_app.store.blinded.resolved_model import as_recorded
-from study_app.store.blinded.sealing import opened, opened_key, sealed
-from study_app.store.checksums import write_checksums
+from study_app.store.blinded.blinding import Key, as_recorded, opened, opened_key, sealed
+from study_app.store.checksums import fingerprint, note_fingerprint, write_checksums
 from study_app.store.folders import SessionFolder, StudyFolder
-from study_app.store.journals.journal import Line
-from study_app.store.journals.journal_writer import Journal
+from study_app.store.journals.journal import Journal, Line
 from study_app.store.recorder import LEAVING_S, Kept, Recorder, event_of, hashes_of
 from study_app.store.sessions.folder_lock import Opening
 from study_app.store.tables import csv_files, session_tables
-from study_app.store.tables.growing_tables import GrowingTables
-from study_app.store.tables.participants import write_participants
-from study_app.store.verification.fingerprints import fingerprint, note_fingerprint
+from study_app.store.tables.session_tables import GrowingTables
+from study_app.store.tables.study_files import write_participants
 
 BEGINNINGS = ("session_started", "session_resumed")
 
@@ -214,13 +210,7 @@ class SessionStore:
             self.opening.release()
 
     def note_resumed(self, what: Mapping[str, Any]) -> None:
-        """Add the data of the resumption to the receipt.
-
-        Raises
-        ------
-        StoreError
-            The receipt cannot be written.
-        """
+        """Add the data of the resumption to the receipt."""
         self._receipt["resumed"] = [*self._receipt.get("resumed", ()), dict(what)]
         self._write_receipt()
 

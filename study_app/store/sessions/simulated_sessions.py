@@ -20,20 +20,22 @@ from study_app.protocol.orders.schedule import stream
 from study_app.protocol.source.files import unbundled
 from study_app.store.atomic import cannot_write, create_folder
 from study_app.store.blinded.allocation import allocate
-from study_app.store.blinded.blinding import open_or_draw_key, reveals
-from study_app.store.blinded.sealing import opened, opened_key, sealed
-from study_app.store.checksums import checksum_bytes
-from study_app.store.clock import SessionClock
+from study_app.store.blinded.blinding import open_or_draw_key, opened, opened_key, reveals, sealed
+from study_app.store.checksums import checksum_bytes, fingerprint, note_fingerprint
 from study_app.store.folders import StudyFolder
-from study_app.store.journals.journal import Line, line_bytes, line_of, plain
-from study_app.store.sessions.begin import SessionStart, first_words, make_folder
+from study_app.store.journals.journal import Line, SessionClock, line_bytes, line_of, plain
+from study_app.store.sessions.begin import (
+    SessionStart,
+    check_participant,
+    check_unused,
+    first_words,
+    make_folder,
+    used_id,
+)
 from study_app.store.sessions.folder_lock import Opening, open_alone
 from study_app.store.sessions.open_session import Place, table_files
-from study_app.store.sessions.participant_ids import check_participant, check_unused, used_id
 from study_app.store.tables import csv_files, session_tables
-from study_app.store.tables.participants import write_participants
-from study_app.store.tables.study_description import check_study, write_description
-from study_app.store.verification.fingerprints import fingerprint, note_fingerprint
+from study_app.store.tables.study_files import check_study, write_description, write_participants
 
 
 class SimulatedStudy:

@@ -29,11 +29,10 @@ from study_app.store.atomic import (
 )
 from study_app.store.blinded.blinding import Key, verified_key
 from study_app.store.folders import ID_PATTERN, StudyFolder
-from study_app.store.sessions.folder_lock import create_opened, is_open, open_alone, refuse_if_open
-from study_app.store.sessions.unstarted_sessions import never_begun
+from study_app.store.sessions.folder_lock import create_opened, is_open, never_begun, open_alone, refuse_if_open
 from study_app.store.sites.merged import FOLDER, Merged, Site, merged_above, read_merged
-from study_app.store.tables.study_description import described_study
-from study_app.store.withdrawals.tombstones import describe_session
+from study_app.store.tables.study_files import described_study
+from study_app.store.withdrawals import describe_session
 
 MAX_SITE_LENGTH: Final = 16
 LEFT_BEHIND: Final = shutil.ignore_patterns(".open-*.json", ".*.tmp")
@@ -207,7 +206,9 @@ def _create(merged: Merged, sources: tuple[_Source, ...]) -> None:
     half = temporary_path(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        _remove_killed(target)
+        for path in temporaries(target.parent):  # of merges that were killed
+            if path.name.startswith(f".{target.name}.") and path.is_dir() and not is_open(path):
+                shutil.rmtree(path, ignore_errors=True)
         opening = create_opened(half)
         (half / FOLDER).mkdir()
         for source in sources:
@@ -225,13 +226,6 @@ def _create(merged: Merged, sources: tuple[_Source, ...]) -> None:
         raise cannot_write(merged.path, error) from error
     finally:
         shutil.rmtree(half, ignore_errors=True)
-
-
-def _remove_killed(target: Path) -> None:
-    """Remove what merges that were killed left next to ``target``."""
-    for path in temporaries(target.parent):
-        if path.name.startswith(f".{target.name}.") and path.is_dir() and not is_open(path):
-            shutil.rmtree(path, ignore_errors=True)
 
 
 def _add(merged: Merged, sources: tuple[_Source, ...]) -> None:
@@ -258,13 +252,7 @@ def _add(merged: Merged, sources: tuple[_Source, ...]) -> None:
 
 
 def _copy(source: _Source, to: Path) -> None:
-    """Copy a results folder and flush it to the disk; links stay links, for `verify` to judge.
-
-    Raises
-    ------
-    StoreError
-        A program wrote there since it was read.
-    """
+    """Copy a results folder and flush it to the disk; links stay links, for `verify` to judge."""
     shutil.copytree(source.path, to, symlinks=True, ignore=LEFT_BEHIND, copy_function=_copy_file)
     for place in (to, *(one for one in paths_in(to) if one.is_dir() and not one.is_symlink())):
         sync_folder(place)

@@ -20,11 +20,10 @@ from pathlib import Path
 from typing import Final
 
 from study_app.errors import StoreError
-from study_app.store.atomic import cannot_read, read_regular
+from study_app.store.atomic import cannot_read, parse_json, read_regular
 from study_app.store.exclusions import Exclusion, exclusions
-from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder
+from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder, check_study_name
 from study_app.store.journals.journal_events import holds, shortened
-from study_app.store.journals.parsing import check_study_name, parse_json
 
 MANIFEST: Final = "sites.json"
 FOLDER: Final = "sites"
@@ -34,19 +33,7 @@ DASH: Final = "-"
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """A site of a merged study, as ``sites.json`` lists it.
-
-    Attributes
-    ----------
-    name : str
-        Letters and digits.
-    merged_at : str
-        When its folder was merged: wall time with its zone.
-    key_hash : str
-        SHA-256 of its sealed key.
-    sessions : int
-        How many sessions it had then.
-    """
+    """A site of a merged study, as ``sites.json`` lists it."""
 
     name: str
     merged_at: str
@@ -211,13 +198,7 @@ def merged_above(folder: Path) -> Path | None:
 
 
 def refuse_merged(folder: Path) -> None:
-    """Refuse to run sessions in a merged study, or in its copy of a site.
-
-    Raises
-    ------
-    StoreError
-        It is one.
-    """
+    """Refuse to run sessions in a merged study, or in its copy of a site."""
     if (folder / MANIFEST).is_file():
         raise StoreError(f"{folder} is a merged study, which holds copies: run sessions in the folder of a site")
     if (above := merged_above(folder)) is not None:

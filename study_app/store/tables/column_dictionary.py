@@ -7,10 +7,21 @@ import sys
 from collections.abc import Sequence
 
 from study_app.store.journals.journal_events import EVENTS
-from study_app.store.tables.column import MISSING, Column
-from study_app.store.tables.columns import EXCLUSIONS, INTERVALS, PARTICIPANTS, RESPONSES, RESPONSES_2, TRIALS, TRIALS_2
-from study_app.store.tables.level_columns import EXPONENTS, OF_TRACKS, SETTINGS, THRESHOLDS
-from study_app.store.tables.recorded_columns import FRAMES, SAMPLES
+from study_app.store.recordings import FRAMES, SAMPLES
+from study_app.store.tables.columns import (
+    EXCLUSIONS,
+    EXPONENTS,
+    INTERVALS,
+    OF_TRACKS,
+    PARTICIPANTS,
+    RESPONSES,
+    RESPONSES_2,
+    SETTINGS,
+    THRESHOLDS,
+    TRIALS,
+    TRIALS_2,
+)
+from study_app.store.tables.csv_files import MISSING, Column
 
 SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
     ("Responses", "subject-…_description-responses_data.csv", "one row per response", RESPONSES),

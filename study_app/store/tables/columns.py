@@ -5,10 +5,209 @@ name mean the same in every table.
 """
 
 from dataclasses import replace
+from typing import Final
 
 from study_app.haptics.model.layout import LIMITER_NAMES
-from study_app.store.tables.column import Column, optional
-from study_app.store.tables.identity_columns import CODE, PARTICIPANT, SESSION, SESSION_COLUMNS, TRIAL, TRIAL_COLUMNS
+from study_app.store.tables.csv_files import Column, optional
+
+STUDY = Column("study", "text", "Short name of the study, from its protocol.")
+PARTICIPANT = Column("participant", "text", "The participant's id: letters and digits, not a name.")
+SESSION = Column("session", "integer", "Number of the participant's session.", minimum=1, maximum=99)
+SIMULATED = Column("simulated", "flag", "true if participant and device were simulated (a rehearsal).")
+PILOT = Column("pilot", "flag", "true if the session was a pilot.")
+TRIAL = Column("trial", "integer", "Number of the trial in the session, in the order of presentation.", minimum=1)
+ATTEMPT = Column("attempt", "integer", "1, or higher if the trial was repeated; the highest counts.", minimum=1)
+BLOCK = Column("block", "text", "Id of the block of trials.")
+PHASE = Column(
+    "phase",
+    "text",
+    "Purpose of the trial; only main trials are analysed.",
+    levels=(
+        ("main", "analysed"),
+        ("practice", "learning the task"),
+        ("baseline", "the undisturbed task to which later statements refer"),
+    ),
+)
+PART = optional("part", "integer", "Part of the study, as shown to the participant.", minimum=1)
+INDEX = Column("index", "integer", "Position of the trial in its block, from 1.", minimum=1)
+CODE = Column("code", "text", "What was presented, as a code (L1, D3 ...) that the sealed key translates.")
+SESSION_COLUMNS = (STUDY, PARTICIPANT, SESSION, SIMULATED, PILOT)
+"""Which session a row is about."""
+TRIAL_COLUMNS = (TRIAL, ATTEMPT, BLOCK, PHASE, PART, INDEX)
+"""Which trial of it."""
+_LIMITERS = {
+    "slope": "the slope limit bounded the change of force with speed",
+    "non_finite": "a force that was not finite was replaced by zero",
+    "energy": "the passivity controller changed the force",
+    "norm": "the force was cut to the force limit",
+    "slew": "the change of force was slowed",
+    "fade": "the force was fading in or out",
+    "stale": "the device had no new sample in time",
+    "glitch": "a sample was rejected as implausible",
+    "stop": "the force was stopped",
+    "estimator": "EWMA gave the velocity, because the Kalman filter's innovations were too large or the delay changed",
+    "saturated": "the device's motors saturated: its force was between zero and the recorded one",
+}
+_INVALID = (
+    "invalid",
+    "an interval was not delivered as requested: nothing was asked, and the trial was presented again",
+)
+_NOT_OF_INTERVALS = ("of", "trial_started_at", "trial_started_s", "marked", "notes")
+_LEVEL = "distance of the comparison from its standard, or the value itself, as the protocol asks"
+PARTICIPANTS: tuple[Column, ...] = (
+    *SESSION_COLUMNS,
+    Column(
+        "status",
+        "text",
+        "How the session ended.",
+        levels=(
+            ("completed", "it reached its last page"),
+            ("withdrawn", "the participant stopped"),
+            ("aborted", "the operator stopped it"),
+            ("broken", "the operator stopped it after device, servo or program had failed"),
+            ("damaged", "its journal is damaged: the row contains what could be read"),
+            ("unfinished", "no end recorded: it is still running, or its program was killed"),
+        ),
+    ),
+    Column("session_started_at", "time", "Time when the session began."),
+    optional("session_ended_at", "time", "Time when the session ended."),
+    Column("resumed", "integer", "How often it was resumed after its program had ended.", minimum=0),
+    optional("device", "text", "The haptic device."),
+    Column("language", "text", "Language of the participant's pages."),
+    Column("trials", "integer", "Number of completed main trials.", minimum=0),
+    Column("responses", "integer", "Number of answers in main trials, including those off the scale.", minimum=0),
+    optional(
+        "validity",
+        "text",
+        "Whether the session's main trials were valid; n/a before the first has ended.",
+        levels=(("valid", "all did"), ("invalid", "at least one did not")),
+    ),
+)
+GROUP = optional("group", "text", "The participant's group; n/a in a study without groups.", sealed=True, later=True)
+PARTICIPANTS_2: tuple[Column, ...] = (
+    *(
+        replace(one, description="Answers given in main trials and forms, those off the scale included.")
+        if one.name == "responses"
+        else one
+        for one in PARTICIPANTS
+    ),
+    GROUP,
+)
+"""Columns of sessions in a study whose protocol has format 2."""
+EXCLUSIONS: tuple[Column, ...] = (
+    PARTICIPANT,
+    SESSION,
+    replace(TRIAL, description="Number of the trial; n/a if the whole session is excluded.", may_miss=True),
+    Column("rule_or_person", "text", "The rule that excludes it, or the initials of the person."),
+    Column("reason", "text", "Reason for the exclusion."),
+    Column("excluded_at", "time", "Time of the decision."),
+)
+SETTINGS: Final[tuple[Column, ...]] = (
+    Column("block", "text", "Id of the block."),
+    optional("standard", "number", "The standard, in the unit of the varied number; n/a where there is none."),
+    Column("n", "integer", "Settings that count.", minimum=0),
+    Column("pse", "number", "Point of subjective equality, a level: the mean of the settings in u."),
+    optional("low", "number", "Lower end of the 95 % interval of the PSE (Student's t)."),
+    optional("high", "number", "Upper end of the 95 % interval of the PSE (Student's t)."),
+    optional(
+        "jnd",
+        "number",
+        "Just-noticeable difference: the standard deviation of the settings, in u (decades where levels are spaced by "
+        "their logarithm, else in the unit of the levels).",
+        minimum=0,
+    ),
+    optional("constant_error", "number", "PSE minus standard, in u; n/a where no standard was presented."),
+    optional(
+        "hysteresis", "number", "Mean of the settings that started high minus mean of those that started low, in u."
+    ),
+)
+"""Of one row per participant and standard of a block whose levels participants set."""
+EXPONENTS: Final[tuple[Column, ...]] = (
+    Column("block", "text", "Id of the block."),
+    Column("levels", "integer", "Levels with answers that count.", minimum=2),
+    Column(
+        "exponent",
+        "number",
+        "Exponent of the power law: the slope of the mean ln answer at each level on ln level, at delivered levels.",
+    ),
+)
+"""Of one row per participant of a block of magnitude estimation."""
+THRESHOLDS: Final[tuple[Column, ...]] = (
+    Column("block", "text", "Id of the block."),
+    optional("standard", "number", "The standard, in the unit of the varied number; n/a where there is none."),
+    optional("condition", "text", "The condition that was compared; n/a in a block of levels."),
+    Column("n", "integer", "Answers that count.", minimum=0),
+    optional(
+        "threshold",
+        "number",
+        "Level at which the psychometric function is half-way between guesses and lapses: posterior median, in the "
+        "unit of the stimulus' levels; n/a where the answers enter no such function.",
+    ),
+    optional("low", "number", "Lower end of the threshold's equal-tailed 95 % interval."),
+    optional("high", "number", "Upper end of the threshold's equal-tailed 95 % interval."),
+    optional(
+        "beyond",
+        "text",
+        "Whether the threshold lies beyond the levels that were presented; n/a: between them.",
+        levels=(("above", "above the highest"), ("below", "below the lowest")),
+    ),
+    optional(
+        "width",
+        "number",
+        "Posterior median of the function's width, from 5 to 95 % of its rise: in decades where levels are spaced by "
+        "their logarithm, else in the unit of the levels.",
+        minimum=0,
+    ),
+    optional("lapse", "number", "Posterior median of the lapse rate.", minimum=0, maximum=1),
+    optional(
+        "weber_exponent",
+        "number",
+        "Slope of ln JND on ln standard over the participant's standards: the same in each of these rows; n/a with "
+        "fewer than two standards.",
+    ),
+    optional("flat_width_threshold", "number", "The threshold under a flat prior on the width."),
+    optional(
+        "reversal_mean",
+        "number",
+        "Mean of the last reversals of the up–down tracks; n/a for other methods and with too few.",
+    ),
+    optional(
+        "target_percent",
+        "number",
+        "Percentage of successes to which the rule of the up–down tracks converges.",
+        "%",
+        minimum=0,
+        maximum=100,
+    ),
+    optional("d_prime", "number", "Sensitivity over all levels presented; n/a where no answer is correct."),
+    optional(
+        "d_prime_model",
+        "text",
+        "The model of d_prime, where the design has two.",
+        levels=(
+            ("differencing", "intervals are compared with each other"),
+            ("independent", "each interval is compared with known alternatives"),
+        ),
+    ),
+    optional("d_prime_other", "number", "Sensitivity under the other model."),
+    optional(
+        "criterion",
+        "number",
+        "c of yes–no and of two-interval forced choice, k of the differencing model of same–different.",
+    ),
+    optional(
+        "share_first", "number", "Share of the first of the answers, such as “first” or “yes”.", minimum=0, maximum=1
+    ),
+    optional(
+        "fit_p",
+        "number",
+        "p of the function's deviance among simulated sets of answers; below 0.05 the function does not fit.",
+        minimum=0,
+        maximum=1,
+    ),
+    optional("drift", "number", "Correlation of trial number and deviance residual.", minimum=-1, maximum=1),
+)
+"""Of one row per participant and standard, or compared condition."""
 
 
 def _measure(name: str, description: str, unit: str = "", *, sealed: bool = False, later: bool = False) -> Column:
@@ -51,6 +250,7 @@ RESPONSES: tuple[Column, ...] = (
 
 _RESPONSES_BY_NAME = {column.name: column for column in RESPONSES}
 
+
 RESPONSES_2: tuple[Column, ...] = (
     *SESSION_COLUMNS,
     optional("form", "text", "Id of the questionnaire that was presented on its own; n/a after a trial."),
@@ -69,20 +269,6 @@ RESPONSES_2: tuple[Column, ...] = (
 )
 """Responses of a study of format 2."""
 
-
-_LIMITERS = {
-    "slope": "the slope limit bounded the change of force with speed",
-    "non_finite": "a force that was not finite was replaced by zero",
-    "energy": "the passivity controller changed the force",
-    "norm": "the force was cut to the force limit",
-    "slew": "the change of force was slowed",
-    "fade": "the force was fading in or out",
-    "stale": "the device had no new sample in time",
-    "glitch": "a sample was rejected as implausible",
-    "stop": "the force was stopped",
-    "estimator": "EWMA gave the velocity, because the Kalman filter's innovations were too large or the delay changed",
-    "saturated": "the device's motors saturated: its force was between zero and the recorded one",
-}
 
 TRIALS: tuple[Column, ...] = (
     *SESSION_COLUMNS,
@@ -188,18 +374,15 @@ TRIALS: tuple[Column, ...] = (
     ),
 )
 
-_INVALID = (
-    "invalid",
-    "an interval was not delivered as requested: nothing was asked, and the trial was presented again",
-)
+
 _TRIALS_BY_NAME = {
     column.name: replace(column, levels=(*column.levels, _INVALID)) if column.name == "outcome" else column
     for column in TRIALS
 }
-_NOT_OF_INTERVALS = ("of", "trial_started_at", "trial_started_s", "marked", "notes")
-_LEVEL = "distance of the comparison from its standard, or the value itself, as the protocol asks"
+
 
 _OUTCOME = [column.name for column in TRIALS].index("outcome")
+
 
 DELIVERED: tuple[Column, ...] = (
     _signed(
@@ -217,6 +400,7 @@ DELIVERED: tuple[Column, ...] = (
     _signed("setting", "The level that the participant set; n/a in intervals that were not adjusted."),
 )
 """What an interval delivered."""
+
 
 VIDEO: tuple[Column, ...] = (
     _count("video_frames", "Frames of the video that were shown; n/a without a video.", sealed=True, later=True),
@@ -241,6 +425,7 @@ VIDEO: tuple[Column, ...] = (
     ),
 )
 """What was seen of a video."""
+
 
 INTERVALS: tuple[Column, ...] = (
     *(column for column in TRIALS[: TRIALS.index(CODE) + 1] if column.name not in _NOT_OF_INTERVALS),
@@ -270,37 +455,7 @@ INTERVALS: tuple[Column, ...] = (
 )
 """Intervals of the trials of a study with designs."""
 
-PARTICIPANTS: tuple[Column, ...] = (
-    *SESSION_COLUMNS,
-    Column(
-        "status",
-        "text",
-        "How the session ended.",
-        levels=(
-            ("completed", "it reached its last page"),
-            ("withdrawn", "the participant stopped"),
-            ("aborted", "the operator stopped it"),
-            ("broken", "the operator stopped it after device, servo or program had failed"),
-            ("damaged", "its journal is damaged: the row contains what could be read"),
-            ("unfinished", "no end recorded: it is still running, or its program was killed"),
-        ),
-    ),
-    Column("session_started_at", "time", "Time when the session began."),
-    optional("session_ended_at", "time", "Time when the session ended."),
-    Column("resumed", "integer", "How often it was resumed after its program had ended.", minimum=0),
-    optional("device", "text", "The haptic device."),
-    Column("language", "text", "Language of the participant's pages."),
-    Column("trials", "integer", "Number of completed main trials.", minimum=0),
-    Column("responses", "integer", "Number of answers in main trials, including those off the scale.", minimum=0),
-    optional(
-        "validity",
-        "text",
-        "Whether the session's main trials were valid; n/a before the first has ended.",
-        levels=(("valid", "all did"), ("invalid", "at least one did not")),
-    ),
-)
 
-GROUP = optional("group", "text", "The participant's group; n/a in a study without groups.", sealed=True, later=True)
 TRIALS_2: tuple[Column, ...] = (
     *_TRIALS_BY_NAME.values(),
     *VIDEO,
@@ -309,25 +464,6 @@ TRIALS_2: tuple[Column, ...] = (
 )
 """Columns of trials in a study whose protocol has format 2."""
 
-PARTICIPANTS_2: tuple[Column, ...] = (
-    *(
-        replace(one, description="Answers given in main trials and forms, those off the scale included.")
-        if one.name == "responses"
-        else one
-        for one in PARTICIPANTS
-    ),
-    GROUP,
-)
-"""Columns of sessions in a study whose protocol has format 2."""
-
-EXCLUSIONS: tuple[Column, ...] = (
-    PARTICIPANT,
-    SESSION,
-    replace(TRIAL, description="Number of the trial; n/a if the whole session is excluded.", may_miss=True),
-    Column("rule_or_person", "text", "The rule that excludes it, or the initials of the person."),
-    Column("reason", "text", "Reason for the exclusion."),
-    Column("excluded_at", "time", "Time of the decision."),
-)
 
 TABLES: dict[str, tuple[Column, ...]] = {"responses": RESPONSES, "trials": TRIALS, "participants": PARTICIPANTS}
 
@@ -342,6 +478,7 @@ def tables_of(protocol_format: int) -> dict[str, tuple[Column, ...]]:
 LATER = frozenset(column.name for column in (*TRIALS_2, *INTERVALS) if column.later)
 """Columns that earlier versions did not write."""
 
+
 SEALED = frozenset(column.name for column in (*TRIALS_2, *DELIVERED) if column.sealed)
 """Columns of a trial that no table has before the key was opened (see ``sealing``)."""
 
@@ -353,3 +490,47 @@ def every_column(protocol_format: int = 1, *, intervals: bool = False) -> tuple[
         for column in columns if name != "intervals" or intervals else ():
             found.setdefault(column.name, column)
     return tuple(found.values())
+
+
+_BY_NAME: Final = {column.name: column for column in INTERVALS}
+
+
+OF_TRACKS: Final[tuple[Column, ...]] = (
+    Column("analysed", "flag", "true where the row counts and does not present the modulus of a magnitude estimation."),
+    Column("track", "text", "What the code stands for: standard and number of the track (8/1), or the condition."),
+    Column("slot", "integer", "Position of the trial among those of its code in the session, from 1.", minimum=1),
+    _BY_NAME["catch"],
+    _BY_NAME["standard"],
+    replace(_BY_NAME["level"], name="level_asked"),
+    optional(
+        "level_delivered",
+        "number",
+        "The level at which the hand met the comparison: from the delivered values, and for a visual delay from the "
+        "mean errors of the frames; n/a where it was not measured.",
+    ),
+    optional(
+        "comparison",
+        "number",
+        "The comparison at this level, in the unit of the varied number; n/a where conditions are compared.",
+    ),
+    optional(
+        "arrangement",
+        "text",
+        "What the intervals presented, in order: S the standard, C the comparison; n/a if none was presented.",
+    ),
+    optional(
+        "comparison_interval",
+        "integer",
+        "The interval that alone presented the comparison, from 1; n/a where there is none.",
+        minimum=1,
+    ),
+    optional("response", "text", "The answer; n/a without one."),
+    optional("value", "number", "The answer as a number, where it is one."),
+    optional("right", "flag", "true if the answer was correct; n/a where no answer is."),
+    optional("response_s", "number", "Time from the question to the first choice of an answer.", "s", minimum=0),
+    optional(
+        "reversal", "flag", "true if the up–down track changed its direction here; n/a where the method has no steps."
+    ),
+    replace(_BY_NAME["setting"], description="The level that the participant set, from level_asked on."),
+)
+"""What a row of tracks has in addition to the trial it is about."""

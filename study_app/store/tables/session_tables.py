@@ -1,28 +1,59 @@
 """Tables from journals: pure functions of the lines alone, so any table can be made again at any time.
 
 A row is a dictionary from column name to value; ``csv_bytes`` writes rows with the columns of ``columns.py``, in their
-order, the same bytes for the same rows on every machine.
+order, the same bytes for the same rows on every machine. While a session runs, only changed rows are written at each
+page, independent of the number of rows; a program killed while it writes leaves a table that is the beginning of what
+the journal gives.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import accumulate
+from pathlib import Path
+from typing import Any, Final
 
 from study_app.errors import StoreError
-from study_app.store.broken_limits import within_limits
+from study_app.store.atomic import replace_end, write_file
+from study_app.store.blinded.blinding import Key, opened
+from study_app.store.delivered import within_limits
 from study_app.store.journals.journal import Line
 from study_app.store.journals.journal_events import CAUSE_WITHHELD
 from study_app.store.progress import is_of_intervals, progress_of
-from study_app.store.tables.column import Column, header, unsealed
-from study_app.store.tables.columns import DELIVERED, TRIALS, VIDEO, tables_of
-from study_app.store.tables.csv_files import Row
-from study_app.store.tables.interval_rows import combined, interval_row
+from study_app.store.tables.columns import DELIVERED, INTERVALS, TRIALS, VIDEO, tables_of
+from study_app.store.tables.csv_files import Column, Row, header, header_bytes, records, unsealed
 
+_PRESENTED: Final = {"S": "standard", "C": "comparison"}
+_LONGEST: Final = frozenset(
+    {
+        "lateness_p99_ms",
+        "worst_gap_ms",
+        "force_peak_n",
+        "loop_delay_ticks",
+        "delay_error_p95_ms",
+        "delay_error_max_ms",
+        "first_frame_gap_ms",
+        "worst_frame_gap_ms",
+        "video_delay_error_max_ms",
+    }
+)
+"""Columns in which a trial has the maximum of its intervals."""
+_MEANS: Final = frozenset(
+    {
+        "tick_rate_hz",
+        "mean_speed_mps",
+        "force_mean_n",
+        "withheld_share",
+        "delivered_error",
+        "delay_error_mean_ms",
+        "video_age_mean_ms",
+    }
+)
+"""Of these a trial has the mean of its intervals; of what is left the sum."""
+_OF_THE_END = header(INTERVALS[[column.name for column in INTERVALS].index("invalid_reasons") :])
 _SESSION_COLUMNS = ("study", "participant", "session", "simulated", "pilot")
 _TRIAL_COLUMNS = ("trial", "attempt", "block", "phase", "part", "index", "code")
 _RECORDED = ("recording", "recording_frames", "samples_recorded", "samples_unrecorded")
 _DERIVED = ("trial_started_at", "trial_started_s", "outcome", "valid", *_RECORDED, "recording_lost", "marked", "notes")
 _MEASURED = tuple(name for name in header(TRIALS) if name not in (*_SESSION_COLUMNS, *_TRIAL_COLUMNS, "of", *_DERIVED))
-
 _DELIVERED = header(DELIVERED)
 
 
@@ -33,11 +64,6 @@ class SessionRows:
     order; the running one has no outcome yet. ``changed`` is the index of the first row of ``trials`` that was added or
     changed since it was last set; rows of ``responses`` never change. ``intervals`` has one row per interval of a trial
     with a design, ``changed_intervals`` is likewise the first of them that was added or changed.
-
-    Raises
-    ------
-    StoreError
-        The lines do not begin as a session's do, or tell of a trial that never started.
     """
 
     def __init__(self, lines: Sequence[Line]) -> None:
@@ -162,6 +188,88 @@ class SessionRows:
             self.intervals[-1]["outcome"] = "interrupted"
 
 
+class GrowingTables:
+    """The tables of a session on the disk, kept up to date with its journal."""
+
+    def __init__(self, path_of: Callable[[str], Path]) -> None:
+        self._path_of = path_of
+        self._tables: dict[str, _GrowingTable] = {}
+        self._rows: SessionRows | None = None
+        self._taken = 0  # lines of the journal
+        self._opened = False
+
+    def write(self, lines: Sequence[Line], key: Key | None, *, whole: bool = False) -> None:
+        """Bring the tables up to date with the journal's ``lines``, which are those of before and new ones.
+
+        Parameters
+        ----------
+        lines : sequence of Line
+            The journal's, those of before and new ones.
+        key : Key or None
+            The study's, once it was opened; without it the sealed columns are left out.
+        whole : bool
+            Whether the files are replaced as wholes and flushed to the disk.
+
+        Raises
+        ------
+        StoreError
+            A table cannot be written; the next call tries again.
+        """
+        if whole or self._rows is None or self._opened != (key is not None):
+            self._rows, self._taken, self._opened = SessionRows(opened(lines, key)), len(lines), key is not None
+            for table in self._tables.values():
+                table.forget()
+        rows = self._rows
+        for line in opened([lines[0], *lines[self._taken :]], key)[1:]:
+            self._taken += 1
+            rows.take(line)
+        for name, columns in table_columns(lines, opened=self._opened).items():
+            table = self._tables.setdefault(name, _GrowingTable(self._path_of(name)))
+            first = {"trials": rows.changed, "intervals": rows.changed_intervals}.get(name, table.rows)
+            table.write(columns, rows.table(name), first, waits=whole)
+        rows.changed, rows.changed_intervals = len(rows.trials), len(rows.intervals)
+
+
+class _GrowingTable:
+    """One table, and where each of its records ends in the file."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._ends: list[int] = []  # the header's first; none where the file must be written as a whole
+
+    @property
+    def rows(self) -> int:
+        """How many rows the file holds."""
+        return max(0, len(self._ends) - 1)
+
+    def forget(self) -> None:
+        """Rewrite the whole file next time."""
+        self._ends = []
+
+    def write(self, columns: Sequence[Column], rows: Sequence[Row], first: int, *, waits: bool) -> None:
+        """Write the rows from index ``first`` on; all of them if the file was changed meanwhile."""
+        kept = first + 1 if self._is_as_left() else 0  # records
+        start = self._ends[kept - 1] if kept else 0
+        new = [*([] if kept else [header_bytes(columns)]), *records(columns, rows[max(0, kept - 1) :])]
+        if not new:
+            return
+        ends, self._ends = self._ends, []  # none before it is written
+        if kept:
+            replace_end(self._path, start, b"".join(new))
+        else:
+            write_file(self._path, b"".join(new), waits=waits)
+        ends[kept:] = [*accumulate(map(len, new), initial=start)][1:]
+        self._ends = ends
+
+    def _is_as_left(self) -> bool:
+        if not self._ends:
+            return False
+        try:
+            return self._path.stat().st_size == self._ends[-1]
+        except OSError:
+            return False
+
+
 def responses(lines: Sequence[Line]) -> list[Row]:
     """Return one row per response, in the order of confirmation."""
     return SessionRows(lines).responses
@@ -220,6 +328,46 @@ def latest(rows: Iterable[Row]) -> list[Row]:
     return [row for row in rows if row["attempt"] == last[row["trial"]]]
 
 
+def response_text(value: Any) -> str | None:
+    """Return an answer as text: of several options their ids with spaces between, "" where none was chosen."""
+    if isinstance(value, list | tuple):
+        return " ".join(value)
+    return None if value is None else str(value)
+
+
+def interval_row(trial: Row, started: Mapping[str, Any], line: Mapping[str, Any], before: Row | None) -> Row:
+    """Return the row of an interval that begins."""
+    row: Row = {name: trial.get(name) for name in header(INTERVALS)} | dict.fromkeys(_OF_THE_END)
+    number = line["interval"]
+    ended_s = None if before is None else before["ended_s"]
+    arrangement = started.get("arrangement")
+    return row | {
+        "interval": number,
+        "interval_started_s": line["t_s"],
+        "gap_s": None if ended_s is None else round(line["t_s"] - ended_s, 6),
+        "presented": None if arrangement is None else _PRESENTED[arrangement[number - 1]],
+        "standard": started.get("standard"),
+        "level": started.get("level"),
+        "catch": started.get("catch"),
+    }
+
+
+def combined(intervals: Iterable[Row], names: Sequence[str]) -> Row:
+    """Return the measures of a trial from all its intervals; None for those measured in none."""
+    rows = list(intervals)
+    return {name: _combined(name, [row[name] for row in rows if row.get(name) is not None]) for name in names}
+
+
+def _combined(name: str, values: list[Any]) -> Any:
+    if not values:
+        return None
+    if name in _LONGEST:
+        return max(values)
+    total = sum(values)
+    found = total / len(values) if name in _MEANS else total
+    return round(found, 6) if isinstance(found, float) else found
+
+
 def _session(lines: Sequence[Line]) -> Row:
     if not lines or lines[0]["event"] != "session_started":
         raise StoreError("the journal does not begin with session_started: restore it from a copy")
@@ -257,13 +405,6 @@ def _response(session: Row, trial: Mapping[str, Any], answer: Mapping[str, Any],
         "answered_at": answered_at,
     }
     return {name: row[name] for name in header(tables_of(2 if kind else 1)["responses"])}
-
-
-def response_text(value: Any) -> str | None:
-    """Return an answer as text: of several options their ids with spaces between, "" where none was chosen."""
-    if isinstance(value, list | tuple):
-        return " ".join(value)
-    return None if value is None else str(value)
 
 
 def _trial(session: Row, line: Line) -> Row:

@@ -16,9 +16,8 @@ from typing import Any, TypeAlias
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.tracks import adjusting_of, design_of, method_of, standards_of, stimulus_of
-from study_app.store.atomic import cannot_read, paths_in
+from study_app.store.atomic import cannot_read, parse_json, paths_in
 from study_app.store.folders import StudyFolder
-from study_app.store.journals.parsing import parse_json
 
 Tables: TypeAlias = Mapping[str, Any]
 
@@ -109,13 +108,7 @@ def certain_telltales(tables: Tables, published: Any, levels: Iterable[float] = 
 
 
 def find_leaks(folder: Path, words: Telltales) -> list[Leak]:
-    """Return where in ``folder`` one of ``words`` stands: in a name or in a text, statements and recordings aside.
-
-    Raises
-    ------
-    StoreError
-        A file cannot be read.
-    """
+    """Return where in ``folder`` one of ``words`` stands: in a name or in a text, statements and recordings aside."""
     found: list[Leak] = []
     key = StudyFolder(folder).key
     for path in paths_in(folder):

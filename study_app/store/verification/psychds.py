@@ -14,8 +14,7 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from study_app.store.atomic import cannot_read, paths_in, read_regular
-from study_app.store.journals.parsing import parse_json
+from study_app.store.atomic import cannot_read, parse_json, paths_in, read_regular
 
 Metadata: TypeAlias = Mapping[str, Any]
 
@@ -55,19 +54,20 @@ class PsychDs:
 
 
 def validate(folder: Path) -> PsychDs:
-    """Check ``folder`` against the rules.
-
-    Raises
-    ------
-    StoreError
-        A file cannot be read.
-    """
+    """Check ``folder`` against the rules."""
     files = _files(folder)
     errors: list[Issue] = []
     metadata = _description(folder, errors)
-    errors += _json_errors(folder, files)
+    errors += [
+        Issue("JSON_INVALID", _name(folder, path), "is not JSON in UTF-8")
+        for path in files
+        if path.suffix == ".json" and path != folder / _DESCRIPTION and _json(path) is None
+    ]
     tables = [path for path in files if _is_table(path.relative_to(folder))]
-    errors += _folder_errors(folder, tables)
+    if not (folder / "data").is_dir():
+        errors.append(Issue("MISSING_DATA_DIRECTORY", ".", "no folder data"))
+    elif not tables:
+        errors.append(Issue("MISSING_DATAFILE", "data", "no file named ..._data.csv"))
     measured: set[str] = set()
     for path in tables:
         errors += _table_errors(folder, path, metadata, measured)
@@ -101,19 +101,6 @@ def _description(folder: Path, errors: list[Issue]) -> Metadata:
     missing = (name for name in REQUIRED if not metadata.get(name))
     errors += [Issue("JSON_KEY_REQUIRED", _DESCRIPTION, f"no {name}") for name in missing]
     return metadata
-
-
-def _json_errors(folder: Path, files: list[Path]) -> Iterator[Issue]:
-    for path in files:
-        if path.suffix == ".json" and path != folder / _DESCRIPTION and _json(path) is None:
-            yield Issue("JSON_INVALID", _name(folder, path), "is not JSON in UTF-8")
-
-
-def _folder_errors(folder: Path, tables: list[Path]) -> Iterator[Issue]:
-    if not (folder / "data").is_dir():
-        yield Issue("MISSING_DATA_DIRECTORY", ".", "no folder data")
-    elif not tables:
-        yield Issue("MISSING_DATAFILE", "data", "no file named ..._data.csv")
 
 
 def _table_errors(folder: Path, path: Path, metadata: Metadata, measured: set[str]) -> Iterator[Issue]:

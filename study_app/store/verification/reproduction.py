@@ -20,9 +20,7 @@ from study_app.protocol.streams import Key, group_of
 from study_app.protocol.trials.presentation import arrangement_text, heard_in, next_level
 from study_app.protocol.trials.tracks import adjusting_of, design_of
 from study_app.store import receipt
-from study_app.store.blinded.blinding import read_key
-from study_app.store.blinded.sealing import opened
-from study_app.store.blinded.whole_protocol import whole_protocol
+from study_app.store.blinded.blinding import opened, read_key, whole_protocol
 from study_app.store.folders import StudyFolder, locate
 from study_app.store.journals import journal
 from study_app.store.journals.journal import Line
@@ -30,15 +28,7 @@ from study_app.store.journals.journal import Line
 
 @dataclass(slots=True)
 class Reproduced:
-    """What was compared.
-
-    Attributes
-    ----------
-    differences : list of str
-        How what was run differs from what receipt, key and answers give; none where it does not.
-    followed : list of str
-        A line per block of levels: how many of them follow from the answers.
-    """
+    """What was compared."""
 
     differences: list[str] = field(default_factory=list)
     followed: list[str] = field(default_factory=list)

@@ -1,8 +1,11 @@
 """One session against its journal, its receipt, its checksums and its recordings.
 
 Of a session that is open in a program only what that program does not change again is judged: its journal, its receipt
-and its recordings, but neither tables nor checksums, which follow the journal.
+and its recordings, but neither tables nor checksums, which follow the journal. `verify` checks everything and takes its
+time; `doubts` looks at the few files behind every number of an analysis, each time they are read.
 """
+
+from __future__ import annotations
 
 import contextlib
 import time
@@ -14,32 +17,83 @@ from typing import Any, Final
 
 from study_app.errors import StoreError
 from study_app.store import receipt
-from study_app.store.atomic import is_there, read_own, read_regular, study_root, temporaries
-from study_app.store.blinded.blinding import Key
-from study_app.store.blinded.sealing import opened, opened_key
-from study_app.store.checksums import files, hashed, read_checksums
+from study_app.store.atomic import cause, is_there, read_own, read_regular, study_root, temporaries
+from study_app.store.blinded.blinding import Key, opened, opened_key
+from study_app.store.checksums import files, fingerprint, hashed, read_checksums
 from study_app.store.folders import FINGERPRINTS, SessionFolder
 from study_app.store.journals import journal
-from study_app.store.journals.cut_journal import RESTORE, beyond
 from study_app.store.journals.journal import Contents, Line
 from study_app.store.journals.journal_events import shortened, unknown_events
 from study_app.store.progress import Given, Progress, named, progress_of, recordable
 from study_app.store.recorder import recording_files
-from study_app.store.sessions.folder_lock import is_open
+from study_app.store.sessions.folder_lock import is_open, never_begun
 from study_app.store.sessions.open_session import Place, table_files
-from study_app.store.sessions.unstarted_sessions import never_begun
+from study_app.store.sessions.recovery import RESTORE, beyond
 from study_app.store.tables import csv_files
-from study_app.store.tables.column import Column
-from study_app.store.tables.participants import opened_or_none, row_from
+from study_app.store.tables.csv_files import Column, in_columns_of
 from study_app.store.tables.session_tables import table_columns
-from study_app.store.verification.fingerprints import fingerprint
-from study_app.store.verification.violations import Gathered
+from study_app.store.tables.study_files import opened_or_none, row_from
 
 AGAIN_S: Final = 0.2
 """After this time is looked again at errors in files that another program may have been writing."""
-
 _BEGUN = "but receipt, tables, recordings or checksums show that the session began: restore it from a copy"
 _ROUNDED_S = 1.1e-6
+CHANGED = "has changed since the session ended (its checksum differs)"
+REBUILT_AFTER = "says that checksums or fingerprint were rewritten after the session ended"
+COMPARE = "compare it with fingerprints stored elsewhere: liquid-study verify --fingerprints FILE"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing found, and where: a path in the study folder."""
+
+    place: str
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.message}"
+
+
+class Gathered:
+    """Findings so far: ``errors`` are files that cannot be trusted as they are, ``warnings`` something to know."""
+
+    def __init__(self, folder: Path) -> None:
+        self.errors: list[Finding] = []
+        self.warnings: list[Finding] = []
+        self._folder = folder
+
+    def alike(self) -> Gathered:
+        """Return findings of the same folder, with nothing found."""
+        return Gathered(self._folder)
+
+    def take(self, others: Gathered) -> None:
+        """Add what others found."""
+        self.errors += others.errors
+        self.warnings += others.warnings
+
+    def error(self, path: Path, message: str) -> None:
+        """Add what makes ``path`` untrustworthy."""
+        self.errors.append(Finding(self._name(path), message))
+
+    def failure(self, path: Path, error: StoreError) -> None:
+        """Add an error that stopped us reading ``path``, which is named once."""
+        self.error(path, str(error).removeprefix(str(path)).lstrip(" ,:/"))
+
+    def warning(self, path: Path, message: str) -> None:
+        """Add what should be known of ``path``."""
+        self.warnings.append(Finding(self._name(path), message))
+
+    @contextlib.contextmanager
+    def reading(self, path: Path) -> Iterator[None]:
+        """Turn an error of reading within this block into a finding about ``path``, and continue after the block."""
+        try:
+            yield
+        except StoreError as error:
+            self.failure(path, error)
+
+    def _name(self, path: Path) -> str:
+        inside = path.is_relative_to(self._folder) and path != self._folder
+        return path.relative_to(self._folder).as_posix() if inside else "."
 
 
 @dataclass(frozen=True, slots=True)
@@ -343,13 +397,124 @@ def _recordings(
 
 
 def _facts(folder: SessionFolder, line: Line, kind: str, name: str, rows: int, found: Gathered) -> None:
-    from study_app.store import recording_files as recording  # noqa: PLC0415 - loads the Parquet library, where there are recordings
+    from study_app.store import recordings  # noqa: PLC0415 - loads the Parquet library, where there are recordings
 
     path = folder.path / name
     expected = {"participant": folder.participant, "session": folder.number, "kind": kind, "rows": rows}
     expected |= {"trial": line["trial"], "attempt": line["attempt"], "interval": line.get("interval")}
     with found.reading(path):
-        facts: dict[str, Any] = recording.read_facts(path)
+        facts: dict[str, Any] = recordings.read_facts(path)
         for fact, value in expected.items():
             if facts.get(fact) != value:
                 found.error(path, f"holds {fact} {facts.get(fact)!r}, the journal says {value!r}")
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """A file that is not what was recorded, and what to do about it."""
+
+    path: Path
+    what: str
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"{self.path} {self.what}: {self.remedy}"
+
+
+def doubts(place: Place) -> tuple[Doubt, ...]:
+    """Return what cannot be trusted of a session's journal, receipt, tables and checksums: one doubt a file at most.
+
+    Once the session has ended they are compared with their checksums: files that keep these are as they were when the
+    tables were made from the journal. Where one does not, a table is compared with what the journal gives, unless the
+    journal itself is doubtful. A session that is open in a program is not judged: its tables follow.
+    """
+    folder = place.folder
+    if is_open(folder.path):
+        return ()
+    again = (Doubt(folder.rebuilt, REBUILT_AFTER, COMPARE),) if is_there(folder.rebuilt) else ()
+    return again if _as_ended(place) else (*again, *_changed_since(place))
+
+
+def _changed_since(place: Place) -> tuple[Doubt, ...]:
+    """Return the doubts of a session whose files are not all as when it had ended, or that has not ended."""
+    folder = place.folder
+    restore = f"restore it from a copy; liquid-study verify {place.study_folder.path} checks everything"
+    if not is_there(folder.journal):
+        return (Doubt(folder.journal, "is missing, so the tables cannot be verified", restore),)
+    try:
+        contents = journal.scan(folder.journal)
+    except StoreError as error:
+        return (Doubt(folder.journal, f"cannot be read ({error})", restore),)
+    if contents.damage is not None:
+        return (Doubt(folder.journal, f"is damaged ({contents.damage.removeprefix(f'{folder.journal}, ')})", restore),)
+    listed, sealed = _listed(place, contents)
+    found = {doubt.path: doubt for doubt in sealed}
+    changed = {path: Doubt(path, CHANGED, restore) for path in _changed(place, listed)}
+    found |= {path: doubt for path, doubt in changed.items() if path in (folder.journal, folder.receipt)}
+    if folder.journal not in found:
+        found |= {doubt.path: doubt for doubt in _table_doubts(place, contents, restore)}
+    return tuple((changed | found).values())
+
+
+def _listed(place: Place, contents: Contents) -> tuple[Mapping[str, str], tuple[Doubt, ...]]:
+    """Return the checksums made when the session had ended, and what is wrong with their list.
+
+    Where there is one the session had ended, even if its journal is incomplete.
+    """
+    ended = bool(contents.lines) and contents.lines[-1]["event"] == "session_ended"
+    if not ended and not is_there(place.folder.checksums):
+        return {}, ()
+    try:
+        return read_checksums(place.folder), ()
+    except StoreError:
+        remedy = f"restore it from a copy, or recreate it from the files with liquid-study rebuild {place.folder.path}"
+        return {}, (Doubt(place.folder.checksums, "is missing or not a list of checksums", remedy),)
+
+
+def _as_ended(place: Place) -> bool:
+    """Return whether journal, receipt and tables are what the checksums of the session's end are of."""
+    try:
+        listed = read_checksums(place.folder)
+        return all(listed.get(name) == hashed(place.folder, name) for name in _behind(place))
+    except StoreError:
+        return False
+
+
+def _changed(place: Place, listed: Mapping[str, str]) -> Iterator[Path]:
+    """Yield journal, receipt and tables that are not those the checksums are of; a missing one is said elsewhere."""
+    for name, path in _behind(place).items():
+        if name in listed and is_there(path) and _hash(place.folder, name) != listed[name]:
+            yield path
+
+
+def _behind(place: Place) -> dict[str, Path]:
+    """Return the files behind every number: journal, receipt and tables, by their path in the session's folder."""
+    folder = place.folder
+    tables = [folder.table(place.study, name) for name in ("responses", "trials", "intervals")]
+    there = [path for path in tables if path != tables[-1] or is_there(path)]  # few studies have intervals
+    return {path.name: path for path in (folder.journal, folder.receipt, *there)}
+
+
+def _table_doubts(place: Place, contents: Contents, restore: str) -> Iterator[Doubt]:
+    """Yield the tables that are not what the journal gives."""
+    try:
+        expected = table_files(place, contents.lines, opened_key(place.study_folder))
+    except (StoreError, KeyError) as error:
+        yield Doubt(place.folder.journal, f"gives no tables ({error})", restore)
+        return
+    tables = table_columns(contents.lines, opened=True)
+    again = f"rebuild it from the journal with liquid-study rebuild {place.folder.path}"
+    for (path, whole), name in zip(expected, tables, strict=True):
+        try:
+            there = read_regular(path)
+        except FileNotFoundError:
+            yield Doubt(path, "is missing", again)
+            continue
+        except OSError as error:
+            yield Doubt(path, f"cannot be read ({cause(error)})", restore)
+            continue
+        content, _ = in_columns_of(there, whole, tables[name])
+        if there != content:
+            pairs = zip_longest(there.split(b"\n"), content.split(b"\n"))
+            line = next(number for number, (ours, theirs) in enumerate(pairs, start=1) if ours != theirs)
+            yield Doubt(path, f"differs from the journal, from line {line} on", again)

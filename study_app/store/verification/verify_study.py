@@ -2,50 +2,56 @@
 
 Nothing is changed. An error is a file that cannot be trusted as it is; a warning is something to know before the
 analysis, such as a session that was not finished. No sentence shows a condition. Of sessions that are open in a program
-journals are judged, and what the list of fingerprints says of them, but no tables.
+journals are judged, and what the list of fingerprints says of them, but no tables. In a merged study every site is
+checked separately, and the data that must agree between them.
 """
 
 from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from study_app.errors import StoreError
+from study_app.protocol.groups.allocation import group_of
 from study_app.protocol.model import StudyHead
 from study_app.store import exclusions, receipt
 from study_app.store.atomic import is_there, read_own, read_regular, temporaries
 from study_app.store.blinded import blinding
-from study_app.store.blinded.blinding import Key
-from study_app.store.blinded.sealing import opened
-from study_app.store.blinded.whole_protocol import whole_protocol
+from study_app.store.blinded.allocation import claims, entries_begun, group_in
+from study_app.store.blinded.blinding import Key, opened, sealed_hash, whole_protocol
+from study_app.store.checksums import listed, place_of, read_copy, unreadable
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import Place
+from study_app.store.sites.merge import unlisted
+from study_app.store.sites.merged import FOLDER, Merged, Site, read_merged
 from study_app.store.tables import csv_files
 from study_app.store.tables.columns import EXCLUSIONS
-from study_app.store.tables.participants import columns_of, table_bytes
-from study_app.store.tables.study_description import (
+from study_app.store.tables.study_files import (
+    columns_of,
     described_study,
     describes_alike,
     description_bytes,
     has_intervals,
     names_sealed,
+    table_bytes,
 )
 from study_app.store.verification import psychds
-from study_app.store.verification.fingerprints import listed, place_of, read_copy, unreadable
 from study_app.store.verification.leaks import certain_telltales, find_leaks, presented_numbers, recorded_numbers
-from study_app.store.verification.verify_allocation import check_allocation
-from study_app.store.verification.verify_session import AGAIN_S, Checked, check_session, check_table
-from study_app.store.verification.violations import Finding, Gathered
-from study_app.store.withdrawals.tombstones import Tombstone, tombstones
+from study_app.store.verification.psychds import Issue, PsychDs
+from study_app.store.verification.verify_session import AGAIN_S, Checked, Finding, Gathered, check_session, check_table
+from study_app.store.withdrawals import Tombstone, describe_session, tombstones
 
 Sessions: TypeAlias = list[Checked]
 Proofs: TypeAlias = Sequence[tuple[str, str]]  # fingerprint and session
+Placed = TypeVar("Placed", Finding, Issue)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +68,51 @@ class Findings:
     def sound(self) -> bool:
         """Whether there is no error, nor one of the format's."""
         return not self.errors and not self.psychds.errors
+
+
+def verify_folder(folder: Path, fingerprints: Path | None = None) -> Findings:
+    """Check a whole study, merged or not.
+
+    Parameters
+    ----------
+    folder : Path
+        The study folder.
+    fingerprints : Path, optional
+        A copy of the ``fingerprints.txt`` of a study that is not merged (see `verify_study.verify`).
+
+    Raises
+    ------
+    StoreError
+        It is not a study folder, or ``fingerprints`` no copy of fingerprints.
+    """
+    merged = read_merged(folder)
+    if merged is None:
+        return verify(folder, fingerprints)
+    if fingerprints is not None:
+        raise StoreError(
+            f"{folder} holds several sites: compare each with the copy of its own fingerprints, such as {fingerprints} "
+            f"with {merged.folder(merged.names[0])}"
+        )
+    found = Gathered(folder)
+    _between(merged, found)
+    each: dict[str, Findings] = {}
+    for name in merged.names:
+        if merged.folder(name).is_dir():  # `_between` says which are missing
+            try:
+                each[name] = verify(merged.folder(name))
+            except StoreError as error:
+                found.failure(merged.folder(name), error)
+    placed = {name: _placed(name, one) for name, one in each.items()}
+    return Findings(
+        (*found.errors, *(error for one in placed.values() for error in one.errors)),
+        (*found.warnings, *(warning for one in placed.values() for warning in one.warnings)),
+        PsychDs(
+            tuple(issue for one in placed.values() for issue in one.psychds.errors),
+            tuple(issue for one in placed.values() for issue in one.psychds.warnings),
+        ),
+        sum(one.sessions for one in each.values()),
+        sum(one.running for one in each.values()),
+    )
 
 
 def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
@@ -93,7 +144,9 @@ def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
     withdrawn = _withdrawn(study, found)
     sessions = [check_session(Place(study, one, name), key, found) for one in study.sessions()]
     _participants(study, name, sessions, found)
-    _chains(study, sessions, found)
+    if early_journals := sum(one.row is not None and not one.chained for one in sessions):
+        many = "1 journal is" if early_journals == 1 else f"{early_journals} journals are"
+        found.warning(study.data, f"{many} of format 1, whose lines cannot show whether an earlier line was changed")
     _fingerprints(study, sessions, early, found)
     if fingerprints is not None and copy is not None:
         _copy(study, sessions, [one for one in copy if one not in _erased(study, withdrawn)], fingerprints, found)
@@ -109,6 +162,42 @@ def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
     rules = psychds.validate(folder)
     rules = rules if whole else replace(rules, errors=())
     return Findings(tuple(found.errors), tuple(found.warnings), rules, len(sessions), running)
+
+
+def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[str], found: Gathered) -> None:
+    """Check that every participant with a session has one entry, that of the journals, and that none was changed.
+
+    Those of the participants who have ``withdrawn`` stay used.
+    """
+    if key is None:
+        return
+    begun = entries_begun(study)
+    holders: dict[str, int] = {}
+    for claim in claims(study):
+        if not claim.participant:
+            if claim.path.stat().st_size:
+                found.error(claim.path, "was changed: restore it from a copy")
+            else:
+                found.warning(claim.path, "was claimed by a program that ended before it wrote it; it stays unused")
+            continue
+        if not key.groups or group_in(claim, key) != group_of(key.groups, key.nonce, claim.entry):
+            found.error(claim.path, "was changed: restore it from a copy")
+        elif claim.participant in holders:
+            first = holders[claim.participant]
+            found.error(claim.path, f"is a second entry of participant {claim.participant}, who has entry {first}")
+        elif claim.participant not in begun and claim.participant not in withdrawn:
+            found.warning(claim.path, f"belongs to participant {claim.participant}, who has no session yet")
+        holders.setdefault(claim.participant, claim.entry)
+    for participant, entry in begun.items():
+        path = study.allocation(entry)
+        if not is_there(path):
+            found.error(path, f"is missing, though participant {participant} has entry {entry}")
+        elif holders.get(participant) != entry:
+            found.error(path, f"is not of participant {participant}, whose journal has entry {entry}")
+    shared = Counter(begun.values())
+    for participant, entry in begun.items():
+        if shared[entry] > 1:
+            found.error(study.allocated, f"entry {entry} of participant {participant} is another participant's, too")
 
 
 def _key(study: StudyFolder, found: Gathered) -> Key | None:
@@ -168,12 +257,6 @@ def _written(study: StudyFolder, sessions: Sessions) -> bool:
     """Return whether a program has had a session open since the check began."""
     now = study.sessions()
     return len(now) != len(sessions) or any(one.running for one in sessions) or any(is_open(one.path) for one in now)
-
-
-def _chains(study: StudyFolder, sessions: Sessions, found: Gathered) -> None:
-    if early := sum(one.row is not None and not one.chained for one in sessions):
-        many = "1 journal is" if early == 1 else f"{early} journals are"
-        found.warning(study.data, f"{many} of format 1, whose lines cannot show whether an earlier line was changed")
 
 
 def _fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, found: Gathered) -> None:
@@ -293,3 +376,55 @@ def _blinding(study: StudyFolder, key: Key | None, found: Gathered) -> None:
                 levels |= recorded_numbers(protocol, opened(journal.read(session.journal), key))
     for leak in find_leaks(study.path, certain_telltales(key.tables, published, levels)):
         found.warning(study.path, f"{leak.place} reveals a condition, although the key is sealed")
+
+
+def _between(merged: Merged, found: Gathered) -> None:
+    """Check what the list of sites says of them, and that no session is in two."""
+    seen: dict[str, Path] = {}
+    for site in merged.sites:
+        folder = merged.folder(site.name)
+        if not folder.is_dir():
+            lists = f"{merged.manifest.name} lists site {site.name}"
+            found.error(folder, f"is missing, but {lists}: restore it from a copy")
+            continue
+        if sealed_hash(folder) != site.key_hash:
+            key = StudyFolder(folder).key
+            found.error(key, f"is not the key that site {site.name} was merged with: restore it from a copy")
+        _compare_site(merged, site, found)
+        for session in StudyFolder(folder).sessions():
+            with contextlib.suppress(StoreError):  # said when the site is checked
+                if (other := receipt.read(session.receipt)["protocol_hash"]) != merged.protocol_hash:
+                    found.error(session.receipt, f"is of protocol {other}, not of {merged.protocol_hash} as merged")
+            begun = describe_session(session).begun
+            if begun and (twin := seen.get(begun)) is not None:
+                found.error(session.path, f"is a copy of {twin.relative_to(merged.path).as_posix()}: it counts twice")
+            seen[begun] = session.path
+    for path in unlisted(merged):
+        found.warning(path, f"is not a site that {merged.manifest.name} lists, so it is ignored")
+    for path in temporaries(merged.path):
+        found.warning(path, "is an incomplete file of a program that was ended, or is being written")
+
+
+def _compare_site(merged: Merged, site: Site, found: Gathered) -> None:
+    """Compare a site's folder with what the list of sites says of it; sessions are only erased there."""
+    study = StudyFolder(merged.folder(site.name))
+    if (name := described_study(study)) not in (None, merged.study):
+        found.error(study.path, f"is of study {name}, but {merged.manifest.name} lists sites of {merged.study}")
+    with contextlib.suppress(StoreError):  # said when the site is checked
+        merged_at = datetime.fromisoformat(site.merged_at)
+        since = [one for one in tombstones(study).values() if datetime.fromisoformat(one.at) >= merged_at]
+        erased = sum(len(one.sessions) for one in since)
+        if (there := len(study.sessions())) + erased < site.sessions:
+            which = f"{there} of the {site.sessions} sessions that {merged.manifest.name} lists"
+            found.error(study.path, f"has {which}: restore the others from a copy")
+
+
+def _placed(site: str, found: Findings) -> Findings:
+    """Return what was found in a site's folder with its place in the merged study's."""
+    below = f"{FOLDER}/{site}"
+
+    def moved(them: Iterable[Placed]) -> tuple[Placed, ...]:
+        return tuple(replace(one, place=below if one.place == "." else f"{below}/{one.place}") for one in them)
+
+    rules = PsychDs(moved(found.psychds.errors), moved(found.psychds.warnings))
+    return replace(found, errors=moved(found.errors), warnings=moved(found.warnings), psychds=rules)

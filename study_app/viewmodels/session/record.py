@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 from study_app.devices.registry import discover
 from study_app.errors import StoreError
 from study_app.number_text import counted
-from study_app.store.blinded.sealing import opened, opened_key
-from study_app.store.broken_limits import beyond_limits
+from study_app.store.blinded.blinding import opened, opened_key
+from study_app.store.delivered import beyond_limits
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folders import SessionFolder, locate
 from study_app.store.journals import journal
 from study_app.store.journals.journal import Line
 from study_app.store.progress import Given, progress_of
 from study_app.store.tables import session_tables
-from study_app.store.tables.participants import row_of
+from study_app.store.tables.study_files import row_of
 from study_app.viewmodels.session.columns import incidents
 from study_app.viewmodels.sessions import SessionFacts, session_facts
 
@@ -135,7 +135,7 @@ def motion(recording: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     StoreError
         It cannot be read.
     """
-    from study_app.store.recording_files import read_samples  # noqa: PLC0415 - pyarrow: only once it is needed
+    from study_app.store.recordings import read_samples  # noqa: PLC0415 - pyarrow: only once it is needed
 
     samples = read_samples(recording)
     thinned = samples[:: max(1, -(-len(samples) // MOST_POINTS))]

@@ -11,9 +11,8 @@ from study_app.analysis.export.export import export
 from study_app.analysis.export.table_formats import table_bytes
 from study_app.errors import AnalysisError
 from study_app.store.output_files import write_files
-from study_app.store.tables.column import Column
 from study_app.store.tables.columns import SEALED
-from study_app.store.tables.formulas import unguarded
+from study_app.store.tables.csv_files import Column, unguarded
 from tests.analysis.conftest import Results
 
 pytestmark = pytest.mark.slow

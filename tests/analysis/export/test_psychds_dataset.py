@@ -16,7 +16,7 @@ from study_app.errors import AnalysisError
 from study_app.protocol.source.files import shipped_file
 from study_app.store.blinded.blinding import reveal
 from study_app.store.output_files import FileCopy, write_files
-from study_app.store.tables.column import Column, optional
+from study_app.store.tables.csv_files import Column, optional
 from study_app.store.verification.psychds import validate
 from tests.studies import rehearsed
 

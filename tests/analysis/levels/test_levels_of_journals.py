@@ -13,9 +13,7 @@ from study_app.analysis.export.export import export
 from study_app.analysis.figures.plotting import plot
 from study_app.analysis.report.write_report import report
 from study_app.protocol.load import load
-from study_app.store.blinded.blinding import read_key
-from study_app.store.blinded.sealing import opened
-from study_app.store.blinded.whole_protocol import whole_protocol
+from study_app.store.blinded.blinding import opened, read_key, whole_protocol
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.receipt import read

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from study_app.analysis.tables.study_tables import load_study
 from study_app.cli import commands
 from study_app.store.folders import SessionFolder, StudyFolder
-from study_app.store.sessions.rebuild import rebuild
+from study_app.store.sessions.recovery import rebuild
 from tests.analysis.conftest import SAMPLE
 
 

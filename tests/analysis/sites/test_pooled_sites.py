@@ -19,11 +19,10 @@ from study_app.analysis.results.level_results import LevelsFound, ThresholdFound
 from study_app.analysis.tables.study_tables import Study, load_study, pooled
 from study_app.errors import StoreError
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.blinded.unblinding import unblind
+from study_app.store.blinded.unblinding import unblind, unblind_folder
 from study_app.store.exclusions import exclude
 from study_app.store.sites.merge import merge
-from study_app.store.sites.unblind_sites import unblind_folder
-from study_app.store.withdrawals.withdraw import withdraw
+from study_app.store.withdrawals import withdraw
 from tests.analysis.levels.level_studies import ADAPTIVE
 from tests.analysis.made_up import delays, everybody, liquids, study
 from tests.analysis.report.read_report import numbers, read, run_in_r

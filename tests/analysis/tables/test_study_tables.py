@@ -8,9 +8,8 @@ import pytest
 from study_app.analysis.tables.study_tables import Study, load_study
 from study_app.errors import AnalysisError, StoreError
 from study_app.protocol.load import parse, source_bytes
-from study_app.store.tables.column import header
 from study_app.store.tables.columns import RESPONSES, TRIALS
-from study_app.store.tables.csv_files import csv_bytes, read_table
+from study_app.store.tables.csv_files import csv_bytes, header, read_table
 from tests.analysis.conftest import CANNOT_JUDGE, Results, make_results
 from tests.analysis.tables.differing_answers import by_condition, refusal
 from tests.store.earlier import TRIALS_HEADER

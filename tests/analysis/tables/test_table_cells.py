@@ -11,8 +11,7 @@ import pytest
 from study_app.analysis.tables import measures
 from study_app.analysis.tables.typed_files import tables
 from study_app.errors import AnalysisError
-from study_app.store.tables.column import MISSING, Column
-from study_app.store.tables.csv_files import problems
+from study_app.store.tables.csv_files import MISSING, Column, problems
 
 COLUMNS = (
     Column("who", "text", "Text."),

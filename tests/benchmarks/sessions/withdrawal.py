@@ -8,7 +8,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from study_app.store.withdrawals.withdraw import withdraw
+from study_app.store.withdrawals import withdraw
 from tests.studies import rehearsed
 
 

@@ -18,7 +18,7 @@ from study_app.analysis.export.export import export
 from study_app.analysis.report.write_report import report
 from study_app.session.simulated import rehearsal
 from study_app.store.blinded.unblinding import unblind
-from study_app.store.sessions.rebuild import rebuild
+from study_app.store.sessions.recovery import rebuild
 from tests.faults.support.killer import SEED, forked
 
 COMMANDS = {"export": (6, 0.0), "rebuild": (12, 0.0), "unblind": (12, 0.0), "report": (1, 0.9)}

@@ -18,7 +18,7 @@ from functools import partial
 from pathlib import Path
 
 from study_app.session.simulated import rehearsal
-from study_app.store.sessions.rebuild import rebuild
+from study_app.store.sessions.recovery import rebuild
 
 SEED = 7
 

@@ -26,7 +26,7 @@ from study_app.gui.widgets.dialogs import Notice
 from study_app.gui.widgets.live_plots import TracePlot
 from study_app.session import start
 from study_app.session.pages import PausePage, TaskPage, TroublePage
-from study_app.store import recording_writer
+from study_app.store import recordings
 from tests.faults.support import short
 from tests.faults.support.watched_program import Person
 
@@ -150,7 +150,7 @@ class Scene:
         self.picture("panels")
         participant.come_forward()
         StepLine.paintEvent, TracePlot.show_traces = self.painted, self.drawn
-        self.samples_file, recording_writer.SamplesFile = recording_writer.SamplesFile, _ends
+        self.samples_file, recordings.SamplesFile = recordings.SamplesFile, _ends
         self.trial = participant.page.trial if isinstance(participant.page, TaskPage) else None
         self.step = self.lose_recording
         return False
@@ -161,7 +161,7 @@ class Scene:
         lost = operator.rail.tally.beyond.text()
         notices = [one.text() for one in operator.findChildren(QLabel) if "recorder" in one.text()]
         if "lost" in lost and notices:  # the tally may be shown first
-            recording_writer.SamplesFile = self.samples_file
+            recordings.SamplesFile = self.samples_file
             self.told["recording"] = lost
             self.told["page at the loss"] = type(participant.page).__name__
             self.told["force without a recording"] = self.rig.servo.force_is_on

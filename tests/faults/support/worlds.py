@@ -8,7 +8,7 @@ from study_app.session.ports import Ports
 from study_app.session.runner import Runner
 from study_app.session.transitions.events import Begin, Chosen, Continue, ItemShown, ResumeAsked, Submitted
 from study_app.session.transitions.state import Phase
-from study_app.store.clock import SessionClock
+from study_app.store.journals.journal import SessionClock
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
 from tests.session import small

@@ -27,8 +27,8 @@ from study_app.session.transitions.events import (
 )
 from study_app.session.transitions.state import Phase
 from study_app.session.trial import SETTLED_S
-from study_app.store.blinded.sealing import opened
-from study_app.store.clock import SessionClock
+from study_app.store.blinded.blinding import opened
+from study_app.store.journals.journal import SessionClock
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.tables.session_tables import trials
 from tests.compiled import needs_servo

@@ -16,7 +16,7 @@ from study_app.protocol.streams import stream
 from study_app.protocol.trials.tracks import design_of
 from study_app.session.simulated import participant
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.blinded import sealing
+from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import open_or_draw_key, read_key
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
@@ -138,7 +138,7 @@ def operator_views(folder: Path, protocol: Path) -> list[Any]:
 
 def levels(folder: Path) -> list[Any]:
     (place,) = StudyFolder(folder).sessions()
-    lines = sealing.opened(journal.read(place.journal), read_key(folder))
+    lines = blinding.opened(journal.read(place.journal), read_key(folder))
     return [(line["level"], line["arrangement"]) for line in lines if line["event"] == "trial_started"]
 
 
@@ -156,8 +156,8 @@ def test_sessions_under_two_keys_write_the_same_but_for_sealed_fields(first: Pat
 def test_a_planted_leak_makes_them_differ(first: Path, protocol: Path, blindly: Any, tmp_path: Path) -> None:
     """One measure of one event is not sealed."""
     with blindly.context() as patch:
-        left = {**sealing._SEALED_IN, "interval_ended": SEALED - {"force_peak_n"}}
-        patch.setattr(sealing, "_SEALED_IN", left)
+        left = {**blinding._SEALED_IN, "interval_ended": SEALED - {"force_peak_n"}}
+        patch.setattr(blinding, "_SEALED_IN", left)
         other = said_in(run(protocol, tmp_path / "planted", 2))
     one = said_in(first)
     assert {name.rpartition("/")[2] for name in one if one[name] != other.get(name)} == {"journal.jsonl"}
@@ -184,7 +184,7 @@ def numbers_of(folder: Path, what: str) -> Trials:
     found: Trials = {}
     for session in StudyFolder(folder).sessions():
         lines = journal.read(session.journal)
-        presented = {line["n"]: line for line in sealing.opened(lines, key)}
+        presented = {line["n"]: line for line in blinding.opened(lines, key)}
         found |= every_number(session, "levels", lines, lambda line, of=presented: str(of[line["n"]][what]))
     return found
 

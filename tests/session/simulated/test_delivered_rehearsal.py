@@ -6,8 +6,7 @@ import pytest
 
 from study_app.evaluation.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.blinded.blinding import read_key
-from study_app.store.blinded.sealing import opened
+from study_app.store.blinded.blinding import opened, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from tests.compiled import needs_servo

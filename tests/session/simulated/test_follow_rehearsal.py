@@ -12,7 +12,7 @@ from study_app.protocol.load import load
 from study_app.protocol.model import Follow
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.folders import StudyFolder
-from study_app.store.recording_files import read_samples
+from study_app.store.recordings import read_samples
 from tests.compiled import needs_servo
 from tests.protocol.edited_studies import text_of
 

@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 
 from study_app.session.simulated.rehearsal import rehearse, resume
-from study_app.store.blinded.blinding import read_key
-from study_app.store.blinded.sealing import opened
+from study_app.store.blinded.blinding import opened, read_key
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.verification.reproduction import reproduced

@@ -30,7 +30,7 @@ from study_app.session.trial import TankView
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.tables.study_description import write_description
+from study_app.store.tables.study_files import write_description
 from tests.compiled import needs_servo
 from tests.session import small
 

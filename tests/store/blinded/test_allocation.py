@@ -24,7 +24,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.reopen import reopen
+from study_app.store.sessions.recovery import reopen
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.faults.support.killer import die, forked

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from study_app.errors import StoreError
-from study_app.store.blinded.blinding import Key
-from study_app.store.blinded.sealing import opened, sealed
+from study_app.store.blinded.blinding import Key, opened, sealed
 from study_app.store.tables.columns import SEALED, TRIALS_2
 
 START = {"n": 1, "event": "session_started", "participant": "P007", "session": 1, "measures_sealed": True}

@@ -7,19 +7,16 @@ import pytest
 
 from study_app.protocol.model import Protocol, StudyHead
 from study_app.store.blinded import unblinding as module
-from study_app.store.blinded.blinding import open_or_draw_key, reveal
-from study_app.store.blinded.sealing import opened
+from study_app.store.blinded.blinding import open_or_draw_key, opened, reveal
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.checksums import replace_checksums
 from study_app.store.folders import REBUILT, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.rebuild import rebuild
-from study_app.store.sessions.reopen import reopen
-from study_app.store.tables.column import header, unsealed
+from study_app.store.sessions.recovery import rebuild, reopen
 from study_app.store.tables.columns import SEALED, TRIALS
-from study_app.store.tables.csv_files import csv_bytes, read_table
-from study_app.store.tables.study_description import description_bytes
+from study_app.store.tables.csv_files import csv_bytes, header, read_table, unsealed
+from study_app.store.tables.study_files import description_bytes
 from study_app.store.verification.verify_study import verify
 from tests.store.conftest import SOURCE, Attend, Start, ticking_clock
 from tests.store.forging import Lines, cover_up, forge

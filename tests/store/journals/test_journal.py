@@ -13,10 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from study_app.errors import StoreError
-from study_app.store.clock import SessionClock
-from study_app.store.journals.journal import read, scan
+from study_app.store.journals.journal import Journal, SessionClock, read, scan
 from study_app.store.journals.journal_events import problem, unknown_events
-from study_app.store.journals.journal_writer import Journal
 from tests.store.conftest import AWKWARD, Start
 
 

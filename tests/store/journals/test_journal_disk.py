@@ -15,10 +15,8 @@ from hypothesis import strategies as st
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
-from study_app.store.journals.journal import read, scan
-from study_app.store.journals.journal_writer import Journal
-from study_app.store.sessions.rebuild import rebuild
-from study_app.store.sessions.reopen import check_can_go_on
+from study_app.store.journals.journal import Journal, read, scan
+from study_app.store.sessions.recovery import check_can_go_on, rebuild
 from study_app.store.verification.verify_study import verify
 from tests.store.conftest import AWKWARD, SOURCE, FullDisk, Start
 from tests.store.forging import Lines, forge
@@ -96,7 +94,7 @@ class Disk:
 @pytest.fixture
 def disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Disk:
     made = Disk(tmp_path / "journal.jsonl")
-    monkeypatch.setattr("study_app.store.journals.journal_writer.os.fsync", made.fsync)
+    monkeypatch.setattr("study_app.store.journals.journal.os.fsync", made.fsync)
     return made
 
 
@@ -120,7 +118,7 @@ def test_a_line_that_nobody_waits_for_is_flushed_behind_and_in_order(disk: Disk)
 def test_a_flush_that_fails_behind_is_told_with_the_next_line_and_loses_none(
     disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("study_app.store.journals.journal_writer.RETRY_S", 3600.0)
+    monkeypatch.setattr("study_app.store.journals.journal.RETRY_S", 3600.0)
     journal = Journal.create(disk.path)
     first = journal.append("counted", value=1)
     disk.fails = 2
@@ -141,7 +139,7 @@ def test_a_flush_that_fails_behind_is_told_with_the_next_line_and_loses_none(
 
 
 def test_a_flush_that_fails_in_the_background_is_told_and_repeated(disk: Disk, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("study_app.store.journals.journal_writer.RETRY_S", 0.0)
+    monkeypatch.setattr("study_app.store.journals.journal.RETRY_S", 0.0)
     journal = Journal.create(disk.path)
     journal.append("counted", value=1)
     journal.check_flushed()
@@ -172,7 +170,7 @@ def test_a_power_cut_takes_no_answer_and_leaves_no_hole(
     """Of what no flush has reached yet any part may be on the disk; flushes may fail."""
     disk = Disk(tmp_path_factory.mktemp("cut") / "journal.jsonl")
     with pytest.MonkeyPatch.context() as patched, contextlib.ExitStack() as over:
-        patched.setattr("study_app.store.journals.journal_writer.os.fsync", disk.fsync)
+        patched.setattr("study_app.store.journals.journal.os.fsync", disk.fsync)
         journal = Journal.create(disk.path)
         over.callback(journal.close)
         kept: list[Any] = []
@@ -201,7 +199,7 @@ KILLED = """
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from study_app.store.journals.journal_writer import Journal
+from study_app.store.journals.journal import Journal
 journal = Journal.create(Path(sys.argv[1]))
 count = 0
 while True:

@@ -8,7 +8,7 @@ import pytest
 
 from study_app.protocol.model import Protocol
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.reopen import reopen
+from study_app.store.sessions.recovery import reopen
 from tests.store.conftest import SOURCE, Start
 
 Again = Start

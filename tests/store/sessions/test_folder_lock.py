@@ -14,8 +14,8 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.store.folders import StudyFolder, locate, study_folder
+from study_app.store.sessions.begin import check_participant, check_unused, used_ids
 from study_app.store.sessions.folder_lock import is_open, markers, open_alone, process_began
-from study_app.store.sessions.participant_ids import check_participant, check_unused, used_ids
 from tests.faults.support.racers import race
 from tests.platforms import needs_fork
 

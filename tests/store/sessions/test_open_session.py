@@ -13,7 +13,7 @@ import pytest
 from study_app.errors import StoreError
 from study_app.store import receipt
 from study_app.store.journals import journal
-from study_app.store.recording_files import read_facts
+from study_app.store.recordings import read_facts
 from study_app.store.sessions.open_session import SessionStore
 from tests.store.conftest import Make, Start
 

@@ -8,8 +8,8 @@ from study_app.store import receipt
 from study_app.store.journals import journal
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import SessionStore, table_files
-from study_app.store.sessions.rebuild import Rebuilt, rebuild
-from study_app.store.verification.integrity import doubts
+from study_app.store.sessions.recovery import Rebuilt, rebuild
+from study_app.store.verification.verify_session import doubts
 from study_app.store.verification.verify_study import verify
 from tests.store.conftest import Attend, Start
 from tests.store.forging import forge

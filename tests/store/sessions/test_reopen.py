@@ -20,11 +20,10 @@ from study_app.protocol.orders.schedule import Trial, build_schedule
 from study_app.store import receipt
 from study_app.store.journals import journal
 from study_app.store.recorder import event_of, recording_files
-from study_app.store.recording_files import read_samples
-from study_app.store.recording_writer import write_frames
+from study_app.store.recordings import read_samples, write_frames
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.reopen import check_can_go_on, reopen
+from study_app.store.sessions.recovery import check_can_go_on, reopen
 from study_app.store.verification.verify_study import verify
 from tests.faults.support.racers import race
 from tests.platforms import needs_fork

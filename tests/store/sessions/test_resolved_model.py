@@ -12,7 +12,7 @@ from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.scene import Ewma, Kalman
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
-from study_app.store.blinded.resolved_model import as_recorded, sealed_model
+from study_app.store.blinded.blinding import as_recorded, sealed_model
 from study_app.store.sessions.open_session import SessionStore
 from tests.protocol.trials import level_studies
 from tests.store.conftest import Start, Tables

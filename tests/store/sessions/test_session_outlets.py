@@ -14,7 +14,7 @@ from study_app.store import receipt
 from study_app.store.journals import journal
 from study_app.store.progress import progress_of
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.reopen import reopen
+from study_app.store.sessions.recovery import reopen
 from tests.outlets.collector import Collector
 from tests.store.conftest import SOURCE, Start
 

@@ -12,12 +12,11 @@ import pytest
 from study_app import app
 from study_app.errors import StoreError
 from study_app.store.folders import StudyFolder
-from study_app.store.journals import journal_writer
+from study_app.store.journals import journal
 from study_app.store.sessions import begin, open_session
-from study_app.store.sessions.folder_lock import markers, open_alone
-from study_app.store.sessions.participant_ids import check_unused, used_ids
-from study_app.store.sessions.reopen import reopen
-from study_app.store.sessions.unstarted_sessions import abandoned, never_begun
+from study_app.store.sessions.begin import check_unused, used_ids
+from study_app.store.sessions.folder_lock import abandoned, markers, never_begun, open_alone
+from study_app.store.sessions.recovery import reopen
 from study_app.store.verification.verify_study import verify
 from tests.faults.support.killer import die, forked
 from tests.platforms import needs_fork
@@ -59,7 +58,7 @@ def left(request: pytest.FixtureRequest, study: StudyFolder, start: Start) -> St
     if request.param in KILLED_BEFORE:
         killed(start, "P004", *KILLED_BEFORE[request.param])
     elif request.param == "the end of the first line":
-        killed(start, "P004", journal_writer, "write_whole", half_a_line)
+        killed(start, "P004", journal, "write_whole", half_a_line)
     else:
         study.session("P004", 1).path.mkdir(parents=True)
     assert study.session("P004", 1).path.is_dir()

@@ -14,20 +14,18 @@ from click.testing import CliRunner, Result
 from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.store.blinded.blinding import reveals
+from study_app.store.blinded.unblinding import all_opened, reveals_of
 from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
+from study_app.store.output_files import write_output
 from study_app.store.sessions.folder_lock import open_alone
-from study_app.store.sessions.rebuild import rebuild
+from study_app.store.sessions.recovery import rebuild
 from study_app.store.sites import merge as merging
 from study_app.store.sites.merge import merge
 from study_app.store.sites.merged import all_exclusions, own_place, read_merged
-from study_app.store.sites.merged_rows import participants_of
-from study_app.store.sites.unblind_sites import all_opened, reveals_of
-from study_app.store.sites.verify_sites import verify_folder
-from study_app.store.tables.study_description import check_study
-from study_app.store.verification.verify_study import verify
-from study_app.store.withdrawals.output_log import write_output
-from study_app.store.withdrawals.withdraw import withdraw
+from study_app.store.tables.study_files import check_study, participants_of
+from study_app.store.verification.verify_study import verify, verify_folder
+from study_app.store.withdrawals import withdraw
 from tests.faults.support.killer import die, forked
 from tests.platforms import needs_fork
 

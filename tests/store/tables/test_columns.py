@@ -12,8 +12,8 @@ from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.exclusions import exclude
 from study_app.store.folders import StudyFolder
 from study_app.store.tables.column_dictionary import SECTIONS, dictionary_markdown
-from study_app.store.tables.formulas import guarded, unguarded
-from study_app.store.tables.study_description import check_study, write_description
+from study_app.store.tables.csv_files import guarded, unguarded
+from study_app.store.tables.study_files import check_study, write_description
 from study_app.store.verification.psychds import validate
 from tests.store.conftest import Start
 

@@ -10,7 +10,7 @@ from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.presentation import Due
 from study_app.protocol.trials.stimuli import Stimulated
-from study_app.store.tables.delivered import delay_error_ms, delivered, delivered_error, judged, missed, undelivered
+from study_app.store.delivered import delay_error_ms, delivered, delivered_error, judged, missed, undelivered
 
 STUDY = """\
 format = 2

@@ -9,8 +9,7 @@ from study_app.protocol.model import Protocol
 from study_app.store import atomic
 from study_app.store.blinded.blinding import reveal
 from study_app.store.sessions.open_session import SessionStore, table_files
-from study_app.store.sessions.rebuild import rebuild
-from study_app.store.sessions.reopen import check_can_go_on
+from study_app.store.sessions.recovery import check_can_go_on, rebuild
 from study_app.store.verification.verify_study import verify
 from tests.store.conftest import SOURCE, FullDisk, Start
 

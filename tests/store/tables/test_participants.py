@@ -12,8 +12,8 @@ import pytest
 from study_app.errors import StoreError
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.sessions.rebuild import rebuild
-from study_app.store.tables import participants
+from study_app.store.sessions.recovery import rebuild
+from study_app.store.tables import study_files
 from study_app.store.verification.verify_study import verify
 from study_app.viewmodels.sessions import sessions
 from tests.store.conftest import Start
@@ -77,15 +77,15 @@ def test_of_two_programs_the_last_to_write_has_seen_both(
     tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """While P001's program is between reading the journals and writing the table, P002's session ends and writes."""
-    write, other = participants.write_file, start("P002")
+    write, other = study_files.write_file, start("P002")
     store = start("P001")
 
     def late(path: Path, content: bytes, **given: Any) -> None:
-        monkeypatch.setattr(participants, "write_file", write)
+        monkeypatch.setattr(study_files, "write_file", write)
         other.finish("withdrawn")
         write(path, content, **given)
 
-    monkeypatch.setattr(participants, "write_file", late)
+    monkeypatch.setattr(study_files, "write_file", late)
     store.finish("completed")
     assert [row["status"] for row in table(tmp_path / "study")] == ["completed", "withdrawn"]
 
@@ -136,24 +136,24 @@ class Killed(BaseException):
 def test_a_program_killed_after_it_overwrote_a_newer_row_leaves_a_table_that_heals(
     tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    write, other = participants.write_file, start("P002")
+    write, other = study_files.write_file, start("P002")
     store = start("P001")
     study = StudyFolder(tmp_path / "study")
     began_ns = time.time_ns() - 20 * 10**9
-    monkeypatch.setattr(participants, "disk_time_ns", lambda _folder: began_ns)
+    monkeypatch.setattr(study_files, "disk_time_ns", lambda _folder: began_ns)
 
     def late(path: Path, content: bytes, **given: Any) -> None:
-        monkeypatch.setattr(participants, "write_file", write)
+        monkeypatch.setattr(study_files, "write_file", write)
         other.finish("withdrawn")
         os.utime(other.folder.journal, ns=(began_ns + 10 * 10**9,) * 2)
         write(path, content, **given)
         raise Killed
 
-    monkeypatch.setattr(participants, "write_file", late)
+    monkeypatch.setattr(study_files, "write_file", late)
     with pytest.raises(Killed):
         store.finish("completed")
     assert [row["status"] for row in table(study.path)] == ["completed", "unfinished"]
-    participants.write_participants(study, "brackish")
+    study_files.write_participants(study, "brackish")
     assert [row["status"] for row in table(study.path)] == ["completed", "withdrawn"]
 
 
@@ -181,6 +181,6 @@ def test_only_journals_that_changed_since_the_table_was_made_are_read(
         path.write_bytes(content)
         age(study.path, 3600.0)
         read.clear()
-        participants.write_participants(study, "brackish")
+        study_files.write_participants(study, "brackish")
         assert set(read) == {f"sub-{name}" for name in expected}
         assert path.read_bytes() == b"".join(rows)

@@ -9,10 +9,8 @@ from hypothesis import strategies as st
 
 from study_app.errors import StoreError
 from study_app.store.progress import progress_of
-from study_app.store.tables.column import MISSING, Column, header
 from study_app.store.tables.columns import TABLES, TRIALS
-from study_app.store.tables.csv_files import csv_bytes, in_columns_of, read_table
-from study_app.store.tables.formulas import guarded
+from study_app.store.tables.csv_files import MISSING, Column, csv_bytes, guarded, header, in_columns_of, read_table
 from study_app.store.tables.session_tables import participant, trials
 
 TEXT = (Column("first", "text", "One."), Column("second", "text", "Two."))

@@ -12,12 +12,11 @@ import pytest
 
 from study_app.errors import StudyError
 from study_app.protocol.model import Protocol
-from study_app.store import recording_files
+from study_app.store import recordings
 from study_app.store.blinded import blinding
 from study_app.store.exclusions import exclude
 from study_app.store.journals.journal import scan
-from study_app.store.sessions.rebuild import rebuild
-from study_app.store.sessions.reopen import check_can_go_on
+from study_app.store.sessions.recovery import check_can_go_on, rebuild
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from study_app.viewmodels.sessions import sessions
@@ -130,12 +129,7 @@ def flipped(content: bytes, chance: random.Random, *, footer: bool) -> Iterator[
         yield content[:at] + bytes([content[at] ^ 1 << chance.randrange(8)]) + content[at + 1 :]
 
 
-READERS = (
-    recording_files.read_samples,
-    recording_files.read_frames,
-    recording_files.read_checks,
-    recording_files.read_facts,
-)
+READERS = (recordings.read_samples, recordings.read_frames, recordings.read_checks, recordings.read_facts)
 
 
 @pytest.mark.parametrize("footer", [False, True], ids=["anywhere", "footer"])

@@ -16,13 +16,12 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
 from study_app.store.blinded import blinding
-from study_app.store.blinded.sealing import opened, sealed
+from study_app.store.blinded.blinding import opened, sealed
+from study_app.store.checksums import listed
 from study_app.store.folders import StudyFolder
-from study_app.store.sessions.rebuild import rebuild
-from study_app.store.sessions.reopen import check_can_go_on
-from study_app.store.verification.fingerprints import listed
+from study_app.store.sessions.recovery import check_can_go_on, rebuild
 from study_app.store.verification.verify_study import verify
-from study_app.store.withdrawals.tombstones import Tombstone, bury, describe_session
+from study_app.store.withdrawals import Tombstone, bury, describe_session
 from tests.store.conftest import SOURCE, Attend, Start
 from tests.store.forging import Lines, cover_up, forge
 

@@ -16,8 +16,7 @@ from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.evaluation.replay import replay
 from study_app.session.simulated.rehearsal import rehearse, resume
-from study_app.store.blinded.blinding import read_key
-from study_app.store.blinded.sealing import opened
+from study_app.store.blinded.blinding import opened, read_key
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.journals import journal
 from study_app.store.verification.reproduction import reproduced

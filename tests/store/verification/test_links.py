@@ -14,7 +14,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.output_files import write_files
 from study_app.store.sessions.open_session import Place, SessionStore
-from study_app.store.verification.integrity import doubts
+from study_app.store.verification.verify_session import doubts
 from study_app.store.verification.verify_study import verify
 from tests.faults.support.killer import forked
 from tests.platforms import needs_fork

@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-from study_app.store.tables.column import Column, header
-from study_app.store.tables.csv_files import problems
+from study_app.store.tables.csv_files import Column, header, problems
 from study_app.store.verification.psychds import Issue, validate
 
 DESCRIPTION: dict[str, Any] = {

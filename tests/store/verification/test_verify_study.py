@@ -16,11 +16,11 @@ from study_app.store.blinded import blinding
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclude
 from study_app.store.folders import StudyFolder
-from study_app.store.sessions.rebuild import rebuild
-from study_app.store.sessions.unstarted_sessions import never_begun
+from study_app.store.sessions.folder_lock import never_begun
+from study_app.store.sessions.recovery import rebuild
 from study_app.store.tables.columns import TABLES
 from study_app.store.tables.csv_files import csv_bytes, read_table
-from study_app.store.tables.participants import write_participants
+from study_app.store.tables.study_files import write_participants
 from study_app.store.verification.verify_study import verify
 from tests.faults.support import short
 from tests.platforms import needs_fork

@@ -20,11 +20,10 @@ from study_app.errors import StoreError
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclude, include
 from study_app.store.folders import StudyFolder
+from study_app.store.sessions.begin import used_ids
 from study_app.store.sessions.folder_lock import open_alone
-from study_app.store.sessions.participant_ids import used_ids
 from study_app.store.verification.verify_study import verify
-from study_app.store.withdrawals.tombstones import tombstones
-from study_app.store.withdrawals.withdraw import Withdrawn, withdraw
+from study_app.store.withdrawals import Withdrawn, tombstones, withdraw
 from tests.faults.support.killer import die, forked
 from tests.platforms import needs_fork
 from tests.studies import rehearsed

@@ -2,7 +2,7 @@
 
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.store.broken_limits import within_limits
+from study_app.store.delivered import within_limits
 from study_app.store.progress import Progress
 from study_app.viewmodels.session.stages import stages
 

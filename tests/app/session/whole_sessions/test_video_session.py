@@ -21,7 +21,7 @@ from study_app.store import workstation
 from study_app.store.blinded.blinding import read_key
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.journals.journal_events import CAUSE_WITHHELD
-from study_app.store.recording_files import read_frames
+from study_app.store.recordings import read_frames
 from study_app.store.verification.verify_study import verify
 from study_app.store.workstation import MachineSettings
 from study_app.video.decoding import Scaler

@@ -1,17 +1,20 @@
 """Withdrawal: erase all that a participant gave from a study's folder and from copies of it.
 
-The tombstone is written first. A program that ends before all is erased leaves a folder that `verify` reports; the same
-command then finishes it. Erased files are unlinked: disks and back-ups may still hold their blocks.
+Of each participant a tombstone remains, a line of ``withdrawals.jsonl`` with nothing that this person gave. It is
+written first. A program that ends before all is erased leaves a folder that `verify` reports; the same command then
+finishes it. Erased files are unlinked: disks and back-ups may still hold their blocks.
 """
 
+import hashlib
+import json
 import re
 import shutil
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from study_app.errors import StoreError
 from study_app.store.atomic import (
@@ -19,25 +22,46 @@ from study_app.store.atomic import (
     cannot_read,
     cannot_write,
     is_there,
+    open_regular,
+    parse_json,
     paths_in,
     read_regular,
     sync_folder,
     write_file,
 )
+from study_app.store.checksums import fingerprint, place_of, read_checksums, sha256
 from study_app.store.exclusions import exclusion_bytes, exclusions
-from study_app.store.folders import SessionFolder, StudyFolder
-from study_app.store.journals.parsing import parse_json
+from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder
+from study_app.store.journals.journal_events import holds
+from study_app.store.output_files import Output, erase_outputs
 from study_app.store.sessions.folder_lock import open_alone, refuse_if_open
 from study_app.store.sites.merged import merged_above
-from study_app.store.tables.participants import write_participants
-from study_app.store.tables.study_description import described_study
-from study_app.store.verification.fingerprints import place_of
-from study_app.store.withdrawals.output_log import Output, erase_outputs
-from study_app.store.withdrawals.tombstones import Tombstone, bury, describe_session, tombstones
+from study_app.store.tables.study_files import described_study, write_participants
 from study_app.workspace import workspace
 
 DATASET: Final = "dataset_description.json"
 RESULTS: Final = "results"
+
+
+@dataclass(frozen=True, slots=True)
+class ErasedSession:
+    """What proves which session was erased."""
+
+    session: int
+    begun: str
+    checksums: str
+    fingerprint: str
+
+
+@dataclass(frozen=True, slots=True)
+class Tombstone:
+    """One withdrawal; a line of ``withdrawals.jsonl``. ``at`` is when the data were erased from that folder."""
+
+    participant: str
+    at: str
+    by: str
+    reason: str
+    sessions: tuple[ErasedSession, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +160,66 @@ def withdraw(
     return Withdrawn(tombstone, tuple(erased), outputs, elsewhere, tuple(left))
 
 
+def tombstones(study: StudyFolder) -> dict[str, Tombstone]:
+    """Return the withdrawals of a study by participant, in the order in which they were made.
+
+    Raises
+    ------
+    StoreError
+        The list cannot be read, or a line of it is not a withdrawal.
+    """
+    try:
+        content = read_regular(study.withdrawals)
+    except (FileNotFoundError, NotADirectoryError):
+        return {}
+    except OSError as error:
+        raise cannot_read(study.withdrawals, error) from error
+    found: dict[str, Tombstone] = {}
+    for number, line in enumerate(content.splitlines(), start=1):
+        if line.strip():
+            tombstone = _parsed(study.withdrawals, number, line)
+            found[tombstone.participant] = tombstone
+    return found
+
+
+def describe_session(session: SessionFolder) -> ErasedSession:
+    """Return what proves which session this is, as far as its files can be read."""
+    try:
+        with open_regular(session.journal) as file:
+            first = file.readline()
+        begun = hashlib.sha256(first).hexdigest() if first.endswith(b"\n") else ""
+    except OSError:
+        begun = ""
+    try:
+        proof, checksums = fingerprint(read_checksums(session)), sha256(session.checksums)
+    except StoreError:
+        proof = checksums = ""
+    return ErasedSession(session.number, begun, checksums, proof)
+
+
+def bury(study: StudyFolder, tombstone: Tombstone) -> None:
+    """Add a tombstone to the study's list."""
+    append_line(study.withdrawals, json.dumps(asdict(tombstone), ensure_ascii=False).encode() + b"\n")
+
+
+def _parsed(path: Path, number: int, line: bytes) -> Tombstone:
+    try:
+        held: dict[str, Any] = parse_json(line)
+        sessions = tuple(ErasedSession(**one) for one in held.pop("sessions"))
+        made = Tombstone(**held, sessions=sessions)
+        proofs = (text for one in sessions for text in (one.begun, one.checksums, one.fingerprint))
+        texts = (made.participant, made.by, made.reason, *proofs)
+        typed = all(isinstance(text, str) for text in texts) and all(isinstance(one.session, int) for one in sessions)
+        if typed and holds("at", made.at) and ID_PATTERN.fullmatch(made.participant):
+            return made
+    except (ValueError, KeyError, TypeError, AttributeError):
+        pass
+    raise StoreError(
+        f"{path}, line {number} is not a withdrawal: restore it from a copy; if it is an incomplete last line, "
+        "remove it and withdraw again"
+    )
+
+
 def _found(study: StudyFolder, also: Iterable[Path]) -> tuple[list[StudyFolder], list[StudyFolder]]:
     """Return the study folders below ``also``, without the study's own, and the Psych-DS exports of the study."""
     found: dict[Path, StudyFolder] = {}
@@ -198,7 +282,9 @@ def _erase(study: StudyFolder, tombstone: Tombstone) -> bool:
         refuse_if_open(session.path)
     if sessions and participant not in tombstones(study):
         bury(study, replace(tombstone, sessions=tuple(map(describe_session, sessions))))
-    _keep_out_of_psychds(study)
+    ignored = study.withdrawals.name.encode()  # by a Psych-DS validator, also in folders of earlier versions
+    if is_there(study.ignore) and ignored not in read_regular(study.ignore).splitlines():
+        append_line(study.ignore, ignored + b"\n")
     person = study.data / f"sub-{participant}"
     try:
         if is_there(person):
@@ -215,13 +301,6 @@ def _erase(study: StudyFolder, tombstone: Tombstone) -> bool:
     if name is not None:
         write_participants(study, name)
     return bool(sessions) or any(changed)
-
-
-def _keep_out_of_psychds(study: StudyFolder) -> None:
-    """Let a Psych-DS validator pass over the list of withdrawals, also in folders of earlier versions."""
-    name = study.withdrawals.name.encode()
-    if is_there(study.ignore) and name not in read_regular(study.ignore).splitlines():
-        append_line(study.ignore, name + b"\n")
 
 
 def _keep_lines(path: Path, keeps: Callable[[bytes], bool]) -> bool:

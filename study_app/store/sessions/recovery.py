@@ -1,9 +1,14 @@
-"""Resuming a session whose program has ended: the journal is continued, with a line for the resumption."""
+"""Sessions whose program has ended: resume them, or recreate the files derived from their journals.
+
+A journal that has lost lines, because other files of its session contain more, is not used.
+"""
 
 import contextlib
+import csv
+import io
 import json
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -17,28 +22,48 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.source.files import bundled, hashes_in, unbundled
 from study_app.store import receipt
-from study_app.store.atomic import is_there, sweep
-from study_app.store.blinded.blinding import Key, open_or_draw_key, read_key, same_conditions
-from study_app.store.checksums import sha256
-from study_app.store.clock import SessionClock
-from study_app.store.folders import SessionFolder, StudyFolder, locate
+from study_app.store.atomic import is_there, paths_in, read_own, sweep, write_file
+from study_app.store.blinded.blinding import Key, open_or_draw_key, opened_key, read_key, same_conditions
+from study_app.store.checksums import (
+    fingerprint,
+    listed,
+    note_fingerprint,
+    note_rebuilt,
+    place_of,
+    read_checksums,
+    renew_checksums,
+    sha256,
+)
+from study_app.store.folders import RECORDING_NAME, SessionFolder, StudyFolder, locate
 from study_app.store.journals import journal
-from study_app.store.journals.cut_journal import refuse_if_cut
-from study_app.store.journals.journal import Contents, Line
-from study_app.store.journals.journal_writer import Journal
+from study_app.store.journals.journal import Contents, Journal, Line, SessionClock
+from study_app.store.journals.journal_events import unknown_events
 from study_app.store.progress import progress_of, recordable
-from study_app.store.recorder import Lost, Recorded, event_of, recording_files
-from study_app.store.sessions.begin import make_recorder, note_allocation, surroundings
+from study_app.store.recorder import Lost, Recorded, event_of, hashes_of, recording_files
+from study_app.store.sessions.begin import make_recorder, note_allocation, refuse_never_begun, surroundings
 from study_app.store.sessions.folder_lock import open_alone, refuse_if_open
-from study_app.store.sessions.open_session import Place, SessionStore
-from study_app.store.sessions.participant_ids import refuse_never_begun
+from study_app.store.sessions.open_session import Place, SessionStore, table_files
 from study_app.store.sites.merged import refuse_merged
-from study_app.store.tables.participants import write_participants
-from study_app.store.tables.study_description import write_description
+from study_app.store.tables import session_tables
+from study_app.store.tables.study_files import write_description, write_participants
 
+RESTORE = "restore the journal from a copy"
 SHOWN_DIFFERENCES = 6
 MOST_GAP_S = 366 * 86400.0
 """Greatest plausible gap: beyond it the wall clock was or is wrong."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rebuilt:
+    """The result of `rebuild`.
+
+    ``rewritten`` files were missing or differed from the journal, ``swept`` were temporary files of a killed program;
+    ``torn_bytes`` at the journal's end are an incomplete line, and were not changed.
+    """
+
+    rewritten: tuple[Path, ...]
+    swept: tuple[Path, ...]
+    torn_bytes: int
 
 
 def reopen(
@@ -118,7 +143,9 @@ def reopen(
         }
         store.append("session_resumed", t_s=at_s, **gap, **facts)
         note_allocation(store)
-        _sweep(folder)
+        sweep(folder.path)
+        if is_there(folder.recordings):
+            sweep(folder.recordings)
         for event, fields in _recordings_found(folder, contents.lines) if left.start.get("recordings") else ():
             store.append(event, **fields)
         around = surroundings(device, screens, clock, motors_masked, outlets, video)
@@ -158,6 +185,102 @@ def sealed_source(session_folder: Path, source: bytes) -> bytes:
     except StoreError:  # `reopen` reports it
         return source
     return bundled(unbundled(source)[0], files.get, hashes_in(source)) if files else source
+
+
+def rebuild(session_folder: Path) -> Rebuilt:
+    """Recreate the files derived from a session's journal.
+
+    These are its tables, the study's table of participants, the receipt's status and the checksums and fingerprint of a
+    finished session. Correct files are not changed. Recreated checksums or fingerprints are noted permanently in
+    ``rebuilt.txt``: they prove nothing about earlier changes.
+
+    Raises
+    ------
+    StoreError
+        It is not a session folder, open in another program, or its journal is empty, damaged or tells less than the
+        session's other files; or a file cannot be written.
+    """
+    study_folder, folder = locate(session_folder)
+    with open_alone(folder.path):
+        contents = journal.whole(folder.journal)
+        place = Place(study_folder, folder, progress_of(contents.lines).start["study"])
+        refuse_if_cut(place, contents.lines)
+        swept = sweep(folder.path) + (sweep(folder.recordings) if is_there(folder.recordings) else ())
+        table = study_folder.participants(place.study)
+        before = _content(table)
+        tables = table_files(place, contents.lines, opened_key(study_folder))
+        rewritten = [path for path, content in tables if _content(path) != content]
+        for path, content in tables:
+            if path in rewritten:
+                write_file(path, content)
+        rewritten += _renew_receipt(folder, contents.lines)
+        write_participants(study_folder, place.study, whole=True)
+        rewritten += [table] if _content(table) != before else []
+        ended = contents.lines[-1]["event"] == "session_ended"
+        if ended:
+            rewritten += _renew_proof(place, contents.lines, rewritten)
+        return Rebuilt(tuple(rewritten), swept, contents.torn_bytes)
+
+
+def refuse_if_cut(place: Place, lines: Sequence[Line]) -> None:
+    """Reject a journal with less information than the session's other files, which would be replaced."""
+    for name in unknown_events(lines):
+        raise StoreError(
+            f"{place.folder.journal} has events {name!r}, which this version does not know: use the version that wrote "
+            "them"
+        )
+    for path, what in (*beyond(place, lines), *_ended_or_recorded(place, lines)):
+        raise StoreError(f"{path} {what}: {RESTORE}")
+
+
+def beyond(place: Place, lines: Sequence[Line]) -> Iterator[tuple[Path, str]]:
+    """Yield each of receipt, checksums and tables that contains more than the journal, with a description.
+
+    A session that has ended has a complete journal. After a power cut the trials table may have one more trial, since
+    the line of a trial's start is not flushed at once; answers are.
+    """
+    folder = place.folder
+    ended = lines[-1]["event"] == "session_ended"
+    held = receipt.read(folder.receipt) if is_there(folder.receipt) else {}
+    if not ended and (status := held.get("status", receipt.UNFINISHED)) != receipt.UNFINISHED:
+        yield folder.receipt, f"its status is {status!r}, the journal's {receipt.UNFINISHED!r}"
+    if len(held.get("resumed", ())) > sum(line["event"] == "session_resumed" for line in lines):
+        yield folder.receipt, "says that the session was resumed more often than the journal does"
+    if ended:
+        return
+    if is_there(folder.checksums):
+        yield folder.checksums, "was written after the session ended, but the journal has no end"
+    for name, rows, spare in (
+        ("responses", session_tables.responses(lines), 0),
+        ("trials", session_tables.trials(lines), 1),
+        ("intervals", session_tables.SessionRows(lines).intervals, 1),
+    ):
+        path = folder.table(place.study, name)
+        if (there := _rows(path, place.study_folder.path)) > len(rows) + spare:
+            yield path, f"has {there} rows, and the journal gives {len(rows)}"
+
+
+def _ended_or_recorded(place: Place, lines: Sequence[Line]) -> Iterator[tuple[Path, str]]:
+    """Yield the study's fingerprints and the recordings that contain more than a journal without an end."""
+    folder, study = place.folder, place.study_folder
+    if lines[-1]["event"] == "session_ended":
+        return
+    if place_of(study, folder) in {session for _, session in listed(study.fingerprints)}:
+        yield study.fingerprints, f"lists {place_of(study, folder)} as ended, but its journal has no end"
+    of_trials = {path for which in recordable(lines) for path in recording_files(folder.recordings, *which)}
+    for path in paths_in(folder.recordings):
+        if path not in of_trials and RECORDING_NAME.fullmatch(path.relative_to(folder.path).as_posix()):
+            yield path, "is of a trial that the journal never started"
+
+
+def _rows(path: Path, root: Path) -> int:
+    """Return the number of rows of a table; 0 if it is not a table, which is made again without a loss."""
+    try:
+        text = read_own(path, root).decode("utf-8", "replace")
+        names, *rows = list(csv.reader(io.StringIO(text, newline=""))) or [[]]
+    except (StoreError, csv.Error):
+        return 0
+    return sum(len(row) == len(names) > 1 for row in rows)
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,15 +350,9 @@ def _go_on(lines: list[Line], now_ns: Callable[[], int], now: datetime | None) -
     return (round(gap_s, 3) if known else None), clock
 
 
-def _sweep(folder: SessionFolder) -> None:
-    sweep(folder.path)
-    if is_there(folder.recordings):
-        sweep(folder.recordings)
-
-
 def _recordings_found(folder: SessionFolder, lines: list[Line]) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the lines about recordings that the ended program did not write: complete or lost."""
-    from study_app.store import recording_files as recording  # noqa: PLC0415 - loads the Parquet library, where there are recordings
+    from study_app.store import recordings  # noqa: PLC0415 - loads the Parquet library, where there are recordings
 
     events = ("recorded", "recording_lost")
     known = {(line["trial"], line["attempt"], line.get("interval")) for line in lines if line["event"] in events}
@@ -244,12 +361,48 @@ def _recordings_found(folder: SessionFolder, lines: list[Line]) -> Iterator[tupl
             continue
         samples, frames = recording_files(folder.recordings, trial, attempt, interval)
         try:
-            facts = recording.read_facts(samples)
-            shown = recording.Written(frames, recording.read_facts(frames)["rows"], sha256(frames))
-            felt = recording.Written(samples, facts["rows"], sha256(samples))
+            facts = recordings.read_facts(samples)
+            shown = recordings.Written(frames, recordings.read_facts(frames)["rows"], sha256(frames))
+            felt = recordings.Written(samples, facts["rows"], sha256(samples))
             yield event_of(Recorded(trial, attempt, felt, shown, facts["dropped"], interval))
         except StoreError:
             if not is_there(samples):  # frames are put in their place first, and are no recording alone
                 with contextlib.suppress(OSError):
                     frames.unlink(missing_ok=True)
             yield event_of(Lost(trial, attempt, "the program ended before it was complete", interval))
+
+
+def _renew_receipt(folder: SessionFolder, lines: list[Line]) -> list[Path]:
+    """Set the receipt's end from the journal; a missing receipt cannot be recreated."""
+    last = lines[-1]
+    if last["event"] != "session_ended" or not is_there(folder.receipt):
+        return []
+    held = receipt.read(folder.receipt)
+    ended = {"status": last["status"], "reason": last["reason"], "ended_at": last["at"]}
+    if all(held.get(name) == value for name, value in ended.items()):
+        return []
+    receipt.write(folder.receipt, held | ended)
+    return [folder.receipt]
+
+
+def _renew_proof(place: Place, lines: list[Line], rewritten: list[Path]) -> list[Path]:
+    """Renew the checksums, and list the fingerprint where it is missing; return what was written.
+
+    Sessions of format 1 have none.
+    """
+    study, folder = place.study_folder, place.folder
+    there = {session for _, session in listed(study.fingerprints)}
+    has_none = "previous" in lines[-1] and place_of(study, folder) not in there
+    noted = [folder.rebuilt] if has_none else []
+    if has_none:
+        note_rebuilt(folder, f"{study.fingerprints.name} had no fingerprint of the session")
+    if not renew_checksums(folder, [*rewritten, *noted], hashes_of(lines)):
+        return []
+    if has_none:
+        note_fingerprint(study, folder, fingerprint(read_checksums(folder)))
+        return [folder.checksums, folder.rebuilt, study.fingerprints]
+    return [folder.checksums, folder.rebuilt]
+
+
+def _content(path: Path) -> bytes | None:
+    return path.read_bytes() if path.is_file() else None

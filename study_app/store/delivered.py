@@ -1,4 +1,4 @@
-"""Checks whether an interval was delivered as requested: its measured values, and the limits of the study it breaks.
+"""Whether trials and intervals were delivered as requested: what was measured, and the limits of the study that break.
 
 The session asks at the end of each interval, the analysis of the recording of the same interval. Forces are taken as
 recordings have them, so that both compute the same.
@@ -7,7 +7,7 @@ recordings have them, so that both compute the same.
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
@@ -23,21 +23,29 @@ FORCES: Final = ("device_force_n", "force_n")
 DAMPING: Final = "damping_nspm"
 SETTLED_S: Final = 0.2
 """Time after the fade-in from which a task without a lead is evaluated [s]."""
-
-
 FELT_N: Final = 0.05
 """RMS of a force below which it has no error: people do not feel it."""
 TRUE_HALF_S: Final = 0.018
 """Half width of the filter [s] whose motion the error of a force is taken on: a longer one misses what the loop adds to
 the motion, a shorter one takes encoder counts for motion."""
-
 LONGEST_S: Final = 0.26
 """The longest lag of a force that is searched: the longest delay with the longest jitter, plus a margin [s]."""
-
 JUDGED: Final = np.dtype(
     [(name, SAMPLE[name]) for name in ("time_ns", "position_m", "force_n", "device_force_n", "limiters")]
 )
 """The fields of a sample for computing the delivered level."""
+Broken: TypeAlias = tuple[str, float, float]
+"""A measured column that breaks a limit, its value and the limit, both in the limit's unit: ms or percent."""
+# Columns of a trial's row and the protocol's limit for each.
+_JUDGED = (
+    ("lateness_p99_ms", "lateness_ms"),
+    ("worst_gap_ms", "worst_gap_ms"),
+    ("delay_error_p95_ms", "delay_error_ms"),
+    ("first_frame_gap_ms", "frame_gap_ms"),
+    ("worst_frame_gap_ms", "frame_gap_ms"),
+    ("withheld_share", "withheld_percent"),
+)
+_LEAST = "targets_reached"  # judged by "targets_percent": the only measure with a least value
 
 
 def judged(samples: Any) -> Any:
@@ -227,3 +235,39 @@ def missed(
     tick_ms = 1000 / rate_hz if vary == FORCE_DELAY else 0.0
     if missed_ms is not None and abs(missed_ms) > limits.level_error_ms + tick_ms:
         yield "level_error_ms"
+
+
+def within_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> bool | None:
+    """Return whether a trial's measured columns are within the protocol's limits, by size; None without measurements.
+
+    ``limits`` are those of the journal's first line, or ``Limits`` of a protocol as a mapping.
+    """
+    judged = _judged(measured, limits)
+    return not beyond_limits(measured, limits) if judged else None
+
+
+def beyond_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> tuple[Broken, ...]:
+    """Return which of a trial's measured columns break a limit: the column's name, its value and the limit.
+
+    Value and limit are in the limit's unit, ms or percent.
+    """
+    judged = _judged(measured, limits)
+    return tuple(one for one in judged if (one[1] < one[2] if one[0] == _LEAST else not abs(one[1]) <= one[2]))
+
+
+def broken_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> tuple[str, ...]:
+    """Return the limits that a trial's or an interval's measured columns break, by their keys in the protocol."""
+    keys = dict(_JUDGED) | {_LEAST: "targets_percent"}
+    return tuple(dict.fromkeys(keys[measure] for measure, _, _ in beyond_limits(measured, limits)))
+
+
+def _judged(measured: Mapping[str, Any], limits: Mapping[str, float]) -> list[Broken]:
+    judged = [
+        (measure, measured[measure] * (100 if limit.endswith("_percent") else 1), limits[limit])
+        for measure, limit in _JUDGED
+        if measured.get(measure) is not None and limit in limits
+    ]
+    reached, targets = measured.get(_LEAST), measured.get("targets")
+    if "targets_percent" in limits and reached is not None and targets:
+        judged.append((_LEAST, 100 * reached / targets, limits["targets_percent"]))
+    return judged

@@ -1,0 +1,326 @@
+"""The files of a study's folder that are made from its sessions: the table of participants, and the description.
+
+``dataset_description.json`` is the Psych-DS description, generated from the column dictionary. Psych-DS 1.5 wants every
+header of every table listed in ``variableMeasured``, and nothing else: the tables of a study folder are written whole,
+headers included, before this file.
+"""
+
+import contextlib
+import csv
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final, TypeAlias
+
+from study_app.errors import StoreError
+from study_app.protocol.model import StudyHead
+from study_app.protocol.texts import text_in
+from study_app.store import receipt
+from study_app.store.atomic import disk_time_ns, is_there, parse_json, read_own, write_file
+from study_app.store.blinded.blinding import Key, opened, opened_key, reveals
+from study_app.store.folders import SessionFolder, StudyFolder, check_study_name
+from study_app.store.journals import journal
+from study_app.store.sessions.folder_lock import never_begun
+from study_app.store.sites.merged import MANIFEST, folders_of, refuse_merged
+from study_app.store.tables import csv_files, session_tables
+from study_app.store.tables.columns import LATER, PARTICIPANTS, PARTICIPANTS_2, SEALED, every_column
+from study_app.store.tables.csv_files import Column, Row, header
+
+COARSE_S = 2.0  # modification times closer than this may be in the wrong order
+NONE: Final[Mapping[Path, csv_files.Row]] = MappingProxyType({})
+
+_Stamp: TypeAlias = tuple[int, int] | None  # when a journal was last changed [ns since 1970], and its size; None: gone
+_Seen: TypeAlias = dict[Path, tuple[_Stamp, list[csv_files.Row]]]
+
+
+def participants(folder: StudyFolder) -> list[csv_files.Row]:
+    """Return one row per session that has begun its journal, by participant and number; each journal is read."""
+    return _rows(folder, {}, NONE)
+
+
+def participants_at_once(folder: StudyFolder) -> list[csv_files.Row]:
+    """Return the result of `participants` without reading each journal, for fast lists.
+
+    A session's row in the table is used if neither its journal nor the study's key was changed since the table was
+    made. So it proves nothing: `verify` reads all.
+    """
+    return _rows(folder, _seen_in_table(folder), NONE)
+
+
+def _rows(folder: StudyFolder, seen: _Seen, known: Mapping[Path, csv_files.Row]) -> list[csv_files.Row]:
+    """Return the rows of all sessions; ``seen``, brought up to date, has those of journals that need not be read."""
+    key = opened_or_none(folder)
+    rows: list[csv_files.Row] = []
+    for session in folder.sessions():
+        if session.path in known:
+            rows.append(known[session.path])
+            continue
+        stamp = _stamp(session.journal)
+        if stamp is None or seen.get(session.path, (None, []))[0] != stamp:
+            seen[session.path] = stamp, row_of(session, key)
+        rows += seen[session.path][1]
+    return rows
+
+
+def _seen_in_table(folder: StudyFolder) -> _Seen:
+    """Return the rows of the table that no change of a journal or of the key made old; a damaged session has none."""
+    for path in folder.data.glob(folder.participants("*").name):
+        with contextlib.suppress(OSError, StoreError, ValueError, csv.Error):  # then the journals are read
+            made_ns = path.stat().st_mtime_ns - round(COARSE_S * 1e9)
+            if is_there(folder.reveals) and folder.reveals.stat().st_mtime_ns >= made_ns:
+                return {}
+            content = read_own(path, folder.path)
+            second = b"group" in content.partition(b"\n")[0].split(b",")
+            found = csv_files.read_table(content, PARTICIPANTS_2 if second else PARTICIPANTS)
+            sessions = {folder.session(row["participant"], row["session"]): row for row in found}
+            return {
+                session.path: (stamp, [row])
+                for session, row in sessions.items()
+                if row["status"] != "damaged" and (stamp := _stamp(session.journal)) is not None and stamp[0] < made_ns
+            }
+    return {}
+
+
+def _stamp(path: Path) -> _Stamp:
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size
+
+
+def opened_or_none(folder: StudyFolder) -> Key | None:
+    """Return the study's key where it was opened and can be read: a lost one hides no session."""
+    with contextlib.suppress(StoreError):
+        return opened_key(folder)
+    return None
+
+
+def row_of(session: SessionFolder, key: Key | None) -> list[csv_files.Row]:
+    """Return the row of one session; none if it has not begun. ``key`` is the study's once it was opened."""
+    try:
+        contents = journal.scan(session.journal) if is_there(session.journal) else journal.Contents([], 0)
+        if not contents.lines and never_begun(session.path):
+            return []
+    except StoreError:  # one session that cannot be read must not stop the others
+        return [_damaged(session, {})]
+    return [row_from(session, contents, key) if contents.lines else _damaged(session, {})]
+
+
+def row_from(session: SessionFolder, contents: journal.Contents, key: Key | None) -> csv_files.Row:
+    """Return the row of a session whose journal has these lines."""
+    try:
+        row = session_tables.participant(opened(contents.lines, key))
+    except StoreError:  # one session that cannot be read must not stop the others
+        return _damaged(session, contents.lines[0])
+    return row if contents.damage is None else row | {"status": "damaged"}
+
+
+def _damaged(session: SessionFolder, start: journal.Line) -> csv_files.Row:
+    """Return the row of a session without one from its journal: from its folder, first line and receipt."""
+    if not start:
+        with contextlib.suppress(StoreError):
+            held = receipt.read(session.receipt)
+            device = held.get("device")
+            name = device.get("name") if isinstance(device, dict) else None
+            start = held | {"at": held.get("started_at"), "device": name}
+    known = {name: start.get(name) for name in ("study", "simulated", "pilot", "device", "language")}
+    which = {"participant": session.participant, "session": session.number, "session_started_at": start.get("at")}
+    return {**dict.fromkeys(header(PARTICIPANTS)), **known, **which, "status": "damaged"}
+
+
+def write_participants(
+    folder: StudyFolder, study: str, known: Mapping[Path, csv_files.Row] = NONE, *, whole: bool = False
+) -> None:
+    """Bring the table up to date with all journals; those that changed since it was made are read.
+
+    Several programs may do so at once on a shared folder: each looks again after it wrote, so that whoever wrote last
+    has seen what the others journalled before they wrote, and the table ends up complete. The table's own time is when
+    its making began, so that a program killed meanwhile leaves none that seems newer than a journal it did not read.
+    """
+    path = folder.participants(study)
+    seen = {} if whole else _seen_in_table(folder)
+    made_ns, content = _made(folder, seen, known)
+    if path.is_file() and path.read_bytes() == content:
+        return
+    while True:
+        write_file(path, content, changed_ns=made_ns)
+        made_ns, again = _made(folder, seen, known)
+        if again == content:
+            return
+        content = again
+
+
+def _made(folder: StudyFolder, seen: _Seen, known: Mapping[Path, csv_files.Row]) -> tuple[int, bytes]:
+    """Return when the making of the table began [ns since 1970, by the clock of the folder's disk], and the table."""
+    began_ns = disk_time_ns(folder.data)
+    return began_ns, table_bytes(folder, _rows(folder, seen, known))
+
+
+def table_bytes(folder: StudyFolder, rows: Sequence[csv_files.Row]) -> bytes:
+    """Return the table with these rows, and the group of each session in a study of format 2 that was unblinded."""
+    return csv_files.csv_bytes(columns_of(folder, rows), [{"group": None} | row for row in rows])
+
+
+def columns_of(folder: StudyFolder, rows: Iterable[csv_files.Row]) -> tuple[Column, ...]:
+    """Return the columns of the table with these rows."""
+    second = any("group" in row for row in rows)
+    return PARTICIPANTS_2 if second and reveals(folder.path) else PARTICIPANTS
+
+
+# What a study folder holds besides tables; patterns as in .gitignore.
+IGNORED = b"""\
+.psychds-ignore
+.*.tmp
+.open-*.json
+journal.jsonl
+receipt.json
+checksums.sha256
+recordings/
+blinding/
+exclusions.csv
+exclusions_reversed.jsonl
+fingerprints.txt
+withdrawals.jsonl
+rebuilt.txt
+"""
+
+
+def description_bytes(study: StudyHead, *, sealed: bool, protocol_format: int = 1, intervals: bool = False) -> bytes:
+    """Return the file for ``study``; the same bytes for the same study on every machine.
+
+    ``sealed`` says that no table has the sealed columns; ``protocol_format`` is the format of the study's file,
+    ``intervals`` whether it has blocks with a design.
+    """
+    title = text_in(study.title, study.languages[0])
+    content = {
+        "@context": "https://schema.org/",
+        "@type": "Dataset",
+        "name": study.name,
+        "alternateName": title,
+        "description": study.description or title,
+        "version": study.version,
+        "variableMeasured": [
+            column.variable
+            for column in every_column(protocol_format, intervals=intervals)
+            if not (sealed and column.sealed)
+        ],
+    }
+    return (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode()
+
+
+def describes_alike(content: bytes, expected: bytes) -> bool:
+    """Return whether a description says the same of the study, and of the same columns but for `LATER`.
+
+    Earlier versions of the program lack columns, describe others in other words, and add a pattern of the cells, which
+    is no property of schema.org's PropertyValue; units and ranges are the same in all.
+    """
+    try:
+        found, wanted = parse_json(content), parse_json(expected)
+        columns, wanted_columns = (
+            [
+                (variable["name"], {key: variable[key] for key in variable.keys() - {"description", "valuePattern"}})
+                for variable in it.pop("variableMeasured")
+            ]
+            for it in (found, wanted)
+        )
+    except (AttributeError, KeyError, TypeError, ValueError):
+        return False
+    names = [name for name, _ in columns]
+    return bool(
+        found == wanted and columns == [one for one in wanted_columns if one[0] in names or one[0] not in LATER]
+    )
+
+
+def write_description(
+    folder: StudyFolder, study: StudyHead, protocol_format: int = 1, *, intervals: bool = False
+) -> None:
+    """Write the description where it is missing or of an older version of the study.
+
+    Until the key is opened it lacks the sealed columns, unless an earlier version of the program described them: then
+    tables have them.
+    """
+    held = read_own(folder.description, folder.path) if is_there(folder.description) else b""
+    sealed = not (reveals(folder.path) or names_sealed(held))
+    content = description_bytes(study, sealed=sealed, protocol_format=protocol_format, intervals=intervals)
+    if held != content:
+        write_file(folder.description, content)
+    if not is_there(folder.ignore):
+        write_file(folder.ignore, IGNORED)
+
+
+def has_intervals(protocol: Mapping[str, Any]) -> bool:
+    """Return whether the protocol in a receipt has blocks with a design."""
+    return any("slots" in block for block in protocol["blocks"].values())
+
+
+def names_sealed(content: bytes) -> bool:
+    """Return whether a description names a sealed column."""
+    with contextlib.suppress(AttributeError, KeyError, TypeError, ValueError):
+        return any(variable["name"] in SEALED for variable in parse_json(content)["variableMeasured"])
+    return False
+
+
+def described_study(folder: StudyFolder) -> str | None:
+    """Return the name of the study whose folder this is, or None where it is none yet."""
+    if not is_there(folder.description):
+        return None
+    try:
+        return check_study_name(parse_json(read_own(folder.description, folder.path))["name"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise StoreError(
+            f"{folder.description} does not describe a study: is {folder.path} a results folder?"
+        ) from error
+
+
+def check_study(folder: StudyFolder, study: str) -> None:
+    """Refuse a folder of another study, of merged sites, of studies in folders of their own, or within one of these.
+
+    Raises
+    ------
+    StoreError
+        Says what the folder is, and which one to use.
+    """
+    refuse_merged(folder.path)
+    described = described_study(folder)
+    if described is not None:
+        if described != study:
+            raise StoreError(f"{folder.path} holds the study {described!r}, not {study!r}: use another results folder")
+        return
+    for above in folder.path.absolute().parents:
+        if is_there(StudyFolder(above).key):
+            raise StoreError(f"{folder.path} lies within {above}, which is a study's folder: use one outside of it")
+    if within := sorted(path.name for path in folder.path.glob("*") if is_there(StudyFolder(path).key)):
+        raise StoreError(
+            f"{folder.path} holds folders of studies ({', '.join(within[:3])}{' ...' if within[3:] else ''}): use "
+            f"one of these or a new one next to them, such as {folder.path / study}"
+        )
+
+
+def participants_of(folder: Path) -> list[Row]:
+    """Return one row per session of a study; in a merged one by site, with the site in the participants' IDs.
+
+    Raises
+    ------
+    StoreError
+        The list of sites cannot be read.
+    """
+    return [
+        {**row, "participant": f"{prefix}{row['participant']}"}
+        for prefix, place in folders_of(folder).items()
+        for row in participants(StudyFolder(place))
+    ]
+
+
+def study_folders(results: Path) -> Iterator[Path]:
+    """Yield the folders of studies and of merged studies under ``results``, sorted.
+
+    Raises
+    ------
+    OSError
+        The folder is not there, or cannot be read.
+    """
+    for folder in sorted(results.iterdir()):
+        if (folder / "data").is_dir() or (not folder.name.startswith(".") and (folder / MANIFEST).is_file()):
+            yield folder

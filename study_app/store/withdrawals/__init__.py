@@ -1,1 +1,0 @@
-"""Withdrawal of participants: what they gave is erased, and a tombstone per participant remains."""
