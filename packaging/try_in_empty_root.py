@@ -47,7 +47,7 @@ from study_app.app.session.garbage_collection import collecting_here
 from study_app.app.session.live_session import LiveSession
 from study_app.gui.application import application_here
 from study_app.gui.theme.theme import LIGHT
-from study_app.session.request import NewSession
+from study_app.session.start import NewSession
 application_here()
 live = LiveSession(NewSession("demo", "P001", 1, 1, "", "en", "scripted", True, None, Path("/home/session")), LIGHT)
 loop = QEventLoop()

@@ -9,7 +9,7 @@ import pytest
 
 from study_app.protocol.load import load
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.session.simulated.trial_features import ConditionFeatures, TrialFeatures
+from study_app.session.simulated.rehearsal import ConditionFeatures, TrialFeatures
 
 
 def once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], object]) -> Path:

@@ -27,9 +27,8 @@ from study_app.gui.display.screens import choose_screens
 from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import parse
 from study_app.protocol.orders.schedule import Schedule, Trial
-from study_app.session.request import NewSession
 from study_app.session.resume import FIRST
-from study_app.session.start import open_store
+from study_app.session.start import NewSession, open_store
 from study_app.store.recordings import read_frames
 from study_app.store.sessions.open_session import SessionStore
 from study_app.validation.computer import machine as machine_here

@@ -24,7 +24,7 @@ from study_app.gui.home.main_window import MainWindow, bug_words
 from study_app.gui.home.view import HomePlace
 from study_app.gui.home.workspace import WorkspaceDialog
 from study_app.gui.widgets.background import wait_for_jobs
-from study_app.session.request import NewSession
+from study_app.session.start import NewSession
 from study_app.store.workstation import MachineSettings, create_workspace
 from study_app.viewmodels.help import FIRST_PAGE, PAGES_OF_PLACES
 from study_app.workspace import Workspace, chosen_workspace, offered_workspace, workspace

@@ -135,7 +135,7 @@ def _of_statements(
     from study_app.analysis.power.batch_counts import sweep
     from study_app.analysis.power.plan import plan
     from study_app.analysis.power.power_curves import powers
-    from study_app.session.simulated.trial_features import condition_features
+    from study_app.session.simulated.rehearsal import condition_features
 
     show("simulating every condition")
     planned = plan(study, condition_features(study, seed=seed, progress=show))

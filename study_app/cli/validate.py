@@ -36,7 +36,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     """
     from study_app.analysis.power.plan import plan
     from study_app.protocol.load import load
-    from study_app.session.simulated.trial_features import condition_features
+    from study_app.session.simulated.rehearsal import condition_features
     from study_app.store.output_files import make_folder, write_files
     from study_app.validation.report_rates.known_effects import simulated
     from study_app.validation.report_rates.rates import Rate, markdown, table

@@ -1,4 +1,4 @@
-"""Whether a session may begin: a pure judgement of what was measured before it.
+"""Whether a session may begin: a pure judgement of what was measured before it, and how the motors were masked.
 
 A failure refuses the session; a warning is something that would make trials invalid, or that somebody should know.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +28,12 @@ from study_app.video.sources import VideosFound
 if TYPE_CHECKING:
     from study_app.haptics.runtime.telemetry import Timing  # the compiler: whoever measures has loaded it
 
+Means: TypeAlias = Literal["no", "headphones", "noise"]
+MEANS: Final[dict[Means, str]] = {"no": "No", "headphones": "Headphones", "noise": "Noise"}
+"""The answers to "Motors masked?", with their words."""
+QUIETEST_DB, LOUDEST_DB, USUAL_DB = 30, 85, 60
+"""Sound pressure levels of masking noise [dB]; above 85 dB hearing is at risk (Directive 2003/10/EC)."""
 Verdict: TypeAlias = Literal["ok", "warning", "failure"]
-
 LEAST_FRESH = 0.5  # share of ticks in which the device had a new sample
 RATE_WARNING, RATE_FAILURE = 0.02, 0.5  # relative error of the servo's rate
 LEAST_REFRESH_HZ = 50.0
@@ -40,6 +44,19 @@ MOST_OF_A_TICK = 0.2  # share of a tick that the force model may take
 SAME = 1.1  # greatest ratio of two errors that count as equal
 _UNKNOWN = {"delay_s": "delay", "count_m": "encoder count", "mass_kg": "mass"}
 SPARE = 3  # times what a session of the expected length takes
+
+
+@dataclass(frozen=True, slots=True)
+class Masking:
+    """The operator's answer; ``noise_db`` is the sound pressure level of the noise [dB], None without noise."""
+
+    means: Means = "no"
+    noise_db: int | None = None
+
+    @property
+    def entry(self) -> dict[str, Any]:
+        """The answer as the receipt has it."""
+        return {"means": self.means, "noise_db": self.noise_db}
 
 
 @dataclass(frozen=True, slots=True)

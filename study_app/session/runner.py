@@ -28,40 +28,37 @@ from study_app.session.device_buttons import DeviceButtons
 from study_app.session.ports import Ports
 from study_app.session.resume import FIRST, Start
 from study_app.session.tasks import Outcome, TaskView
-from study_app.session.transitions.commands import (
+from study_app.session.transitions.events import (
     Adjust,
+    Broke,
     CheckFlushed,
     Command,
+    EndAsked,
+    Event,
     FadeIn,
     Finish,
+    ForceStopped,
     LeaveTask,
+    PauseAsked,
+    Reconnected,
     Rest,
     ShowPage,
     StartTrial,
+    Stepped,
     StopForce,
     StopTrial,
-    Write,
-    WriteTables,
-)
-from study_app.session.transitions.events import (
-    Broke,
-    EndAsked,
-    Event,
-    ForceStopped,
-    PauseAsked,
-    Reconnected,
-    Stepped,
     TaskDone,
     TimeUp,
+    Write,
     WriteCompleted,
     WriteFailed,
     WriteRetried,
+    WriteTables,
     broken,
 )
 from study_app.session.transitions.state import FINAL, Phase, SessionState, Stall
 from study_app.session.transitions.table import advance, open_session
-from study_app.session.trial import RunningTrial, TankView, ball_is_back, resting_view
-from study_app.session.trial_recording import Recording
+from study_app.session.trial import Recording, RunningTrial, TankView, ball_is_back, resting_view
 from study_app.store.delivered import broken_limits, delivered, undelivered
 
 RETRY_S = 1.0  # a disk that took nothing is tried again so often

@@ -1,10 +1,13 @@
-"""The trial under way: prepared, then begun with the first painted frame of its tank, followed, and summed up.
+"""The trial under way: prepared, begun with the first painted frame of its tank, followed, recorded and summed up.
 
 Until that frame there is no force, the task's clock stands at zero and nothing is recorded, however long a window takes
-to show the tank. Without a window, whoever runs the session reports the first frame at once.
+to show the tank. Without a window, whoever runs the session reports the first frame at once. A recording has every tick
+from shortly before the first frame: whatever the force was still fading from, so that every force of the trial can be
+computed again from the recording alone. Measures name no requested delay: only the achieved one less the requested.
 """
 
 import math
+from collections import deque
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -12,26 +15,224 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.haptics.model.layout import LIMITER_GLITCH
+from study_app.haptics.model.layout import LIMITER_GLITCH, LIMITER_NAMES, SAMPLE
 from study_app.haptics.model.scene import Scene
-from study_app.protocol.trials.tasks import AnyTask, Follow
-from study_app.session.ports import ServoPort
+from study_app.haptics.runtime.telemetry import timing
+from study_app.protocol.trials.task import AnyTask
+from study_app.protocol.trials.tasks.follow import Follow
+from study_app.session.ports import RecorderPort, ServoPort
 from study_app.session.tasks import Outcome, TargetReached, TaskView, track
-from study_app.session.transitions.commands import StartTrial
-from study_app.session.trial_recording import Recording
-from study_app.session.trial_statistics import TrialStatistics
+from study_app.session.transitions.events import StartTrial
 from study_app.store.delivered import JUDGED, delivered_error, judged
 from study_app.video.frames import VideoFrame, VideoSource
+from study_app.video.statistics import VideoStatistics
 
+LEAD_S = 0.6  # longer than the slowest fade
+_TIMES = np.dtype([(name, SAMPLE[name]) for name in ("tick", "time_ns", "lateness_ns")])
 # Everything is drawn this much later than the trial asks. Then the moment to draw lies between two samples at every
 # delay, none included, and is met exactly; else the newest sample, up to a tick old, would stand in where there is no
 # delay, and the error of the delay would tell such trials from all others. Two ticks at 1 kHz.
 SETTLED_S = 0.002
-
 LEAST_SET_S = 1.0
 """A setting takes at least so long after the task's lead: less could not be judged. [choice]"""
 FROZEN_S = 1.0
 """A tick or a frame that does not come for longer ends the attempt: no limit of a study permits more. [choice]"""
+
+
+class Recording:
+    """Hands the samples of trials, and the frames shown in them, to the recorder; without one it does nothing.
+
+    Parameters
+    ----------
+    recorder : RecorderPort or None
+        Where they go.
+    rate_hz : float
+        The servo's nominal rate.
+    """
+
+    def __init__(self, recorder: RecorderPort | None, rate_hz: float) -> None:
+        self._recorder = recorder
+        self._rate_hz = rate_hz
+        self._lead = round(LEAD_S * rate_hz)
+        self._before: deque[Any] = deque()
+        self._held = 0
+        self._running = False
+
+    def take(self, samples: Any) -> None:
+        """Take the newest samples, in order (array of ``layout.SAMPLE``), which are not changed afterwards."""
+        if self._recorder is None or len(samples) == 0:
+            return
+        if self._running:
+            self._recorder.append(samples)
+        self._before.append(samples)
+        self._held += len(samples)
+        while self._held - len(self._before[0]) >= self._lead:
+            self._held -= len(self._before.popleft())
+
+    def forget(self) -> None:
+        """Drop what came before: the servo was started again, so nothing felt from here on goes on from it."""
+        self._before.clear()
+        self._held = 0
+
+    def start(self, trial: int, attempt: int, interval: int | None = None) -> None:
+        """Begin the recording of a trial or of one of its intervals, with what came just before it."""
+        if self._recorder is None:
+            return
+        self._recorder.start(trial, attempt, self._rate_hz, interval)
+        self._running = True
+        spare = max(self._held - self._lead, 0)
+        for index, samples in enumerate(self._before):
+            self._recorder.append(samples[spare:] if index == 0 else samples)
+
+    def frame(self, painted_ns: int, sample_ns: int, video: VideoFrame | None = None) -> None:
+        """Take a frame that was painted at one moment and showed another [ns], and the frame of a video in it."""
+        if self._recorder is not None and self._running:
+            self._recorder.frame(painted_ns, sample_ns, video)
+
+    def stop(self) -> None:
+        """End the recording."""
+        if self._recorder is not None and self._running:
+            self._recorder.stop()
+        self._running = False
+
+
+class TrialStatistics:
+    """Adds up samples and frames as they come."""
+
+    def __init__(
+        self, *, rate_hz: float, late_s: float, due_ns: int, paints: bool = True, videos: bool = False
+    ) -> None:
+        self._video = VideoStatistics() if videos else None
+        self._rate_hz = rate_hz
+        self._late_s = late_s
+        self._fewest = 1 if paints else 2  # frames before the first of them can have stood
+        self._times: list[Any] = []
+        self._errors_s: list[float] = []
+        self._painted_ns = due_ns
+        self._first_gap_ns = 0
+        self._frame_gap_ns = 0
+        self._last_m: NDArray[np.float64] | None = None
+        self._path_m = 0.0
+        self._force_sum_n = 0.0
+        self._force_peak_n = 0.0
+        self._limited = np.zeros(len(LIMITER_NAMES), np.int64)
+        self._permitted_sum_n = 0.0
+        self._withheld_sum_n = 0.0
+        self._delay_ticks: int | None = None
+        self._most_delay_ticks = 0
+        self._delay_changes = 0
+
+    def feed(self, samples: Any) -> None:
+        """Take the next samples, in order (recarray of ``layout.SAMPLE``)."""
+        if len(samples) == 0:
+            return
+        times = np.empty(len(samples), _TIMES)
+        for name in _TIMES.fields or ():
+            times[name] = samples[name]
+        self._times.append(times)
+        self._move(samples["position_m"][samples["limiters"] & LIMITER_GLITCH == 0])
+        force_n = np.sqrt(np.einsum("ij,ij->i", samples["device_force_n"], samples["device_force_n"]))
+        self._force_sum_n += float(force_n.sum())
+        self._force_peak_n = max(self._force_peak_n, float(force_n.max()))
+        self._permitted_sum_n += float(samples["permitted_n"].sum())
+        self._withheld_sum_n += float(samples["withheld_n"].sum())
+        self._follow_delay(samples["delay_ticks"])
+        limiters = samples["limiters"]
+        if limiters.any():
+            bits = np.arange(len(LIMITER_NAMES))
+            self._limited += ((limiters[:, None] >> bits) & 1).sum(axis=0)
+
+    def frame(self, painted_ns: int, shown_ns: int, delay_s: float, video: VideoFrame | None = None) -> None:
+        """Take a frame that was painted at one moment and showed another [ns], at the delay then asked for [s].
+
+        ``video`` is the frame of a video in it.
+        """
+        if self._video is not None and video is not None:
+            self._video.frame(painted_ns, video, delay_s)
+        gap_ns = painted_ns - self._painted_ns
+        if self._errors_s:
+            self._frame_gap_ns = max(self._frame_gap_ns, gap_ns)
+        else:
+            self._first_gap_ns = gap_ns
+        self._painted_ns = painted_ns
+        self._errors_s.append((painted_ns - shown_ns) * 1e-9 - delay_s)
+
+    def frame_gap_ns(self, until_ns: int) -> int:
+        """Return the longest time that a frame stood, the newest one until a moment [ns]; 0 before the first frame."""
+        return max(self._frame_gap_ns, until_ns - self._painted_ns) if len(self._errors_s) >= self._fewest else 0
+
+    def summary(self, *, samples_dropped: int, worst_gap_s: float, until_ns: int) -> dict[str, Any]:
+        """Return the measured columns of the trial row, to six decimals; None where nothing was measured.
+
+        Parameters
+        ----------
+        samples_dropped : int
+            How many samples of the trial were not read.
+        worst_gap_s : float
+            The longest time between two ticks, as the servo kept it [s].
+        until_ns : int
+            When the trial ended: until then the last frame stood [ns].
+        """
+        return {
+            name: round(value, 6) if isinstance(value, float) else value
+            for name, value in self._columns(samples_dropped, worst_gap_s, until_ns).items()
+        }
+
+    def _columns(self, samples_dropped: int, worst_gap_s: float, until_ns: int) -> dict[str, Any]:
+        times = np.concatenate([np.empty(0, _TIMES), *self._times]).view(np.recarray)
+        timed = timing(times, self._rate_hz)
+        ticks = timed.ticks
+        elapsed_s = float(times.time_ns[-1] - times.time_ns[0]) * 1e-9 if ticks else 0.0
+        return {
+            "ticks": ticks,
+            "tick_rate_hz": timed.rate_hz if ticks > 1 else None,
+            "lateness_p99_ms": timed.lateness_p99_s * 1e3 if ticks else None,
+            "worst_gap_ms": worst_gap_s * 1e3 if ticks else None,
+            "overruns": timed.overruns,
+            "samples_dropped": samples_dropped,
+            "path_length_m": self._path_m,
+            "mean_speed_mps": self._path_m / elapsed_s if elapsed_s > 0 else None,
+            "force_mean_n": self._force_sum_n / ticks if ticks else None,
+            "force_peak_n": self._force_peak_n if ticks else None,
+            "withheld_share": self._withheld_sum_n / self._permitted_sum_n if self._permitted_sum_n > 0 else None,
+            "loop_delay_ticks": self._most_delay_ticks if ticks else None,
+            "loop_delay_changes": self._delay_changes if ticks else None,
+            **{f"limiter_{name}": int(count) for name, count in zip(LIMITER_NAMES, self._limited, strict=True)},
+            **self._frames(until_ns),
+            **({} if self._video is None else self._video.columns()),
+        }
+
+    def _move(self, positions: NDArray[np.float64]) -> None:
+        """Add the path through ``positions`` (n, 3) [m]; non-finite ones are left out."""
+        finite = np.isfinite(positions).all(axis=1)
+        places = positions if finite.all() else positions[finite]
+        if self._last_m is not None:
+            places = np.concatenate((self._last_m, places))
+        if len(places) == 0:
+            return
+        steps = np.diff(places, axis=0)
+        self._path_m += float(np.sqrt(np.einsum("ij,ij->i", steps, steps)).sum())
+        self._last_m = places[-1:].copy()
+
+    def _follow_delay(self, delay_ticks: NDArray[np.int64]) -> None:
+        """Count how often the loop's delay (n,) [ticks] changed, and keep the longest."""
+        before = int(delay_ticks[0]) if self._delay_ticks is None else self._delay_ticks
+        self._delay_changes += int(np.count_nonzero(np.diff(delay_ticks, prepend=before)))
+        self._most_delay_ticks = max(self._most_delay_ticks, int(delay_ticks.max()))
+        self._delay_ticks = int(delay_ticks[-1])
+
+    def _frames(self, until_ns: int) -> dict[str, Any]:
+        errors_s = np.asarray(self._errors_s, np.float64)
+        seen = errors_s.size > 0
+        return {
+            "frames": int(errors_s.size),
+            "frames_late": int((errors_s > self._late_s).sum()),
+            "delay_error_mean_ms": float(errors_s.mean()) * 1e3 if seen else None,
+            "delay_error_p95_ms": float(np.percentile(errors_s, 95)) * 1e3 if seen else None,
+            "delay_error_max_ms": float(errors_s.max()) * 1e3 if seen else None,
+            "first_frame_gap_ms": self._first_gap_ns * 1e-6 if seen else None,
+            "worst_frame_gap_ms": self.frame_gap_ns(until_ns) * 1e-6 if errors_s.size >= self._fewest else None,
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,31 +250,7 @@ class TankView:
 
 
 class RunningTrial:
-    """One attempt of a trial, from its preparation to its end.
-
-    Parameters
-    ----------
-    command : StartTrial
-        What is presented, and how late it is drawn.
-    scene : Scene
-        What is felt.
-    late_s : float
-        A frame counts as late if its delay is more than this over the one asked for [s].
-    servo : ServoPort
-        Presents the scene.
-    reader : telemetry.Reader
-        The telemetry's, from which the samples given to `follow` come; it counts those that were lost.
-    recording : Recording
-        Takes frames and samples from the first frame on.
-    paints : bool
-        Whether a window paints frames as long as the trial runs.
-    hides_ball : bool
-        Whether the ball is not drawn once the lead of the task is over.
-    video : VideoSource, optional
-        The video that is seen.
-    videos : bool
-        Whether a condition of the study shows a video.
-    """
+    """One attempt of a trial, from its preparation to its end."""
 
     def __init__(
         self,

@@ -15,7 +15,7 @@ from study_app.app.main_controller import MainController, home
 from study_app.app.session import live_session
 from study_app.app.session.termination import BY_SIGNAL_S
 from study_app.errors import DeviceLost
-from study_app.session.request import NewSession
+from study_app.session.start import NewSession
 
 pytestmark = pytest.mark.slow
 

@@ -21,7 +21,7 @@ from study_app.app.workstation_controller import WorkstationController
 from study_app.devices.descriptor import NONE, READY, Backend
 from study_app.errors import DeviceNotFound
 from study_app.gui.theme.theme import DARK
-from study_app.session.request import NewSession
+from study_app.session.start import NewSession
 from study_app.store.exclusions import Exclusion
 from study_app.store.workstation import load
 from study_app.workers.messages import Crashed, Refused

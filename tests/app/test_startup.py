@@ -25,7 +25,7 @@ from study_app.app.session import live_session
 from study_app.gui.application import application_here
 from study_app.gui.theme.theme import LIGHT
 from study_app.gui.widgets.background import wait_for_jobs
-from study_app.session.request import NewSession
+from study_app.session.start import NewSession
 
 def loaded():
     return sorted({name.partition(".")[0] for name in sys.modules})

@@ -14,7 +14,7 @@ from study_app.app.workstation_settings import described, settings_here, text_sc
 from study_app.devices.descriptor import READY, Backend
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.widgets.dialogs import Notice
-from study_app.session.request import NewSession
+from study_app.session.start import NewSession
 from study_app.store import workstation
 from study_app.store.workstation import DEFAULTS, DisplayOffset, MachineSettings, save
 from study_app.user_folder import settings_file

@@ -19,8 +19,8 @@ from study_app.haptics.model.layout import LIMITER_GLITCH, STATUS_OK
 from study_app.haptics.model.slope_limits import slew_limit_n
 from study_app.protocol.load import load
 from study_app.session.simulated import rehearsal
-from study_app.session.simulated.exploration import exploration
-from study_app.session.simulated.rehearsed_session import RehearsedSession
+from study_app.session.simulated.observers import exploration
+from study_app.session.simulated.rehearsal import RehearsedSession
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.verification.verify_study import verify

@@ -14,7 +14,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.resume import REHEARSED_SCREENS, resume_at
 from study_app.session.simulated.answers_only import DEVICE, Answering, Kept, SimulatedTime, rehearse_answers
-from study_app.session.simulated.trial_features import ConditionFeatures
+from study_app.session.simulated.rehearsal import ConditionFeatures
 from study_app.session.transitions.table import open_session
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.blinded.unblinding import unblind_folder

@@ -25,8 +25,16 @@ from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.protocol.source.files import source_bytes
 from study_app.protocol.wording.without_force import without_force
 from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
-from study_app.session.transitions.commands import ShowPage
-from study_app.session.transitions.events import Begin, Chosen, Continue, ItemShown, LanguageChosen, Submitted, TaskDone
+from study_app.session.transitions.events import (
+    Begin,
+    Chosen,
+    Continue,
+    ItemShown,
+    LanguageChosen,
+    ShowPage,
+    Submitted,
+    TaskDone,
+)
 from study_app.session.transitions.state import FINAL
 from study_app.session.transitions.table import advance, open_session
 from study_app.store.progress import Progress

@@ -11,8 +11,7 @@ from PySide6.QtTest import QTest
 from study_app.errors import DeviceError, DeviceNotFound
 from study_app.gui.home.startup_window import OpeningWindow
 from study_app.protocol.load import load
-from study_app.session.request import NewSession, study_results
-from study_app.session.start import check
+from study_app.session.start import NewSession, check, study_results
 
 CHOSEN = NewSession("demo", "P001", 1, 7, "", "en", "mouse", True, None, Path("nowhere"))
 

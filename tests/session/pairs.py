@@ -5,8 +5,7 @@ from typing import Any
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.resume import FIRST, Start
-from study_app.session.transitions.commands import Finish, Write
-from study_app.session.transitions.events import Begin, Chosen, Continue, Submitted, TaskDone, TimeUp
+from study_app.session.transitions.events import Begin, Chosen, Continue, Finish, Submitted, TaskDone, TimeUp, Write
 from study_app.session.transitions.state import FINAL, Phase, SessionState
 from study_app.session.transitions.table import advance, open_session
 from tests.protocol.trials.level_studies import BLOCK, HEAD, SECRET, key_of, study

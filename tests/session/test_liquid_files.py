@@ -20,8 +20,8 @@ from study_app.protocol.orders.schedule import Trial, build_schedule, stream
 from study_app.protocol.source.files import unbundled
 from study_app.protocol.source.json_schema import schema
 from study_app.session.pages import TaskPage
-from study_app.session.request import resumed
 from study_app.session.simulated import rehearsal
+from study_app.session.start import resumed
 from study_app.session.transitions.page_builder import page
 from study_app.session.transitions.state import Phase
 from study_app.session.transitions.table import open_session

@@ -14,16 +14,18 @@ from study_app.protocol.orders.durations import expected_duration_s
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.session.pages import Progress, TextPage
 from study_app.session.resume import resume_at
-from study_app.session.transitions.commands import Command, ShowPage, Write
 from study_app.session.transitions.events import (
     Begin,
     Broke,
     Chosen,
+    Command,
     ItemShown,
     Reconnected,
     ResumeAsked,
+    ShowPage,
     Submitted,
     TaskDone,
+    Write,
     broken,
 )
 from study_app.session.transitions.state import FINAL, Phase, SessionState

@@ -15,11 +15,9 @@ from study_app.protocol.load import parse, protocol_hash, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import PageStep, Schedule, Trial, build_schedule
 from study_app.session.pages import PausePage
-from study_app.session.request import NewSession, resumed
 from study_app.session.resume import REHEARSED_SCREENS, begun_schedule, find_protocol, is_rehearsal, resume_at
-from study_app.session.start import check, open_store
-from study_app.session.transitions.commands import FadeIn, ShowPage, StartTrial, Write
-from study_app.session.transitions.events import Begin, ResumeAsked
+from study_app.session.start import NewSession, check, open_store, resumed
+from study_app.session.transitions.events import Begin, FadeIn, ResumeAsked, ShowPage, StartTrial, Write
 from study_app.session.transitions.state import Phase, SessionState
 from study_app.session.transitions.table import advance, open_session
 from study_app.store.journals import journal

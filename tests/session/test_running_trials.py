@@ -9,9 +9,8 @@ from study_app.haptics.model.scene import Scene
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tasks import Explore, Follow
 from study_app.session.tasks import TaskView
-from study_app.session.transitions.commands import StartTrial
-from study_app.session.trial import SETTLED_S, RunningTrial
-from study_app.session.trial_recording import Recording
+from study_app.session.transitions.events import StartTrial
+from study_app.session.trial import SETTLED_S, Recording, RunningTrial
 from study_app.video.frames import VideoFrame
 from study_app.video.statistics import VideoStatistics
 from tests.session.fakes import FakeServo

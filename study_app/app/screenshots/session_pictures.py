@@ -17,7 +17,7 @@ from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import apply_theme
 from study_app.protocol.model import Reach
 from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
-from study_app.session.request import NewSession
+from study_app.session.start import NewSession
 
 COCKPIT: Final = (1600, 900)
 FULL: Final = (1920, 1080)

@@ -14,9 +14,8 @@ from study_app.errors import StoreError
 from study_app.gui.application import application_here
 from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import load
-from study_app.session.request import NewSession, draw_seed, resumed, study_results
 from study_app.session.resume import is_rehearsal
-from study_app.session.start import check
+from study_app.session.start import NewSession, check, draw_seed, resumed, study_results
 from study_app.store import receipt
 from study_app.store.folders import locate
 from study_app.store.sessions.begin import refuse_never_begun

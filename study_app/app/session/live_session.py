@@ -34,8 +34,7 @@ from study_app.gui.theme.theme import Theme
 from study_app.gui.widgets.dialogs import Notice
 from study_app.protocol.load import parse
 from study_app.session.preflight import Check, checks, refused
-from study_app.session.request import NewSession
-from study_app.session.start import Ready, check, measured, open_outlets, open_store, videos_of
+from study_app.session.start import NewSession, Ready, check, measured, open_outlets, open_store, videos_of
 
 if TYPE_CHECKING:
     from study_app.app.session.bridge import SessionBridge

@@ -21,8 +21,7 @@ from study_app.haptics.model.scene import Scene
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.tasks import Stroke
 from study_app.session.preflight import Facts, checks
-from study_app.session.request import NewSession
-from study_app.session.start import Ready, measured
+from study_app.session.start import NewSession, Ready, measured
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.folders import StudyFolder, locate
 from study_app.store.journals import journal

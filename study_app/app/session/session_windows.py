@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from study_app.devices.rig import Rig
     from study_app.gui.theme.theme import Theme
     from study_app.haptics.runtime.servo import Servo
-    from study_app.session.request import NewSession
+    from study_app.session.start import NewSession
     from study_app.store.sessions.open_session import SessionStore
     from study_app.video.sources import Videos
 

@@ -22,7 +22,7 @@ from study_app.gui.widgets.controls import ActionButton, Check, Choice, Number
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.protocol.groups import refuse_beyond_last
 from study_app.protocol.wording.languages import language_name
-from study_app.session.request import NewSession, check_row, draw_seed, study_results
+from study_app.session.start import NewSession, check_row, draw_seed, study_results
 from study_app.store.sessions.begin import MAX_SESSION, check_participant
 from study_app.store.workstation import DEFAULTS, MachineSettings
 from study_app.viewmodels.devices.list_view import device_label, device_or_default

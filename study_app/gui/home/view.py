@@ -29,7 +29,7 @@ from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.dialogs import choose_protocol
 from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.main_view import Place, make_shortcuts
-from study_app.session.request import resumed
+from study_app.session.start import resumed
 from study_app.store.workstation import DEFAULTS, MachineSettings
 from study_app.viewmodels.designer.keys import key_cap, with_key
 from study_app.viewmodels.devices.list_view import DeviceShown, looking

@@ -13,7 +13,7 @@ from study_app.gui.widgets.cards import Card, Chip, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice, Number
 from study_app.gui.widgets.labels import figures, label
 from study_app.gui.widgets.live_plots import LatenessPlot
-from study_app.session.masking import LOUDEST_DB, MEANS, QUIETEST_DB, USUAL_DB, Masking
+from study_app.session.preflight import LOUDEST_DB, MEANS, QUIETEST_DB, USUAL_DB, Masking
 from study_app.viewmodels.preflight import WAITING, PreflightView, histogram
 
 FULL, LEAST = QSize(1200, 800), QSize(1024, 640)

@@ -4,15 +4,19 @@ What a trial felt like is drawn from what rehearsed participants felt in its con
 takes its least time, and nothing of it is measured, so those columns say n/a. Everything else is as in a rehearsal: the
 same machine, orders, answer model and files, and every row says that it is simulated. Who feels what the rehearsed
 participant felt answers word for word as in the rehearsal.
+
+A session can begin at a later step: a simulated participant answers what comes before, sensing varied numbers as they
+were requested and nothing else, and it is resumed there. The journal notes which steps were simulated, and the session
+counts as simulated.
 """
 
 import time
 import typing
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from datetime import datetime
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from study_app.errors import SessionError
 from study_app.protocol.blocks import Block
@@ -24,23 +28,38 @@ from study_app.protocol.trials.stimuli import DELAYS, Stimulated
 from study_app.protocol.trials.tasks import AnyTask
 from study_app.session.pages import DesignPage, FeedbackPage, Interval, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import REHEARSED_SCREENS
-from study_app.session.simulated.adjusting_observer import LOOK_S
-from study_app.session.simulated.design_observer import OBSERVER, Comparison
 from study_app.session.simulated.observers import reading_s
-from study_app.session.simulated.participant import SimulatedParticipant
-from study_app.session.simulated.trial_features import REHEARSED_PEOPLE, ConditionFeatures, condition_features
-from study_app.session.transitions.commands import Adjust, Command, Finish, ShowPage, StartTrial, Write
-from study_app.session.transitions.events import Begin, Continue, Event, ResumeAsked, Stepped, TaskDone, TimeUp
+from study_app.session.simulated.participant import LOOK_AT_SETTING_S, OBSERVER, Comparison, SimulatedParticipant
+from study_app.session.simulated.rehearsal import REHEARSED_PEOPLE, ConditionFeatures, condition_features
+from study_app.session.transitions.events import (
+    Adjust,
+    Begin,
+    Command,
+    Continue,
+    Event,
+    Finish,
+    ResumeAsked,
+    ShowPage,
+    StartTrial,
+    Stepped,
+    TaskDone,
+    TimeUp,
+    Write,
+)
+from study_app.session.transitions.page_builder import preview
 from study_app.session.transitions.state import FINAL, SessionState
 from study_app.session.transitions.table import advance, open_session
 from study_app.store.folders import rehearsal_folder
 from study_app.store.journals.journal import SessionClock
+from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.simulated_sessions import SimulatedStudy
 from study_app.workspace import workspace
 
 DEVICE = {"name": "answers-only", "measured": False}
 SAY_EVERY_S = 5.0
 REACH_S = 1.0  # from target to target, without a hand
+BEGINS: Final = frozenset({"page_shown", "form_shown", "trial_started"})
+"""The lines that begin a step."""
 
 
 def rehearse_answers(
@@ -124,21 +143,7 @@ class SimulatedTime:
 
 
 class Answering(SimulatedParticipant):
-    """One session that is answered without being held.
-
-    Parameters
-    ----------
-    study : Protocol
-        What is run, with all its groups.
-    state : SessionState
-        The session before its first step.
-    kept : Kept
-        Where its events go.
-    time_passed : SimulatedTime
-        Its clock.
-    felt : callable
-        Returns the features of trials in a condition of a block; one is drawn for each trial.
-    """
+    """One session that is answered without being held."""
 
     def __init__(
         self,
@@ -189,7 +194,7 @@ class Answering(SimulatedParticipant):
         sensed = self._sensed_in[page.trial]
         self._pass(page.task.lead_s)
         while True:
-            self._pass(LOOK_S)
+            self._pass(LOOK_AT_SETTING_S)
             steps = observer.steps(sensed[-1], self._remembered(page.trial, sensed[-1]))
             over = self._time.seconds - began_s >= page.task.limit_s
             if over or not steps:
@@ -256,3 +261,71 @@ def _least_s(task: AnyTask) -> float:
     if task.duration_s is not None:
         return task.duration_s
     return (task.count or 0) * (task.dwell_s + REACH_S)
+
+
+def begin_at(results: Path, study: Protocol, source: bytes, start: SessionStart, step: int) -> Path:
+    """Begin a simulated session in a new study folder, answer the steps before ``step``; return the session's folder.
+
+    The session is unfinished; resumed exactly, it goes on at ``step``, or at the next one that is not passed over.
+
+    Parameters
+    ----------
+    results : Path
+        The study folder, without sessions.
+    study : Protocol
+        The study.
+    source : bytes
+        Its source.
+    start : SessionStart
+        What the session begins with.
+    step : int
+        The index of the step in the schedule of `preview.preview` with the same seed and participant.
+
+    Raises
+    ------
+    SessionError
+        The simulated participant does not reach that step.
+    StoreError
+        The folder cannot be written.
+    """
+    shown = preview(study, start.seed, start.participant)
+    state = open_session(shown.protocol, shown.schedule, shown.codes, start.language, secret=shown.secret)
+    lines, passed = _Lines(), SimulatedTime()
+    answering = Answering(study, state, lines, passed, lambda _block, _condition: (NO_FEATURES,))
+    lines.session = answering
+    lines.until = step
+    answering.run(until=step)
+    if step and answering.state.index < step:
+        raise SessionError(f"step {step + 1} is not reached: {lines.reason or 'the session ends before it'}")
+    clock = SessionClock(lambda: 0, datetime.now().astimezone() - timedelta(seconds=passed.seconds))
+    with begin(results, study, source, start, clock=clock) as store:
+        if store.key.codes != shown.codes:
+            raise SessionError(f"{results} holds sessions with another seed: use a new folder")
+        if step:
+            text = f"Steps 1 to {step} were answered by a simulated participant, without force."
+            store.append("note", t_s=0.0, waits=False, kind="note", text=text)
+        for event, at_s, fields in lines.kept:
+            store.append(event, t_s=at_s, waits=False, **fields)
+        return store.folder.path
+
+
+@dataclass
+class _Lines:
+    """The lines of the steps before one; what begins that one is left to whoever resumes."""
+
+    kept: list[tuple[str, float, dict[str, Any]]] = field(default_factory=list)
+    reason: str = ""
+    session: Answering | None = None
+    until: int = 0
+    _begun: bool = False
+
+    def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None:
+        """Keep a line unless the step has begun."""
+        assert self.session is not None  # noqa: S101 - set before the session runs
+        self._begun = self._begun or (event in BEGINS and self.session.state.index >= self.until)
+        if not self._begun:
+            self.kept.append((event, t_s or 0.0, fields))
+
+    def finish(self, _status: str, reason: str = "") -> None:
+        """Keep why the session ended before the step."""
+        self.reason = reason

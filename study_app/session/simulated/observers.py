@@ -1,29 +1,42 @@
 """SIMULATED participants, for rehearsals: they read, explore, reach for what they see lit, and answer what they felt.
 
 What such a participant knows is what a person would know: the pages, the tank as it was drawn (as late as that was),
-and the force on the hand. Nothing here knows a condition.
+and the force on the hand. Nothing here knows a condition. A tank is explored by strokes, circles, zigzags and stops,
+round after round in random order; only sums, products, quotients and square roots of the numbers drawn are used, so
+that a seed gives the same motion everywhere.
 """
 
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from study_app.devices.simulated.hand_commands import HandOrders
-from study_app.protocol.model import Explore, Follow, Reach
-from study_app.protocol.questions import ItemView, Value, shown
-from study_app.protocol.simulated_observer import Rater, TrialFeatures, judgements
-from study_app.protocol.trials.tasks import AnyTask
+from study_app.protocol.forms.show_if import Value, shown
+from study_app.protocol.forms.simulated_observer import Rater, TrialFeatures, judgements
+from study_app.protocol.orders.schedule import shuffle, stream
+from study_app.protocol.questions.question import ItemView
+from study_app.protocol.trials.task import AnyTask
+from study_app.protocol.trials.tasks.explore import Explore
+from study_app.protocol.trials.tasks.follow import Follow
+from study_app.protocol.trials.tasks.reach import Reach
 from study_app.psychophysics.delivery import lag
 from study_app.session.pages import DesignPage, QuestionnairePage, TextPage
-from study_app.session.simulated.exploration import exploration
+from study_app.session.tasks import track
 from study_app.session.trial import TankView
 from study_app.store.delivered import LONGEST_S
 
-Draw = Callable[[], float]
-
+Floats: TypeAlias = NDArray[np.float64]
+Draw: TypeAlias = Callable[[], float]
+RATE_HZ = 200.0
+PACE_MPS = (0.06, 0.22)  # slowest and fastest mean pace of a stroke
+REST_S = (0.3, 0.9)  # a stop after each figure, to feel what the liquid does
+_CORNERS = 128
+_TURN = complex(0.9987954562051724, 0.049067674327418015)  # one corner further round the circle
+Figure: TypeAlias = Callable[[Draw, Floats, Floats], list[Floats]]
 SECONDS_PER_WORD = 0.12
 REACTION_S = (0.2, 0.35)  # from seeing a target lit to moving
 ANSWER_S = (0.8, 2.6)
@@ -31,11 +44,13 @@ CHANGES_MIND = 0.08
 AIM_ERROR = 0.3  # of a target's radius, at most, along each axis
 FOLLOWED_HZ = 200.0
 CORRECTION_S = 0.35  # the hand was still for so long outside the target before it tries again
-
-
-def reading_s(page: TextPage) -> float:
-    """Return how long it takes to read a page [s]."""
-    return 1.0 + SECONDS_PER_WORD * sum(len(paragraph.split()) for paragraph in (page.title, *page.paragraphs))
+LONGEST_PATH_S: Final = 60.0
+"""The path begins anew after so long, or shortly before the task would end by time."""
+BEFORE_END_S: Final = 0.1
+MOVE_S: Final = 0.8
+STAY_S: Final = 0.2
+"""From one target to the next, and how long the ball stays there beyond the dwell time."""
+_SAMPLE = np.dtype([("time_ns", np.int64), ("position_m", np.float64, 3)])
 
 
 @dataclass(slots=True)
@@ -93,6 +108,92 @@ class SensedTrial:
             return 0.0
         rows = lag(force_n, np.concatenate(self.model_n), round(LONGEST_S / self.period_s))
         return 0.0 if rows is None else max(rows * self.period_s, 0.0)
+
+
+def exploration(draw: Draw, half_m: tuple[float, float, float], duration_s: float) -> tuple[Floats, Floats]:
+    """Return a motion of at least ``duration_s`` that begins and stays within ``half_m`` of the middle."""
+    reach_m = 0.7 * np.asarray(half_m)
+    pieces = [np.zeros((1, 3))]
+    coming: list[Figure] = []
+    while sum(map(len, pieces)) < duration_s * RATE_HZ:
+        coming = coming or list(shuffle(FIGURES, draw))
+        pieces += coming.pop()(draw, reach_m, pieces[-1][-1])
+        pieces.append(np.tile(pieces[-1][-1], (_rows(_between(draw, *REST_S)), 1)))
+    position_m = np.concatenate(pieces)
+    return np.arange(len(position_m)) / RATE_HZ, position_m
+
+
+def _strokes_across(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
+    """Go to and fro from left to right, at any height."""
+    y = _between(draw, -1, 1) * reach_m[1] * 0.5
+    ends = [np.array([side * reach_m[0], y, 0.0]) for side in (1, -1, 1, -1)]
+    return _through(draw, start_m, ends)
+
+
+def _strokes_up(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
+    x = _between(draw, -1, 1) * reach_m[0] * 0.5
+    return _through(draw, start_m, [np.array([x, side * reach_m[1], 0.0]) for side in (1, -1, 1)])
+
+
+def _strokes_in_depth(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
+    x = _between(draw, -1, 1) * reach_m[0] * 0.5
+    return _through(draw, start_m, [np.array([x, 0.0, side * reach_m[2]]) for side in (1, -1, 1)])
+
+
+def _zigzag(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
+    """Cross the tank in legs that turn by about 90°."""
+    across = np.linspace(-1, 1, 6) * reach_m[0]
+    side = reach_m[2] * 0.5
+    return _through(draw, start_m, [np.array([x, 0.0, side * (1 - 2 * (i % 2))]) for i, x in enumerate(across)])
+
+
+def _circles(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
+    """Stir: three rounds about the middle, begun and ended at full pace as a hand does that stops at once."""
+    radius_m = min(reach_m[0], reach_m[2]) * _between(draw, 0.6, 1.0)
+    pace_mps = _between(draw, *PACE_MPS)
+    first = np.array([radius_m, 0.0, 0.0])
+    corners = np.empty(_CORNERS + 1, complex)
+    corners[0] = 1.0
+    for k in range(_CORNERS):
+        corners[k + 1] = corners[k] * _TURN
+    rows = _rows(3 * 2 * np.pi * radius_m / pace_mps)
+    corner = (np.arange(1, rows + 1) * (3 * _CORNERS / rows)) % _CORNERS
+    x = np.interp(corner, np.arange(_CORNERS + 1), corners.real)
+    z = np.interp(corner, np.arange(_CORNERS + 1), corners.imag)
+    return [_stroke(start_m, first, pace_mps), radius_m * np.column_stack((x, np.zeros(rows), z))]
+
+
+def _through(draw: Draw, start_m: Floats, places_m: list[Floats]) -> list[Floats]:
+    """Go from place to place, each stroke at a pace of its own."""
+    return [
+        _stroke(begin, end, _between(draw, *PACE_MPS))
+        for begin, end in zip([start_m, *places_m[:-1]], places_m, strict=True)
+    ]
+
+
+def _stroke(begin_m: Floats, end_m: Floats, pace_mps: float) -> Floats:
+    """Return the rows of a minimum-jerk stroke after its first (Flash & Hogan 1985, eq. 10)."""
+    way = end_m - begin_m
+    rows = _rows(float(np.sqrt((way * way).sum())) / pace_mps)
+    share = np.arange(1, rows + 1) / rows
+    done = share * share * share * (10.0 + share * (6.0 * share - 15.0))
+    return np.asarray(begin_m + done[:, None] * way)
+
+
+FIGURES: tuple[Figure, ...] = (_strokes_across, _circles, _zigzag, _strokes_up, _strokes_in_depth)
+
+
+def _rows(duration_s: float) -> int:
+    return max(1, round(duration_s * RATE_HZ))
+
+
+def _between(draw: Draw, low: float, high: float) -> float:
+    return low + (high - low) * draw()
+
+
+def reading_s(page: TextPage) -> float:
+    """Return how long it takes to read a page [s]."""
+    return 1.0 + SECONDS_PER_WORD * sum(len(paragraph.split()) for paragraph in (page.title, *page.paragraphs))
 
 
 class Explorer:
@@ -224,13 +325,71 @@ def newly_shown(
     return tuple(item for item in shown(page.items, answers) if item not in seen)
 
 
-def _between(draw: Draw, low: float, high: float) -> float:
-    return low + (high - low) * draw()
-
-
 def _mean(values: Any) -> float:
     return float(values.mean()) if len(values) else 0.0
 
 
 def _norm(vectors: Any) -> Any:
     return np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
+
+
+class ProgrammedBall:
+    """A ball on a path of ``duration_s`` [s], which repeats.
+
+    Parameters
+    ----------
+    task : AnyTask
+        The task that it moves through.
+    workspace_m : tuple of float
+        Full sizes of the tank along x, y, z [m].
+    hidden_after_lead : bool
+        Whether the ball is not drawn once the lead of the task is over.
+    seed : int
+        What the path of an exploration is drawn from.
+    """
+
+    def __init__(
+        self, task: AnyTask, workspace_m: tuple[float, float, float], *, hidden_after_lead: bool = False, seed: int = 1
+    ) -> None:
+        self._task, self._hides = task, hidden_after_lead
+        times_s, self._positions_m = _path(task, workspace_m, min(LONGEST_PATH_S, task.limit_s - BEFORE_END_S), seed)
+        self.duration_s = float(times_s[-1])
+        self._times_ns = np.round(times_s * 1e9).astype(np.int64)
+        samples = np.zeros(len(times_s), _SAMPLE)
+        samples["time_ns"], samples["position_m"] = self._times_ns, self._positions_m
+        self._tracker = track(task)
+        self._tracker.feed(samples)
+
+    def view(self, elapsed_s: float) -> TankView:
+        """Return what the tank shows ``elapsed_s`` after the ball began to move [s]."""
+        now_ns = round(elapsed_s % self.duration_s * 1e9)
+        position_m = np.array([np.interp(now_ns, self._times_ns, axis) for axis in self._positions_m.T])
+        shown = self._tracker.at(now_ns)
+        return TankView(position_m, shown, now_ns, self._hides and shown.elapsed_s >= self._task.lead_s)
+
+
+def _path(
+    task: AnyTask, workspace_m: tuple[float, float, float], duration_s: float, seed: int
+) -> tuple[Floats, Floats]:
+    """Return times (n,) [s] and positions (n, 3) [m, hand frame] of a path of about ``duration_s``."""
+    if isinstance(task, Explore):
+        x, y, z = (size / 2 for size in workspace_m)
+        times_s, positions_m = exploration(stream(seed, "preview/hand").random, (x, y, z), duration_s)
+        kept = times_s <= duration_s
+        return times_s[kept], positions_m[kept]
+    if isinstance(task, Follow):
+        times_s = np.arange(0.0, duration_s, 1 / RATE_HZ)
+        return times_s, np.array([task.target_m(float(time_s)) for time_s in times_s])
+    return _reaches(task, duration_s)
+
+
+def _reaches(task: Reach, duration_s: float) -> tuple[Floats, Floats]:
+    """Return minimum-jerk movements from target to target (Flash & Hogan 1985), with a stay in each."""
+    each_s = MOVE_S + task.dwell_s + STAY_S
+    count = max(1, min(int(duration_s / each_s), task.count or int(duration_s / each_s)))
+    ends_m = np.array([(0.0, 0.0, 0.0), *(task.targets_m[at % len(task.targets_m)] for at in range(count))])
+    times_s = np.arange(0.0, min(count * each_s, duration_s), 1 / RATE_HZ)
+    at = np.minimum((times_s / each_s).astype(int), count - 1)
+    share = np.clip((times_s - at * each_s) / MOVE_S, 0.0, 1.0)
+    way = share**3 * (10 - 15 * share + 6 * share**2)
+    return times_s, ends_m[at] + way[:, None] * (ends_m[at + 1] - ends_m[at])

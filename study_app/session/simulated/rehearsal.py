@@ -5,27 +5,61 @@ only the device, the clock, the screen and the participant are simulated. Time i
 same call into another folder gives the same tables but for wall-clock times. Every row says that it is simulated.
 
 What a participant does and answers in a trial is drawn from streams of that trial. A rehearsal that was killed and
-resumed answers as one that was not: from what is felt in the whole session, which is computed again for that.
+resumed answers as one that was not: from what is felt in the whole session, which is computed again for that. What each
+condition feels like is rehearsed in a few whole sessions that are kept nowhere: the force of an even motion could be
+had by arithmetic alone, but opinions rest on the wake's push, on how rough a force is and how late the picture was,
+too.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import datetime
 from functools import partial
 from pathlib import Path
+from typing import Any, Final, TypeAlias
+
+import numpy as np
 
 from study_app.devices.registry import descriptor_of, discover
-from study_app.devices.rig import Rig
-from study_app.errors import SessionError
+from study_app.devices.rig import Rig, open_rig, study_settings
+from study_app.devices.simulated.hand_commands import hand_of
+from study_app.errors import SessionError, StoreError
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.protocol.blocks import Block
+from study_app.protocol.forms.simulated_observer import NO_FEATURES, TrialFeatures
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import Schedule, build_schedule
-from study_app.protocol.simulated_observer import TrialFeatures
+from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule, draw_key, stream
+from study_app.protocol.trials.due import next_level
+from study_app.protocol.trials.keyed import Key as LevelKey
+from study_app.protocol.trials.presentation import delays_force
+from study_app.session.pages import (
+    DesignPage,
+    FeedbackPage,
+    Interval,
+    Page,
+    PausePage,
+    QuestionnairePage,
+    TaskPage,
+    TextPage,
+)
+from study_app.session.ports import KeptSession, Ports
 from study_app.session.resume import FIRST, REHEARSED_SCREENS, Start, find_protocol, resume_at, source_to_resume
-from study_app.session.simulated.design_observer import OBSERVER, Observer
-from study_app.session.simulated.rehearsed_session import RehearsedSession, rehearsal_rig
-from study_app.session.unkept import Unkept
+from study_app.session.runner import Runner
+from study_app.session.simulated.observers import Draw, SensedTrial, hand_for, reading_s, rest
+from study_app.session.simulated.participant import (
+    LOOK_AT_SETTING_S,
+    OBSERVER,
+    AdjustingObserver,
+    Comparison,
+    Observer,
+    SimulatedParticipant,
+)
+from study_app.session.transitions.events import Begin, Continue, Event, ResumeAsked, Stepped, Submitted
+from study_app.session.trial import TankView
 from study_app.store.blinded.allocation import session_protocol
+from study_app.store.blinded.blinding import Key
 from study_app.store.folders import StudyFolder, locate, rehearsal_folder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import SessionClock
@@ -35,6 +69,258 @@ from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import reopen
 from study_app.store.tables.study_files import check_study
 from study_app.workspace import workspace
+
+LOOK_S = 0.05  # the session looks at the device so often
+IDLE_S = 0.5  # and while reading and answering
+FRAME_S = 1 / 60
+PAINT_S = (0.002, 0.006)  # from looking at the clock to the frame being on the screen
+Where: TypeAlias = tuple[str, str]
+"""A block, whose task is done, and a condition."""
+ConditionFeatures: TypeAlias = Mapping[Where, tuple[TrialFeatures, ...]]
+"""What was felt in each trial of a condition in a block."""
+REHEARSED_PEOPLE: Final = 4
+"""So many simulated participants feel all conditions."""
+
+
+class DiscardingStore:
+    """A session that is kept nowhere."""
+
+    recorder = None
+    fingerprint = ""
+
+    def __init__(self, now_ns: Callable[[], int], codes: dict[str, dict[str, str]], secret: bytes) -> None:
+        self.clock = SessionClock(now_ns)
+        self.key = Key(hash="", drawn="seed", codes=codes, tables={}, tables_hash="", nonce=secret)
+
+    def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None:
+        """Keep nothing."""
+
+    def check_flushed(self) -> None:
+        """Do nothing: nothing is kept."""
+
+    def write_tables(self) -> None:
+        """Keep nothing."""
+
+    def finish(self, status: str, reason: str = "") -> None:
+        """Keep nothing."""
+
+
+def rehearsal_rig(study: Protocol, person: str, seed: int, device: str) -> Rig:
+    """Return a device with a simulated hand, and its servo on a virtual clock that only the servo advances."""
+    settings = study_settings(study, stream(seed, f"rehearsal/{person}/hand"))
+    rig = open_rig(device, settings, clock=VirtualClock())
+    if hand_of(rig.device) is None:
+        rig.stop()
+        raise SessionError(f"device '{device}' has no hand that takes orders, so that it cannot be rehearsed on")
+    return rig
+
+
+@dataclass(slots=True)
+class _Setting:
+    """A level that is being set: by whom, what was sensed since the last steps, and when they were made [s]."""
+
+    observer: AdjustingObserver
+    scale: float
+    judged_s: float = 0.0
+    done: bool = False
+    senses: SensedTrial = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.senses = SensedTrial(self.scale)
+
+
+class RehearsedSession(SimulatedParticipant):
+    """One session and its simulated participant."""
+
+    def __init__(
+        self,
+        study: Protocol,
+        schedule: Schedule,
+        rig: Rig,
+        store: KeptSession,
+        start: Start = FIRST,
+        felt: Callable[[int, tuple[TrialFeatures, ...]], object] | None = None,
+        known: Mapping[int, tuple[TrialFeatures, ...]] | None = None,
+        observer: Observer = OBSERVER,
+    ) -> None:
+        super().__init__(study, schedule, observer)
+        self._known = known or {}
+        self._tell_felt = felt
+        self.rig = rig
+        hand = hand_of(rig.device)
+        assert hand is not None  # noqa: S101 - `rehearsal_rig` has looked
+        self._hand = hand
+        self._now_s = store.clock.seconds
+        self._felt_in: dict[int, tuple[TrialFeatures, ...]] = {}
+        self._touch = rig.servo.telemetry.reader()
+        self._next_frame_ns = 0
+        self._period_s = 1 / study.device.rate_hz if delays_force(study) else None
+        self._paint: Draw = self._stream("screen")
+        ports = Ports(rig.servo, store, self._present, self._now_s, store.recorder)
+        self._runner = Runner(study, schedule, store.key.codes, ports, study.study.languages[0], start, store.key.nonce)
+
+    def _seconds(self) -> float:
+        return self._now_s()
+
+    def _post(self, event: Event) -> None:
+        self._runner.post(event)
+        self._notice()
+
+    def _poll(self) -> None:
+        self._runner.poll()
+        self._notice()
+
+    def _notice(self) -> None:
+        """End where a person would wait for the disk."""
+        if self._runner.stalled is not None:
+            raise StoreError(self._runner.stalled)
+
+    def run(self) -> None:
+        """Go from the first page to the last."""
+        self._post(Begin(self._now_s()))
+        if isinstance(self.page, PausePage):  # before the trial that a resumed session goes on with
+            self._post(ResumeAsked(self._now_s(), "participant"))
+        while not self._runner.finished:
+            match self.page:
+                case TextPage() as page:
+                    self._pass(reading_s(page))
+                    if page is self.page:
+                        self._post(Continue(self._now_s()))
+                case FeedbackPage() | TaskPage(interval=Interval(resting=True)):
+                    self._pass(LOOK_S)
+                case TaskPage() as page:
+                    self._do(page)
+                case QuestionnairePage() | DesignPage() as page:
+                    self._fill_in(page)
+                case _:
+                    raise SessionError(f"the rehearsal failed: {self.rig.servo.fault or self.page}")
+
+    def _present(self, page: Page) -> None:
+        self.page = page
+
+    def _pass(self, seconds: float) -> None:
+        """Let time pass while nothing is done."""
+        end_s = self._now_s() + seconds
+        page = self.page
+        while self._now_s() < end_s and page is self.page:
+            self._advance(min(IDLE_S, end_s - self._now_s()))
+            self._poll()
+
+    def _advance(self, seconds: float) -> None:
+        """Let the servo take its ticks; who ends the program ends them, and without them no time passes."""
+        servo = self.rig.servo
+        if servo.advance(max(1, round(seconds * servo.rate_hz))) == 0 and servo.fault is None:
+            raise SessionError("the rehearsal was stopped from outside")
+
+    def _do(self, page: TaskPage) -> None:
+        """Do a task until its page is left, seeing every frame and feeling every tick."""
+        interval = page.interval
+        named = str(page.trial) if interval is None else f"{page.trial}/{interval.number}"
+        arm, draw = self._hand, self._stream(f"{named}/behaviour")
+        self._paint = self._stream(f"{named}/screen")
+        senses = SensedTrial(self._study.scene.scale, self._period_s)
+        self._touch.read()
+        self._next_frame_ns = self.rig.servo.now_ns()
+        hand = hand_for(page.task, arm, draw, self._now_s())
+        setting = _Setting(self._adjusting(page.trial), self._study.scene.scale) if page.adjusts else None
+        self.look(senses)  # the first frame, with which the trial begins, is painted at once
+        while page is self.page:
+            self._advance(LOOK_S)
+            view = self.look(senses)
+            wants_to_go_on = view is not None and hand.act(self._now_s(), view)
+            samples = np.asarray(self._touch.read())
+            senses.feel(samples)
+            self._poll()
+            if setting is not None and view is not None and page is self.page:
+                self._set(page, setting, view, samples)
+            if wants_to_go_on and page is self.page:
+                self._post(Continue(self._now_s()))
+        rest(page.task, arm)
+        earlier = () if interval is None or interval.number == 1 else self._felt_in.get(page.trial, ())
+        self._felt_in[page.trial] = (*earlier, senses.features())
+        if self._tell_felt is not None:
+            self._tell_felt(page.trial, self._felt_in[page.trial])
+
+    def _set(self, page: TaskPage, setting: _Setting, view: TankView, samples: Any) -> None:
+        """Adjust what is felt by what was sensed since the last steps, and confirm where that is done."""
+        setting.senses.feel(samples)
+        setting.senses.see(self.rig.servo.now_ns(), view)
+        since_s = view.task.elapsed_s - setting.judged_s
+        if setting.done or since_s < LOOK_AT_SETTING_S or view.task.elapsed_s < page.task.lead_s + LOOK_AT_SETTING_S:
+            return
+        sensed = self._attended(page.trial).sensed(setting.senses.features())
+        steps = setting.observer.steps(sensed, self._remembered(page.trial, sensed))
+        setting.senses.clear()
+        setting.judged_s = view.task.elapsed_s
+        if steps:
+            self._post(Stepped(self._now_s(), steps))
+        else:
+            setting.done = True
+            self.answers += 1
+            self._post(Submitted(self._now_s()))
+
+    def look(self, senses: SensedTrial) -> TankView | None:
+        """Show the frames that are due since the last look; return what the newest showed, None where none was due."""
+        view = None
+        while self._next_frame_ns <= self.rig.servo.now_ns():
+            view = self._runner.view(self._next_frame_ns)
+            if view is not None:
+                low, high = PAINT_S
+                painted_ns = self._next_frame_ns + round(1e9 * (low + (high - low) * self._paint()))
+                self._runner.frame_shown(painted_ns, view.sample_time_ns)
+                senses.see(painted_ns, view)
+            self._next_frame_ns += round(1e9 * FRAME_S)
+        return view
+
+    def _felt(self, trial: int | None) -> TrialFeatures:
+        return NO_FEATURES if trial is None else {**self._felt_in, **self._known}[trial][-1]
+
+    def _sensed(self, block: Block) -> Mapping[int, Sequence[float]]:
+        sensed = Comparison.of(self._study, block, self.observer).sensed
+        felt_in = {**self._felt_in, **self._known}
+        return {
+            number: [*map(sensed, felt)] for number, felt in felt_in.items() if self._trials[number].block == block.id
+        }
+
+
+def condition_features(
+    protocol: Protocol, *, seed: int, people: int = REHEARSED_PEOPLE, progress: Callable[[str], object] | None = None
+) -> ConditionFeatures:
+    """Return what ``people`` simulated participants feel in every condition of the blocks.
+
+    Raises
+    ------
+    DeviceError
+        The simulated device cannot be opened.
+    SessionError
+        A session broke.
+    """
+    codes = draw_key(protocol, stream(seed, "blinding").random)
+    key = LevelKey(codes, b"what each condition feels like")
+    found: dict[Where, list[TrialFeatures]] = {}
+    for number in range(1, people + 1):
+        person = f"P{number:03d}"
+        schedule = build_schedule(protocol, person, seed)
+        places = {trial.number: _presented(protocol, key, schedule, trial) for trial in schedule.trials}
+
+        def feel(trial: int, felt: tuple[TrialFeatures, ...], places: Mapping[int, tuple[Where, ...]] = places) -> None:
+            found.setdefault(places[trial][len(felt) - 1], []).append(felt[-1])
+
+        with rehearsal_rig(protocol, person, seed, "scripted") as machine:
+            RehearsedSession(
+                protocol, schedule, machine, DiscardingStore(machine.servo.now_ns, codes, key.secret), felt=feel
+            ).run()
+        if progress is not None:
+            progress(f"{number} of {people} sessions simulated")
+    return {where: tuple(felt) for where, felt in found.items()}
+
+
+def _presented(protocol: Protocol, key: LevelKey, schedule: Schedule, trial: Trial) -> tuple[Where, ...]:
+    """Return what a trial presents, interval by interval; nothing where it is passed over with any answers."""
+    if protocol.blocks[trial.block].design is None:
+        return ((trial.block, key.codes[trial.block][trial.code]),)
+    due = next_level(protocol, key, schedule, trial, ())
+    return () if due is None else tuple((trial.block, one.condition) for one in due.intervals)
 
 
 def rehearse(
@@ -176,5 +462,7 @@ def _felt_in_whole_session(
     """Return what is felt in each trial (by number) of a session that is not interrupted."""
     felt: dict[int, tuple[TrialFeatures, ...]] = {}
     with rehearsal_rig(study, schedule.participant, schedule.seed, device) as rig:
-        RehearsedSession(study, schedule, rig, Unkept(rig.servo.now_ns, codes, secret), felt=felt.__setitem__).run()
+        RehearsedSession(
+            study, schedule, rig, DiscardingStore(rig.servo.now_ns, codes, secret), felt=felt.__setitem__
+        ).run()
     return felt

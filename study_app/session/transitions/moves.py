@@ -6,37 +6,34 @@ from study_app.errors import SessionError
 from study_app.protocol.orders.schedule import Trial
 from study_app.protocol.trials.presentation import delay_s_of
 from study_app.session.resume import FIRST
-from study_app.session.transitions.answers import keep_setting
-from study_app.session.transitions.commands import (
-    Adjust,
-    FadeIn,
-    Finish,
-    LeaveTask,
-    Rest,
-    StopForce,
-    StopTrial,
-    Write,
-    WriteTables,
-)
 from study_app.session.transitions.events import (
+    Adjust,
     Begin,
     Broke,
     Continue,
     EndAsked,
+    FadeIn,
+    Finish,
     ForceStopped,
     LanguageChosen,
+    LeaveTask,
     Note,
     PauseAsked,
     Reconnected,
     RepeatAsked,
+    Rest,
     ResumeAsked,
     Stepped,
+    StopForce,
+    StopTrial,
     Submitted,
     TaskDone,
     TimeUp,
+    Write,
     WriteCompleted,
     WriteFailed,
     WriteRetried,
+    WriteTables,
 )
 from study_app.session.transitions.page_builder import consent_hash
 from study_app.session.transitions.state import Hold, Phase, SessionState, Stall
@@ -48,6 +45,7 @@ from study_app.session.transitions.steps import (
     break_off,
     enter,
     enter_reached,
+    keep_setting,
     present_again,
     reach,
     rest,

@@ -1,14 +1,25 @@
-"""Pages made of a session's state: the protocol's texts and the interface's words, in the participant's language."""
+"""Pages made of a session's state: the protocol's texts and the interface's words, in the participant's language.
+
+The state is that of a session that runs, or of a preview: the session that a seed gives before any is run. For that no
+sealed key is read: the codes are drawn from the seed, so that a preview reveals nothing of a study that is run.
+"""
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final, Literal, TypeAlias
 
 from study_app.protocol.blocks import Block
+from study_app.protocol.forms.show_if import Value
+from study_app.protocol.groups.allocation import group_of
+from study_app.protocol.groups.own_protocol import own_protocol
 from study_app.protocol.model import PageText, Protocol, Questionnaire
-from study_app.protocol.orders.schedule import FormStep, Trial
-from study_app.protocol.questions import ChoiceView, Context, NumberView, Question
+from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Trial, build_schedule, draw_key, stream
+from study_app.protocol.questions.choice import ChoiceView
+from study_app.protocol.questions.number import NumberView
+from study_app.protocol.questions.question import Context, Question
 from study_app.protocol.trials.designs import ORDINALS
+from study_app.protocol.trials.keyed import draw_secret
 from study_app.protocol.trials.tracks import design_of
 from study_app.protocol.wording.languages import Words, words
 from study_app.session.pages import (
@@ -25,7 +36,12 @@ from study_app.session.pages import (
     TextPage,
     TroublePage,
 )
-from study_app.session.transitions.state import Phase, SessionState
+from study_app.session.transitions.state import Answer, Phase, Plan, SessionState
+
+PARTICIPANT: Final = "P001"
+SEED: Final = 1
+"""The participant and the seed of a preview, unless others are asked for."""
+Kind: TypeAlias = Literal["text", "tank", "questions", "feedback"]
 
 
 def page(state: SessionState) -> Page:
@@ -237,3 +253,127 @@ def _among(state: SessionState, trial: Trial, label: str, index: int) -> Progres
     protocol = state.plan.protocol
     at_most = protocol.blocks[trial.block].until is not None
     return Progress(trial.part, protocol.parts, label, index, trial.of, at_most)
+
+
+@dataclass(frozen=True, slots=True)
+class Preview:
+    """One session of a study.
+
+    Attributes
+    ----------
+    protocol : Protocol
+        The session's protocol: in a study with groups, with the steps of the participant's group.
+    schedule : Schedule
+        Its steps in order.
+    codes : mapping
+        Block → code → condition or track.
+    secret : bytes
+        What levels are drawn from.
+    """
+
+    protocol: Protocol = field(repr=False)
+    schedule: Schedule
+    codes: Mapping[str, Mapping[str, str]] = field(repr=False)
+    secret: bytes = field(repr=False)
+
+
+def preview(study: Protocol, seed: int = SEED, participant: str = PARTICIPANT) -> Preview:
+    """Return the first session of the first participant of a folder that begins with this seed.
+
+    Parameters
+    ----------
+    study : Protocol
+        The study.
+    seed : int
+        What all randomness of the session comes from, the codes too.
+    participant : str
+        The participant's id, whose number determines the row of a square.
+    """
+    draw = stream(seed, "blinding").random
+    secret = draw_secret(draw)
+    codes = draw_key(study, draw)
+    shares = {name: group.share for name, group in study.groups.items()}
+    own = own_protocol(study, group_of(shares, secret, 1) if shares else None, 1)
+    return Preview(own, build_schedule(own, participant, seed), codes, secret)
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """One of the pages of a step: its kind, and in a trial with a design which interval (from 1) a tank presents."""
+
+    kind: Kind
+    interval: int = 1
+
+
+def moments(shown: Preview, index: int) -> tuple[Moment, ...]:
+    """Return the pages of a step, in the order in which a session shows them."""
+    step = shown.schedule.steps[index]
+    if isinstance(step, PageStep):
+        return (Moment("text"),)
+    if isinstance(step, FormStep):
+        return (Moment("questions"),)
+    state = _state(shown, index, shown.protocol.study.languages[0])
+    design = state.design
+    if design is None:
+        return (Moment("tank"), *([Moment("questions")] if state.asks else []))
+    found = [Moment("tank", number) for number in range(1, design.intervals + 1)]
+    if state.asks and not design.adjusts:
+        found.append(Moment("questions"))
+        if design.has_correct_answer and design.shows_feedback(step.phase == "practice"):
+            found.append(Moment("feedback"))
+    return tuple(found)
+
+
+def previewed_page(
+    shown: Preview, index: int, moment: Moment, language: str, answers: Mapping[str, Value] | None = None
+) -> Page:
+    """Return a page of a step, as a session would show it.
+
+    Parameters
+    ----------
+    shown : Preview
+        The session.
+    index : int
+        The step's index in the schedule.
+    moment : Moment
+        Which of the step's pages.
+    language : str
+        One of the study's languages.
+    answers : mapping, optional
+        Answers that were given before, by the id of the item; what would not be accepted is left out.
+    """
+    if moment.kind == "feedback":
+        return FeedbackPage(right=True)
+    state = replace(_state(shown, index, language), interval=moment.interval)
+    if moment.kind == "tank":
+        return page(replace(state, phase=Phase.TASK))
+    if moment.kind == "text":
+        made = page(replace(state, phase=Phase.READING))
+        return replace(made, coming=None) if isinstance(made, TextPage) else made
+    kept = {} if not answers else dict(_accepted(state, answers))
+    return page(replace(state, phase=Phase.ANSWERING, answers=kept))
+
+
+def tested_condition(shown: Preview, index: int) -> str | None:
+    """Return the condition that a trial presents; None for other steps, and where a number is varied."""
+    step = shown.schedule.steps[index]
+    if not isinstance(step, Trial):
+        return None
+    if shown.protocol.blocks[step.block].design is not None:
+        return shown.protocol.conditions_in(step.block)[0]
+    return shown.codes[step.block][step.code]
+
+
+def _state(shown: Preview, index: int, language: str) -> SessionState:
+    plan = Plan(shown.protocol, shown.schedule, shown.codes, language, secret=shown.secret)
+    return SessionState(plan, index=index)
+
+
+def _accepted(state: SessionState, answers: Mapping[str, Value]) -> list[tuple[str, Answer]]:
+    """Return the answers that the questions of the page accept."""
+    asked = {question.id: question for question in state.questions}
+    return [
+        (item, Answer(onset_s=0.0, first_s=0.0, last_s=0.0, value=value))
+        for item, value in answers.items()
+        if item in asked and asked[item].problem(value, state.context) is None
+    ]

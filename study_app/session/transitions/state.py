@@ -16,7 +16,7 @@ from study_app.protocol.trials.presentation import Due, next_level
 from study_app.protocol.trials.tasks import AnyTask, lasting
 from study_app.protocol.trials.tracks import adjusting_of, design_of, method_of
 from study_app.session.resume import FIRST, Start
-from study_app.session.transitions.commands import Command
+from study_app.session.transitions.events import Command
 
 
 class Phase(Enum):

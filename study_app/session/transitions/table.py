@@ -29,12 +29,12 @@ from study_app.errors import SessionError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule
 from study_app.session.resume import FIRST, Start
-from study_app.session.transitions import answers, moves
-from study_app.session.transitions.commands import Command
+from study_app.session.transitions import moves, steps
 from study_app.session.transitions.events import (
     Begin,
     Broke,
     Chosen,
+    Command,
     Continue,
     EndAsked,
     Event,
@@ -74,10 +74,10 @@ TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     # Trials of intervals: rests and feedback end by time alone.
     (Phase.RESTING, TimeUp): moves.end_rest,  # → task of the next interval
     (Phase.FEEDBACK, TimeUp): moves.end_feedback,  # → reading, task, resting, answering (a form), complete, ended
-    (Phase.ANSWERING, ItemShown): answers.show_item,  # stays
-    (Phase.ANSWERING, Chosen): answers.choose,  # stays
-    (Phase.ANSWERING, Retracted): answers.retract,  # stays
-    (Phase.ANSWERING, Submitted): answers.submit,  # → reading, task, resting, feedback, complete, ended
+    (Phase.ANSWERING, ItemShown): steps.show_item,  # stays
+    (Phase.ANSWERING, Chosen): steps.choose,  # stays
+    (Phase.ANSWERING, Retracted): steps.retract,  # stays
+    (Phase.ANSWERING, Submitted): steps.submit,  # → reading, task, resting, feedback, complete, ended
     # Pausing: esc, the operator, or a force stop.
     **{(phase, PauseAsked): moves.pause for phase in RUNNING},  # → paused; the attempt at a trial is over
     (Phase.PAUSED, PauseAsked): moves.pause_again,  # stays
@@ -115,11 +115,6 @@ def open_session(
     """Return the state before ``Begin``; ``key`` is block → code → condition, ``start`` where a resumed one goes on.
 
     ``secret`` is the sealed key's nonce, from which levels are drawn: only a study without designs needs none.
-
-    Raises
-    ------
-    SessionError
-        The study has no texts in that language, or its levels cannot be drawn.
     """
     if language not in protocol.study.languages:
         known = ", ".join(protocol.study.languages)
@@ -130,13 +125,7 @@ def open_session(
 
 
 def advance(state: SessionState, event: Event) -> tuple[SessionState, tuple[Command, ...]]:
-    """Return the next state and what is to be done, in order.
-
-    Raises
-    ------
-    SessionError
-        The event cannot be taken in this phase, or says something impossible; the state is what it was.
-    """
+    """Return the next state and what is to be done, in order."""
     move = TRANSITIONS.get((state.phase, type(event)))
     if move is None:
         if state.stall is not None:

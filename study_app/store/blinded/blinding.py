@@ -9,9 +9,9 @@ system's randomness, a rehearsal's from its seed, and a folder holds one or the 
 Measures of a trial that can reveal its condition are encrypted with the nonce: a line ``trial_ended`` or
 ``interval_ended`` of a journal holds these columns, a line ``trial_started`` of a trial with a design what it presents,
 as one text, ``sealed``: in hexadecimal digits a tag, and their JSON encrypted. The tag is the HMAC-SHA256 of session,
-trial and JSON; the JSON is combined with SHAKE-256 of nonce and tag by exclusive or. So equal numbers of two trials look
-different, and a changed or moved text is detected (a synthetic initialisation vector as in RFC 5297, with the standard
-library's hashes). Spaces make all texts equally long.
+trial and JSON; the JSON is combined with SHAKE-256 of nonce and tag by exclusive or. So equal numbers of two trials
+look different, and a changed or moved text is detected (a synthetic initialisation vector as in RFC 5297, with the
+standard library's hashes). Spaces make all texts equally long.
 
 A file may leave the choice of effects and laws to the program (``effects = "auto"``) and its estimator to the format's
 default; another version may choose otherwise. So a receipt's protocol names the estimator, and effects and laws of each

@@ -480,7 +480,7 @@ LATER = frozenset(column.name for column in (*TRIALS_2, *INTERVALS) if column.la
 
 
 SEALED = frozenset(column.name for column in (*TRIALS_2, *DELIVERED) if column.sealed)
-"""Columns of a trial that no table has before the key was opened (see ``sealing``)."""
+"""Columns of a trial that no table has before the key was opened (see ``blinding``)."""
 
 
 def every_column(protocol_format: int = 1, *, intervals: bool = False) -> tuple[Column, ...]:

@@ -24,7 +24,7 @@ from study_app.protocol.trials.presentation import next_level
 from study_app.protocol.trials.stimuli import DELAYS
 from study_app.protocol.trials.tracks import condition_of, design_of, method_of, stimulus_of
 from study_app.psychophysics.precision import ESTIMATE_NOISE
-from study_app.session.simulated.design_observer import OBSERVER, Observer, estimate
+from study_app.session.simulated.participant import OBSERVER, Observer, estimate
 from study_app.validation.thresholds.methods_alone import PEOPLE, keyed_draw
 from study_app.validation.thresholds.verdicts import Verdict, group_coverage
 

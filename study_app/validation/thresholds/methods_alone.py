@@ -21,7 +21,7 @@ from study_app.protocol.trials.methods import Heard
 from study_app.protocol.trials.presentation import Due, arrangement_text, heard_of, next_level
 from study_app.protocol.trials.stimuli import DELAYS
 from study_app.protocol.trials.tracks import design_of, method_of, stimulus_of
-from study_app.session.simulated.design_observer import Comparison, Observer
+from study_app.session.simulated.participant import Comparison, Observer
 from study_app.validation.thresholds.planted import Planted
 
 PEOPLE: Final = 10

@@ -17,7 +17,7 @@ from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.simulated_observer import NO_FEATURES, Draw, Rater, rate, rater
 from study_app.protocol.streams import stream
-from study_app.session.simulated.design_observer import Observer
+from study_app.session.simulated.participant import Observer
 from study_app.validation.thresholds.methods_alone import simulate
 from study_app.validation.thresholds.planted import planted
 

@@ -7,7 +7,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.stimuli import DELAYS
 from study_app.protocol.trials.tracks import standards_of, stimulus_of
-from study_app.session.simulated.design_observer import OBSERVER, Observer
+from study_app.session.simulated.participant import OBSERVER, Observer
 
 SHIPPED: Final[dict[str, Observer]] = {
     "viscosityjnd": OBSERVER,

@@ -6,8 +6,7 @@ from typing import Final
 from study_app.protocol.orders.schedule import PageStep, Step, Trial
 from study_app.protocol.wording.languages import Words, language_name, words
 from study_app.session.pages import Page
-from study_app.session.simulated.preview import Preview
-from study_app.session.transitions.previewed_pages import Moment
+from study_app.session.transitions.page_builder import Moment, Preview
 
 
 @dataclass(frozen=True, slots=True)

@@ -77,7 +77,7 @@ def test_the_command_writes_the_same_bytes_with_one_worker_two_and_a_cluster(
     worker_options: tuple[tuple[str, str], ...], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(
-        "study_app.session.simulated.trial_features.condition_features", lambda protocol, **_: felt_in(protocol)
+        "study_app.session.simulated.rehearsal.condition_features", lambda protocol, **_: felt_in(protocol)
     )
     written = []
     for number, words in enumerate(worker_options):

@@ -20,8 +20,7 @@ from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import load
-from study_app.session.request import NewSession
-from study_app.session.start import Ready
+from study_app.session.start import NewSession, Ready
 from study_app.store.blinded.blinding import open_or_draw_key
 from tests.compiled import needs_servo
 

@@ -26,8 +26,7 @@ from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.load import load
 from study_app.protocol.trials.tasks import Stroke
 from study_app.session.preflight import Facts
-from study_app.session.request import NewSession
-from study_app.session.start import Ready
+from study_app.session.start import NewSession, Ready
 from tests.session import small
 
 CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "mouse", True, None, Path("nowhere"))

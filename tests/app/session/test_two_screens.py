@@ -25,7 +25,7 @@ from study_app.app.session.live_session import LiveSession
 from study_app.gui.application import application_here
 from study_app.gui.theme.theme import LIGHT
 from study_app.session import start
-from study_app.session.request import NewSession
+from study_app.session.start import NewSession
 
 start.MEASURED_S = 0.1
 application_here()

@@ -12,7 +12,7 @@ from study_app.gui.home import new_session_dialog
 from study_app.gui.home.new_session_dialog import NewSessionDialog
 from study_app.gui.widgets.background import Background
 from study_app.protocol.load import source_bytes
-from study_app.session.request import MAX_SEED
+from study_app.session.start import MAX_SEED
 from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.workstation import MachineSettings
 from study_app.viewmodels.home import study_facts

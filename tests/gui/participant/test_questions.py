@@ -16,8 +16,17 @@ from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.protocol.questions import ChoiceView, ItemView, NumberView, RatingView, SliderView
 from study_app.session.pages import QuestionnairePage
-from study_app.session.transitions.commands import ShowPage, Write
-from study_app.session.transitions.events import Begin, Chosen, ItemShown, PauseAsked, Retracted, Submitted, TaskDone
+from study_app.session.transitions.events import (
+    Begin,
+    Chosen,
+    ItemShown,
+    PauseAsked,
+    Retracted,
+    ShowPage,
+    Submitted,
+    TaskDone,
+    Write,
+)
 from study_app.session.transitions.state import Phase
 from study_app.session.transitions.table import advance, open_session
 from tests.gui.participant.driver import KEY, Participant, description_of, tap, told_of

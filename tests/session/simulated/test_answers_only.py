@@ -13,8 +13,7 @@ from study_app.protocol.load import load
 from study_app.protocol.simulated_observer import TrialFeatures
 from study_app.session.simulated import answers_only
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.session.simulated.rehearsal import rehearse
-from study_app.session.simulated.trial_features import ConditionFeatures, condition_features
+from study_app.session.simulated.rehearsal import ConditionFeatures, condition_features, rehearse
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 

@@ -20,11 +20,9 @@ from study_app.protocol.load import load, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.session.simulated import rehearsal
-from study_app.session.simulated.design_observer import OBSERVER, Comparison
-from study_app.session.simulated.exploration import RATE_HZ, exploration
-from study_app.session.simulated.observers import SensedTrial
-from study_app.session.simulated.rehearsed_session import RehearsedSession
-from study_app.session.simulated.trial_features import condition_features
+from study_app.session.simulated.observers import RATE_HZ, SensedTrial, exploration
+from study_app.session.simulated.participant import OBSERVER, Comparison
+from study_app.session.simulated.rehearsal import RehearsedSession, condition_features
 from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView
 from study_app.store.folders import StudyFolder

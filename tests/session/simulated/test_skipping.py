@@ -11,8 +11,8 @@ from study_app.protocol.orders.schedule import Trial
 from study_app.protocol.streams import Key
 from study_app.protocol.trials.presentation import next_level
 from study_app.session.resume import Start, resume_at
-from study_app.session.simulated.preview import preview
-from study_app.session.simulated.skipping import begin_at
+from study_app.session.simulated.answers_only import begin_at
+from study_app.session.transitions.page_builder import preview
 from study_app.store.blinded.blinding import read_key
 from study_app.store.folders import locate
 from study_app.store.journals import journal

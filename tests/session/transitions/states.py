@@ -3,7 +3,6 @@
 from functools import cache
 from typing import Any, get_args
 
-from study_app.session.transitions.commands import ShowPage, Write
 from study_app.session.transitions.events import (
     Broke,
     Chosen,
@@ -18,8 +17,10 @@ from study_app.session.transitions.events import (
     RepeatAsked,
     ResumeAsked,
     Retracted,
+    ShowPage,
     Stepped,
     TaskDone,
+    Write,
     WriteFailed,
 )
 from study_app.session.transitions.state import Phase, SessionState

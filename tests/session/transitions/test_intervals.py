@@ -9,8 +9,7 @@ import pytest
 from study_app.errors import SessionError
 from study_app.protocol.orders.schedule import Trial
 from study_app.session.resume import resume_at
-from study_app.session.transitions.commands import Finish, Write
-from study_app.session.transitions.events import Begin, ResumeAsked, TaskDone, TimeUp
+from study_app.session.transitions.events import Begin, Finish, ResumeAsked, TaskDone, TimeUp, Write
 from study_app.session.transitions.state import FINAL, Phase, SessionState
 from study_app.session.transitions.table import advance
 from tests.session import pairs

@@ -12,36 +12,33 @@ from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import Trial
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import FIRST
-from study_app.session.simulated.preview import preview
-from study_app.session.transitions.commands import (
-    FadeIn,
-    Finish,
-    Rest,
-    ShowPage,
-    StartTrial,
-    StopForce,
-    StopTrial,
-    Write,
-    WriteTables,
-)
 from study_app.session.transitions.events import (
     Begin,
     Broke,
     Chosen,
     Continue,
     EndAsked,
+    FadeIn,
+    Finish,
     ForceStopped,
     ItemShown,
     PauseAsked,
     RepeatAsked,
+    Rest,
     ResumeAsked,
     Retracted,
+    ShowPage,
+    StartTrial,
+    StopForce,
+    StopTrial,
     Submitted,
     TaskDone,
     TimeUp,
+    Write,
     WriteCompleted,
+    WriteTables,
 )
-from study_app.session.transitions.previewed_pages import Moment, moments, previewed_page
+from study_app.session.transitions.page_builder import Moment, moments, preview, previewed_page
 from study_app.session.transitions.state import FINAL, Phase, SessionState
 from study_app.session.transitions.table import advance, open_session
 from tests.session import small

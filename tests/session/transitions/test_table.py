@@ -8,8 +8,17 @@ from study_app.errors import SessionError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.pages import EndPage, QuestionnairePage, TaskPage, TextPage, TroublePage
-from study_app.session.transitions.commands import Rest, StartTrial, StopForce, StopTrial, Write
-from study_app.session.transitions.events import ForceStopped, WriteCompleted, WriteFailed, WriteRetried
+from study_app.session.transitions.events import (
+    ForceStopped,
+    Rest,
+    StartTrial,
+    StopForce,
+    StopTrial,
+    Write,
+    WriteCompleted,
+    WriteFailed,
+    WriteRetried,
+)
 from study_app.session.transitions.moves import STOPPABLE
 from study_app.session.transitions.state import FINAL, Phase
 from study_app.session.transitions.table import advance, open_session

@@ -17,8 +17,17 @@ from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial, build_schedule
 from study_app.session.pages import Page
-from study_app.session.transitions.commands import Adjust, Command, ShowPage, StartTrial, Write
-from study_app.session.transitions.events import Begin, Event, TaskDone, TimeUp
+from study_app.session.transitions.events import (
+    Adjust,
+    Begin,
+    Command,
+    Event,
+    ShowPage,
+    StartTrial,
+    TaskDone,
+    TimeUp,
+    Write,
+)
 from study_app.session.transitions.state import FINAL, Phase, SessionState
 from study_app.session.transitions.table import advance, open_session
 from tests.protocol.edited_studies import text_of

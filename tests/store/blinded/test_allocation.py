@@ -15,7 +15,7 @@ from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import build_schedule, stream
 from study_app.protocol.simulated_observer import NO_FEATURES
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.session.simulated.trial_features import ConditionFeatures
+from study_app.session.simulated.rehearsal import ConditionFeatures
 from study_app.store.blinded import allocation
 from study_app.store.blinded.allocation import allocate, allocated, claims, session_protocol
 from study_app.store.blinded.blinding import open_or_draw_key

@@ -17,7 +17,7 @@ from study_app.workers.server import Send, Stop
 
 if TYPE_CHECKING:
     from study_app.analysis.power import threshold_studies
-    from study_app.session.simulated.trial_features import ConditionFeatures
+    from study_app.session.simulated.rehearsal import ConditionFeatures
 
 SEED: Final = 1
 """That of ``power`` where none is given."""
@@ -227,7 +227,7 @@ _features_of: dict[str, ConditionFeatures] = {}
 
 def _features(wanted: Detecting, watch: Watch) -> ConditionFeatures:
     """Return the features of each condition, kept for the last study: rehearsing them takes most of the time."""
-    from study_app.session.simulated.trial_features import condition_features  # noqa: PLC0415 - the compiler: only here
+    from study_app.session.simulated.rehearsal import condition_features  # noqa: PLC0415 - the compiler: only here
 
     if wanted.depends not in _features_of:
         found = condition_features(wanted.protocol, seed=SEED, progress=lambda _words: watch(0, STUDIES))

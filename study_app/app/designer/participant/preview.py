@@ -34,10 +34,9 @@ from study_app.protocol.questions import Value
 from study_app.protocol.source.document import Path, value_at
 from study_app.protocol.wording.languages import language_name
 from study_app.session.pages import DesignPage, TaskPage
-from study_app.session.simulated.preview import preview
-from study_app.session.simulated.programmed_ball import ProgrammedBall
+from study_app.session.simulated.observers import ProgrammedBall
 from study_app.session.transitions.events import Chosen, Continue, LanguageChosen, Retracted, Submitted
-from study_app.session.transitions.previewed_pages import Moment, moments, previewed_page, tested_condition
+from study_app.session.transitions.page_builder import Moment, moments, preview, previewed_page, tested_condition
 from study_app.viewmodels.designer.keys import tip
 from study_app.viewmodels.designer.participant_page import SIZES, ParticipantView, ScreenSize, moment_words, step_words
 

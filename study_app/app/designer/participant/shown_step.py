@@ -9,7 +9,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import variants
 from study_app.protocol.orders.schedule import FormStep, PageStep, Step, Trial, build_schedule
 from study_app.protocol.source.document import Path
-from study_app.session.simulated.preview import PARTICIPANT, SEED, Preview, preview
+from study_app.session.transitions.page_builder import PARTICIPANT, SEED, Preview, preview
 
 Side: TypeAlias = Literal["tank", "questions"]
 

@@ -6,7 +6,7 @@ from typing import TypeAlias
 from study_app.authoring.names import named_places
 from study_app.protocol.orders.schedule import FormStep, PageStep, Step, Trial
 from study_app.protocol.source.document import Path
-from study_app.session.simulated.preview import Preview
+from study_app.session.transitions.page_builder import Preview
 
 Graph: TypeAlias = Mapping[Path, frozenset[Path]]
 """What each table names, by paths: ``("conditions", "syrup")`` → ``{("liquids", "syrup")}``."""

@@ -25,9 +25,9 @@ from study_app.devices.registry import descriptor_of, title_of
 from study_app.errors import StoreError, StudyError
 from study_app.gui.designer.view import DesignerPlace
 from study_app.gui.widgets.background import Background
-from study_app.session.request import NewSession, resumed
-from study_app.session.simulated.preview import PARTICIPANT
-from study_app.session.simulated.skipping import begin_at
+from study_app.session.simulated.answers_only import begin_at
+from study_app.session.start import NewSession, resumed
+from study_app.session.transitions.page_builder import PARTICIPANT
 from study_app.store.atomic import copy_folder, write_file
 from study_app.store.folders import kept_pilot_folder
 from study_app.store.sessions.begin import SessionStart

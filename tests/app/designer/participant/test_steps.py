@@ -10,7 +10,7 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.writer.edits import Edit, Set, Unset
 from study_app.protocol.load import load, parse, source_bytes
 from study_app.protocol.orders.schedule import PageStep, Trial
-from study_app.session.simulated.preview import preview
+from study_app.session.transitions.page_builder import preview
 from tests.protocol.groups.grouped import grouped
 
 

@@ -23,7 +23,7 @@ from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.widgets.controls import CompactStop
 from study_app.session.pages import ChoicePage, FeedbackPage, PausePage, QuestionnairePage, TaskPage, TextPage
-from study_app.session.simulated.preview import preview
+from study_app.session.transitions.page_builder import preview
 from study_app.store.verification.verify_study import verify
 from study_app.viewmodels.sessions import sessions
 from tests.app.people import window
