@@ -38,8 +38,7 @@ from study_app.haptics.model.scene import FADE_S, Scene
 from study_app.haptics.runtime.pack import adjust_into, pack
 from study_app.haptics.runtime.recompute import take_sample, was_lost_at_read
 from study_app.protocol.model import Protocol
-from study_app.protocol.trials.answered import presented_by
-from study_app.protocol.trials.presentation import link_seed
+from study_app.protocol.trials.presentation import link_seed, presented_by
 from study_app.store import receipt, recordings
 from study_app.store.atomic import is_there
 from study_app.store.blinded import blinding

@@ -11,8 +11,8 @@ from study_app.errors import ProtocolError, SessionError
 from study_app.protocol.load import at_hand, parse, protocol_hash, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial, build_schedule
-from study_app.protocol.trials.answered import heard_in
-from study_app.protocol.trials.method import Heard
+from study_app.protocol.trials.methods import Heard
+from study_app.protocol.trials.presentation import heard_in
 from study_app.store.blinded.blinding import Key, opened
 from study_app.store.journals.journal import Line
 from study_app.store.progress import Progress, progress_of

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from study_app.haptics.model.layout import LIMITER_GLITCH, LIMITER_NAMES, SAMPLE
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.telemetry import timing
-from study_app.protocol.trials.task import AnyTask
-from study_app.protocol.trials.tasks.follow import Follow
+from study_app.protocol.trials.tasks import AnyTask, Follow
 from study_app.session.ports import RecorderPort, ServoPort
 from study_app.session.tasks import Outcome, TargetReached, TaskView, track
 from study_app.session.transitions.events import StartTrial

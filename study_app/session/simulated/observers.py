@@ -15,14 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.devices.simulated.hand_commands import HandOrders
-from study_app.protocol.forms.show_if import Value, shown
-from study_app.protocol.forms.simulated_observer import Rater, TrialFeatures, judgements
 from study_app.protocol.orders.schedule import shuffle, stream
-from study_app.protocol.questions.question import ItemView
-from study_app.protocol.trials.task import AnyTask
-from study_app.protocol.trials.tasks.explore import Explore
-from study_app.protocol.trials.tasks.follow import Follow
-from study_app.protocol.trials.tasks.reach import Reach
+from study_app.protocol.questions import ItemView, Value, shown
+from study_app.protocol.simulated_observer import Rater, TrialFeatures, judgements
+from study_app.protocol.trials.tasks import AnyTask, Explore, Follow, Reach
 from study_app.psychophysics.delivery import lag
 from study_app.session.pages import DesignPage, QuestionnairePage, TextPage
 from study_app.session.tasks import track

@@ -20,9 +20,8 @@ from typing import Final
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, stream
-from study_app.protocol.questions.choice import ChoiceView
-from study_app.protocol.questions.question import ItemView, plain_number
-from study_app.protocol.questions.rating import RatingView
+from study_app.protocol.questions import ChoiceView, ItemView, RatingView, Value, plain_number
+from study_app.protocol.simulated_observer import TrialFeatures, rater
 from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.stimuli import DELAYS, FORCE_DELAY, OF_LINK
 from study_app.protocol.trials.tracks import design_of, stimulus_of

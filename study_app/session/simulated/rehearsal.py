@@ -27,13 +27,12 @@ from study_app.devices.simulated.hand_commands import hand_of
 from study_app.errors import SessionError, StoreError
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.protocol.blocks import Block
-from study_app.protocol.forms.simulated_observer import NO_FEATURES, TrialFeatures
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule, draw_key, stream
-from study_app.protocol.trials.due import next_level
-from study_app.protocol.trials.keyed import Key as LevelKey
-from study_app.protocol.trials.presentation import delays_force
+from study_app.protocol.simulated_observer import NO_FEATURES, TrialFeatures
+from study_app.protocol.streams import Key as LevelKey
+from study_app.protocol.trials.presentation import delays_force, next_level
 from study_app.session.pages import (
     DesignPage,
     FeedbackPage,

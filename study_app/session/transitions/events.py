@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
 from study_app.errors import DeviceError, ServoFault, StudyError, VideoError
-from study_app.protocol.forms.show_if import Value
+from study_app.protocol.questions import Value
 from study_app.protocol.trials.stimuli import Stimulated
-from study_app.protocol.trials.task import AnyTask
+from study_app.protocol.trials.tasks import AnyTask
 from study_app.session.pages import Page
 
 Status: TypeAlias = Literal["completed", "withdrawn", "aborted", "broken"]

@@ -10,16 +10,12 @@ from dataclasses import dataclass, field, replace
 from typing import Final, Literal, TypeAlias
 
 from study_app.protocol.blocks import Block
-from study_app.protocol.forms.show_if import Value
-from study_app.protocol.groups.allocation import group_of
-from study_app.protocol.groups.own_protocol import own_protocol
 from study_app.protocol.model import PageText, Protocol, Questionnaire
+from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Trial, build_schedule, draw_key, stream
-from study_app.protocol.questions.choice import ChoiceView
-from study_app.protocol.questions.number import NumberView
-from study_app.protocol.questions.question import Context, Question
+from study_app.protocol.questions import ChoiceView, Context, NumberView, Question, Value
+from study_app.protocol.streams import draw_secret, group_of
 from study_app.protocol.trials.designs import ORDINALS
-from study_app.protocol.trials.keyed import draw_secret
 from study_app.protocol.trials.tracks import design_of
 from study_app.protocol.wording.languages import Words, words
 from study_app.session.pages import (

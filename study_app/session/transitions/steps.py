@@ -7,9 +7,14 @@ from typing import Any, Final, TypeAlias
 from study_app.errors import SessionError
 from study_app.protocol.blocks import Block
 from study_app.protocol.orders.schedule import FormStep, PageStep, Step, Trial
-from study_app.protocol.trials.answered import heard_of
-from study_app.protocol.trials.due import Due, criterion_met
-from study_app.protocol.trials.presentation import arrangement_text, delay_s_of, longest_delay_s
+from study_app.protocol.trials.presentation import (
+    Due,
+    arrangement_text,
+    criterion_met,
+    delay_s_of,
+    heard_of,
+    longest_delay_s,
+)
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.session.transitions import page_builder
 from study_app.session.transitions.events import (

@@ -13,6 +13,8 @@ from pathlib import Path
 from study_app.errors import StoreError
 from study_app.protocol.groups import refuse_beyond_last
 from study_app.protocol.model import Protocol
+from study_app.protocol.orders.durations import own_protocol
+from study_app.protocol.streams import group_of
 from study_app.store.atomic import (
     cannot_write,
     is_there,

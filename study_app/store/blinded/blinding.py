@@ -34,10 +34,9 @@ from typing import Any, Final, Literal, TypeAlias
 from study_app.errors import StoreError
 from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.gate import resolve
-from study_app.protocol.groups.allocation import group_of
 from study_app.protocol.model import Protocol, SceneDefaults, StudyLiquid
 from study_app.protocol.orders.schedule import block_codes, draw_key
-from study_app.protocol.streams import draw_secret
+from study_app.protocol.streams import draw_secret, group_of
 from study_app.store import receipt
 from study_app.store.atomic import append_line, create_folder, is_there, parse_json, read_own
 from study_app.store.folders import SessionFolder, StudyFolder

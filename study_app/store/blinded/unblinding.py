@@ -13,7 +13,7 @@ from typing import Final
 
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
-from study_app.protocol.trials.answered import heard_in
+from study_app.protocol.trials.presentation import heard_in
 from study_app.store import receipt
 from study_app.store.atomic import is_there, write_file
 from study_app.store.blinded.blinding import Codes, Key, opened, read_key, reveal, reveals, verified_key, whole_protocol

@@ -15,7 +15,7 @@ from typing import Any, Final, TypeAlias
 
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
-from study_app.protocol.texts import text_in
+from study_app.protocol.table import text_in
 from study_app.store import receipt
 from study_app.store.atomic import disk_time_ns, is_there, parse_json, read_own, write_file
 from study_app.store.blinded.blinding import Key, opened, opened_key, reveals

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
 from study_app.errors import StoreError
-from study_app.protocol.groups.allocation import group_of
 from study_app.protocol.model import StudyHead
+from study_app.protocol.streams import group_of
 from study_app.store import exclusions, receipt
 from study_app.store.atomic import is_there, read_own, read_regular, temporaries
 from study_app.store.blinded import blinding

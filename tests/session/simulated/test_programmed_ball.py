@@ -3,10 +3,7 @@
 import numpy as np
 import pytest
 
-from study_app.protocol.trials.task import AnyTask
-from study_app.protocol.trials.tasks.explore import Explore
-from study_app.protocol.trials.tasks.follow import Follow
-from study_app.protocol.trials.tasks.reach import Reach
+from study_app.protocol.trials.tasks import AnyTask, Explore, Follow, Reach
 from study_app.session.simulated.observers import ProgrammedBall
 
 TANK_M = (0.12, 0.1, 0.08)

@@ -3,7 +3,7 @@
 import pytest
 
 from study_app.protocol.streams import stream
-from study_app.protocol.trials.kinds import default_design
+from study_app.protocol.trials.designs import default_design
 from study_app.session.simulated.participant import OBSERVER, Comparison
 from study_app.validation.thresholds.noticed_delays import (
     CRITERIA_S,

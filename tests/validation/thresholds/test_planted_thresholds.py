@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from study_app.cli import commands
 from study_app.protocol.load import load, parse
 from study_app.protocol.streams import stream
-from study_app.protocol.trials.kinds import default_design
+from study_app.protocol.trials.designs import default_design
 from study_app.session.simulated.participant import OBSERVER, Comparison, Observer
 from study_app.validation.thresholds.methods_alone import StudyFound, simulate
 from study_app.validation.thresholds.planted import Planted, planted

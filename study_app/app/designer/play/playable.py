@@ -20,7 +20,7 @@ from study_app.protocol.groups import numbered_parts
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial
 from study_app.protocol.source.document import Path, entries, value_at
-from study_app.protocol.source.liquid_files import with_liquid_files
+from study_app.protocol.source.files import with_liquid_files
 from study_app.session.transitions.page_builder import Preview, preview
 from study_app.viewmodels.designer.participant_page import step_words
 
