@@ -33,12 +33,12 @@ def evaluate(study: Study, *, progress: Progress = silent, planning: bool = True
     Examples
     --------
     >>> from pathlib import Path
-    >>> from study_app.analysis.findings.settings_differ import FINDING
+    >>> from study_app.analysis.findings.statement_tests import SettingsDiffer
     >>> from study_app.analysis.tables.study_tables import load_study
     >>> results = evaluate(load_study(Path("results/sample-rek2024")), planning=False)
     >>> [(block.id, block.n, block.revealed) for block in results.blocks]
     [('liquids', 12, False), ('delays', 12, False)]
-    >>> tested = FINDING.of(results.blocks[0])[0]
+    >>> tested = SettingsDiffer.of(results.blocks[0])[0]
     >>> print(f"{tested.item}: p = {tested.outcome.p:.2f}, W = {tested.outcome.effect:.2f}")
     feels_liquid: p = 0.78, W = 0.03
     """
@@ -106,14 +106,14 @@ def found_in(study: Study | None, answers: Asked) -> BlockFound:
     settings: list[NotTested] = []
     not_tested: list[NotTested] = []
     for finding in all_findings():
-        if finding.tests is None:
+        if not finding.what:
             continue
         if block.kind not in (finding.kinds if block.revealed else finding.sealed):
             if not block.revealed and block.kind in finding.waits:
                 not_tested.append(NotTested(finding.what, SEALED))
             continue
         (value, absent), failed = answers.attempt(
-            finding.what, partial(finding.tests, answers, found), (finding.empty, ())
+            finding.what, partial(finding.test, answers, found), (finding.empty, ())
         )
         found = finding.add_to(found, value)
         if finding.about == "sessions":

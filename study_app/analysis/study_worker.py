@@ -196,7 +196,7 @@ def _title(study: Study, name: str) -> str:
     from study_app.analysis.findings import all_findings  # noqa: PLC0415
 
     titles = {_name(study, block): captions.title(block) for block in study.blocks}
-    titles |= {one.figure.name: one.figure.title for one in all_findings() if one.figure is not None}
+    titles |= {one.figure_name: one.figure_title for one in all_findings() if one.figure_name}
     return titles.get(name) or titles.get(name.partition("-")[0], name.capitalize())
 
 

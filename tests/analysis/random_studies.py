@@ -66,9 +66,10 @@ def keeps_contract(made: Study, forms: Sequence[str] = ()) -> Results:
         for finding in all_findings():
             if found.kind not in (finding.kinds if found.revealed else finding.sealed):
                 assert finding.of(found) == finding.empty, finding.key
-            told = [*finding.sentences(found, made.decided), *finding.limits(found), *finding.methods(found, results)]
+            here = finding(found, results)
+            told = [*here.sentences(), *here.limits(), *here.methods()]
             assert all(text.endswith(".") for text in told), finding.key
-            assert all(row["block"] == found.id for row in finding.rows(found)), finding.key
+            assert all(row["block"] == found.id for row in here.rows()), finding.key
     asked = [(one.block, one.question) for one in answers(results)]
     assert len(set(asked)) == len(asked)
     assert failures.found == []

@@ -12,14 +12,10 @@ from scipy.stats import binom
 from study_app.analysis.designs.block_tests import MANY, of_tables
 from study_app.analysis.designs.verdicts import judged
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.findings.contrast_with_control import FINDING as CONTRASTS
-from study_app.analysis.findings.contrast_with_control import equivalent_up_to
-from study_app.analysis.findings.delay_trend import FINDING as TREND
-from study_app.analysis.findings.liquid_recognition import FINDING as RECOGNITION
-from study_app.analysis.findings.other_assumptions import FINDING as AGAIN
-from study_app.analysis.findings.pair_comparison import FINDING as PAIRS
-from study_app.analysis.findings.pair_comparison import pairs_of
-from study_app.analysis.findings.settings_differ import FINDING as OMNIBUS
+from study_app.analysis.findings.delays import ContrastsWithControl, equivalent_up_to
+from study_app.analysis.findings.other_assumptions import SameWithOtherAssumptions
+from study_app.analysis.findings.recognition import LiquidRecognition
+from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer, pairs_of
 from study_app.analysis.report.json_values import plain
 from study_app.analysis.results import item_test
 from study_app.analysis.results.block_results import BlockFound, Results
@@ -104,15 +100,19 @@ def test_results_hold_no_number_that_is_none() -> None:
 
 def test_equivalence_goes_up_from_the_shortest_delay_and_stops_at_the_first_that_is_not(rek: Folder) -> None:
     _, delays = blocks(opened(rek, 12))
-    for item, up_to in equivalent_up_to(CONTRASTS.of(delays)).items():
-        verdicts = [one.verdict == "equivalent" for one in CONTRASTS.of(delays) if one.item == item]
+    for item, up_to in equivalent_up_to(ContrastsWithControl.of(delays)).items():
+        verdicts = [one.verdict == "equivalent" for one in ContrastsWithControl.of(delays) if one.item == item]
         run = verdicts.index(False) if False in verdicts else len(verdicts)
         assert up_to == ([None, *delays.delays_ms[1:]][run])
 
 
 def test_of_five_no_pair_and_no_model_is_there_and_it_says_why(rek: Folder) -> None:
     liquids, delays = blocks(opened(rek, 5))
-    assert (PAIRS.of(liquids), AGAIN.of(liquids).mixed, AGAIN.of(delays).mixed) == ((), (), ())
+    assert (
+        Pairs.of(liquids),
+        SameWithOtherAssumptions.of(liquids).mixed,
+        SameWithOtherAssumptions.of(delays).mixed,
+    ) == ((), (), ())
     assert [one.what for one in liquids.absent] == ["comparison of two settings", "mixed model of the settings"]
     assert "5 participants cannot show it: the smallest p that 5 pairs can give is 0.0625" in liquids.absent[0].why
     assert "0.1875, which is above 0.05" in liquids.absent[0].why
@@ -123,9 +123,9 @@ def test_nothing_decided_makes_everything_exploratory(tmp_path: Path) -> None:
     results = found(opened(without("all", tmp_path / "rek2024"), 8))
     liquids, delays = results.blocks
     assert not results.decided.made
-    assert {one.primary for one in OMNIBUS.of(liquids)} == {False}
-    assert {one.correction for one in OMNIBUS.of(liquids)} == {"Benjamini-Hochberg"}
-    assert "shown" not in {one.verdict for one in OMNIBUS.of(liquids)}
+    assert {one.primary for one in SettingsDiffer.of(liquids)} == {False}
+    assert {one.correction for one in SettingsDiffer.of(liquids)} == {"Benjamini-Hochberg"}
+    assert "shown" not in {one.verdict for one in SettingsDiffer.of(liquids)}
     why = {one.what: one.why for one in (*liquids.absent, *delays.absent)}
     assert "chosen by the answers" in why["test of equivalence"]
     assert "does not say which statements name" in why["test of recognition"]
@@ -135,8 +135,8 @@ def test_nothing_decided_makes_everything_exploratory(tmp_path: Path) -> None:
 
 def test_a_bound_that_was_not_decided_is_not_made_up(tmp_path: Path) -> None:
     _, delays = blocks(opened(without("equivalence_bound", tmp_path / "rek2024"), 8))
-    assert CONTRASTS.entries(delays) == {"against": (), "equivalent_up_to": {}}
-    assert len(TREND.of(delays)) == 5
+    assert ContrastsWithControl.entries(delays) == {"against": (), "equivalent_up_to": {}}
+    assert len(DelayTrend.of(delays)) == 5
 
 
 @pytest.mark.parametrize("level", [1, 4, 7])
@@ -147,10 +147,12 @@ def test_equal_answers_are_no_variation_and_no_evidence(rek: Folder, level: int)
     results = found(rek)
     json.dumps(plain(results), allow_nan=False)
     liquids, delays = results.blocks
-    assert {one.verdict for one in (*OMNIBUS.of(liquids), *TREND.of(delays))} == {"not tested"}
-    assert {one.found.verdict for one in CONTRASTS.of(delays)} == {"equivalent"}  # eleven of eleven did not move
-    assert RECOGNITION.of(liquids) is not None
-    assert RECOGNITION.of(liquids).found.undecided == 33
+    assert {one.verdict for one in (*SettingsDiffer.of(liquids), *DelayTrend.of(delays))} == {"not tested"}
+    assert {one.found.verdict for one in ContrastsWithControl.of(delays)} == {
+        "equivalent"
+    }  # eleven of eleven did not move
+    assert LiquidRecognition.of(liquids) is not None
+    assert LiquidRecognition.of(liquids).found.undecided == 33
 
 
 def test_missing_answers_drop_the_participant_and_are_never_neutral(rek: Folder) -> None:
@@ -163,16 +165,16 @@ def test_missing_answers_drop_the_participant_and_are_never_neutral(rek: Folder)
     rek.add("P100", missing)
     rek.open()
     liquids, _ = blocks(rek)
-    one = next(one for one in OMNIBUS.of(liquids) if one.item == "immersive")
+    one = next(one for one in SettingsDiffer.of(liquids) if one.item == "immersive")
     assert (one.outcome.n, one.outcome.dropped) == (8, 1)
     assert one.outcome.p == pytest.approx(whole["immersive"].p)
-    assert [other.item for other in AGAIN.of(liquids).incomplete] == ["immersive"]
-    assert AGAIN.of(liquids).incomplete[0].outcome.n == 9
+    assert [other.item for other in SameWithOtherAssumptions.of(liquids).incomplete] == ["immersive"]
+    assert SameWithOtherAssumptions.of(liquids).incomplete[0].outcome.n == 9
     assert next(row for row in liquids.measures if row["item"] == "immersive" and row["missing"])["n"] == 8
 
 
 def _omnibus(folder: Folder) -> tuple:  # type: ignore[type-arg]
-    return OMNIBUS.of(found(folder).blocks[0])
+    return SettingsDiffer.of(found(folder).blocks[0])
 
 
 def test_two_settings_are_compared_as_a_pair(small: Folder) -> None:
@@ -185,8 +187,8 @@ def test_two_settings_are_compared_as_a_pair(small: Folder) -> None:
         small.add(f"P{number:03d}", answer)
     small.open()
     (block,) = found(small).blocks
-    assert {one.outcome.test for one in OMNIBUS.of(block)} == {"Wilcoxon signed ranks"}
-    assert OMNIBUS.of(block)[0].outcome.p == pytest.approx(2 / 2**8)
+    assert {one.outcome.test for one in SettingsDiffer.of(block)} == {"Wilcoxon signed ranks"}
+    assert SettingsDiffer.of(block)[0].outcome.p == pytest.approx(2 / 2**8)
 
 
 @pytest.mark.parametrize("n", [12, 24])

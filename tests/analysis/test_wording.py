@@ -8,12 +8,9 @@ import pytest
 
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.codebook import codebook_bytes
-from study_app.analysis.findings.contrast_with_control import FINDING as CONTRASTS
-from study_app.analysis.findings.delay_trend import FINDING as TREND
-from study_app.analysis.findings.detection_threshold import FINDING as THRESHOLD
-from study_app.analysis.findings.factors.session_comparison import FINDING as SESSIONS
-from study_app.analysis.findings.other_assumptions import FINDING as AGAIN
-from study_app.analysis.findings.settings_differ import FINDING as OMNIBUS
+from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold
+from study_app.analysis.findings.other_assumptions import SameWithOtherAssumptions
+from study_app.analysis.findings.statement_tests import DelayTrend, SessionsDiffer, SettingsDiffer
 from study_app.analysis.report.block_section import block
 from study_app.analysis.report.findings_summary import findings
 from study_app.analysis.report.methods_paragraph import methods
@@ -60,8 +57,8 @@ def test_pooled_versions_of_a_protocol_are_named() -> None:
 def test_the_verdict_of_unanimity_holds_after_the_correction() -> None:
     made = study_of(12)
     (found,) = evaluate(made, planning=False).blocks
-    assert {one.verdict for one in CONTRASTS.of(found) if one.delay_ms > 0} == {"different"}
-    assert all(one.found.interval is None for one in CONTRASTS.of(found))
+    assert {one.verdict for one in ContrastsWithControl.of(found) if one.delay_ms > 0} == {"different"}
+    assert all(one.found.interval is None for one in ContrastsWithControl.of(found))
 
 
 @pytest.mark.parametrize(("longest_ms", "verdict"), [(50.0, "different"), (200.0, "inconclusive")])
@@ -73,9 +70,9 @@ def test_the_verdict_of_one_of_many_comparisons_is_the_corrected_one(longest_ms:
 
     settings = delays([ms for ms in (0.0, 50.0, 100.0, 150.0, 200.0) if ms <= longest_ms])
     (found,) = evaluate(study(settings, list(everybody(settings, 10, answer))), planning=False).blocks
-    assert CONTRASTS.of(found)[0].found.p_difference is not None
-    assert CONTRASTS.of(found)[0].found.p_difference <= 0.05 / 2
-    assert CONTRASTS.of(found)[0].verdict == verdict
+    assert ContrastsWithControl.of(found)[0].found.p_difference is not None
+    assert ContrastsWithControl.of(found)[0].found.p_difference <= 0.05 / 2
+    assert ContrastsWithControl.of(found)[0].verdict == verdict
 
 
 def test_all_statements_are_told_as_a_reader_would() -> None:
@@ -129,9 +126,9 @@ def test_repetitions_are_said_and_single_answers_are_used_where_levels_count() -
     assert line in " ".join(block(found, results, ()))
     (described,) = json.loads(codebook_bytes(made, {}))["blocks"]
     assert described["answers_per_participant_setting_and_item"] == [2, 2]
-    assert THRESHOLD.of(found) is not None
-    assert set(THRESHOLD.of(found).asked) == {20}
-    for one in AGAIN.of(found).mixed:
+    assert DetectionThreshold.of(found) is not None
+    assert set(DetectionThreshold.of(found).asked) == {20}
+    for one in SameWithOtherAssumptions.of(found).mixed:
         assert all(float(level).is_integer() for level in one.outcome.levels)  # type: ignore[attr-defined]
 
 
@@ -139,16 +136,16 @@ def test_sessions_are_shown_and_tested() -> None:
     made = study(delays(FOUR_LEVELS), list(everybody(delays(FOUR_LEVELS), 10, rising(1, shift=2.0), sessions=2)))
     results, found = evaluated(made)
     assert found.sessions == (1, 2)
-    assert [one.verdict for one in SESSIONS.of(found)] == ["suggested", "suggested"]
-    assert all("sessions as a factor" in one.outcome.method for one in AGAIN.of(found).mixed)
-    assert len(AGAIN.of(found).mixed) == len(ITEMS)
+    assert [one.verdict for one in SessionsDiffer.of(found)] == ["suggested", "suggested"]
+    assert all("sessions as a factor" in one.outcome.method for one in SameWithOtherAssumptions.of(found).mixed)
+    assert len(SameWithOtherAssumptions.of(found).mixed) == len(ITEMS)
     page = " ".join(block(found, results, ()))
     assert "The answers are of sessions 1 and 2, which are compared with each other" in page
     assert "Do sessions differ?" in page
     three = study(delays(FOUR_LEVELS), list(everybody(delays(FOUR_LEVELS), 10, rising(2), sessions=3)))
     _, found = evaluated(three)
-    assert {one.outcome.test for one in SESSIONS.of(found)} == {"Friedman"}
-    assert "suggested" not in {one.verdict for one in SESSIONS.of(found)}
+    assert {one.outcome.test for one in SessionsDiffer.of(found)} == {"Friedman"}
+    assert "suggested" not in {one.verdict for one in SessionsDiffer.of(found)}
 
 
 def test_conditions_of_one_delay_are_replicates_of_it() -> None:
@@ -156,10 +153,10 @@ def test_conditions_of_one_delay_are_replicates_of_it() -> None:
     results, found = evaluated(study(delays(twice), list(everybody(delays(twice), 12, rising(3)))))
     assert found.delays_ms == FOUR_LEVELS
     assert found.replicated_ms == (50.0,)
-    assert {one.delay_ms for one in CONTRASTS.of(found)} == {50.0, 100.0, 150.0}
-    assert TREND.of(found)[0].outcome.p is not None
-    assert THRESHOLD.of(found) is not None
-    assert THRESHOLD.of(found).asked == (12, 24, 12, 12)
+    assert {one.delay_ms for one in ContrastsWithControl.of(found)} == {50.0, 100.0, 150.0}
+    assert DelayTrend.of(found)[0].outcome.p is not None
+    assert DetectionThreshold.of(found) is not None
+    assert DetectionThreshold.of(found).asked == (12, 24, 12, 12)
     assert "Several conditions present 50 ms: they are taken as repeated presentations" in " ".join(
         block(found, results, ())
     )
@@ -171,4 +168,4 @@ def test_of_two_settings_the_higher_one_is_named() -> None:
     results, found = evaluated(made)
     page = " ".join(block(found, results, ()))
     assert "above 0 where Liquid1 was rated higher than Liquid2" in page
-    assert ITEMS[0] == OMNIBUS.of(found)[0].item
+    assert ITEMS[0] == SettingsDiffer.of(found)[0].item

@@ -8,7 +8,7 @@ from study_app import figure_style as style
 from study_app.analysis.figures import answer_figures, captions
 from study_app.analysis.figures.picture import Drawing, Picture
 from study_app.analysis.findings import all_findings
-from study_app.analysis.findings.lowest_delay import FINDING as LOWEST
+from study_app.analysis.findings.delays import LowestDelay
 from study_app.analysis.results.block_results import Results
 from study_app.analysis.results.section_failures import Failure, Failures
 from study_app.analysis.tables.study_tables import Study
@@ -38,13 +38,13 @@ def _of_block(drawing: Drawing) -> Iterator[tuple[str, Callable[[Drawing], Pictu
     """Yield what a block's figures are called, and how each is drawn."""
     yield drawing.block.kind, _answers
     for finding in all_findings():
-        if finding.figure is not None:
-            yield finding.figure.name, finding.figure.draw
+        if finding.figure_name:
+            yield finding.figure_name, finding(drawing.found, drawing.results).figure
 
 
 def _answers(drawing: Drawing) -> Picture:
     study, block, found = drawing.study, drawing.block, drawing.found
-    lowest = {one.item: one.over_all_ms for one in LOWEST.of(found) if one.over_all_ms is not None}
+    lowest = {one.item: one.over_all_ms for one in LowestDelay.of(found) if one.over_all_ms is not None}
     caption = captions.caption(study, block)
     if lowest:
         caption += (

@@ -1,19 +1,16 @@
-"""The questions asked of the answers of a block: one module per finding, described by its ``FINDING``.
-
-Modules of folders in this one, such as ``factors``, are findings, too.
-"""
+"""The questions asked of the answers of a block: every subclass of `Finding` in a module of this folder."""
 
 import sys
 from functools import cache
 from typing import Any
 
-from study_app.analysis.results.finding import Finding
+from study_app.analysis.findings.finding import Finding
 from study_app.discovery import modules_of
 
 
 @cache
-def all_findings() -> tuple[Finding[Any], ...]:
-    """Return the ``FINDING`` of every module of this folder, in the order of their places."""
-    here = list(modules_of(sys.modules[__name__]))
-    modules = [inner for one in here for inner in (modules_of(one) if hasattr(one, "__path__") else [one])]
-    return tuple(sorted((module.FINDING for module in modules), key=lambda finding: finding.place))
+def all_findings() -> tuple[type[Finding[Any]], ...]:
+    """Return every finding of the modules of this folder, in the order of their places."""
+    held = [one for module in modules_of(sys.modules[__name__]) for one in vars(module).values()]
+    found = {one for one in held if isinstance(one, type) and issubclass(one, Finding) and hasattr(one, "key")}
+    return tuple(sorted(found, key=lambda finding: finding.place))

@@ -2,17 +2,16 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any
 
 import numpy as np
 
 from study_app.analysis.designs.block_tests import MANY, Asked
 from study_app.analysis.designs.verdicts import alone
-from study_app.analysis.figures.picture import Picture
+from study_app.analysis.findings.finding import Absent, Finding, Row
 from study_app.analysis.report.html_page import heading, paragraph, table
 from study_app.analysis.report.test_rows import judged_row
-from study_app.analysis.results.block_results import BlockFound, Results
-from study_app.analysis.results.finding import Finding, Row
+from study_app.analysis.results.block_results import BlockFound
 from study_app.analysis.results.item_test import Tested
 from study_app.analysis.results.not_tested import NotTested
 from study_app.analysis.results.words import interval, number, p_value, short, statistic
@@ -22,8 +21,6 @@ from study_app.analysis.statistics.skillings_mack import skillings_mack
 from study_app.analysis.tables.measures import Array
 from study_app.number_text import counted
 
-OTHERS: Final = "the same asked with other assumptions"
-
 
 @dataclass(frozen=True, slots=True)
 class OtherAssumptions:
@@ -31,12 +28,6 @@ class OtherAssumptions:
 
     mixed: tuple[Tested, ...] = ()
     incomplete: tuple[Tested, ...] = ()
-
-
-def _tested(answers: Asked, _found: BlockFound) -> tuple[OtherAssumptions, tuple[NotTested, ...]]:
-    if answers.block.kind == "delays":
-        return asked_again(answers, np.array(answers.block.delays_ms)[:, None] / 100, "the delay")
-    return asked_again(answers, None, "the settings")
 
 
 def asked_again(answers: Asked, columns: Array | None, what: str) -> tuple[OtherAssumptions, tuple[NotTested, ...]]:
@@ -90,47 +81,6 @@ def _no_model(answers: Asked) -> str:
     return ""
 
 
-def _rows(found: BlockFound) -> Iterator[Row]:
-    asked = FINDING.of(found)
-    for one in asked.mixed:
-        yield judged_row(found, "settings differ, mixed model", one)
-    for one in asked.incomplete:
-        yield judged_row(found, "settings differ, incomplete participants too", one)
-
-
-def _section(found: BlockFound, _results: Results, _pictures: Mapping[str, Picture]) -> Iterator[str]:
-    asked = FINDING.of(found)
-    again = (*asked.mixed, *asked.incomplete)
-    if not again:
-        return
-    yield heading(3, "The same asked with other assumptions")
-    yield table(
-        ("Statement", "Test", "n", "statistic", "p", "effect", "interval", "note"),
-        [
-            [
-                short(found, one.item),
-                one.outcome.test,
-                str(one.outcome.n),
-                statistic(one.outcome),
-                p_value(one.outcome.p),
-                *_effects(found, one),
-                one.outcome.note,
-            ]
-            for one in again
-        ],
-        words=2,
-        last=1,
-    )
-    effects = ""
-    if asked.mixed:
-        per = "per 100 ms of delay" if found.delays_ms else f"against {found.names[0]}"
-        effects = (
-            f"Effects of the mixed model: log odds of a higher answer {per}, 95 % Wald intervals; p by likelihood "
-            "ratio. "
-        )
-    yield paragraph(f"{effects}These p are not corrected and decide nothing.", "soft")
-
-
 def _effects(found: BlockFound, one: Tested) -> tuple[str, str]:
     outcome = one.outcome
     if isinstance(outcome, Ordinal) and len(outcome.coefficients) > 1:
@@ -144,30 +94,79 @@ def _effects(found: BlockFound, one: Tested) -> tuple[str, str]:
     return number(outcome.effect), interval(outcome.interval)
 
 
-def _common_methods(blocks: Sequence[BlockFound]) -> Iterator[str]:
-    asked = [FINDING.of(found) for found in blocks]
-    if any(one.mixed for one in asked):
-        yield (
-            "As a check, answers were fitted by cumulative logit models with a random intercept for each participant "
-            "(adaptive quadrature, likelihood ratio)."
+class SameWithOtherAssumptions(Finding[OtherAssumptions]):
+    """The same questions under other assumptions: the mixed model, and a test with incomplete participants."""
+
+    key = "again"
+    place = 13
+    row_place = 5
+    what = "the same asked with other assumptions"
+    part = "other assumptions"
+    empty = OtherAssumptions()
+
+    @classmethod
+    def entries(cls, found: BlockFound) -> Mapping[str, Any]:
+        return {"mixed": cls.of(found).mixed, "incomplete": cls.of(found).incomplete}
+
+    @classmethod
+    def test(cls, answers: Asked, found: BlockFound) -> tuple[OtherAssumptions, Absent]:
+        if answers.block.kind == "delays":
+            return asked_again(answers, np.array(answers.block.delays_ms)[:, None] / 100, "the delay")
+        return asked_again(answers, None, "the settings")
+
+    def rows(self) -> Iterator[Row]:
+        asked = self.value
+        for one in asked.mixed:
+            yield judged_row(self.found, "settings differ, mixed model", one)
+        for one in asked.incomplete:
+            yield judged_row(self.found, "settings differ, incomplete participants too", one)
+
+    def section(self) -> Iterator[str]:
+        asked = self.value
+        again = (*asked.mixed, *asked.incomplete)
+        if not again:
+            return
+        yield heading(3, "The same asked with other assumptions")
+        yield table(
+            ("Statement", "Test", "n", "statistic", "p", "effect", "interval", "note"),
+            [
+                [
+                    short(self.found, one.item),
+                    one.outcome.test,
+                    str(one.outcome.n),
+                    statistic(one.outcome),
+                    p_value(one.outcome.p),
+                    *_effects(self.found, one),
+                    one.outcome.note,
+                ]
+                for one in again
+            ],
+            words=2,
+            last=1,
         )
-    again = " and Skillings and Mack's test uses those who missed some" if any(one.incomplete for one in asked) else ""
-    yield (
-        "Missing answers were never replaced; tests over several settings use participants who answered under all of "
-        f"them, comparisons of two those who answered under both{again}."
-    )
+        effects = ""
+        if asked.mixed:
+            per = "per 100 ms of delay" if self.found.delays_ms else f"against {self.found.names[0]}"
+            effects = (
+                f"Effects of the mixed model: log odds of a higher answer {per}, 95 % Wald intervals; p by likelihood "
+                "ratio. "
+            )
+        yield paragraph(f"{effects}These p are not corrected and decide nothing.", "soft")
 
-
-FINDING: Final[Finding[OtherAssumptions]] = Finding(
-    key="again",
-    place=13,
-    what=OTHERS,
-    empty=OtherAssumptions(),
-    tests=_tested,
-    numbers=lambda found: {"mixed": FINDING.of(found).mixed, "incomplete": FINDING.of(found).incomplete},
-    row_place=5,
-    rows=_rows,
-    part="other assumptions",
-    section=_section,
-    common_methods=_common_methods,
-)
+    @classmethod
+    def common_methods(cls, blocks: Sequence[BlockFound]) -> Iterator[str]:
+        asked = [cls.of(found) for found in blocks]
+        if any(one.mixed for one in asked):
+            yield (
+                "As a check, answers were fitted by cumulative logit models with a random intercept for each "
+                "participant "
+                "(adaptive quadrature, likelihood ratio)."
+            )
+        again = (
+            " and Skillings and Mack's test uses those who missed some" if any(one.incomplete for one in asked) else ""
+        )
+        yield (
+            "Missing answers were never replaced; tests over several settings use participants who answered under all "
+            "of "
+            f"them, comparisons of two those who answered under both{again}."
+        )

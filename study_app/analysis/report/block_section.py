@@ -50,7 +50,7 @@ def _parts(
     yield "presentations", lambda: _presentations(found)
     yield "figure of answers", lambda: drawn(pictures, found.kind)
     for finding in all_findings():
-        yield finding.part, partial(finding.section, found, results, pictures)
+        yield finding.part, finding(found, results, pictures).section
     yield "what is not here", lambda: _absent(found)
 
 

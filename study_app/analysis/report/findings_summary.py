@@ -20,7 +20,7 @@ def findings(results: Results) -> tuple[str, ...]:
         for found in results.blocks
         if found.n
         for finding in all_findings()
-        for line in finding.sentences(found, results.decided)
+        for line in finding(found, results).sentences()
     )
     return (*of_statements, *of_levels(results))
 
@@ -53,7 +53,7 @@ def limits(study: Study, results: Results) -> tuple[str, ...]:
             )
         lines += _untested(found)
         lines += _mixed_up(found, results)
-        lines += [sentence for finding in all_findings() for sentence in finding.limits(found)]
+        lines += [sentence for finding in all_findings() for sentence in finding(found, results).limits()]
     lines += [sentence for found in results.levels for sentence in level_limits(found)]
     return tuple(lines)
 

@@ -46,7 +46,7 @@ def plain(value: Any) -> Any:
 
 def _entries(found: BlockFound) -> Iterator[tuple[str, Any]]:
     """Yield a block's fields, the findings about settings in their midst and those about sessions last."""
-    tested = [finding for finding in all_findings() if finding.tests is not None]
+    tested = [finding for finding in all_findings() if finding.what]
     for field in fields(found):
         if field.name != "findings":
             yield field.name, getattr(found, field.name)

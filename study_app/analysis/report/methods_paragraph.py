@@ -34,7 +34,7 @@ def _sentences(study: Study, results: Results) -> Iterator[str]:
     for found in blocks:
         yield from said_of_presentations(found)
         for finding in all_findings():
-            yield from finding.methods(found, results)
+            yield from finding(found, results).methods()
     yield from _common(results, blocks)
     yield _program()
 

@@ -46,7 +46,7 @@ MOTION: Final = (
 def tests(results: Results) -> list[dict[str, Any]]:
     """Return a row for every test."""
     in_order = sorted(all_findings(), key=lambda finding: finding.row_place)
-    return [row for found in results.blocks for finding in in_order for row in finding.rows(found)]
+    return [row for found in results.blocks for finding in in_order for row in finding(found, results).rows()]
 
 
 def tests_csv(results: Results) -> bytes:

@@ -151,7 +151,7 @@ if (differing == 0) cat("every number that R computes is the report's\\n") else 
 def r_script(study: Study, results: Results) -> str:
     """Return the script."""
     table = f"study-{study.name}_description-responses_data.csv"
-    calls = [line for found in results.blocks if found.n for line in _calls(found)]
+    calls = [line for found in results.blocks if found.n for line in _calls(found, results)]
     of_levels, compared = level_lines(study, results.levels)
     start = START.format(table=table, exact=EXACT_UP_TO, numeric=TEXTS if study.protocol_format > 1 else NUMBERS)
     of_sites = list(_site_calls(results))
@@ -181,10 +181,10 @@ def _site_calls(results: Results) -> Iterator[str]:
             yield f"threshold_sites({r_text(what)}, {values}, {ends})"
 
 
-def _calls(found: BlockFound) -> Iterator[str]:
+def _calls(found: BlockFound, results: Results) -> Iterator[str]:
     codes = r_vector([setting.code for setting in found.settings])
     if found.replicated_ms:
         by_delay = {setting.delay_ms: setting.code for setting in found.settings}
         codes += f", {r_vector([by_delay[setting.delay_ms] for setting in found.settings])}"
     for finding in all_findings():
-        yield from finding.calls(found, codes)
+        yield from finding(found, results).calls(codes)

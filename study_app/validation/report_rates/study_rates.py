@@ -8,16 +8,10 @@ import numpy as np
 
 from study_app.analysis.designs.block_tests import Asked, of_tables
 from study_app.analysis.evaluate import found_in
-from study_app.analysis.findings.contrast_with_control import FINDING as CONTRASTS
-from study_app.analysis.findings.delay_trend import FINDING as TREND
-from study_app.analysis.findings.detection_threshold import FINDING as THRESHOLD
-from study_app.analysis.findings.liquid_recognition import FINDING as RECOGNITION
-from study_app.analysis.findings.lowest_delay import FINDING as LOWEST
-from study_app.analysis.findings.over_all_statements import FINDING as OVERALL
-from study_app.analysis.findings.over_all_statements import over_all
-from study_app.analysis.findings.pair_comparison import FINDING as PAIRS
-from study_app.analysis.findings.settings_differ import FINDING as OMNIBUS
-from study_app.analysis.findings.unchanged_delay import common_ms
+from study_app.analysis.findings.delay_answers import common_ms
+from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay
+from study_app.analysis.findings.recognition import LiquidRecognition
+from study_app.analysis.findings.statement_tests import DelayTrend, OverAll, Pairs, SettingsDiffer, over_all
 from study_app.analysis.report.first_page.answer import FOUND
 from study_app.analysis.report.first_page.claims import answers as answered
 from study_app.analysis.results.block_results import BlockFound, Results
@@ -98,13 +92,13 @@ def _study(simulation: Simulated, cell: Cell, truth: Truth, seed: int, study: in
         )
         result = found_in(None, asked)
         if cell.extent != "partial":  # with draws of its own: the same draws in all studies would shift the rate
-            result = OVERALL.add_to(result, over_all(replace(asked, seed=1 + study), DRAWS))
+            result = OverAll.add_to(result, over_all(replace(asked, seed=1 + study), DRAWS))
         results.append(result)
         judged = _in_delays if block.kind == "delays" else _in_liquids
         for (what, at_most), hit in judged(asked, result, cell, truth[place]):
             found[f"{what} ({block.kind})", at_most] = hit
         if cell.extent == "empty":
-            overall = OVERALL.of(result)
+            overall = OverAll.of(result)
             differs = overall is not None and (overall.p or 1.0) <= simulation.decided.alpha
             found[f"test over all statements ({block.kind})", "at most 5 %"] = differs
     found[LOST] = bool(failures.found)
@@ -117,19 +111,22 @@ def _study(simulation: Simulated, cell: Cell, truth: Truth, seed: int, study: in
 
 def _in_liquids(asked: Asked, found: BlockFound, cell: Cell, _truth: Array) -> Iterator[tuple[Event, bool]]:
     if cell.extent == "empty":
-        yield ("settings differ in a statement", "at most 5 %"), any(one.verdict in FOUND for one in OMNIBUS.of(found))
+        yield (
+            ("settings differ in a statement", "at most 5 %"),
+            any(one.verdict in FOUND for one in SettingsDiffer.of(found)),
+        )
         yield ("liquids recognised", "at most 5 %"), _recognised(found)
     equal = _equal_pairs(asked.block, cell.extent)
     if equal:
-        found_equal = any(one.tested.verdict in FOUND and (one.first, one.second) in equal for one in PAIRS.of(found))
+        found_equal = any(one.tested.verdict in FOUND and (one.first, one.second) in equal for one in Pairs.of(found))
         yield ("equal liquids distinguished", "at most 5 %"), found_equal
     if cell.extent == "full":
-        yield ("some liquids distinguished", "counted"), any(one.tested.verdict in FOUND for one in PAIRS.of(found))
+        yield ("some liquids distinguished", "counted"), any(one.tested.verdict in FOUND for one in Pairs.of(found))
         yield ("liquids recognised", "counted"), _recognised(found)
 
 
 def _recognised(found: BlockFound) -> bool:
-    recognition = RECOGNITION.of(found)
+    recognition = LiquidRecognition.of(found)
     return recognition is not None and recognition.verdict in FOUND
 
 
@@ -149,29 +146,29 @@ def _in_delays(asked: Asked, found: BlockFound, cell: Cell, truth: Array) -> Ite
     block = asked.block
     null = [block.settings[at].delay_ms or 0.0 for at in alike(block, cell.extent)]
     if cell.extent == "empty":
-        yield ("trend in a statement", "at most 5 %"), any(one.verdict in FOUND for one in TREND.of(found))
+        yield ("trend in a statement", "at most 5 %"), any(one.verdict in FOUND for one in DelayTrend.of(found))
         yield ("detection threshold printed", "at most 5 %"), _printed(found)
     if null:
-        low = any(one.over_all_ms is not None and one.over_all_ms <= max(null) for one in LOWEST.of(found))
+        low = any(one.over_all_ms is not None and one.over_all_ms <= max(null) for one in LowestDelay.of(found))
         yield ("lowest delay stated too low", "at most 5 %"), low
-        differ = any(one.verdict == "different" and one.delay_ms <= max(null) for one in CONTRASTS.of(found))
+        differ = any(one.verdict == "different" and one.delay_ms <= max(null) for one in ContrastsWithControl.of(found))
         yield ("equal delays called different", "at most 5 %"), differ
     if cell.extent != "empty":
         yield from _equivalence(asked, found, truth)
     if cell.extent == "full":
-        yield ("lowest delay stated", "counted"), any(one.over_all_ms is not None for one in LOWEST.of(found))
+        yield ("lowest delay stated", "counted"), any(one.over_all_ms is not None for one in LowestDelay.of(found))
         yield ("detection threshold printed", "counted"), _printed(found)
 
 
 def _printed(found: BlockFound) -> bool:
-    threshold = THRESHOLD.of(found)
+    threshold = DetectionThreshold.of(found)
     return threshold is not None and threshold.effect is not None
 
 
 def _equivalence(asked: Asked, found: BlockFound, truth: Array) -> Iterator[tuple[Event, bool]]:
     """Yield whether a delay is called equivalent that is not: the one nearest to the bound, and on the first page."""
     bound = asked.decided.equivalence_bound
-    if bound is None or not CONTRASTS.of(found):
+    if bound is None or not ContrastsWithControl.of(found):
         return
     beyond = {
         (item.id, setting.delay_ms or 0.0): float(away)
@@ -182,7 +179,7 @@ def _equivalence(asked: Asked, found: BlockFound, truth: Array) -> Iterator[tupl
     if not beyond:
         return
     nearest = min(beyond, key=beyond.__getitem__)
-    called = {(one.item, one.delay_ms): one.verdict == "equivalent" for one in CONTRASTS.of(found)}
+    called = {(one.item, one.delay_ms): one.verdict == "equivalent" for one in ContrastsWithControl.of(found)}
     yield ("nearest beyond the bound called equivalent", "at most 5 %"), called[nearest]
     up_to = common_ms(found)
     too_far = up_to is not None and any(delay <= up_to for _, delay in beyond)

@@ -4,11 +4,8 @@ from collections.abc import Mapping
 
 import pytest
 
-from study_app.analysis.findings.contrast_with_control import FINDING as CONTRASTS
-from study_app.analysis.findings.contrast_with_control import ContrastWithControl
-from study_app.analysis.findings.delay_meaning import by_delay, meaning, tempting_ms
-from study_app.analysis.findings.lowest_delay import FINDING as LOWEST
-from study_app.analysis.findings.lowest_delay import Lowest
+from study_app.analysis.findings.delay_answers import by_delay, meaning, tempting_ms
+from study_app.analysis.findings.delays import ContrastsWithControl, ContrastWithControl, Lowest, LowestDelay
 from study_app.analysis.report.findings_summary import findings, limits
 from study_app.analysis.results.block_results import BlockFound
 from study_app.analysis.results.block_results import Results as Found
@@ -52,7 +49,7 @@ def delays(
         items=(Item("different", "It was different.", "Different"),),
         labels=tuple("1234567"),
         measures=(),
-        findings={CONTRASTS.key: against(differences, expected), LOWEST.key: lowest},
+        findings={ContrastsWithControl.key: against(differences, expected), LowestDelay.key: lowest},
     )
 
 
@@ -122,9 +119,9 @@ def test_a_trend_that_shows_only_within_its_statement_speaks_against_nothing() -
 def test_one_of_many_comparisons_that_differs_by_chance_speaks_against_nothing() -> None:
     chance = [2, 1, 1, 1, 1, 2, 1, -1, 1, 0]
     alone = delays({50: chance})
-    assert CONTRASTS.of(alone)[0].verdict == "different"
+    assert ContrastsWithControl.of(alone)[0].verdict == "different"
     many = delays({50: chance, **{float(ms): SCATTERED * 2 for ms in range(75, 201, 25)}})
-    assert CONTRASTS.of(many)[0].verdict == "inconclusive"
+    assert ContrastsWithControl.of(many)[0].verdict == "inconclusive"
     last = delays({**{float(ms): SCATTERED * 2 for ms in range(75, 201, 25)}, 225: chance})
     assert "different only before Holm's correction for 7 comparisons" in claim(last)
     assert "normality" not in claim(last)
@@ -133,17 +130,17 @@ def test_one_of_many_comparisons_that_differs_by_chance_speaks_against_nothing()
 
 def test_five_people_cannot_make_a_single_comparison_different_by_taking_them_as_normal() -> None:
     certain = delays({50: [3, 4, 3, 4, 4]})
-    assert CONTRASTS.of(certain)[0].found.p_different is not None
-    assert CONTRASTS.of(certain)[0].found.p_different < 0.001
-    assert CONTRASTS.of(certain)[0].p_adjusted == 0.0625
-    assert CONTRASTS.of(certain)[0].verdict == "out of reach"
+    assert ContrastsWithControl.of(certain)[0].found.p_different is not None
+    assert ContrastsWithControl.of(certain)[0].found.p_different < 0.001
+    assert ContrastsWithControl.of(certain)[0].p_adjusted == 0.0625
+    assert ContrastsWithControl.of(certain)[0].verdict == "out of reach"
 
 
 def test_what_only_t_calls_equivalent_is_told_as_inconclusive(rek: Results) -> None:
     block = delays({50: DOUBTED})
-    assert CONTRASTS.of(block)[0].found.p is not None
-    assert CONTRASTS.of(block)[0].found.p < 0.05
-    assert CONTRASTS.of(block)[0].found.checks_agree is False
+    assert ContrastsWithControl.of(block)[0].found.p is not None
+    assert ContrastsWithControl.of(block)[0].found.p < 0.05
+    assert ContrastsWithControl.of(block)[0].found.checks_agree is False
     assert "within the bound by t alone" in claim(block)
     ((*told, said),) = by_delay(block)
     assert told == ["50 ms", "–", "–", "Different", "–"]

@@ -7,16 +7,10 @@ import numpy as np
 import pytest
 
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.findings.contrast_with_control import FINDING as CONTRASTS
-from study_app.analysis.findings.contrast_with_control import equivalent_up_to
-from study_app.analysis.findings.detection_threshold import FINDING as THRESHOLD
-from study_app.analysis.findings.distinguished_liquids import given, recognised
-from study_app.analysis.findings.liquid_recognition import FINDING as RECOGNITION
-from study_app.analysis.findings.liquid_recognition import RecognitionResult
-from study_app.analysis.findings.lowest_delay import FINDING as LOWEST
-from study_app.analysis.findings.over_all_statements import FINDING as OVERALL
-from study_app.analysis.findings.pair_comparison import FINDING as PAIRS
-from study_app.analysis.findings.unchanged_delay import common_ms
+from study_app.analysis.findings.delay_answers import common_ms
+from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay, equivalent_up_to
+from study_app.analysis.findings.recognition import LiquidRecognition, RecognitionResult, given, recognised
+from study_app.analysis.findings.statement_tests import OverAll, Pairs
 from study_app.analysis.report.first_page.answer import Answer
 from study_app.analysis.report.first_page.claims import answers
 from study_app.analysis.report.first_page.first_page import first_page
@@ -73,9 +67,9 @@ def test_up_to_which_delay_nothing_changes_needs_every_statement() -> None:
     assert found.text.startswith("Up to 50 ms: mean answers to both statements stay within ±1 point of those at 0 ms")
     against = tuple(
         one if one.item == ITEMS[0] else replace(one, found=replace(one.found, verdict="inconclusive"))
-        for one in CONTRASTS.of(results.blocks[0])
+        for one in ContrastsWithControl.of(results.blocks[0])
     )
-    block = CONTRASTS.add_to(results.blocks[0], against)
+    block = ContrastsWithControl.add_to(results.blocks[0], against)
     assert equivalent_up_to(against) == {ITEMS[0]: 50.0, ITEMS[1]: None}
     assert common_ms(block) is None
     assert (
@@ -126,7 +120,7 @@ def ordered(people: int, decided: Decided = DECIDED) -> Results:
     settings = liquids(3)
     trials = list(everybody(settings, people, lambda _p, _s, code, i: 2 * int(code[1:]) if i == ITEMS[1] else 4))
     results = evaluate(study(settings, trials, decided), planning=False)
-    return replace(results, blocks=(RECOGNITION.add_to(results.blocks[0], None),))
+    return replace(results, blocks=(LiquidRecognition.add_to(results.blocks[0], None),))
 
 
 def test_liquids_that_differ_are_told_where_too_few_people_can_show_no_pair() -> None:
@@ -140,9 +134,9 @@ def test_liquids_that_differ_are_told_where_too_few_people_can_show_no_pair() ->
     assert named(ordered(5, replace(DECIDED, primary=ITEMS[:1])), "distinguished").exploratory
     results = ordered(7)
     assert named(results, "distinguished").text.startswith("Rated differently: liquid1 – liquid2")
-    unclear = PAIRS.add_to(
+    unclear = Pairs.add_to(
         results.blocks[0],
-        tuple(replace(one, tested=replace(one.tested, verdict="not shown")) for one in PAIRS.of(results.blocks[0])),
+        tuple(replace(one, tested=replace(one.tested, verdict="not shown")) for one in Pairs.of(results.blocks[0])),
     )
     assert named(replace(results, blocks=(unclear,)), "distinguished").text == (
         "The liquids were rated differently in “Harder”; which ones is not shown."
@@ -152,8 +146,8 @@ def test_liquids_that_differ_are_told_where_too_few_people_can_show_no_pair() ->
 def test_pairs_that_only_exploratory_statements_tell_apart_are_marked() -> None:
     results = ordered(8)
     block = results.blocks[0]
-    first = replace(PAIRS.of(block)[0], tested=replace(PAIRS.of(block)[0].tested, verdict="suggested"))
-    marked = named(replace(results, blocks=(PAIRS.add_to(block, (first, *PAIRS.of(block)[1:])),)), "distinguished")
+    first = replace(Pairs.of(block)[0], tested=replace(Pairs.of(block)[0].tested, verdict="suggested"))
+    marked = named(replace(results, blocks=(Pairs.add_to(block, (first, *Pairs.of(block)[1:])),)), "distinguished")
     assert marked.text.startswith("Rated differently: liquid1 – liquid2 (exploratory), liquid1 – liquid3 and")
     assert not marked.exploratory
     assert "exploratory" not in named(results, "distinguished").text
@@ -181,8 +175,12 @@ def test_the_headline_is_of_primary_statements_and_exploratory_ones_follow_it_ma
     assert not found.exploratory
     assert found.at_ms == 150
     assert [line.startswith("Exploratory: ") for line in found.sizes] == [True, False, True]
-    block = LOWEST.add_to(results.blocks[0], tuple(one for one in LOWEST.of(results.blocks[0]) if one.item != "harder"))
-    block = CONTRASTS.add_to(block, tuple(one for one in CONTRASTS.of(block) if one.item != "harder"))
+    block = LowestDelay.add_to(
+        results.blocks[0], tuple(one for one in LowestDelay.of(results.blocks[0]) if one.item != "harder")
+    )
+    block = ContrastsWithControl.add_to(
+        block, tuple(one for one in ContrastsWithControl.of(block) if one.item != "harder")
+    )
     alone = named(replace(results, blocks=(block,)), "noticed from")
     assert alone.exploratory
     assert alone.text.startswith("From 50 ms on at the latest: “Different”")
@@ -197,9 +195,9 @@ def test_a_threshold_alone_is_exploratory_unless_its_statement_is_primary(
     decided: dict[str, Any], exploratory: bool
 ) -> None:
     results = rising(3)
-    block = CONTRASTS.add_to(LOWEST.add_to(results.blocks[0], ()), ())
-    assert THRESHOLD.of(block) is not None
-    assert THRESHOLD.of(block).effect is not None
+    block = ContrastsWithControl.add_to(LowestDelay.add_to(results.blocks[0], ()), ())
+    assert DetectionThreshold.of(block) is not None
+    assert DetectionThreshold.of(block).effect is not None
     found = named(replace(results, blocks=(block,), decided=replace(results.decided, **decided)), "noticed from")
     assert (found.claims, found.exploratory) == (True, exploratory)
 
@@ -213,11 +211,11 @@ def test_the_measured_rate_is_that_of_the_nearest_size(participants: int, n: int
 
 def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() -> None:
     results = rising(3)
-    assert OVERALL.of(results.blocks[0]) is not None
+    assert OverAll.of(results.blocks[0]) is not None
 
     def with_p(*ps: float) -> list[bool]:
         blocks = tuple(
-            OVERALL.add_to(results.blocks[0], replace(OVERALL.of(results.blocks[0]), p=p))  # type: ignore[type-var]
+            OverAll.add_to(results.blocks[0], replace(OverAll.of(results.blocks[0]), p=p))  # type: ignore[type-var]
             for p in ps
         )
         return [one.claims for one in answers(replace(results, blocks=blocks)) if one.question == "noticed from"]
@@ -226,7 +224,7 @@ def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() 
     assert with_p(0.051) == [False]
     assert with_p(0.03, 0.9) == [False, False]
     assert with_p(0.02, 0.04) == [True, True]
-    none = replace(results, blocks=(OVERALL.add_to(results.blocks[0], None),))
+    none = replace(results, blocks=(OverAll.add_to(results.blocks[0], None),))
     assert named(none, "noticed from").text.startswith("Nothing is claimed here")
     assert named(none, "noticed from").sizes == ()
 

@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.findings.over_all_statements import FINDING as OVERALL
+from study_app.analysis.findings.statement_tests import OverAll
 from study_app.analysis.report.json_values import plain
 from study_app.analysis.tables.study_tables import load_study
 from study_app.cli import commands
@@ -20,14 +20,14 @@ TESTS = {
     "tables.study_tables.Study.aggregate": ("liquids", "measures of settings"),
     "designs.block_tests.presented": ("delays", "counts of answers"),
     "designs.block_tests.session_numbers": ("delays", "numbers of sessions"),
-    "findings.settings_differ.friedman": ("liquids", "test of settings"),
-    "findings.over_all_statements.global_permutation": ("liquids", "test over all statements"),
-    "findings.liquid_recognition.recognition": ("liquids", "test of recognition"),
+    "findings.statement_tests.friedman": ("liquids", "test of settings"),
+    "findings.statement_tests.global_permutation": ("liquids", "test over all statements"),
+    "findings.recognition.recognition": ("liquids", "test of recognition"),
     "findings.other_assumptions.ordinal": ("liquids", "the same asked with other assumptions"),
-    "findings.delay_trend.page": ("delays", "test of a trend (Page)"),
-    "findings.lowest_delay.step_down": ("delays", "lowest delay that shows"),
-    "findings.contrast_with_control.tost": ("delays", "test of equivalence"),
-    "findings.detection_threshold.noticed": ("delays", "detection threshold"),
+    "findings.statement_tests.page": ("delays", "test of a trend (Page)"),
+    "findings.delays.step_down": ("delays", "lowest delay that shows"),
+    "findings.delays.tost": ("delays", "test of equivalence"),
+    "findings.delays.noticed": ("delays", "detection threshold"),
 }
 WRITING = {
     "figures.answer_figures.render": "figure liquids",
@@ -35,7 +35,7 @@ WRITING = {
     "report.write_report.findings_summary.findings": "texts: findings",
     "report.write_report.r_script": "report.R",
     "report.number_files.motion_csv": "motion.csv",
-    "findings.lowest_delay.table": "lowest delay",
+    "findings.delays.table": "lowest delay",
     "report.write_report.conduct_section.conduct": "section “How it was run”",
 }
 
@@ -66,7 +66,7 @@ def test_a_test_that_fails_takes_no_other_with_it(opened: Results, monkeypatch: 
         (absent,) = (one for one in found.absent if one.what == what)
         assert "ValueError: f(a) and f(b) must have different signs" in absent.why
         json.dumps(plain(results), allow_nan=False)
-        assert OVERALL.of(found) is not None or "over all" in what
+        assert OverAll.of(found) is not None or "over all" in what
         assert results.performance is not None
 
 
@@ -74,7 +74,7 @@ def test_a_test_that_fails_takes_no_other_with_it(opened: Results, monkeypatch: 
 def test_a_report_with_failures_is_written_and_ends_with_three(
     opened: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for broken in (*WRITING, "findings.detection_threshold.noticed"):
+    for broken in (*WRITING, "findings.delays.noticed"):
         monkeypatch.setattr(f"study_app.analysis.{broken}", fail)
     to = tmp_path / "report"
     done = CliRunner().invoke(commands, ["report", str(opened.folder), "--to", str(to)])

@@ -11,7 +11,7 @@ from scipy.stats import kruskal
 from study_app.analysis.designs.site_thresholds import site_thresholds
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.export import export
-from study_app.analysis.findings.factors.site_comparison import FINDING as SITES
+from study_app.analysis.findings.statement_tests import SitesDiffer
 from study_app.analysis.preregistration.commitment import FILE, Commitment, written
 from study_app.analysis.preregistration.deviations import deviations
 from study_app.analysis.report.write_report import report
@@ -188,11 +188,11 @@ def test_planted_differences_between_sites_are_found_and_nothing_else() -> None:
         return study(liquids(3), list(everybody(liquids(3), 12, answer)))
 
     (block,) = evaluate(pooled_of(at("A"), at("B")), planning=False).blocks
-    tests = SITES.of(block)
+    tests = SitesDiffer.of(block)
     assert {one.item: one.verdict for one in tests.level} == {"different": "suggested", "harder": "not shown"}
     assert {one.item: one.verdict for one in tests.profile} == {"different": "not shown", "harder": "suggested"}
     (alone,) = evaluate(at("A"), planning=False).blocks
-    assert SITES.of(alone) == SITES.empty
+    assert SitesDiffer.of(alone) == SitesDiffer.empty
 
 
 def test_two_settings_are_compared_by_their_differences() -> None:
@@ -205,7 +205,7 @@ def test_two_settings_are_compared_by_their_differences() -> None:
         return study(settings, list(everybody(settings, 10, answer)))
 
     (block,) = evaluate(pooled_of(at(0), at(2)), planning=False).blocks
-    (first, *_) = SITES.of(block).profile
+    (first, *_) = SitesDiffer.of(block).profile
     assert first.outcome.test == "Kruskal-Wallis of differences"
     assert first.verdict == "suggested"
 

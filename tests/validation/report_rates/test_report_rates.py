@@ -4,14 +4,10 @@ import pytest
 
 from study_app.analysis.designs.block_tests import of_tables
 from study_app.analysis.evaluate import found_in
-from study_app.analysis.findings.contrast_with_control import FINDING as CONTRASTS
-from study_app.analysis.findings.delay_trend import FINDING as TREND
-from study_app.analysis.findings.detection_threshold import FINDING as THRESHOLD
-from study_app.analysis.findings.liquid_recognition import FINDING as RECOGNITION
-from study_app.analysis.findings.lowest_delay import FINDING as LOWEST
-from study_app.analysis.findings.other_assumptions import FINDING as AGAIN
-from study_app.analysis.findings.pair_comparison import FINDING as PAIRS
-from study_app.analysis.findings.settings_differ import FINDING as OMNIBUS
+from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay
+from study_app.analysis.findings.other_assumptions import SameWithOtherAssumptions
+from study_app.analysis.findings.recognition import LiquidRecognition
+from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer
 from study_app.analysis.power.plan import plan
 from study_app.protocol.load import load
 from study_app.protocol.simulated_observer import TrialFeatures
@@ -64,15 +60,17 @@ def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Simulated, partic
                 )
                 for verdicts_only in (False, True)
             )
-            assert [one.verdict for one in CONTRASTS.of(quick)] == [one.verdict for one in CONTRASTS.of(whole)]
-            assert (OMNIBUS.of(quick), PAIRS.of(quick)) == (OMNIBUS.of(whole), PAIRS.of(whole))
-            assert [one.p_adjusted for one in TREND.of(quick)] == [one.p_adjusted for one in TREND.of(whole)]
-            assert (LOWEST.of(quick), THRESHOLD.of(quick), AGAIN.of(quick).mixed) == (
-                LOWEST.of(whole),
-                THRESHOLD.of(whole),
+            assert [one.verdict for one in ContrastsWithControl.of(quick)] == [
+                one.verdict for one in ContrastsWithControl.of(whole)
+            ]
+            assert (SettingsDiffer.of(quick), Pairs.of(quick)) == (SettingsDiffer.of(whole), Pairs.of(whole))
+            assert [one.p_adjusted for one in DelayTrend.of(quick)] == [one.p_adjusted for one in DelayTrend.of(whole)]
+            assert (LowestDelay.of(quick), DetectionThreshold.of(quick), SameWithOtherAssumptions.of(quick).mixed) == (
+                LowestDelay.of(whole),
+                DetectionThreshold.of(whole),
                 (),
             )
-            recognised = RECOGNITION.of(whole), RECOGNITION.of(quick)
+            recognised = LiquidRecognition.of(whole), LiquidRecognition.of(quick)
             assert len({None if one is None else (one.verdict, one.found.p) for one in recognised}) == 1
 
 

@@ -4,13 +4,12 @@ from dataclasses import replace
 from typing import Any
 
 from study_app.analysis.findings import all_findings
-from study_app.analysis.findings.over_all_statements import FINDING as OVERALL
+from study_app.analysis.findings.finding import Finding
+from study_app.analysis.findings.statement_tests import OverAll
 from study_app.analysis.report.first_page.answer import NO_EVIDENCE, Answer
 from study_app.analysis.results.block_results import BlockFound, Results
-from study_app.analysis.results.finding import Finding, Question
 from study_app.analysis.statistics.multiple_comparisons import holm
 from study_app.analysis.tables.compared_blocks import Kind
-from study_app.analysis.tables.planned_analysis import Decided
 
 
 def answers(results: Results) -> tuple[Answer, ...]:
@@ -19,11 +18,11 @@ def answers(results: Results) -> tuple[Answer, ...]:
     They claim something about a block only where the one test over all its statements finds a difference, corrected
     by Holm over the blocks: in a study where nothing differs they then claim anything at most so often as alpha says.
     """
-    overall = holm([None if (one := OVERALL.of(found)) is None else one.p for found in results.blocks])
+    overall = holm([None if (one := OverAll.of(found)) is None else one.p for found in results.blocks])
     return tuple(
         _unless_claimed_alone(one, p, results.decided.alpha)
         for found, p in zip(results.blocks, overall, strict=True)
-        for one in _of_block(found, results.decided)
+        for one in _of_block(found, results)
     )
 
 
@@ -38,16 +37,16 @@ def _unless_claimed_alone(answer: Answer, p_over_all: float | None, alpha: float
     return replace(answer, text=text, sizes=(), claims=False, exploratory=False, at_ms=None)
 
 
-def _of_block(found: BlockFound, decided: Decided) -> tuple[Answer, ...]:
+def _of_block(found: BlockFound, results: Results) -> tuple[Answer, ...]:
     """Return the answers that a block gives: none before anybody's answers count."""
     if not found.n:
         return ()
     if not found.revealed:
         waits = "This waits for the key to be opened: until then settings are codes."
-        return tuple(Answer(one.key, found.id, found.title, waits, ()) for one, _ in questions(found.kind))
-    return tuple(question.answer(found, decided) for _, question in questions(found.kind))
+        return tuple(Answer(one.key, found.id, found.title, waits, ()) for one in questions(found.kind))
+    return tuple(one(found, results).answer() for one in questions(found.kind))
 
 
-def questions(kind: Kind) -> tuple[tuple[Finding[Any], Question], ...]:
-    """Return the findings that answer a question of the first page about blocks of this kind, and the questions."""
-    return tuple((one, one.question) for one in all_findings() if one.question is not None and kind in one.kinds)
+def questions(kind: Kind) -> tuple[type[Finding[Any]], ...]:
+    """Return the findings that answer a question of the first page about blocks of this kind."""
+    return tuple(one for one in all_findings() if one.question and kind in one.kinds)

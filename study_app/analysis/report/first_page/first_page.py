@@ -25,7 +25,7 @@ def first_page(results: Results, limits: Sequence[str], failures: Failures) -> M
     found_answers = answers(results)
     return render(
         "first_page.html",
-        answers=[_shown(one, found[one.block], failures) for one in found_answers],
+        answers=[_shown(one, found[one.block], results, failures) for one in found_answers],
         several=len({one.block for one in found_answers}) > 1,
         without_findings=of_levels(results) or (none_found(results),),
         limits=list(limits),
@@ -34,16 +34,16 @@ def first_page(results: Results, limits: Sequence[str], failures: Failures) -> M
     )
 
 
-def _shown(answer: Answer, found: BlockFound, failures: Failures) -> dict[str, Any]:
-    question = next(question for one, question in questions(found.kind) if one.key == answer.question)
+def _shown(answer: Answer, found: BlockFound, results: Results, failures: Failures) -> dict[str, Any]:
+    finding = next(one for one in questions(found.kind) if one.key == answer.question)(found, results)
     drawn = failures.attempt(
         f"picture “{answer.question}”",
-        lambda: pictures.draw(lambda sheet: question.picture(sheet, found, answer)) if found.revealed else None,
+        lambda: pictures.draw(lambda sheet: finding.picture(sheet, answer)) if found.revealed else None,
         block=answer.block,
     )
     png, alt = (b"", "") if isinstance(drawn, Failure) or drawn is None else drawn
     return {
-        "question": question.words.format(kind=found.kind),
+        "question": finding.question.format(kind=found.kind),
         "title": answer.title,
         "text": _kept_together(answer.text),
         "exploratory": answer.exploratory,

@@ -1,31 +1,192 @@
-"""The first page's answer to which liquids, or views, were distinguished."""
+"""Recognition of liquids by the statement rated highest, and the first page's answer to which were distinguished."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from typing import Final
 
+import numpy as np
 from matplotlib.axes import Axes
 
 from study_app import figure_style as style
+from study_app.analysis.designs.block_tests import Asked
+from study_app.analysis.designs.verdicts import verdict
+from study_app.analysis.figures import captions, recognition_matrix
 from study_app.analysis.figures.page_layout import Sheet
-from study_app.analysis.findings.liquid_recognition import FINDING as RECOGNITION
-from study_app.analysis.findings.liquid_recognition import RecognitionResult
-from study_app.analysis.findings.pair_comparison import FINDING as PAIRS
-from study_app.analysis.findings.pair_comparison import smallest_of_pairs
-from study_app.analysis.findings.settings_differ import FINDING as OMNIBUS
+from study_app.analysis.figures.picture import Drawing, Picture
+from study_app.analysis.findings.finding import Absent, Finding, Row
+from study_app.analysis.findings.statement_tests import Pairs, SettingsDiffer, smallest_of_pairs
 from study_app.analysis.report.first_page.answer import FOUND, NO_EVIDENCE, Answer
 from study_app.analysis.report.first_page.pictures import FOOT_PT, HEIGHT_PT, WIDTH_PT, foot
+from study_app.analysis.report.html_page import heading, paragraph, table
+from study_app.analysis.report.r_syntax import r_number, r_text, r_vector
+from study_app.analysis.report.test_rows import rows_alone, test_row
 from study_app.analysis.results.block_results import BlockFound
-from study_app.analysis.results.finding import Finding, Question
-from study_app.analysis.results.item_test import Tested
-from study_app.analysis.results.words import counted, interval, listed, name, number, short
+from study_app.analysis.results.item_test import Tested, Verdict
+from study_app.analysis.results.not_tested import NotTested
+from study_app.analysis.results.words import counted, interval, lead, listed, name, number, p_equals, p_value, short
 from study_app.analysis.statistics.outcome import Interval
 from study_app.analysis.statistics.paired import Paired
+from study_app.analysis.statistics.recognition import MOST as MOST_NAMED
+from study_app.analysis.statistics.recognition import Recognition, named, recognition
 from study_app.analysis.tables.planned_analysis import Decided
 
-KEY: Final = "distinguished"
+
+@dataclass(frozen=True, slots=True)
+class RecognitionResult:
+    """The recognition of liquids: the items that name one, and which of them is right for each setting (code)."""
+
+    labels: tuple[str, ...]
+    settings: tuple[str, ...]
+    right: tuple[str | None, ...]
+    found: Recognition
+    verdict: Verdict
+
+
+class LiquidRecognition(Finding[RecognitionResult | None]):
+    """Recognition of liquids: the statement rated highest names one."""
+
+    key = "named"
+    place = 4
+    row_place = 8
+    what = "test of recognition"
+    part = "recognition"
+    kinds = ("liquids",)
+    waits = ("liquids",)
+    figure_name = "recognition"
+    figure_title = "What each liquid was named"
+
+    @classmethod
+    def test(cls, answers: Asked, found: BlockFound) -> tuple[RecognitionResult | None, Absent]:
+        """Test whether settings were named for what they were."""
+        labels = answers.decided.names
+        right = tuple(setting.label for setting in answers.block.settings)
+        if not answers.decided.named_in(answers.block) or not any(right):
+            return None, (NotTested(cls.what, "the protocol does not say which statements name these liquids"),)
+        if not 2 <= answers.k <= MOST_NAMED or len(labels) < 2:
+            return None, (NotTested(cls.what, f"it needs 2 to {MOST_NAMED} settings and two names"),)
+        ratings = np.stack([answers.values[label] for label in labels], axis=2)
+        truth = [None if label is None else labels.index(label) for label in right]
+        tested = recognition(named(ratings), truth, len(labels), seed=answers.intervals)
+        said = verdict(tested.p, tested.smallest_p, answers.decided.alpha, primary=answers.decided.binding)
+        return RecognitionResult(labels, answers.block.codes, right, tested, said), ()
+
+    def rows(self) -> Iterator[Row]:
+        named = self.value
+        if named is not None:
+            row = test_row(self.found, "liquids are recognised", named.found) | rows_alone(self.found, "recognition")
+            yield row | {"verdict": named.verdict}
+
+    def section(self) -> Iterator[str]:
+        named = self.value
+        if named is None:
+            return
+        yield heading(3, "Were the liquids recognised?")
+        yield from self.drawn()
+        rates = {rate.setting: rate for rate in named.found.rates}
+        yield table(
+            ("Liquid", "right", "of", "share", "95 % interval"),
+            [
+                [
+                    name,
+                    str(rates[place].hits),
+                    str(rates[place].n),
+                    number(rates[place].rate),
+                    interval(rates[place].interval),
+                ]
+                for place, name in enumerate(self.found.names)
+                if place in rates
+            ],
+        )
+        outcome = named.found
+        why = "" if outcome.interval else f" ({outcome.no_interval})"
+        note = f" {outcome.note[:1].upper()}{outcome.note[1:]}." if outcome.note else ""
+        if outcome.p is None:
+            yield paragraph(f"Not tested: {outcome.note}.")
+            return
+        yield paragraph(
+            f"Hits {number(outcome.statistic, 0)}, {number(outcome.expected, 1)} expected by chance, "
+            f"{p_equals(outcome.p)} (smallest attainable {p_value(outcome.smallest_p)}), {named.verdict}. Kappa of "
+            "decided "
+            f"answers {number(outcome.effect)}, 95 % interval {interval(outcome.interval)}{why}. Chance: "
+            f"{outcome.method}.{note} One test, corrected for no other."
+        )
+        yield paragraph("Intervals of the shares: Clopper-Pearson, which takes participants one by one.", "soft")
+
+    def figure(self, drawing: Drawing) -> Picture | None:
+        study, block, named = drawing.study, drawing.block, self.value
+        if named is None:
+            return None
+        shorts = {item.id: item.short for item in self.found.items}
+        right = [None if label is None else named.labels.index(label) for label in named.right]
+        hits, expected = named.found.statistic, named.found.expected
+        chance = ""
+        if hits is not None and expected is not None and named.found.p is not None:
+            chance = (
+                f" Right: {hits:g}; {number(expected, 1)} would be by chance, that is after exchanging the liquids "
+                "within "
+                f"each participant (exact, one-sided, {p_equals(named.found.p)})."
+            )
+        caption = (
+            f"The name that was rated highest for each liquid ({drawing.simulated}{captions.counts(study, block)[0]}). "
+            f"Cells: counts and share of the row; framed: right. Undecided: {counted(2, 'name')} or more were rated "
+            f"equally high.{chance}"
+        )
+        return drawing.picture(
+            self.figure_title,
+            caption,
+            lambda **own: (
+                recognition_matrix.draw(
+                    named.found.table,
+                    self.found.names,
+                    [shorts[label] for label in named.labels],
+                    right,
+                    counts=captions.counts(study, block),
+                    foot="Counts, with the share of the row. Framed: the name that is right.",
+                    **own,
+                ).figure
+            ),
+        )
+
+    def sentences(self) -> Iterator[str]:
+        named = self.value
+        if named is None or named.found.p is None or named.found.expected is None or named.found.statistic is None:
+            return
+        rates = [f"{self.found.names[rate.setting]} {rate.hits} of {rate.n}" for rate in named.found.rates]
+        answers = named.found.decided + named.found.undecided
+        verdict = {
+            "shown": "recognition above chance is shown",
+            "suggested": "recognition above chance is suggested (exploratory)",
+            "out of reach": "recognition above chance was out of reach of these answers",
+        }.get(named.verdict, "recognition above chance is not shown")
+        yield (
+            f"{lead(self.found)}: {verdict}: {named.found.statistic:g} of {answers} names were right, "
+            f"{number(named.found.expected, 1)} expected by chance ({p_equals(named.found.p)}). This is "
+            f"about all liquids together; by liquid: {listed(rates)}."
+        )
+
+    def methods(self) -> Iterator[str]:
+        if self.value is not None:
+            yield (
+                "A participant was taken to have named the liquid whose statement he or she rated highest; equal "
+                "highest "
+                "ratings are undecided and count as no hit. Hits were tested against exchanging the liquids within "
+                "participants (exact, one-sided)."
+            )
+
+    def calls(self, codes: str) -> Iterator[str]:
+        named = self.value
+        if named is not None and named.found.statistic is not None:
+            right = ", ".join("NA_character_" if label is None else r_text(label) for label in named.right)
+            block, labels = r_text(self.found.id), r_vector(named.labels)
+            yield f"hits({block}, {block}, {labels}, {codes}, c({right}), {r_number(named.found.statistic)})"
+
+
 OTHERS: Final = ("#c9d1d8", "#aab5be", "#dfe5ea", "#b9c3cb", "#d3dae0")
+
+
 """Grounds of the wrong names, with the dark text on each of them at a contrast of at least 7."""
+
 
 UNDECIDED: Final = "undecided"
 
@@ -51,28 +212,6 @@ def given(named: RecognitionResult, label: str) -> float:
     place = named.labels.index(label)
     asked = sum(sum(row[:-1]) for row in named.found.table)
     return sum(row[place] for row in named.found.table) / asked if asked else 0.0
-
-
-def distinguished(found: BlockFound, decided: Decided) -> Answer:
-    """Return which liquids were recognised by name, and which of them, or of the views, were rated differently."""
-    apart = {pair: tests for pair, tests in _compared(found).items() if tests}
-    differing = [one for one in OMNIBUS.of(found) if one.verdict in FOUND]
-    decisive = [one for tests in apart.values() for one in tests] or differing
-    named = RECOGNITION.of(found)
-    if named is not None and named.found.p is None:
-        named = None
-    known = () if named is None else recognised(named)
-    exploratory = _suggested(decisive) and (named is None or not known or named.verdict == "suggested")
-    of_pairs = _of_pairs(found, apart, differing, decided, mark=not exploratory)
-    text = of_pairs if named is None else _of_names(found, named, known)
-    claims = bool(decisive or known)
-    if not claims:
-        text = f"{text} {NO_EVIDENCE}"
-    sizes = (
-        *(() if named is None else (_hits(found, named), of_pairs)),
-        *(_largest(found, apart) if apart else _agreement(found, differing)),
-    )
-    return Answer(KEY, found.id, found.title, text, sizes, claims, claims and exploratory)
 
 
 def _suggested(tests: Sequence[Tested]) -> bool:
@@ -128,11 +267,11 @@ def _compared(found: BlockFound) -> dict[tuple[str, str], list[Tested]]:
     """Return in which statements each two settings (codes) were rated differently."""
     codes = [setting.code for setting in found.settings]
     if len(codes) == 2:
-        return {(codes[0], codes[1]): [one for one in OMNIBUS.of(found) if one.verdict in FOUND]}
+        return {(codes[0], codes[1]): [one for one in SettingsDiffer.of(found) if one.verdict in FOUND]}
     return {
         (first, second): [
             one.tested
-            for one in PAIRS.of(found)
+            for one in Pairs.of(found)
             if (one.first, one.second) == (first, second) and one.tested.verdict in FOUND
         ]
         for first, second in combinations(codes, 2)
@@ -222,11 +361,6 @@ def _first_upper(words: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-def _picture(sheet: Sheet, found: BlockFound, _answer: Answer) -> str | None:
-    named = RECOGNITION.of(found)
-    return _ratings(sheet, found) if named is None else _names(sheet, named, found)
-
-
 def _names(sheet: Sheet, named: RecognitionResult, found: BlockFound) -> str:
     """Draw a bar a liquid: how many gave it its right name, and which other names it was given."""
     left = 4 + max(sheet.text_width(words, 9) for words in found.names)
@@ -272,7 +406,7 @@ def _called(named: RecognitionResult, found: BlockFound, label: str) -> str:
 
 def _ratings(sheet: Sheet, found: BlockFound) -> str | None:
     """Draw medians and quartiles of the liquids in the statement that differs most."""
-    tested = [one for one in OMNIBUS.of(found) if one.outcome.effect is not None]
+    tested = [one for one in SettingsDiffer.of(found) if one.outcome.effect is not None]
     if not tested:
         return None
     item = max(tested, key=lambda one: abs(one.outcome.effect or 0.0)).item
@@ -303,10 +437,35 @@ def _levels(sheet: Sheet, axes: Axes) -> None:
         axes.axvline(level, color=style.GRID, linewidth=0.6, zorder=0)
 
 
-FINDING: Final[Finding[None]] = Finding(
-    key=KEY,
-    place=20,
-    empty=None,
-    kinds=("liquids", "views"),
-    question=Question(words="Which {kind} were distinguished?", answer=distinguished, picture=_picture),
-)
+class Distinguished(Finding[None]):
+    """The first page's answer to which liquids, or views, were distinguished."""
+
+    key = "distinguished"
+    place = 20
+    kinds = ("liquids", "views")
+    question = "Which {kind} were distinguished?"
+
+    def answer(self) -> Answer:
+        """Return which liquids were recognised by name, and which of them, or of the views, were rated differently."""
+        apart = {pair: tests for pair, tests in _compared(self.found).items() if tests}
+        differing = [one for one in SettingsDiffer.of(self.found) if one.verdict in FOUND]
+        decisive = [one for tests in apart.values() for one in tests] or differing
+        named = LiquidRecognition.of(self.found)
+        if named is not None and named.found.p is None:
+            named = None
+        known = () if named is None else recognised(named)
+        exploratory = _suggested(decisive) and (named is None or not known or named.verdict == "suggested")
+        of_pairs = _of_pairs(self.found, apart, differing, self.results.decided, mark=not exploratory)
+        text = of_pairs if named is None else _of_names(self.found, named, known)
+        claims = bool(decisive or known)
+        if not claims:
+            text = f"{text} {NO_EVIDENCE}"
+        sizes = (
+            *(() if named is None else (_hits(self.found, named), of_pairs)),
+            *(_largest(self.found, apart) if apart else _agreement(self.found, differing)),
+        )
+        return Answer(self.key, self.found.id, self.found.title, text, sizes, claims, claims and exploratory)
+
+    def picture(self, sheet: Sheet, answer: Answer) -> str | None:
+        named = LiquidRecognition.of(self.found)
+        return _ratings(sheet, self.found) if named is None else _names(sheet, named, self.found)

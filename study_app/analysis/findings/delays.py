@@ -1,0 +1,566 @@
+"""Comparisons over delays: each with the shortest, the lowest that shows, the detection threshold, and reaching."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from study_app.analysis.designs.block_tests import MANY, Asked
+from study_app.analysis.designs.verdicts import HOLM
+from study_app.analysis.figures import movement_plots, psychometric_curve, small_multiples
+from study_app.analysis.figures.picture import Drawing, Picture
+from study_app.analysis.findings.finding import Absent, Finding, Row
+from study_app.analysis.findings.statement_tests import ONE_DELAY, DelayTrend
+from study_app.analysis.report.first_page.answer import FOUND
+from study_app.analysis.report.html_page import heading, paragraph, table
+from study_app.analysis.report.r_syntax import r_number, r_text
+from study_app.analysis.report.test_rows import rows_alone, test_row
+from study_app.analysis.results.block_results import BlockFound, Results
+from study_app.analysis.results.not_tested import NotTested
+from study_app.analysis.results.words import (
+    all_of,
+    beyond,
+    counted,
+    enough,
+    interval,
+    lead,
+    least,
+    listed,
+    ms,
+    number,
+    p_value,
+    percent,
+    short,
+)
+from study_app.analysis.statistics.equivalence.power import MOST, STUDIES, participants_needed
+from study_app.analysis.statistics.equivalence.tost import Equivalence, fewest, tost
+from study_app.analysis.statistics.equivalence.tost import Verdict as Nearness
+from study_app.analysis.statistics.multiple_comparisons import holm
+from study_app.analysis.statistics.psychometrics.threshold import Threshold, noticed
+from study_app.analysis.statistics.trend import StepDown, step_down
+from study_app.analysis.tables.compared_blocks import Block
+from study_app.analysis.tables.performance import OF_REACHES
+from study_app.analysis.tables.planned_analysis import Direction
+
+AGAINST = (
+    *("Statement", "Delay", "n", "difference", "interval", "people beyond the bound", "p equivalent"),
+    "p without normality",
+    *("p different, adjusted", "n for 80 %", "Verdict"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ContrastWithControl:
+    """One delay compared with the shortest in one statement.
+
+    ``found`` holds the verdict; ``p_adjusted`` is p of a difference, corrected over the ``members`` comparisons of
+    the block; ``expected`` the direction that was stated before the study, None where none was.
+    """
+
+    item: str
+    delay_ms: float
+    control_ms: float
+    found: Equivalence
+    p_adjusted: float | None
+    members: int
+    expected: Direction | None = None
+
+    @property
+    def verdict(self) -> Nearness:
+        """What may be said: "equivalent" where every test shows it, "different" by the corrected p."""
+        return self.found.verdict
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether answers went where they were expected to, or nothing was expected."""
+        away = self.found.effect or 0.0
+        return self.expected is None or (away > 0) == (self.expected == "increasing")
+
+
+def equivalent_up_to(against: tuple[ContrastWithControl, ...]) -> dict[str, float | None]:
+    """Return the longest delay up to which all are equivalent, by statement: a fixed order, so nothing is corrected.
+
+    Equivalent is only what every test shows.
+    """
+    found: dict[str, float | None] = {}
+    stopped = set()
+    for one in against:
+        found.setdefault(one.item, None)
+        if one.verdict != "equivalent":
+            stopped.add(one.item)
+        elif one.item not in stopped:
+            found[one.item] = one.delay_ms
+    return found
+
+
+def _differs(found: BlockFound, against: ContrastWithControl) -> dict[str, Any]:
+    """Return the row of the same comparison asked the other way: whether the delay differs at all."""
+    outcome = against.found
+    by = "the larger p of a t test and of exact signed ranks, two-sided"
+    return test_row(found, "a delay differs", outcome) | {
+        "test": "difference, paired",
+        "statistic": outcome.t,
+        "p": outcome.p_difference,
+        "method": "t test, two-sided" if outcome.p_different_ranks is None else by,
+        "p_adjusted": against.p_adjusted,
+        "smallest_p": None if outcome.p_different_ranks is None else 0.5 ** (outcome.n - 1),
+        "family": f"{found.id}: each delay against the shortest",
+        "members": against.members,
+        "correction": HOLM,
+        "note": None if outcome.t is not None else outcome.note,
+    }
+
+
+def _without_normality(tested: Equivalence) -> float | None:
+    """Return the largest p of the tests for equivalence that do not ask for normality."""
+    return max((p for p in (tested.p_permutation, tested.p_ranks, tested.p_bootstrap) if p is not None), default=None)
+
+
+def _p_different(one: ContrastWithControl) -> str:
+    """Return the adjusted p of a difference, unless no answers of so many participants could have shown one."""
+    out = min(1.0, 2 * 0.5**one.found.n) * one.members > one.found.alpha
+    return "out of reach" if out and one.p_adjusted is not None else p_value(one.p_adjusted)
+
+
+def _needed(one: ContrastWithControl) -> str:
+    """Return how many participants equivalence would take, and a dash where this is unknown."""
+    if one.found.n_needed is not None:
+        return str(one.found.n_needed)
+    return f"> {MOST}" if one.found.sd is not None else "–"
+
+
+def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
+    """Yield how the comparisons with the shortest delay were made, and what they could not show."""
+    first = against[0].found
+    yield (
+        f"Two one-sided t tests with a bound of ±{first.bound:g}, intervals of {percent(1 - 2 * first.alpha)}. "
+        "Equivalent: the t tests, changes of signs, signed ranks and the bootstrap-t (for answers that lean to one "
+        "side) all show that the mean lies within the bound; each comparison stands for itself, so that a single one "
+        "among many is weak. "
+        f"It needs {enough(first.alpha)}. It is about the mean: the table also states how many people differ by more "
+        "than the bound, with a 95 % Clopper-Pearson interval of their share. Different: the larger p of a two-sided "
+        f"t test and of exact signed ranks, Holm-adjusted over the {len(against)} comparisons of this table, is at "
+        f"most {first.alpha:g}. Where "
+        "all differences are equal, signs and ranks decide. Inconclusive: neither. Out of reach: no answers of so "
+        "many participants could have given either. n for 80 %: participants with whom all these tests would show "
+        f"equivalence in 80 % of simulated studies ({STUDIES} for each number, differences about 0 with this spread, "
+        "rounded as these are); a spread estimated from few is itself uncertain."
+    )
+    least = first.smallest_check_p
+    if least is not None:
+        yield f"By signs and ranks the smallest p for equivalence is {p_value(least)}."
+    differing = 0.5 ** (first.n - 1) if first.n else 1.0
+    if differing * len(against) > first.alpha:
+        yield (
+            f"For a difference the signed ranks of {counted(first.n, 'pair')} give {p_value(differing)} at least, so "
+            "that after the correction no comparison here can be called different, however clear it is; a trend over "
+            "all delays can be shown."
+        )
+    disagree = sum(one.found.checks_agree is False for one in against)
+    if disagree:
+        yield f"*: p with and without normality decide differently ({disagree}); equivalent is only what all show."
+
+
+class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
+    """Equivalence of each delay to the shortest one, and difference from it."""
+
+    key = "against"
+    place = 7
+    row_place = 10
+    what = "test of equivalence"
+    part = "comparisons with the shortest delay"
+    kinds = ("delays",)
+    waits = ("delays",)
+    empty = ()
+
+    @classmethod
+    def test(cls, answers: Asked, found: BlockFound) -> tuple[tuple[ContrastWithControl, ...], Absent]:
+        """Compare every delay with the shortest one, by the bound that was decided."""
+        bound, delays_ms = answers.decided.equivalence_bound, answers.block.delays_ms
+        if answers.k < 2:
+            return (), (NotTested(cls.what, ONE_DELAY),)
+        if bound is None:
+            why = "the protocol decided no bound of equivalence, and one chosen now would be chosen by the answers"
+            return (), (NotTested(cls.what, why),)
+        outcomes = []
+        for item in answers.block.items:
+            answers.each(item.short)
+            values = answers.values[item.id]
+            for place, delay_ms in enumerate(delays_ms[1:], start=1):
+                differences = values[:, place] - values[:, 0]
+                tested = tost(
+                    differences,
+                    bound,
+                    alpha=answers.decided.alpha,
+                    seed=answers.seed,
+                    checks=answers.n <= MANY,
+                    verdict_only=answers.verdicts_only,
+                )
+                if answers.planning:
+                    tested = replace(tested, n_needed=participants_needed(differences, bound, answers.decided.alpha))
+                outcomes.append((item.id, delay_ms, tested))
+        adjusted = holm([tested.p_difference for _, _, tested in outcomes])
+        return tuple(
+            ContrastWithControl(
+                item,
+                delay_ms,
+                delays_ms[0],
+                tested.judged(p, len(outcomes)),
+                p,
+                len(outcomes),
+                answers.decided.direction(item),
+            )
+            for (item, delay_ms, tested), p in zip(outcomes, adjusted, strict=True)
+        ), ()
+
+    @classmethod
+    def entries(cls, found: BlockFound) -> Mapping[str, Any]:
+        against = cls.of(found)
+        up_to = equivalent_up_to(against) if cls.key in found.findings else None
+        return {cls.key: against, "equivalent_up_to": up_to}
+
+    def rows(self) -> Iterator[Row]:
+        for against in self.value:
+            row = test_row(self.found, "a delay is equivalent", against.found) | {"item": against.item}
+            compared = f"{against.delay_ms:g} ms − {against.control_ms:g} ms"
+            row |= rows_alone(self.found, f"{against.item} at {against.delay_ms:g} ms")
+            yield row | {"comparison": compared, "verdict": against.verdict}
+            yield _differs(self.found, against) | {
+                "item": against.item,
+                "comparison": compared,
+                "verdict": against.verdict,
+            }
+
+    def section(self) -> Iterator[str]:
+        """Yield the comparisons of each delay with the shortest."""
+        if not self.value:
+            return
+        control = ms(self.value[0].control_ms)
+        yield heading(3, f"Each delay against {control}")
+        yield table(
+            AGAINST,
+            [
+                [
+                    short(self.found, one.item),
+                    ms(one.delay_ms),
+                    str(one.found.n),
+                    number(one.found.effect),
+                    interval(one.found.interval),
+                    beyond(one.found),
+                    p_value(one.found.p),
+                    p_value(_without_normality(one.found)),
+                    _p_different(one),
+                    _needed(one),
+                    one.verdict + (" *" if one.found.checks_agree is False else ""),
+                ]
+                for one in self.value
+            ],
+            words=2,
+            last=1,
+        )
+        yield paragraph(" ".join(_about_against(self.value)), "soft")
+
+    def limits(self) -> Iterator[str]:
+        against, found = self.value, self.found
+        if against and found.n < fewest(against[0].found.alpha):
+            yield f"{lead(found)}: equivalence needs {enough(against[0].found.alpha)}. This study has {found.n}."
+        undecided = [one for one in against if one.verdict in ("inconclusive", "out of reach")]
+        if undecided:
+            yield (
+                f"{lead(found)}: inconclusive or out of reach: {len(undecided)} of {len(against)} comparisons "
+                "with "
+                f"{ms(undecided[0].control_ms)}, which show neither a difference nor that it stays within the bound."
+            )
+
+    def methods(self) -> Iterator[str]:
+        if self.value:
+            bound, level = self.value[0].found.bound, percent(1 - 2 * self.results.decided.alpha)
+            points = "point" if bound == 1 else "points"
+            beforehand = ", decided before the first session" if self.results.decided.binding else ""
+            yield (
+                f"Equivalence to {self.found.delays_ms[0]:g} ms was tested by two one-sided t tests on paired "
+                "differences with "
+                f"a bound of ±{bound:g} {points}{beforehand}, and {level} intervals, and called equivalent only "
+                "where changes of signs, signed ranks and the bootstrap-t agreed, and with "
+                f"{least(self.results.decided.alpha)}; it was called different where "
+                "the larger p of a t test and of exact signed ranks, Holm-adjusted over all these comparisons, was at "
+                "most "
+                "alpha, and otherwise inconclusive."
+            )
+
+    def calls(self, codes: str) -> Iterator[str]:
+        by_delay = {setting.delay_ms: setting.code for setting in self.found.settings}
+        for one in self.value:
+            interval = one.found.interval
+            if one.found.p is None or one.found.p_different is None or interval is None:
+                continue
+            first, second = r_text(by_delay[one.control_ms]), r_text(by_delay[one.delay_ms])
+            what = r_text(f"{one.item}, {one.delay_ms:g} ms")
+            numbers = (one.found.bound, one.found.p, interval.low, interval.high, interval.level, one.found.p_different)
+            values = ", ".join(r_number(value) for value in numbers)
+            answers = f"wide({r_text(self.found.id)}, {r_text(one.item)}, {codes})"
+            yield f"equivalent({what}, {answers}, {first}, {second}, {values})"
+
+
+@dataclass(frozen=True, slots=True)
+class Lowest:
+    """The lowest delay at which a trend shows in one statement, stepping down.
+
+    The error rate of ``steps`` holds within the statement; that of ``over_all_ms``, the lowest delay whose steps all
+    have p ≤ alpha / ``members``, over all statements of the family.
+    """
+
+    item: str
+    steps: StepDown
+    members: int = 1
+
+    @property
+    def over_all_ms(self) -> float | None:
+        """The lowest delay that shows with the error rate held over all statements; None without any."""
+        lowest = None
+        for step in self.steps.steps:
+            if step.page.p is None or step.page.p > self.steps.alpha / self.members:
+                break
+            lowest = step.longest_ms
+        return lowest
+
+
+def _at_most(delay_ms: float | None) -> str:
+    return "–" if delay_ms is None else f"≤ {ms(delay_ms)}"
+
+
+class LowestDelay(Finding[tuple[Lowest, ...]]):
+    """The lowest delay at which a trend shows, stepping down from the longest."""
+
+    key = "lowest"
+    place = 6
+    row_place = 9
+    what = "lowest delay that shows"
+    part = "lowest delay"
+    kinds = ("delays",)
+    waits = ("delays",)
+    empty = ()
+
+    @classmethod
+    def test(cls, answers: Asked, found: BlockFound) -> tuple[tuple[Lowest, ...], Absent]:
+        """Step down in the statements whose trend is there at all."""
+        trends, lowest = DelayTrend.of(found), []
+        showing = [one for one in trends if one.verdict in FOUND]
+        for one in showing:
+            direction = answers.decided.direction(one.item) or "increasing"
+            steps = step_down(answers.values[one.item], answers.block.delays_ms, direction, alpha=answers.decided.alpha)
+            lowest.append(Lowest(one.item, steps, one.members))
+        if trends and not showing:
+            why = "no statement shows a trend over all delays; that is not evidence that none is noticed"
+            return (), (NotTested(cls.what, why),)
+        return tuple(lowest), ()
+
+    def rows(self) -> Iterator[Row]:
+        for lowest in self.value:
+            for step in lowest.steps.steps:
+                row = test_row(self.found, "answers follow the delay, stepping down", step.page)
+                row |= rows_alone(self.found, f"stepping down within {lowest.item}") | {
+                    "members": len(lowest.steps.steps)
+                }
+                row |= {"correction": "none: fixed order, ends at the first that fails"}
+                yield row | {"item": lowest.item, "comparison": f"up to {step.longest_ms:g} ms"}
+
+    def section(self) -> Iterator[str]:
+        """Yield the lowest delay that shows, by statement."""
+        if not self.value:
+            return
+        yield heading(3, "The lowest delay that shows")
+        yield table(
+            ("Statement", "lowest", "uncorrected", "steps down: longest delay, p"),
+            [
+                [
+                    short(self.found, one.item),
+                    _at_most(one.over_all_ms),
+                    _at_most(one.steps.lowest_ms),
+                    "; ".join(f"{ms(step.longest_ms)} {p_value(step.page.p)}" for step in one.steps.steps),
+                ]
+                for one in self.value
+            ],
+            words=4,
+        )
+        members = self.value[0].members
+        yield paragraph(
+            "Only where a trend is there at all, the longest delay is dropped as long as a trend is left. The order is "
+            f"fixed. The lowest delay is the one whose steps all have p of at most alpha / {members}, so that the "
+            "error "
+            "rate holds over all statements; uncorrected it holds within one statement alone. The result is an upper "
+            "bound and biased upward: few participants find only long delays.",
+            "soft",
+        )
+
+    def sentences(self) -> Iterator[str]:
+        lowest = [
+            f"“{short(self.found, one.item)}” {ms(one.over_all_ms)}"
+            for one in self.value
+            if one.over_all_ms is not None
+        ]
+        if lowest:
+            complete = {one.steps.steps[0].page.n for one in self.value}
+            most = max(complete)
+            used = counted(most, "participant") if len(complete) == 1 else f"{min(complete)} to {most} participants"
+            yield (
+                f"{lead(self.found)}: the lowest delay at which the answers of {used} show a trend, "
+                f"corrected for {all_of(self.value[0].members, 'statement')}: {listed(lowest)}. "
+                "Each is an upper bound: shorter delays may be noticed too."
+            )
+
+
+class DetectionThreshold(Finding[Threshold | None]):
+    """The detection threshold of a delay: a psychometric function fitted to the answers to one statement."""
+
+    key = "threshold"
+    place = 8
+    row_place = 11
+    what = "detection threshold"
+    part = "detection threshold"
+    kinds = ("delays",)
+    waits = ("delays",)
+    figure_name = "threshold"
+    figure_title = "When a delay is noticed"
+
+    @classmethod
+    def test(cls, answers: Asked, found: BlockFound) -> tuple[Threshold | None, Absent]:
+        item = answers.decided.noticed
+        if item is None or item not in answers.values:
+            return None, (NotTested(cls.what, "the protocol names no statement that asks for it"),)
+        answers.each(cls.what)
+        single, delays_ms = answers.single[item], answers.block.delays_ms
+        return noticed(single, delays_ms, alpha=answers.decided.alpha, seed=answers.seed), ()
+
+    def rows(self) -> Iterator[Row]:
+        threshold = self.value
+        if threshold is not None:
+            yield test_row(self.found, "a delay is noticed", threshold)
+
+    def section(self) -> Iterator[str]:
+        """Yield the detection threshold, or why there is none."""
+        threshold = self.value
+        if threshold is None:
+            return
+        yield heading(3, "From when on is a delay noticed?")
+        counts = ", ".join(
+            f"{ms(level)} {yes} of {asked}"
+            for level, yes, asked in zip(threshold.levels, threshold.yes, threshold.asked, strict=True)
+        )
+        if threshold.effect is None:
+            yield paragraph(f"No threshold: {threshold.note}. Noticed: {counts}.")
+            yield from self.drawn()
+            return
+        yield paragraph(
+            f"Detection threshold {number(threshold.effect, 0)} ms, 95 % interval {interval(threshold.interval, 0)} ms"
+            f"{f' ({threshold.no_interval})' if threshold.no_interval else ''}; guesses {number(threshold.guess)}, "
+            "lapses "
+            f"{number(threshold.lapse)}; {threshold.method}; n = {threshold.n}. Noticed: {counts}. "
+            f"{threshold.note[:1].upper()}{threshold.note[1:]}. Agreement is no yes or no: "
+            "who agrees somewhat with “different” may mean little."
+        )
+        yield from self.drawn()
+
+    def figure(self, drawing: Drawing) -> Picture | None:
+        threshold = self.value
+        if threshold is None or not any(threshold.asked):
+            return None
+        lowest = min(
+            (one.over_all_ms for one in LowestDelay.of(drawing.found) if one.over_all_ms is not None), default=None
+        )
+        curve = f"No curve: {threshold.note}."
+        if threshold.effect is not None:
+            curve = (
+                f"Curve: {threshold.method}; diamond: the detection threshold, {threshold.effect:.0f} ms, on its 95 % "
+                f"interval {interval(threshold.interval, 0)} ms."
+            )
+        dashed = (
+            "" if lowest is None else f" Dashed: the lowest delay up to which a statement follows it, {lowest:g} ms."
+        )
+        caption = (
+            f"Share of answers that noticed the delay, over the delay asked for ({drawing.simulated}n = "
+            f"{threshold.n}). "
+            f"{curve}{dashed}"
+        )
+        return drawing.picture(
+            self.figure_title,
+            caption,
+            lambda **own: psychometric_curve.draw(threshold, lowest, counts=("",), **own).figure,
+        )
+
+    def sentences(self) -> Iterator[str]:
+        threshold = self.value
+        if threshold is not None and threshold.effect is not None:
+            yield (
+                f"{lead(self.found)}: the detection threshold is {threshold.effect:.0f} ms (95 % interval "
+                f"{interval(threshold.interval, 0)} ms, n = {threshold.n}), if agreeing counts as noticing; "
+                f"{'; '.join(words for words in (threshold.no_interval, threshold.note) if words)}."
+            )
+
+    def methods(self) -> Iterator[str]:
+        if self.value is not None:
+            yield (
+                "The detection threshold is the 50 % point between guesses and lapses of a logistic function fitted by "
+                "maximum likelihood to agreement (5 to 7) in single answers, all participants pooled, with a profile "
+                "interval that is scaled by how far participants differ. It is stated only where a permutation test "
+                "against a flat line shows a rise, and where it lies among the delays that were presented."
+            )
+
+
+MOVES = {
+    "movement_time_s": "Movement time, s",
+    "path_mm": "Path, mm",
+    "overshoot_mm": "Overshoot, mm",
+    "submovements": "Submovements",
+}
+
+
+def _kept(block: Block, results: Results) -> str:
+    """Say how many trials kept to the limits of timing."""
+    here = [one for one in results.delivered if one.block == block.id]
+    judged, valid = sum(one.judged for one in here), sum(one.valid for one in here)
+    if not judged:
+        return "Whether trials kept to the protocol's limits of timing was not measured."
+    return f"Trials that kept to the protocol's limits of timing: {valid} of {judged}; all are included."
+
+
+class Movement(Finding[None]):
+    """The figure of how participants reach under a delay, measured from recordings."""
+
+    key = "movement"
+    place = 11
+    part = "figure of movement"
+    figure_name = "movement"
+    figure_title = "Reaching over added delay"
+
+    def section(self) -> Iterable[str]:
+        return self.drawn()
+
+    def figure(self, drawing: Drawing) -> Picture | None:
+        block, measured = drawing.block, drawing.results.performance
+        if not drawing.found.delays_ms or measured is None or not measured.recorded_in(block.id):
+            return None
+        people = sorted({trial.participant for trial in measured.reached if trial.block == block.id})
+        plots = [
+            movement_plots.Measured(MOVES[measure], measured.by_participant(people, block, measure))
+            for measure in OF_REACHES
+        ]
+        n = f"n = {len(people)} participant" + ("" if len(people) == 1 else "s")
+        caption = (
+            f"How participants reached, over the delay that was asked for ({drawing.simulated}{n} with recordings). "
+            f"Thin lines: {small_multiples.line_words(len(people))}; thick line: median; band: the middle half. "
+            "Movement time: from the lighting of a target to the entry that was held. Scales do not begin at zero. "
+            f"{_kept(block, drawing.results)}"
+        )
+        return drawing.picture(
+            self.figure_title,
+            caption,
+            lambda **own: (
+                movement_plots.draw(
+                    plots,
+                    [setting.delay_ms or 0.0 for setting in block.settings],
+                    counts=[f"{n} with recordings", n],
+                    foot="Added delay, ms. A participant's point: the median of a trial's reaches, the first left out.",
+                    **own,
+                ).figure
+            ),
+        )

@@ -1,0 +1,608 @@
+"""Tests of statements: whether settings differ, in which pairs, with the delay, between sessions and between sites.
+
+The tables, the rows of tests.csv, the sentences and the calls in R of all of them are made here.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any, ClassVar, Final
+
+import numpy as np
+from scipy.stats import rankdata
+
+from study_app import number_text
+from study_app.analysis.designs.block_tests import SEALED, Asked, each_statement
+from study_app.analysis.designs.verdicts import FDR, HOLM, in_family, judged
+from study_app.analysis.findings.finding import Absent, Finding, Row
+from study_app.analysis.report.html_page import heading, paragraph, table
+from study_app.analysis.report.r_syntax import r_number, r_text, r_vector
+from study_app.analysis.report.test_rows import judged_row, rows_alone, test_row
+from study_app.analysis.results.block_results import BlockFound
+from study_app.analysis.results.item_test import Tested
+from study_app.analysis.results.not_tested import NotTested
+from study_app.analysis.results.words import (
+    all_of,
+    counted,
+    higher,
+    interval,
+    lead,
+    listed,
+    name,
+    number,
+    p_equals,
+    p_value,
+    settings_noun,
+    short,
+    statistic,
+    test_name,
+)
+from study_app.analysis.statistics.friedman import Friedman, friedman
+from study_app.analysis.statistics.global_permutation import global_permutation
+from study_app.analysis.statistics.independent_groups import GroupsDiffer, groups_differ
+from study_app.analysis.statistics.multiple_comparisons import false_discovery, holm
+from study_app.analysis.statistics.outcome import Outcome
+from study_app.analysis.statistics.paired import Paired, paired
+from study_app.analysis.statistics.trend import Page, page
+from study_app.analysis.tables.compared_blocks import KINDS
+from study_app.analysis.tables.measures import medians
+
+ONE_DELAY: Final = "the block has one delay: there is nothing to compare it with"
+HEAD: Final = ("Statement", "n", "Statistic", "p", "adjusted p", "smallest p", "Effect", "Interval", "Verdict")
+
+
+def table_of_tests(
+    title: str, found: BlockFound, tests: Sequence[Tested], compared: Sequence[str] = ()
+) -> Iterator[str]:
+    """Yield a table of tests; ``compared`` are the names of what each of them compares."""
+    if not tests:
+        return
+    first, outcomes = tests[0], [one.outcome for one in tests]
+    intervals = dict.fromkeys(one.interval.method for one in outcomes if one.interval is not None)
+    reasons = dict.fromkeys(one.no_interval for one in outcomes if one.no_interval)
+    methods = dict.fromkeys(one.method for one in outcomes if one.p is not None)
+    family = dict.fromkeys(
+        f"{one.members} in the family “{one.family}”, p adjusted by {one.correction}" for one in tests
+    )
+    two = isinstance(first.outcome, Paired) and len(compared) == 2
+    above = f", above 0 where {compared[0]} was rated higher than {compared[1]}" if two else ""
+    yield heading(3, title)
+    yield table(
+        HEAD,
+        [
+            [
+                short(found, one.item),
+                f"{one.outcome.n}" + (f" (−{one.outcome.dropped})" if one.outcome.dropped else ""),
+                statistic(one.outcome),
+                *(p_value(p) for p in (one.outcome.p, one.p_adjusted, one.outcome.smallest_p)),
+                number(one.outcome.effect),
+                interval(one.outcome.interval),
+                one.verdict + (f" ({one.outcome.note})" if one.verdict == "not tested" and one.outcome.note else ""),
+            ]
+            for one in tests
+        ],
+        last=1,
+    )
+    yield paragraph(
+        f"{test_name(first.outcome)}; effect: {first.outcome.effect_name}{above}. "
+        f"Found by: {'; '.join(methods) or 'none'}. {'; '.join(family)}. "
+        + (f"Intervals: 95 %, {'; '.join(intervals)}." if intervals else ""),
+        "soft",
+    )
+    if reasons and not intervals:
+        yield paragraph(f"Intervals: {'; '.join(reasons)}.", "soft")
+
+
+def tests_in_words(found: BlockFound, tests: Sequence[Tested], showing: str, nothing: str) -> Iterator[str]:
+    """Yield in which statements tests show something, or that they show ``nothing``; no sentence without tests."""
+    if not tests:
+        return
+    shown, suggested = (
+        [
+            f"“{short(found, one.item)}” ({higher(found, one.outcome)}"
+            f"{'' if one.p_adjusted is None else f'adjusted {p_equals(one.p_adjusted)}'})"
+            for one in tests
+            if one.verdict == verdict
+        ]
+        for verdict in ("shown", "suggested")
+    )
+    if shown or suggested:
+        parts = [*([listed(shown)] if shown else []), *([f"{listed(suggested)} (exploratory)"] if suggested else [])]
+        yield f"{lead(found)}: {showing} {'; '.join(parts)}."
+    elif any(one.outcome.p is not None for one in tests):
+        yield f"{lead(found)}: {nothing} is shown."
+    else:
+        why = "; ".join(dict.fromkeys(one.outcome.note for one in tests))
+        yield f"{lead(found)}: no statement could be tested ({why})."
+
+
+def families(tests: Sequence[Tested]) -> str:
+    """Return what is corrected together: primary statements, and apart from them the exploratory ones."""
+    each = sorted({(not one.primary, one.members, one.correction) for one in tests})
+    several = len(each) > 1
+    return "p adjusted " + listed(
+        [
+            f"over {counted(members, 'statement')} by {correction}"
+            + (f" ({'exploratory' if exploratory else 'primary'})" if several else "")
+            for exploratory, members, correction in each
+        ]
+    )
+
+
+def r_call(what: str, table: str, outcome: Outcome, *between: str) -> Iterator[str]:
+    """Yield the call in R that computes a test again; ``between`` are arguments that its kind has besides."""
+    if outcome.statistic is None or outcome.p is None:
+        return
+    match outcome:
+        case Friedman():
+            if outcome.n < 2:
+                return  # R's friedman.test refuses a single participant
+            kind, p = "friedman", outcome.p_chi2
+        case GroupsDiffer():
+            kind, p = "sites", outcome.p_chi2
+        case Page():
+            kind, p, between = "page", outcome.p, ("TRUE" if outcome.direction == "decreasing" else "FALSE",)
+        case _:
+            kind, p = "pair", outcome.p
+    numbers = (r_number(outcome.statistic), "NA" if p is None else r_number(p))
+    yield f"{kind}({', '.join((r_text(what), table, *between, *numbers))})"
+
+
+def _wide(found: BlockFound, item: str, codes: str) -> str:
+    return f"wide({r_text(found.id)}, {r_text(item)}, {codes})"
+
+
+def compared(answers: Asked) -> tuple[tuple[Tested, ...], Absent]:
+    """Test in every statement whether the settings are answered alike."""
+    if answers.k < 2:
+        return (), (NotTested("test of settings", "the block has one setting: there is nothing to compare it with"),)
+    outcomes = each_statement(answers, lambda values: _alike(answers, values))
+    return judged(outcomes, answers.decided, f"{answers.block.id}: settings differ"), ()
+
+
+def _alike(answers: Asked, values: Any) -> Outcome:
+    if values.shape[1] == 2:
+        return paired(values[:, 0], values[:, 1], alpha=answers.decided.alpha)
+    return friedman(values, draws=answers.draws, seed=answers.seed)
+
+
+class StatementTests(Finding[tuple[Tested, ...]]):
+    """One test of every statement; words may contain {noun}, what the settings are called."""
+
+    empty = ()
+    asks: ClassVar[str]
+    title: ClassVar[str]
+    showing: ClassVar[str] = ""
+    nothing: ClassVar[str] = ""
+
+    def compared(self) -> Sequence[str]:
+        """Return the names of what is compared."""
+        return ()
+
+    def rows(self) -> Iterator[Row]:
+        return (judged_row(self.found, self.asks, one) for one in self.value)
+
+    def section(self) -> Iterator[str]:
+        return table_of_tests(self._said(self.title), self.found, self.value, self.compared())
+
+    def sentences(self) -> Iterator[str]:
+        if self.showing:
+            yield from tests_in_words(self.found, self.value, self._said(self.showing), self._said(self.nothing))
+
+    def calls(self, codes: str) -> Iterator[str]:
+        for one in self.value:
+            yield from r_call(one.item, _wide(self.found, one.item, codes), one.outcome)
+
+    def _said(self, words: str) -> str:
+        return words.format(noun=settings_noun(self.found))
+
+
+class SettingsDiffer(StatementTests):
+    """Differences between settings, statement by statement."""
+
+    key = "omnibus"
+    place = 2
+    row_place = 2
+    what = "test of settings"
+    part = "tests of settings"
+    kinds = ("liquids", "views")
+    sealed = KINDS
+    statements = True
+    asks = "settings differ"
+    title = "Do the {noun}s differ, statement by statement?"
+    showing = "the {noun}s differ in"
+    nothing = "in no single statement a difference between the {noun}s"
+
+    @classmethod
+    def test(cls, answers: Asked, found: BlockFound) -> tuple[tuple[Tested, ...], Absent]:
+        return compared(answers)
+
+    def compared(self) -> Sequence[str]:
+        return self.found.names
+
+    def methods(self) -> Iterator[str]:
+        if tests := self.value:
+            one = _first_tested(tests)
+            yield (
+                f"Each statement was tested by {test_name(one.outcome)} ({one.outcome.method}), with "
+                f"{one.outcome.effect_name} as the effect, {families(tests)}."
+            )
+
+    def calls(self, codes: str) -> Iterator[str]:
+        if len(self.found.settings) != 2:
+            return super().calls(codes)
+        first, second = (setting.code for setting in self.found.settings)
+        return (call for one in self.value for call in _pair_calls(self.found, codes, first, second, one))
+
+
+def _pair_calls(found: BlockFound, codes: str, first: str, second: str, one: Tested) -> Iterator[str]:
+    what = f"{one.item}, {first} and {second}"
+    yield from r_call(what, _wide(found, one.item, codes), one.outcome, r_text(first), r_text(second))
+
+
+def _first_tested(tests: Sequence[Tested]) -> Tested:
+    return next((one for one in tests if one.outcome.p is not None), tests[0])
+
+
+class DelayTrend(StatementTests):
+    """Page's test of a trend over the delay, in every statement whose direction was stated."""
+
+    key = "trends"
+    place = 5
+    row_place = 3
+    what = "test of a trend (Page)"
+    part = "trends"
+    kinds = ("delays",)
+    waits = ("delays",)
+    statements = True
+    asks = "answers follow the delay"
+    title = "Do answers follow the delay?"
+    showing = "answers follow the delay, in the direction stated before the study, in"
+    nothing = "in no statement a trend over the delay"
+
+    @classmethod
+    def test(cls, answers: Asked, found: BlockFound) -> tuple[tuple[Tested, ...], Absent]:
+        if answers.k < 2:
+            return (), (NotTested(cls.what, ONE_DELAY),)
+        outcomes = {}
+        for item in answers.block.items:
+            if (direction := answers.decided.direction(item.id)) is not None:
+                answers.each(item.short)
+                outcomes[item.id] = page(answers.values[item.id], direction, seed=answers.intervals)
+        undirected = [item.short for item in answers.block.items if item.id not in outcomes]
+        why = f"the protocol does not say whether answers should rise or fall with delay ({', '.join(undirected)})"
+        tested = judged(outcomes, answers.decided, f"{answers.block.id}: trend over delay")
+        return tested, (NotTested(cls.what, why),) if undirected else ()
+
+    def methods(self) -> Iterator[str]:
+        if trends := self.value:
+            yield (
+                "Trends over the delay were tested by Page's L "
+                f"({_first_tested(trends).outcome.method.split(',')[0]}), "
+                "one-sided in the direction stated "
+                f"{'beforehand' if self.results.decided.binding else 'by the protocol'}, "
+                f"{families(trends)}; where a trend showed, the longest delay was dropped and the test repeated "
+                "until it no longer did, which gives an upper bound of the lowest delay that is noticed (every step at "
+                "alpha over the number of statements, so that the error rate holds over all of them)."
+            )
+
+
+class SessionsDiffer(StatementTests):
+    """The comparison of sessions in every statement, by the participants who came to all of them."""
+
+    key = "by_session"
+    place = 12
+    row_place = 4
+    what = "comparison of sessions"
+    part = "sessions"
+    sealed = KINDS
+    about = "sessions"
+    asks = "sessions differ"
+    title = "Do sessions differ?"
+
+    def compared(self) -> Sequence[str]:
+        return [f"session {number}" for number in self.found.sessions]
+
+    @classmethod
+    def test(cls, answers: Asked, found: BlockFound) -> tuple[tuple[Tested, ...], Absent]:
+        """A participant's answers in a session are their median over the settings answered in all sessions."""
+        numbers = found.sessions
+        if len(numbers) < 2:
+            return (), ()
+        outcomes = {}
+        for item in answers.block.items:
+            answers.each(f"{item.short}, sessions")
+            single, of = answers.single[item.id], answers.sessions[item.id]
+            each = np.stack([medians(np.where(of == one, single, np.nan)) for one in numbers], axis=2)
+            common = np.asarray(~np.isnan(each).any(axis=2))
+            outcomes[item.id] = _alike(answers, medians(np.where(common[..., None], each, np.nan).transpose(0, 2, 1)))
+        family, alpha = f"{answers.block.id}: sessions", answers.decided.alpha
+        tested = in_family(outcomes, alpha, family, false_discovery, FDR, primary=False)
+        if all(one.outcome.n == 0 for one in tested):
+            return (), (NotTested(cls.what, f"no one answered the same setting in all of sessions {numbers}"),)
+        return tested, ()
+
+    def calls(self, codes: str) -> Iterator[str]:
+        numbers = r_vector(map(str, self.found.sessions))
+        for one in self.value:
+            rows = f"by_session({r_text(self.found.id)}, {r_text(one.item)}, {numbers}, {codes})"
+            two = () if isinstance(one.outcome, Friedman) else ("1", "2")
+            yield from r_call(f"{one.item}, sessions", rows, one.outcome, *two)
+
+
+@dataclass(frozen=True, slots=True)
+class SiteTests:
+    """Tests of each statement: of the participants' medians (``level``), and of the ``profile`` over settings."""
+
+    level: tuple[Tested, ...] = ()
+    profile: tuple[Tested, ...] = ()
+
+
+class SitesDiffer(Finding[SiteTests]):
+    """The comparison of a merged study's sites: in the level of answers, and in what settings do.
+
+    Comparisons of settings are within participants, so that a difference in level between sites cannot appear in them.
+    What can is a difference between settings that is another at another site.
+    """
+
+    key = "by_site"
+    place = 12.5
+    row_place = 4.5
+    what = "comparison of sites"
+    part = "sites"
+    sealed = KINDS
+    about = "sessions"
+    empty = SiteTests()
+
+    @classmethod
+    def test(cls, answers: Asked, found: BlockFound) -> tuple[SiteTests, Absent]:
+        """A participant's level is the median over settings; the profile has their ranks, or the difference of two."""
+        if not answers.sites:
+            return SiteTests(), ()
+        if not answers.block.revealed:
+            return SiteTests(), (NotTested(cls.what, SEALED),)
+
+        def differ(values: Any, test: str) -> GroupsDiffer:
+            return groups_differ(values, answers.sites, test=test, draws=answers.draws, seed=answers.seed)
+
+        levels, profiles = {}, {}
+        for item in answers.block.items:
+            answers.each(f"{item.short}, sites")
+            values = answers.values[item.id]
+            levels[item.id] = differ(np.median(values, axis=1)[:, None], "Kruskal-Wallis")
+            if answers.k == 2:
+                profiles[item.id] = differ(np.diff(values, axis=1), "Kruskal-Wallis of differences")
+            elif answers.k > 2:
+                ranks = rankdata(values, axis=1, nan_policy="propagate")
+                profiles[item.id] = differ(ranks, "permutation test of rank profiles")
+        return SiteTests(
+            *(
+                in_family(
+                    tests,
+                    answers.decided.alpha,
+                    f"{answers.block.id}: sites, {what}",
+                    false_discovery,
+                    FDR,
+                    primary=False,
+                )
+                for tests, what in ((levels, "level"), (profiles, "settings"))
+            )
+        ), ()
+
+    @classmethod
+    def entries(cls, found: BlockFound) -> Mapping[str, Any]:
+        return super().entries(found) if cls.of(found).level else {}
+
+    def rows(self) -> Iterator[Row]:
+        tests = self.value
+        yield from (judged_row(self.found, "sites differ", one) for one in tests.level)
+        yield from (judged_row(self.found, "interaction of setting and site", one) for one in tests.profile)
+
+    def section(self) -> Iterator[str]:
+        tests, noun = self.value, settings_noun(self.found)
+        yield from table_of_tests("Do sites differ?", self.found, tests.level)
+        yield from table_of_tests(f"Do differences between the {noun}s depend on the site?", self.found, tests.profile)
+        if tests.level:
+            yield paragraph(
+                f"First each participant's median over the {noun}s is compared between sites, then the order of the "
+                f"{noun}s by each participant's answers. All other tests compare within participants, so that a "
+                "difference in level between sites does not enter them.",
+                "soft",
+            )
+
+    def sentences(self) -> Iterator[str]:
+        tests, noun = self.value, settings_noun(self.found)
+        nothing = "in no single statement a difference between sites"
+        yield from tests_in_words(self.found, tests.level, "sites differ in", nothing)
+        nothing = f"in no single statement that differences between the {noun}s depend on the site"
+        showing = f"differences between the {noun}s depend on the site in"
+        yield from tests_in_words(self.found, tests.profile, showing, nothing)
+
+    @classmethod
+    def common_methods(cls, blocks: Sequence[BlockFound]) -> Iterator[str]:
+        tests = [one for found in blocks for one in (*cls.of(found).level, *cls.of(found).profile)]
+        if names := list(dict.fromkeys(test_name(one.outcome) for one in tests)):
+            yield (
+                f"Sites were compared by {listed(names)}, with participants exchanged between sites, p adjusted by "
+                f"{FDR}; all other tests are within participants, with the participants of all sites together."
+            )
+
+    def calls(self, codes: str) -> Iterator[str]:
+        for kind in ("level", "profile"):
+            for one in getattr(self.value, kind):
+                yield from r_call(one.item, _wide(self.found, one.item, codes), one.outcome, r_text(kind))
+
+
+def over_all(answers: Asked, draws: int | None = None) -> Outcome | None:
+    """Test once over all statements whether the settings are answered alike; ``draws`` of them if not as usual."""
+    if answers.k < 2 or (answers.verdicts_only and draws is None):
+        return None
+    answers.each("all statements")
+    values = np.array(list(answers.values.values()))
+    return global_permutation(values, draws=draws or answers.draws_over_all, seed=answers.seed)
+
+
+class OverAll(Finding[Outcome | None]):
+    """Differences between settings at all: one test over all statements of a block."""
+
+    key = "overall"
+    place = 1
+    row_place = 1
+    what = "test over all statements"
+    part = "test over all statements"
+    waits = ("liquids", "views")
+
+    @classmethod
+    def test(cls, answers: Asked, found: BlockFound) -> tuple[Outcome | None, Absent]:
+        return over_all(answers), ()
+
+    def rows(self) -> Iterator[Row]:
+        if (overall := self.value) is not None:
+            row = test_row(self.found, "settings differ, all statements", overall)
+            yield row | rows_alone(self.found, "all statements at once")
+
+    def section(self) -> Iterator[str]:
+        if (overall := self.value) is None:
+            return
+        if overall.p is None:
+            yield paragraph(f"One test over all statements: none ({overall.note}).")
+            return
+        yield paragraph(
+            f"One test over all statements: {statistic(overall)}, {p_equals(overall.p)} (smallest attainable "
+            f"{p_value(overall.smallest_p)}; {overall.method}), {overall.effect_name} {number(overall.effect)}, "
+            f"n = {overall.n}."
+        )
+
+    def sentences(self) -> Iterator[str]:
+        overall = self.value
+        if overall is not None and overall.p is not None:
+            yield (
+                f"{lead(self.found)}: one test over {all_of(len(self.found.items), 'statement')} "
+                f"{'finds' if overall.p <= self.results.decided.alpha else 'does not find'} a difference between the "
+                f"{settings_noun(self.found)}s ({p_equals(overall.p)}, n = {overall.n})."
+            )
+
+    def methods(self) -> Iterator[str]:
+        if self.value is not None and not self.found.delays_ms:
+            yield (
+                f"The {settings_noun(self.found)}s were compared over {all_of(len(self.found.items), 'statement')} at "
+                "once by "
+                "permuting them within participants, the statistic being the sum of the statements' Friedman "
+                "statistics."
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """Two settings (codes) compared in one statement; the family is all pairs that are compared in the block."""
+
+    first: str
+    second: str
+    tested: Tested
+
+
+def smallest_of_pairs(settings: int, participants: int) -> float:
+    """Return the smallest p that a comparison of two of the settings can have, corrected over all pairs by Holm."""
+    return min(1.0, math.comb(settings, 2) * 2.0 ** (1 - participants))
+
+
+def pairs_of(answers: Asked, omnibus: tuple[Tested, ...]) -> tuple[tuple[Pair, ...], Absent]:
+    """Compare settings two by two in the statements that differ at all; all pairs of all of them are one Holm family.
+
+    Where one liquid differs from all others, every statement is opened, and each holds pairs that do not differ.
+    """
+    n, k, alpha, codes = answers.n, answers.k, answers.decided.alpha, answers.block.codes
+    if k < 3:
+        return (), ()
+    if (corrected := smallest_of_pairs(k, n)) > alpha:
+        why = (
+            f"{number_text.counted(n, 'participant')} cannot show it: the smallest p that "
+            f"{number_text.counted(n, 'pair')} can give is "
+            f"{smallest_of_pairs(2, n):.4g}, after Holm's correction over {math.comb(k, 2)} pairs {corrected:.4g}, "
+            f"which is above {alpha:g}"
+        )
+        return (), (NotTested(Pairs.what, why),)
+    opened = [one.item for one in omnibus if one.verdict in ("shown", "suggested")]
+    if not opened:
+        return (), (NotTested(Pairs.what, "no statement shows a difference between the settings"),)
+    each = [(item, *two) for item in opened for two in combinations(range(k), 2)]
+    outcomes = {
+        f"{item} {first} {second}": paired(answers.values[item][:, first], answers.values[item][:, second], alpha=alpha)
+        for item, first, second in each
+    }
+    primary = [answers.decided.is_primary(item) for item, *_ in each]
+    tested = in_family(outcomes, alpha, f"{answers.block.id}: all pairs of settings", holm, HOLM, primary=primary)
+    return tuple(
+        Pair(codes[first], codes[second], replace(one, item=item))
+        for (item, first, second), one in zip(each, tested, strict=True)
+    ), ()
+
+
+class Pairs(Finding[tuple[Pair, ...]]):
+    """The comparison of settings two by two, in the statements that differ at all."""
+
+    key = "pairs"
+    place = 3
+    row_place = 7
+    what = "comparison of two settings"
+    part = "pairs"
+    kinds = ("liquids", "views")
+    waits = ("liquids", "views")
+    empty = ()
+
+    @classmethod
+    def test(cls, answers: Asked, found: BlockFound) -> tuple[tuple[Pair, ...], Absent]:
+        return pairs_of(answers, SettingsDiffer.of(found))
+
+    def rows(self) -> Iterator[Row]:
+        for pair in self.value:
+            compared = f"{name(self.found, pair.first)} − {name(self.found, pair.second)}"
+            yield judged_row(self.found, "two settings differ", pair.tested) | {"comparison": compared}
+
+    def section(self) -> Iterator[str]:
+        if not (pairs := self.value):
+            return
+        yield heading(3, "Which of them differ?")
+        yield table(
+            ("Statement", "Pair", "n", "V", "p", "adjusted p", "smallest p", "rank-biserial", "Interval", "Verdict"),
+            [self._row(one) for one in pairs],
+            words=2,
+            last=1,
+        )
+        yield paragraph(
+            "Wilcoxon's signed ranks, exact, only in statements that differ as a whole; above 0 the first of a pair "
+            "was "
+            f"rated higher. p adjusted by Holm over all {pairs[0].tested.members} pairs of this table. "
+            f"{pairs[0].tested.outcome.method}. "
+            "Intervals: 95 %, Fisher z, which cover about 90 % up to two dozen pairs; none where all pairs that differ "
+            "went one way, since −1 and 1 are the ends of the scale, nor below six pairs that differ.",
+            "soft",
+        )
+
+    def _row(self, pair: Pair) -> list[str]:
+        outcome = pair.tested.outcome
+        differ = outcome.n - (outcome.zeros if isinstance(outcome, Paired) else 0)
+        one_way = outcome.effect is not None and abs(outcome.effect) == 1.0
+        return [
+            short(self.found, pair.tested.item),
+            f"{name(self.found, pair.first)} – {name(self.found, pair.second)}",
+            f"{outcome.n} ({differ} differ)",
+            number(outcome.statistic, 1),
+            *(p_value(p) for p in (outcome.p, pair.tested.p_adjusted, outcome.smallest_p)),
+            number(outcome.effect),
+            f"– (all {differ} one way)" if one_way else interval(outcome.interval),
+            pair.tested.verdict,
+        ]
+
+    def methods(self) -> Iterator[str]:
+        if self.value:
+            yield (
+                "Where these showed a difference, pairs were compared by Wilcoxon's signed ranks (exact; equal pairs "
+                "left out) with the matched rank-biserial correlation, Holm-adjusted over all pairs of all these "
+                "statements."
+            )
+
+    def calls(self, codes: str) -> Iterator[str]:
+        for pair in self.value:
+            yield from _pair_calls(self.found, codes, pair.first, pair.second, pair.tested)
