@@ -5,18 +5,26 @@ from dataclasses import replace
 from functools import partial
 from typing import Final
 
-from study_app.analysis.designs.block_tests import SEALED, Asked, asked, facts, untested
-from study_app.analysis.designs.level_summaries import levels_found
-from study_app.analysis.designs.question_measures import questions_found, scores_found
-from study_app.analysis.designs.site_thresholds import site_thresholds
+from study_app.analysis.data.blocks import Block
+from study_app.analysis.data.motion import Performance, performance
+from study_app.analysis.data.questions import questions_found, scores_found
+from study_app.analysis.data.study_tables import Study
 from study_app.analysis.findings import all_findings
-from study_app.analysis.results.block_results import BlockFound, Results
-from study_app.analysis.results.conduct import delivered, orders
-from study_app.analysis.results.not_tested import NotTested
-from study_app.analysis.results.section_failures import Ended, Failure, Failures, Progress, silent
-from study_app.analysis.tables.compared_blocks import Block
-from study_app.analysis.tables.performance import Performance, performance
-from study_app.analysis.tables.study_tables import Study
+from study_app.analysis.findings.block_tests import SEALED, Asked, asked, facts, untested
+from study_app.analysis.levels.summaries import levels_found
+from study_app.analysis.levels.thresholds import site_thresholds
+from study_app.analysis.results import (
+    BlockFound,
+    Ended,
+    Failure,
+    Failures,
+    NotTested,
+    Progress,
+    Results,
+    delivered,
+    orders,
+    silent,
+)
 
 SEED: Final = 1
 """Of all random rearrangements and resamples: the same results give the same numbers."""
@@ -34,7 +42,7 @@ def evaluate(study: Study, *, progress: Progress = silent, planning: bool = True
     --------
     >>> from pathlib import Path
     >>> from study_app.analysis.findings.statement_tests import SettingsDiffer
-    >>> from study_app.analysis.tables.study_tables import load_study
+    >>> from study_app.analysis.data.study_tables import load_study
     >>> results = evaluate(load_study(Path("results/sample-rek2024")), planning=False)
     >>> [(block.id, block.n, block.revealed) for block in results.blocks]
     [('liquids', 12, False), ('delays', 12, False)]

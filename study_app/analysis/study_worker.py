@@ -36,8 +36,8 @@ from study_app.store.tables.study_files import participants_of, study_folders
 from study_app.workers.messages import Stopped
 
 if TYPE_CHECKING:
-    from study_app.analysis.tables.compared_blocks import Block
-    from study_app.analysis.tables.study_tables import Study
+    from study_app.analysis.data.blocks import Block
+    from study_app.analysis.data.study_tables import Study
 
 # The libraries of an evaluation are loaded where they are needed: sessions are listed before.
 
@@ -103,7 +103,7 @@ def _changed(path: Path) -> float:
 
 def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
     """Tell of the sessions, then of the study, then draw; once the key is open, evaluate and draw the rest."""
-    from study_app.analysis.tables.study_tables import load_study  # noqa: PLC0415
+    from study_app.analysis.data.study_tables import load_study  # noqa: PLC0415
 
     send(Progress("reading sessions", 0.0))
     opened = reveals_of(folder) if all_opened(folder) else ()
@@ -113,15 +113,21 @@ def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
     study = load_study(folder)
     send(_study_found(study))
     _go_on(stop)
-    from study_app.analysis.figures import answer_figures, captions  # noqa: PLC0415
+    from study_app.analysis.figures import answer_figures  # noqa: PLC0415
 
     for number, block in enumerate(study.blocks):
         send(Progress("drawing", 0.3 + 0.7 * number / len(study.blocks)))
         if len(study.answers(block)):
             svg = answer_figures.render(study, block, "svg")
-            send(FigureDrawn(_name(study, block), captions.title(block), captions.caption(study, block), svg))
+            send(
+                FigureDrawn(_name(study, block), answer_figures.title(block), answer_figures.caption(study, block), svg)
+            )
         else:
-            send(FigureDrawn(_name(study, block), captions.title(block), "No completed session has answers here yet."))
+            send(
+                FigureDrawn(
+                    _name(study, block), answer_figures.title(block), "No completed session has answers here yet."
+                )
+            )
         _go_on(stop)
     _draw_questions(study, send, stop)
     if study.revealed and study.n:
@@ -130,7 +136,7 @@ def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
 
 def _draw_questions(study: Study, send: Send, stop: Callable[[], bool]) -> None:
     """Draw the figures of questions that no block of statements holds."""
-    from study_app.analysis.designs.question_measures import questions_found  # noqa: PLC0415
+    from study_app.analysis.data.questions import questions_found  # noqa: PLC0415
     from study_app.analysis.figures.question_figures import question_pictures  # noqa: PLC0415
 
     found = questions_found(study)
@@ -180,7 +186,7 @@ def _study_found(study: Study) -> StudyFound:
 def _evaluate(study: Study, send: Send, stop: Callable[[], bool]) -> None:
     """Test everything, then draw again what that adds to, and what only then can be drawn."""
     from study_app.analysis.evaluate import evaluate  # noqa: PLC0415
-    from study_app.analysis.figures.report_figures import pictures  # noqa: PLC0415
+    from study_app.analysis.figures.study_figures import pictures  # noqa: PLC0415
 
     going = partial(_going, send, stop)
     going("testing", 0.0)
@@ -192,10 +198,10 @@ def _evaluate(study: Study, send: Send, stop: Callable[[], bool]) -> None:
 
 
 def _title(study: Study, name: str) -> str:
-    from study_app.analysis.figures import captions  # noqa: PLC0415
+    from study_app.analysis.figures import answer_figures  # noqa: PLC0415
     from study_app.analysis.findings import all_findings  # noqa: PLC0415
 
-    titles = {_name(study, block): captions.title(block) for block in study.blocks}
+    titles = {_name(study, block): answer_figures.title(block) for block in study.blocks}
     titles |= {one.figure_name: one.figure_title for one in all_findings() if one.figure_name}
     return titles.get(name) or titles.get(name.partition("-")[0], name.capitalize())
 

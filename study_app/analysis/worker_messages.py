@@ -1,4 +1,7 @@
-"""Orders to the worker process that reads and evaluates studies, and its answers, as frozen values."""
+"""Orders to the worker process that reads and evaluates studies, its answers, and its client.
+
+The libraries and tables of an evaluation stay in that process.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,6 +9,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from study_app.store.exclusions import Exclusion
+from study_app.workers.client import WorkerClient
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,3 +151,11 @@ class Done:
 
 
 Answer: TypeAlias = StudiesFound | SessionsFound | StudyFound | FigureDrawn | Progress | Done
+
+
+AnalysisClient: TypeAlias = WorkerClient[Order, Answer]
+
+
+def start_analysis_worker() -> AnalysisClient:
+    """Start a worker process for orders about studies (see `study_app.analysis.study_worker.carry_out`)."""
+    return WorkerClient("study_app.analysis.study_worker:carry_out", name="analysis")

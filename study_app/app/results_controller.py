@@ -13,8 +13,8 @@ from typing import Any, Final, TypeAlias
 
 from PySide6.QtCore import QObject, QTimer
 
-from study_app.analysis.worker_client import AnalysisClient, start_analysis_worker
 from study_app.analysis.worker_messages import (
+    AnalysisClient,
     Answer,
     Done,
     FigureDrawn,
@@ -30,6 +30,7 @@ from study_app.analysis.worker_messages import (
     TakeBack,
     WriteReport,
     WriteTables,
+    start_analysis_worker,
 )
 from study_app.app.results_rows import exclusions_at, left_out, opened
 from study_app.gui.application import open_here

@@ -85,7 +85,7 @@ def _validate(validator: Path, to: Path) -> None:
 @click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write into.")
 def plot(results: Path, to: Path) -> None:
     """Draw the responses, with codes for conditions until the study is unblinded, then with names."""
-    from study_app.analysis.figures.plotting import plot as plot_study
+    from study_app.analysis.figures.study_figures import plot as plot_study
 
     with progress() as show:
         show("drawing the responses")

@@ -16,9 +16,8 @@ from study_app.workers.executors import Workers
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from study_app.analysis.power.power_curves import Powers
-    from study_app.analysis.power.threshold_studies import PrecisionPlans
-    from study_app.analysis.power.threshold_tables import Precisions
+    from study_app.analysis.planning.power_curves import Powers
+    from study_app.analysis.planning.threshold_studies import PrecisionPlans, Precisions
     from study_app.protocol.model import Protocol
 
 SIZES = (5, 8, 12, 16, 20, 24)
@@ -95,8 +94,8 @@ def power(
         workers = Workers(workers.count)
     elif engine == "dask" and workers.cluster is None:
         raise click.UsageError("--engine dask needs a cluster: give --cluster tcp://HOST:8786")
-    from study_app.analysis.power.plan import compares_statements
-    from study_app.analysis.power.threshold_studies import plans
+    from study_app.analysis.planning.simulated_studies import compares_statements
+    from study_app.analysis.planning.threshold_studies import plans
     from study_app.protocol.load import load
     from study_app.store.output_files import make_folder
 
@@ -132,10 +131,9 @@ def _of_statements(
     study: Protocol, sizes: tuple[int, ...], studies: int, seed: int, show: ShowProgress, executor: Executor
 ) -> Iterator[Powers]:
     """Yield the power of the tests of statements, from ever more studies."""
-    from study_app.analysis.power.batch_counts import sweep
-    from study_app.analysis.power.plan import plan
-    from study_app.analysis.power.power_curves import powers
-    from study_app.session.simulated.rehearsal import condition_features
+    from study_app.analysis.planning.power_curves import powers
+    from study_app.analysis.planning.simulated_studies import plan, sweep
+    from study_app.session.simulated.trial_features import condition_features
 
     show("simulating every condition")
     planned = plan(study, condition_features(study, seed=seed, progress=show))
@@ -153,8 +151,7 @@ def _of_thresholds(
     executor: Executor,
 ) -> Iterator[Precisions]:
     """Yield the precision of thresholds, from ever more studies."""
-    from study_app.analysis.power.threshold_studies import sweep
-    from study_app.analysis.power.threshold_tables import Precisions
+    from study_app.analysis.planning.threshold_studies import Precisions, sweep
 
     show("simulating observers")
     for done, found in sweep(planned, sizes, studies, seed, executor):
@@ -163,10 +160,8 @@ def _of_thresholds(
 
 def _write(found: Powers | Precisions, to: Path | None) -> None:
     """Print the tables; write them and the figures into a folder."""
-    from study_app.analysis.power.power_curves import Powers
-    from study_app.analysis.power.power_files import write
-    from study_app.analysis.power.power_tables import power_markdown
-    from study_app.analysis.power.threshold_tables import threshold_csv, threshold_markdown
+    from study_app.analysis.planning.power_curves import Powers, power_markdown, write
+    from study_app.analysis.planning.threshold_studies import threshold_csv, threshold_markdown
     from study_app.store.output_files import write_files
 
     if isinstance(found, Powers):
@@ -190,8 +185,8 @@ def preregister(protocol: str, computed: Path | None, to: Path | None) -> None:
 
     In the study's folder (results/<study>) the report compares the study with it and lists every deviation.
     """
-    from study_app.analysis.preregistration.commitment import FILE as NAME
-    from study_app.analysis.preregistration.document import preregistration
+    from study_app.analysis.planning.preregistration import FILE as NAME
+    from study_app.analysis.planning.preregistration import preregistration
     from study_app.protocol.load import parse, protocol_hash, source_bytes
     from study_app.store.output_files import write_files
 

@@ -275,6 +275,6 @@ HIDDEN = ("zembla", "quorn", "1013.7", "877.3")
 @pytest.fixture
 def figures_of_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw PNG alone, which the page holds: every form is drawn anew, by the same code."""
-    from study_app.analysis.figures.report_figures import pictures
+    from study_app.analysis.figures.study_figures import pictures
 
     monkeypatch.setattr("study_app.analysis.report.write_report.pictures", partial(pictures, forms=("png",)))

@@ -7,9 +7,9 @@ from typing import Any
 
 import pandas as pd
 
-from study_app.analysis.tables.compared_blocks import Block, Item, Setting
-from study_app.analysis.tables.planned_analysis import NOTHING, Decided
-from study_app.analysis.tables.study_tables import Study
+from study_app.analysis.data.blocks import NOTHING, Block, Decided, Item, Setting
+from study_app.analysis.data.study_tables import Study
+from study_app.store.tables.column import Column
 from study_app.store.tables.columns import RESPONSES, TRIALS
 from study_app.store.tables.csv_files import Column
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from study_app import figure_style
-from study_app.analysis.figures.levels.level_pictures import level_pictures
+from study_app.analysis.data.study_tables import Study
+from study_app.analysis.figures.level_figures import level_pictures
 from study_app.analysis.figures.question_figures import question_pictures
-from study_app.analysis.figures.report_figures import pictures
+from study_app.analysis.figures.study_figures import pictures
 from study_app.analysis.report import write_report
-from study_app.analysis.tables.study_tables import Study
 from tests.golden import figure_of, file_lines, stub_png
 
 GOLDEN = Path(__file__).parent / "golden"

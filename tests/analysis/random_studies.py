@@ -7,19 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from study_app.analysis.data.study_tables import Study
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.figures.report_figures import pictures
+from study_app.analysis.figures.study_figures import pictures
 from study_app.analysis.findings import all_findings
-from study_app.analysis.report import findings_summary, number_files
-from study_app.analysis.report.block_section import block
-from study_app.analysis.report.first_page.claims import answers
-from study_app.analysis.report.first_page.first_page import first_page
-from study_app.analysis.report.json_values import plain
-from study_app.analysis.report.methods_paragraph import methods
-from study_app.analysis.report.r_script import r_script
-from study_app.analysis.results.block_results import Results
-from study_app.analysis.results.section_failures import Failures
-from study_app.analysis.tables.study_tables import Study
+from study_app.analysis.report import number_files, sentences
+from study_app.analysis.report.first_page import answers, first_page
+from study_app.analysis.report.number_files import plain, r_script
+from study_app.analysis.report.sections import block
+from study_app.analysis.report.sentences import methods
+from study_app.analysis.results import Failures, Results
 from tests.analysis.made_up import DECIDED, ITEMS, Presented, delays, liquids, study
 from tests.analysis.report.read_report import FORBIDDEN, seen
 
@@ -57,8 +54,8 @@ def keeps_contract(made: Study, forms: Sequence[str] = ()) -> Results:
     json.dumps(plain(results), allow_nan=False)
     failures = Failures()
     figures = list(pictures(made, results, forms, failures)) if forms else []
-    texts = [*findings_summary.findings(results), methods(made, results), *findings_summary.limits(made, results)]
-    page = first_page(results, findings_summary.limits(made, results), failures)
+    texts = [*sentences.findings(results), methods(made, results), *sentences.limits(made, results)]
+    page = first_page(results, sentences.limits(made, results), failures)
     texts.append(seen(re.sub(r'src="[^"]*"', 'src="#part-"', page)))
     for found in results.blocks:
         section = " ".join(block(found, results, figures, failures))

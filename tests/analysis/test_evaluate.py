@@ -9,23 +9,19 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from study_app.analysis.designs.block_tests import MANY, of_tables
-from study_app.analysis.designs.verdicts import judged
+from study_app.analysis import results
+from study_app.analysis.data.blocks import Block, Decided, Item, Setting
+from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.evaluate import evaluate
+from study_app.analysis.findings.block_tests import MANY, judged, of_tables
 from study_app.analysis.findings.delays import ContrastsWithControl, equivalent_up_to
 from study_app.analysis.findings.other_assumptions import SameWithOtherAssumptions
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer, pairs_of
-from study_app.analysis.report.json_values import plain
-from study_app.analysis.results import item_test
-from study_app.analysis.results.block_results import BlockFound, Results
-from study_app.analysis.statistics.friedman import friedman
-from study_app.analysis.statistics.multiple_comparisons import false_discovery, holm
-from study_app.analysis.statistics.outcome import DRAWS
-from study_app.analysis.statistics.paired import paired
-from study_app.analysis.tables.compared_blocks import Block, Item, Setting
-from study_app.analysis.tables.planned_analysis import Decided
-from study_app.analysis.tables.study_tables import load_study
+from study_app.analysis.report.number_files import plain
+from study_app.analysis.results import BlockFound, Results
+from study_app.analysis.statistics.outcome import DRAWS, false_discovery, holm
+from study_app.analysis.statistics.rank_tests import friedman, paired
 from study_app.errors import AnalysisError
 from study_app.protocol.load import parse, source_bytes
 from tests.analysis.conftest import Answer, make_results, twelve
@@ -201,7 +197,7 @@ def test_where_one_liquid_differs_the_others_are_seldom_told_apart(n: int) -> No
     decided = replace(DECIDED, primary=())
     wrong = right = 0
     opened_ = paired([1.0, 2.0], [2.0, 1.0])
-    omnibus = tuple(item_test.Tested(item.id, opened_, "f", 9, "Holm", 0.001, True, "shown") for item in items)
+    omnibus = tuple(results.Tested(item.id, opened_, "f", 9, "Holm", 0.001, True, "shown") for item in items)
     for _ in range(100):
         latent = 3.5 + np.array([[0.0], [2.0], [0.0]]) + rng.normal(0, 1, (9, n, 3, 1))
         values = {item.id: np.clip(np.rint(rows), 1, 7) for item, rows in zip(items, latent, strict=True)}

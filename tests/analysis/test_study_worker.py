@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.export.export import export
-from study_app.analysis.figures import captions
+from study_app.analysis.figures import answer_figures
 from study_app.analysis.study_worker import carry_out
-from study_app.analysis.tables.study_tables import load_study
-from study_app.analysis.worker_client import AnalysisClient, start_analysis_worker
 from study_app.analysis.worker_messages import (
+    AnalysisClient,
     Answer,
     Done,
     FigureDrawn,
@@ -30,6 +30,7 @@ from study_app.analysis.worker_messages import (
     TakeBack,
     WriteReport,
     WriteTables,
+    start_analysis_worker,
 )
 from study_app.errors import AnalysisError, StoreError
 from study_app.protocol.load import load
@@ -107,7 +108,7 @@ def test_once_open_names_are_told_and_what_tests_add_is_drawn_again(study: Path)
     assert shares == sorted(shares)
     assert shares
     block = load_study(study).blocks[0]
-    assert next(one.title for one in of_kind(FigureDrawn, answers)) == captions.title(block)
+    assert next(one.title for one in of_kind(FigureDrawn, answers)) == answer_figures.title(block)
 
 
 def test_trials_can_be_named_for_leaving_out_and_then_do_not_count(study: Path) -> None:

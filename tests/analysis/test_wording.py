@@ -6,18 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from study_app.analysis.data.study_tables import Study
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.export.codebook import codebook_bytes
+from study_app.analysis.export.table_files import codebook_bytes
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold
 from study_app.analysis.findings.other_assumptions import SameWithOtherAssumptions
 from study_app.analysis.findings.statement_tests import DelayTrend, SessionsDiffer, SettingsDiffer
-from study_app.analysis.report.block_section import block
-from study_app.analysis.report.findings_summary import findings
-from study_app.analysis.report.methods_paragraph import methods
-from study_app.analysis.report.r_script import r_script
-from study_app.analysis.results.block_results import BlockFound, Results
-from study_app.analysis.results.words import all_of, said_of_presentations
-from study_app.analysis.tables.study_tables import Study
+from study_app.analysis.report.number_files import r_script
+from study_app.analysis.report.sections import block
+from study_app.analysis.report.sentences import findings, methods
+from study_app.analysis.results import BlockFound, Results, all_of, said_of_presentations
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
 
 pytestmark = pytest.mark.slow

@@ -12,8 +12,7 @@ from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 from study_app.analysis.study_worker import carry_out
-from study_app.analysis.worker_client import start_analysis_worker
-from study_app.analysis.worker_messages import Answer, Order
+from study_app.analysis.worker_messages import Answer, Order, start_analysis_worker
 from study_app.app.results_controller import ResultsController
 from study_app.errors import StudyError
 from study_app.gui.home.main_window import MainWindow

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from study_app.analysis.designs.level_summaries import levels_found
-from study_app.analysis.report.answers.withheld_section import withheld
-from study_app.analysis.tables.compared_blocks import setting_name
-from study_app.analysis.tables.study_tables import load_study
-from study_app.analysis.tables.tracks import tracks
+from study_app.analysis.data.blocks import setting_name
+from study_app.analysis.data.study_tables import load_study
+from study_app.analysis.levels.summaries import levels_found
+from study_app.analysis.levels.thresholds import tracks
+from study_app.analysis.report.level_sections import withheld
 from study_app.evaluation import replay as replay_module
 from study_app.evaluation.replay import replay
 from study_app.protocol.load import parse

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from study_app import workspace
-from study_app.analysis.preregistration import commitment
+from study_app.analysis.planning import preregistration
 from study_app.authoring import drafts
 from study_app.devices.falcon.mechanics import calibration
 from study_app.errors import StudyError
@@ -34,7 +34,7 @@ HASH = "0123456789abcdef" * 4
 LINE = json.dumps({"at": AT, "by": "AB", "reason": "x", "exclusion": asdict(Exclusion("P1", 1, None, "CD", "y", AT))})
 TOMBSTONE = Tombstone("P1", AT, "AB", "asked", (ErasedSession(1, HASH, HASH, "k3vq-7m2p-xw4d"),))
 MERGED = Merged(Path(), "demo", HASH, (Site("A", AT, HASH, 3), Site("B", AT, HASH, 4)))
-COMMITMENT = commitment.Commitment("demo", "1", HASH, 24, 0.1, ("catch",))
+COMMITMENT = preregistration.Commitment("demo", "1", HASH, 24, 0.1, ("catch",))
 
 
 def read_workspace(_folder: Path) -> object:
@@ -43,7 +43,7 @@ def read_workspace(_folder: Path) -> object:
 
 
 def use_commitment(folder: Path) -> object:
-    found = commitment.read(folder)
+    found = preregistration.read(folder)
     return found and (found.protocol_hash[:12], set(found.rules))
 
 
@@ -65,7 +65,7 @@ KINDS: dict[str, tuple[Callable[[Path], Path], str, Callable[[Path], object]]] =
         "k3vq-7m2p-xw4d  data/sub-P007/ses-01\n",
         lambda f: (listed(f / "fingerprints.txt"), unreadable(f / "fingerprints.txt")),
     ),
-    "preregistration": (lambda f: f / commitment.FILE, commitment.written(COMMITMENT), use_commitment),
+    "preregistration": (lambda f: f / preregistration.FILE, preregistration.written(COMMITMENT), use_commitment),
     "settings": (lambda _: settings_file(), workstation.DEFAULTS.model_dump_json(), lambda _: workstation.load()),
     "workspace": (lambda _: settings_file(), '{"workspace": "/tmp", "results": "/tmp/results"}', read_workspace),
     "outputs": (

@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from study_app.analysis.tables.study_tables import load_study
+from study_app.analysis.data.study_tables import load_study
 from study_app.session.transitions.events import EndAsked, Note, RepeatAsked
 from study_app.session.transitions.state import Phase
 from study_app.store.exclusions import exclude, exclusions

@@ -39,7 +39,7 @@ ERROR = re.compile(r"([a-z]\w*\.)?[A-Z]\w+(, ([a-z]\w*\.)?[A-Z]\w+)*")
 EXAMPLES = (
     "study_app.protocol.load.load",
     "study_app.haptics.runtime.offline.simulate",
-    "study_app.analysis.tables.study_tables.load_study",
+    "study_app.analysis.data.study_tables.load_study",
     "study_app.analysis.evaluate.evaluate",
     "study_app.evaluation.replay.replay",
 )

@@ -8,7 +8,7 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import t as student
 
-from study_app.analysis.statistics.psychometrics.posterior import fitted
+from study_app.analysis.statistics.thresholds import fitted
 from study_app.psychophysics.families import CLIP, KAPPA, level_at, position, rise, success
 from study_app.psychophysics.grid import FREE_GUESSES, Grid, evenly, geometric, quantile
 from study_app.psychophysics.precision import AT_ONCE, Expected, estimated, student_975

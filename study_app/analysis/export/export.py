@@ -3,14 +3,13 @@
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
+from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.export import psychds_dataset, spss
-from study_app.analysis.export.table_files import NOTHING_ELSE, Extra, file_name, table_files
-from study_app.analysis.export.table_formats import table_bytes
-from study_app.analysis.export.typed_tables import deliver
-from study_app.analysis.export.wide_table import wide
-from study_app.analysis.results.section_failures import Failure, Progress, silent
-from study_app.analysis.tables.study_tables import Study, load_study
-from study_app.store.output_files import FileCopy, write_output
+from study_app.analysis.export.table_files import NOTHING_ELSE, Extra, file_name, table_bytes, table_files
+from study_app.analysis.export.tables import deliver, wide
+from study_app.analysis.results import Failure, Progress, silent
+from study_app.store.output_files import FileCopy
+from study_app.store.withdrawals.output_log import write_output
 
 
 def export(

@@ -17,11 +17,10 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.export.delivered import Delivered
-from study_app.analysis.export.wide_table import Cells, QuestionCells
-from study_app.analysis.tables.asked_questions import AskedScore
-from study_app.analysis.tables.measures import LEVELS
-from study_app.analysis.tables.study_tables import Study
+from study_app.analysis.data.blocks import AskedScore
+from study_app.analysis.data.measures import LEVELS
+from study_app.analysis.data.study_tables import Study
+from study_app.analysis.export.tables import Cells, Delivered, QuestionCells
 from study_app.errors import AnalysisError
 from study_app.store.tables.csv_files import Column
 

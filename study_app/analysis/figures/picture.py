@@ -7,13 +7,11 @@ from functools import partial
 from matplotlib.figure import Figure
 
 from study_app import figure_style as style
+from study_app.analysis.data.blocks import Block
+from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.answer_figures import marks
 from study_app.analysis.figures.page_layout import Sheet
-from study_app.analysis.results.block_results import BlockFound, Results
-from study_app.analysis.results.section_failures import Failure, Failures
-from study_app.analysis.results.words import counted
-from study_app.analysis.tables.compared_blocks import Block
-from study_app.analysis.tables.study_tables import Study
+from study_app.analysis.results import BlockFound, Failure, Failures, Results, counted
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,24 +1,194 @@
-"""The figures of questions that no block of statements holds, each as PNG, SVG and PDF with its caption."""
+"""The figures of questions that no block of statements holds."""
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
-from typing import Final
+from typing import Final, TypeAlias
+
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap, to_hex
 
 from study_app import figure_style as style
-from study_app.analysis.figures import answer_figures, questions
+from study_app.analysis.data.blocks import AskedQuestion
+from study_app.analysis.data.study_tables import Study
+from study_app.analysis.figures import answer_figures
+from study_app.analysis.figures.page_layout import MARGIN_PT, Mark, Sheet
 from study_app.analysis.figures.picture import Picture, attempted, files_of, sample_words
-from study_app.analysis.figures.questions.group_rows import Look, QuestionFigure
-from study_app.analysis.results.question_answers import QuestionFound
-from study_app.analysis.results.section_failures import Failures
-from study_app.analysis.results.words import counted
-from study_app.analysis.tables.asked_questions import AskedQuestion
-from study_app.analysis.tables.study_tables import Study
-from study_app.discovery import modules_of
+from study_app.analysis.levels.results import QuestionFound
+from study_app.analysis.results import Failures, counted
 
-FIGURES: Final[dict[str, QuestionFigure]] = {
-    module.FIGURE.id: module.FIGURE for module in modules_of(questions) if hasattr(module, "FIGURE")
-}
-"""Every figure by the id that a kind of question names it by, found by importing the modules of one folder."""
+LEFT_PT: Final = 120.0
+RIGHT_PT: Final = 40.0
+TOP_PT: Final = 30.0
+FOOT_PT: Final = 34.0
+LINE_PT: Final = 8.5
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """The title of a figure, what must not be overlooked, how many answered, and the fonts."""
+
+    title: str
+    marks: Sequence[Mark]
+    counts: Sequence[str]
+    fonts: Sequence[str]
+
+
+Draw: TypeAlias = Callable[[AskedQuestion, QuestionFound, Look], Sheet]
+
+
+@dataclass(frozen=True, slots=True)
+class QuestionFigure:
+    """A figure by its id: what draws it, and the sentence of its caption."""
+
+    id: str
+    draw: Draw
+    caption: str
+
+
+def rows(names: Sequence[str], ns: Sequence[int], look: Look, *, row_pt: float) -> tuple[Sheet, Axes]:
+    """Return a sheet and its axes, in which row k lies around y = k, the first at the top."""
+    height = TOP_PT + row_pt * len(names) + FOOT_PT
+    sheet = Sheet(style.PAGE_WIDTH_PT, height, look.fonts)
+    sheet.heading(look.title, look.marks, look.counts)
+    axes = sheet.axes(LEFT_PT, TOP_PT, sheet.width_pt - LEFT_PT - RIGHT_PT, row_pt * len(names))
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    for place, (name, n) in enumerate(zip(names, ns, strict=True)):
+        lines = sheet.wrap(name, LEFT_PT - MARGIN_PT - 8, 7)
+        middle = TOP_PT + row_pt * (place + 0.5)
+        for number, line in enumerate(lines):
+            y = middle + LINE_PT * (number - (len(lines) - 1) / 2) + 2.5
+            sheet.text(LEFT_PT - 8, y, line, size=7, ha="right")
+        sheet.text(sheet.width_pt - MARGIN_PT, middle + 2.5, f"n = {n}", size=6.5, colour=style.TEXT_SOFT, ha="right")
+    return sheet, axes
+
+
+ROW_PT: Final = 30.0
+BAND: Final = 0.22
+PILE: Final = 0.07  # from one of equal answers to the next
+
+
+@style.own_settings()
+def draw_distribution(asked: AskedQuestion, found: QuestionFound, look: Look) -> Sheet:
+    """Draw the answers."""
+    groups = found.groups
+    sheet, axes = rows(
+        [group.name for group in groups], [int(group.numbers["n"]) for group in groups], look, row_pt=ROW_PT
+    )
+    values = [value for group in groups for value in group.numbers["values"]]
+    low, high = asked.bounds or (min(values, default=0.0), max(values, default=1.0))
+    span = (high - low) or 1.0
+    axes.set_xlim(low - 0.03 * span, high + 0.03 * span)
+    for place, group in enumerate(groups):
+        numbers = group.numbers
+        axes.plot([low, high], [place, place], color=style.GRID, linewidth=0.8, zorder=0)
+        if numbers["median"] is None:
+            continue
+        axes.fill_between([numbers["q1"], numbers["q3"]], place - BAND, place + BAND, color=style.BAND, linewidth=0)
+        axes.plot([numbers["median"]] * 2, [place - BAND, place + BAND], color=style.ACCENT, linewidth=1.6)
+        for value, many in sorted(Counter(numbers["values"]).items()):
+            ys = [place + PILE * (number - (many - 1) / 2) for number in range(many)]
+            axes.plot([value] * many, ys, "o", markersize=2.6, color=style.PARTICIPANT, gid=f"{group.code}")
+    y = sheet.height_pt - FOOT_PT + 12
+    view = asked.question.view(0, asked.context)
+    ends = (f"{low:g} {getattr(view, 'low', '')}".strip(), f"{high:g} {getattr(view, 'high', '')}".strip())
+    sheet.text(LEFT_PT, y, ends[0], size=6.5, colour=style.TEXT_SOFT)
+    sheet.text(sheet.width_pt - RIGHT_PT, y, ends[1], size=6.5, colour=style.TEXT_SOFT, ha="right")
+    return sheet
+
+
+DISTRIBUTION: Final = QuestionFigure(
+    "distribution",
+    draw_distribution,
+    "Every answer is a dot; line: median; band: from the lower to the upper quartile.",
+)
+
+
+OPTION_PT: Final = 20.0
+
+
+@style.own_settings()
+def draw_options(asked: AskedQuestion, found: QuestionFound, look: Look) -> Sheet:
+    """Draw the counts of all options."""
+    several = len(found.groups) > 1
+    bars = [
+        (f"{group.name}: {words}" if several else words, int(group.numbers["counts"][option]), int(group.numbers["n"]))
+        for group in found.groups
+        for option, words in asked.levels.items()
+    ]
+    sheet, axes = rows([name for name, _, _ in bars], [n for _, _, n in bars], look, row_pt=OPTION_PT)
+    most = max((n for _, _, n in bars), default=1) or 1
+    axes.set_xlim(0, most * 1.06)
+    for place, (_, count, n) in enumerate(bars):
+        axes.barh(place, n, height=0.56, color=style.GROUND)
+        axes.barh(place, count, height=0.56, color=style.ACCENT, gid=f"bar-{place}")
+        axes.text(count + 0.01 * most, place, str(count), va="center", fontproperties=sheet.font(6.5))
+    return sheet
+
+
+OPTIONS: Final = QuestionFigure("counts", draw_options, "How often each option was chosen; grey: all who answered.")
+
+
+RATING_PT: Final = 26.0
+HALF: Final = 0.32
+SWATCH_PT: Final = 18.0
+NARROW: Final = 0.03  # share of a bar in which the value is not printed
+
+
+def colours(points: int) -> list[str]:
+    """Return a colour for each point, from the palette of agreement."""
+    palette = LinearSegmentedColormap.from_list("points", style.LEVEL_COLOURS)
+    return [to_hex(palette(place / (points - 1))) for place in range(points)]
+
+
+def _ink(colour: str) -> str:
+    red, green, blue = (int(colour[place : place + 2], 16) for place in (1, 3, 5))
+    return "#000000" if 0.299 * red + 0.587 * green + 0.114 * blue > 130 else "#ffffff"
+
+
+@style.own_settings()
+def draw_ratings(asked: AskedQuestion, found: QuestionFound, look: Look) -> Sheet:
+    """Draw the counts of all points."""
+    groups = found.groups
+    sheet, axes = rows(
+        [group.name for group in groups], [int(group.numbers["n"]) for group in groups], look, row_pt=RATING_PT
+    )
+    axes.set_xlim(0, 1)
+    inks = colours(len(asked.levels))
+    for place, group in enumerate(groups):
+        total = max(1, int(group.numbers["n"]))
+        left = 0.0
+        for count, colour in zip(group.numbers["counts"].values(), inks, strict=True):
+            share = count / total
+            axes.barh(place, share, left=left, height=2 * HALF, color=colour, gid=f"{group.code}")
+            if share > NARROW:
+                axes.text(
+                    left + share / 2, place, str(count), ha="center", va="center", color=_ink(colour),
+                    fontproperties=sheet.font(6.5),
+                )  # fmt: skip
+            left += share
+    _legend(sheet, list(asked.levels.values()), inks)
+    return sheet
+
+
+def _legend(sheet: Sheet, names: list[str], inks: list[str]) -> None:
+    """Write the ends of the scale, and between them the points in their colours."""
+    y, right = sheet.height_pt - 12, sheet.width_pt - RIGHT_PT
+    sheet.text(LEFT_PT, y, names[0], size=6.5, colour=style.TEXT_SOFT)
+    sheet.text(right, y, names[-1], size=6.5, colour=style.TEXT_SOFT, ha="right")
+    x = (LEFT_PT + right - SWATCH_PT * len(inks)) / 2
+    for point, ink in enumerate(inks, start=1):
+        sheet.box(x, y - 8.5, SWATCH_PT, 11, ink, rounding=0.5)
+        sheet.text(x + SWATCH_PT / 2, y, str(point), size=6.5, colour=_ink(ink), ha="center")
+        x += SWATCH_PT
+
+
+RATINGS: Final = QuestionFigure("rating", draw_ratings, "Counts of the answers at each point, as shares of each bar.")
+
+
+FIGURES: Final = {one.id: one for one in (RATINGS, OPTIONS, DISTRIBUTION)}
+"""Every figure by the id that a kind of question names it by."""
 
 
 def question_pictures(

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
 from study_app import figure_style as style
-from study_app.analysis.figures import psychometric_curve
+from study_app.analysis.figures import delay_figures
 from study_app.analysis.figures.page_layout import Sheet
 from study_app.analysis.findings.delays import (
     ContrastsWithControl,
@@ -14,14 +14,13 @@ from study_app.analysis.findings.delays import (
     LowestDelay,
     equivalent_up_to,
 )
-from study_app.analysis.findings.finding import Finding
+from study_app.analysis.findings.finding import FOOT_PT, HEIGHT_PT, NO_EVIDENCE, WIDTH_PT, Answer, Finding, foot
 from study_app.analysis.findings.statement_tests import DelayTrend
-from study_app.analysis.report.first_page.answer import NO_EVIDENCE, Answer
-from study_app.analysis.report.first_page.pictures import FOOT_PT, HEIGHT_PT, WIDTH_PT, foot
 from study_app.analysis.report.html_page import box, heading, paragraph, table
-from study_app.analysis.results.block_results import BlockFound, Results
-from study_app.analysis.results.delivered_delay import Delivered
-from study_app.analysis.results.words import (
+from study_app.analysis.results import (
+    BlockFound,
+    Delivered,
+    Results,
     all_of,
     beyond,
     counted,
@@ -35,7 +34,7 @@ from study_app.analysis.results.words import (
     short,
     signed_difference,
 )
-from study_app.analysis.statistics.equivalence.tost import fewest
+from study_app.analysis.statistics.equivalence import fewest
 
 
 class NoticedFrom(Finding[None]):
@@ -123,7 +122,7 @@ class NoticedFrom(Finding[None]):
         if threshold is None or not any(threshold.asked):
             return None
         axes = sheet.axes(32, 6, WIDTH_PT - 46, HEIGHT_PT - FOOT_PT - 16)
-        psychometric_curve.curve(sheet, axes, threshold, answer.at_ms)
+        delay_figures.curve(sheet, axes, threshold, answer.at_ms)
         dashed = "" if answer.at_ms is None else "; dashed: the answer"
         foot(sheet, f"Share that noticed, over delay in ms{dashed}")
         curve = "" if threshold.effect is None else ", with the fitted curve"

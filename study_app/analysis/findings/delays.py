@@ -4,19 +4,19 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from study_app.analysis.designs.block_tests import MANY, Asked
-from study_app.analysis.designs.verdicts import HOLM
-from study_app.analysis.figures import movement_plots, psychometric_curve, small_multiples
+from study_app.analysis.data.blocks import Block, Direction
+from study_app.analysis.data.motion import OF_REACHES
+from study_app.analysis.figures import delay_figures
 from study_app.analysis.figures.picture import Drawing, Picture
-from study_app.analysis.findings.finding import Absent, Finding, Row
+from study_app.analysis.findings.block_tests import HOLM, MANY, Asked
+from study_app.analysis.findings.finding import FOUND, Absent, Finding, Row
 from study_app.analysis.findings.statement_tests import ONE_DELAY, DelayTrend
-from study_app.analysis.report.first_page.answer import FOUND
 from study_app.analysis.report.html_page import heading, paragraph, table
-from study_app.analysis.report.r_syntax import r_number, r_text
-from study_app.analysis.report.test_rows import rows_alone, test_row
-from study_app.analysis.results.block_results import BlockFound, Results
-from study_app.analysis.results.not_tested import NotTested
-from study_app.analysis.results.words import (
+from study_app.analysis.report.test_rows import r_number, r_text, rows_alone, test_row
+from study_app.analysis.results import (
+    BlockFound,
+    NotTested,
+    Results,
     all_of,
     beyond,
     counted,
@@ -31,15 +31,18 @@ from study_app.analysis.results.words import (
     percent,
     short,
 )
-from study_app.analysis.statistics.equivalence.power import MOST, STUDIES, participants_needed
-from study_app.analysis.statistics.equivalence.tost import Equivalence, fewest, tost
-from study_app.analysis.statistics.equivalence.tost import Verdict as Nearness
-from study_app.analysis.statistics.multiple_comparisons import holm
-from study_app.analysis.statistics.psychometrics.threshold import Threshold, noticed
+from study_app.analysis.statistics.equivalence import (
+    MOST_PARTICIPANTS,
+    STUDIES,
+    Equivalence,
+    fewest,
+    participants_needed,
+    tost,
+)
+from study_app.analysis.statistics.equivalence import Verdict as Nearness
+from study_app.analysis.statistics.outcome import holm
+from study_app.analysis.statistics.psychometrics import Threshold, noticed
 from study_app.analysis.statistics.trend import StepDown, step_down
-from study_app.analysis.tables.compared_blocks import Block
-from study_app.analysis.tables.performance import OF_REACHES
-from study_app.analysis.tables.planned_analysis import Direction
 
 AGAINST = (
     *("Statement", "Delay", "n", "difference", "interval", "people beyond the bound", "p equivalent"),
@@ -125,7 +128,7 @@ def _needed(one: ContrastWithControl) -> str:
     """Return how many participants equivalence would take, and a dash where this is unknown."""
     if one.found.n_needed is not None:
         return str(one.found.n_needed)
-    return f"> {MOST}" if one.found.sd is not None else "–"
+    return f"> {MOST_PARTICIPANTS}" if one.found.sd is not None else "–"
 
 
 def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
@@ -484,7 +487,7 @@ class DetectionThreshold(Finding[Threshold | None]):
         return drawing.picture(
             self.figure_title,
             caption,
-            lambda **own: psychometric_curve.draw(threshold, lowest, counts=("",), **own).figure,
+            lambda **own: delay_figures.draw_threshold(threshold, lowest, counts=("",), **own).figure,
         )
 
     def sentences(self) -> Iterator[str]:
@@ -541,13 +544,13 @@ class Movement(Finding[None]):
             return None
         people = sorted({trial.participant for trial in measured.reached if trial.block == block.id})
         plots = [
-            movement_plots.Measured(MOVES[measure], measured.by_participant(people, block, measure))
+            delay_figures.Measured(MOVES[measure], measured.by_participant(people, block, measure))
             for measure in OF_REACHES
         ]
         n = f"n = {len(people)} participant" + ("" if len(people) == 1 else "s")
         caption = (
             f"How participants reached, over the delay that was asked for ({drawing.simulated}{n} with recordings). "
-            f"Thin lines: {small_multiples.line_words(len(people))}; thick line: median; band: the middle half. "
+            f"Thin lines: {delay_figures.line_words(len(people))}; thick line: median; band: the middle half. "
             "Movement time: from the lighting of a target to the entry that was held. Scales do not begin at zero. "
             f"{_kept(block, drawing.results)}"
         )
@@ -555,7 +558,7 @@ class Movement(Finding[None]):
             self.figure_title,
             caption,
             lambda **own: (
-                movement_plots.draw(
+                delay_figures.draw_movement(
                     plots,
                     [setting.delay_ms or 0.0 for setting in block.settings],
                     counts=[f"{n} with recordings", n],

@@ -6,19 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from study_app.analysis.designs.block_tests import MANY, Asked
-from study_app.analysis.designs.verdicts import alone
+from study_app.analysis.data.measures import Array
+from study_app.analysis.findings.block_tests import MANY, Asked, alone
 from study_app.analysis.findings.finding import Absent, Finding, Row
 from study_app.analysis.report.html_page import heading, paragraph, table
 from study_app.analysis.report.test_rows import judged_row
-from study_app.analysis.results.block_results import BlockFound
-from study_app.analysis.results.item_test import Tested
-from study_app.analysis.results.not_tested import NotTested
-from study_app.analysis.results.words import interval, number, p_value, short, statistic
-from study_app.analysis.statistics.ordinal import Ordinal, ordinal
+from study_app.analysis.results import BlockFound, NotTested, Tested, interval, number, p_value, short, statistic
+from study_app.analysis.statistics.mixed_model import Ordinal, ordinal
 from study_app.analysis.statistics.outcome import FEW
-from study_app.analysis.statistics.skillings_mack import skillings_mack
-from study_app.analysis.tables.measures import Array
+from study_app.analysis.statistics.rank_tests import skillings_mack
 from study_app.number_text import counted
 
 

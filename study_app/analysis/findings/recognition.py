@@ -9,27 +9,45 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from study_app import figure_style as style
-from study_app.analysis.designs.block_tests import Asked
-from study_app.analysis.designs.verdicts import verdict
-from study_app.analysis.figures import captions, recognition_matrix
+from study_app.analysis.data.blocks import Decided
+from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.page_layout import Sheet
 from study_app.analysis.figures.picture import Drawing, Picture
-from study_app.analysis.findings.finding import Absent, Finding, Row
+from study_app.analysis.findings.block_tests import Asked, verdict
+from study_app.analysis.findings.finding import (
+    FOOT_PT,
+    FOUND,
+    HEIGHT_PT,
+    NO_EVIDENCE,
+    WIDTH_PT,
+    Absent,
+    Answer,
+    Finding,
+    Row,
+    foot,
+)
 from study_app.analysis.findings.statement_tests import Pairs, SettingsDiffer, smallest_of_pairs
-from study_app.analysis.report.first_page.answer import FOUND, NO_EVIDENCE, Answer
-from study_app.analysis.report.first_page.pictures import FOOT_PT, HEIGHT_PT, WIDTH_PT, foot
 from study_app.analysis.report.html_page import heading, paragraph, table
-from study_app.analysis.report.r_syntax import r_number, r_text, r_vector
-from study_app.analysis.report.test_rows import rows_alone, test_row
-from study_app.analysis.results.block_results import BlockFound
-from study_app.analysis.results.item_test import Tested, Verdict
-from study_app.analysis.results.not_tested import NotTested
-from study_app.analysis.results.words import counted, interval, lead, listed, name, number, p_equals, p_value, short
+from study_app.analysis.report.test_rows import r_number, r_text, r_vector, rows_alone, test_row
+from study_app.analysis.results import (
+    BlockFound,
+    NotTested,
+    Tested,
+    Verdict,
+    counted,
+    interval,
+    lead,
+    listed,
+    name,
+    number,
+    p_equals,
+    p_value,
+    short,
+)
 from study_app.analysis.statistics.outcome import Interval
-from study_app.analysis.statistics.paired import Paired
+from study_app.analysis.statistics.rank_tests import Paired
 from study_app.analysis.statistics.recognition import MOST as MOST_NAMED
 from study_app.analysis.statistics.recognition import Recognition, named, recognition
-from study_app.analysis.tables.planned_analysis import Decided
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +146,8 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
                 f"each participant (exact, one-sided, {p_equals(named.found.p)})."
             )
         caption = (
-            f"The name that was rated highest for each liquid ({drawing.simulated}{captions.counts(study, block)[0]}). "
+            f"The name that was rated highest for each liquid ({drawing.simulated}"
+            f"{answer_figures.counts(study, block)[0]}). "
             f"Cells: counts and share of the row; framed: right. Undecided: {counted(2, 'name')} or more were rated "
             f"equally high.{chance}"
         )
@@ -136,12 +155,12 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
             self.figure_title,
             caption,
             lambda **own: (
-                recognition_matrix.draw(
+                answer_figures.draw_recognition(
                     named.found.table,
                     self.found.names,
                     [shorts[label] for label in named.labels],
                     right,
-                    counts=captions.counts(study, block),
+                    counts=answer_figures.counts(study, block),
                     foot="Counts, with the share of the row. Framed: the name that is right.",
                     **own,
                 ).figure

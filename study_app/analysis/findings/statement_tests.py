@@ -13,16 +13,16 @@ import numpy as np
 from scipy.stats import rankdata
 
 from study_app import number_text
-from study_app.analysis.designs.block_tests import SEALED, Asked, each_statement
-from study_app.analysis.designs.verdicts import FDR, HOLM, in_family, judged
+from study_app.analysis.data.blocks import KINDS
+from study_app.analysis.data.measures import medians
+from study_app.analysis.findings.block_tests import FDR, HOLM, SEALED, Asked, each_statement, in_family, judged
 from study_app.analysis.findings.finding import Absent, Finding, Row
 from study_app.analysis.report.html_page import heading, paragraph, table
-from study_app.analysis.report.r_syntax import r_number, r_text, r_vector
-from study_app.analysis.report.test_rows import judged_row, rows_alone, test_row
-from study_app.analysis.results.block_results import BlockFound
-from study_app.analysis.results.item_test import Tested
-from study_app.analysis.results.not_tested import NotTested
-from study_app.analysis.results.words import (
+from study_app.analysis.report.test_rows import judged_row, r_number, r_text, r_vector, rows_alone, test_row
+from study_app.analysis.results import (
+    BlockFound,
+    NotTested,
+    Tested,
     all_of,
     counted,
     higher,
@@ -38,15 +38,17 @@ from study_app.analysis.results.words import (
     statistic,
     test_name,
 )
-from study_app.analysis.statistics.friedman import Friedman, friedman
-from study_app.analysis.statistics.global_permutation import global_permutation
-from study_app.analysis.statistics.independent_groups import GroupsDiffer, groups_differ
-from study_app.analysis.statistics.multiple_comparisons import false_discovery, holm
-from study_app.analysis.statistics.outcome import Outcome
-from study_app.analysis.statistics.paired import Paired, paired
+from study_app.analysis.statistics.outcome import Outcome, false_discovery, holm
+from study_app.analysis.statistics.rank_tests import (
+    Friedman,
+    GroupsDiffer,
+    Paired,
+    friedman,
+    global_permutation,
+    groups_differ,
+    paired,
+)
 from study_app.analysis.statistics.trend import Page, page
-from study_app.analysis.tables.compared_blocks import KINDS
-from study_app.analysis.tables.measures import medians
 
 ONE_DELAY: Final = "the block has one delay: there is nothing to compare it with"
 HEAD: Final = ("Statement", "n", "Statistic", "p", "adjusted p", "smallest p", "Effect", "Interval", "Verdict")

@@ -1,10 +1,13 @@
-"""The page and its parts: one HTML file with its style and its pictures inside, without scripts, nothing fetched."""
+"""The page and its parts: one HTML file with its style, typeface and pictures inside, without scripts."""
 
 import base64
+import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
-from typing import Any
+from importlib import resources
+from typing import Any, Final
 
+from fontTools.subset import Options, Subsetter, load_font, save_font
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
@@ -88,3 +91,33 @@ def drawn(pictures: Mapping[str, Picture], name: str) -> Iterator[Markup]:
     """Yield the figure of this name, where there is one."""
     if name in pictures:
         yield picture(pictures[name].files["png"], pictures[name].caption)
+
+
+WEIGHTS: Final = {400: "Regular", 600: "SemiBold"}
+
+
+def font_faces(text: str) -> str:
+    """Return ``@font-face`` rules with the signs of ``text``; empty where Inter was not installed with the program."""
+    folder = resources.files("study_app") / "gui" / "assets" / "fonts"
+    rules = []
+    for weight, name in WEIGHTS.items():
+        file = folder / f"Inter-{name}.otf"
+        if not file.is_file():
+            return ""
+        data = base64.b64encode(_subset(file.read_bytes(), text)).decode("ascii")
+        rules.append(
+            f'@font-face {{ font-family: "Inter"; font-weight: {weight}; src: url(data:font/woff;base64,{data}); }}'
+        )
+    return "\n".join(rules)
+
+
+def _subset(content: bytes, text: str) -> bytes:
+    """Return the signs of ``text`` as WOFF; the same signs give the same bytes."""
+    options = Options(flavor="woff", layout_features=["kern", "tnum"], notdef_outline=True)
+    font = load_font(io.BytesIO(content), options)
+    subsetter = Subsetter(options)
+    subsetter.populate(text=text)
+    subsetter.subset(font)
+    target = io.BytesIO()
+    save_font(font, target, options)
+    return target.getvalue()

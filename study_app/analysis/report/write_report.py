@@ -8,26 +8,31 @@ from pathlib import Path
 from typing import Any
 
 from study_app import __version__
+from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.export.stated_credits import credit_lines
-from study_app.analysis.export.table_files import table_files
-from study_app.analysis.export.typed_tables import deliver
-from study_app.analysis.figures.levels.level_pictures import level_pictures
+from study_app.analysis.export.table_files import credit_lines, table_files
+from study_app.analysis.export.tables import deliver
+from study_app.analysis.figures.level_figures import level_pictures
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.figures.question_figures import question_pictures
-from study_app.analysis.figures.report_figures import pictures
-from study_app.analysis.preregistration.deviations import section as preregistration_section
-from study_app.analysis.report import block_section, conduct_section, findings_summary, number_files
-from study_app.analysis.report.answers import question_section
-from study_app.analysis.report.first_page.first_page import first_page
-from study_app.analysis.report.html_page import box, bullets, heading, not_there, page, paragraph, render, table
-from study_app.analysis.report.methods_paragraph import methods, version_words
-from study_app.analysis.report.r_script import r_script
-from study_app.analysis.report.typeface import font_faces
-from study_app.analysis.results.block_results import Results
-from study_app.analysis.results.section_failures import Failure, Failures, Progress, silent
-from study_app.analysis.results.words import counted
-from study_app.analysis.tables.study_tables import Study, load_study
+from study_app.analysis.figures.study_figures import pictures
+from study_app.analysis.planning.preregistration import deviations_section as preregistration_section
+from study_app.analysis.report import number_files, sections, sentences
+from study_app.analysis.report.first_page import first_page
+from study_app.analysis.report.html_page import (
+    box,
+    bullets,
+    font_faces,
+    heading,
+    not_there,
+    page,
+    paragraph,
+    render,
+    table,
+)
+from study_app.analysis.report.number_files import r_script
+from study_app.analysis.report.sentences import methods, version_words
+from study_app.analysis.results import Failure, Failures, Progress, Results, counted, silent
 from study_app.errors import AnalysisError
 from study_app.store.blinded.unblinding import reveals_of
 from study_app.store.output_files import write_output
@@ -111,8 +116,8 @@ def _files(study: Study, results: Results, drawn: Sequence[Picture], failures: F
     texts = {
         what: _or_why(failures, f"texts: {what}", make, one_line=what == "methods")
         for what, make in (
-            ("findings", lambda: findings_summary.findings(results)),
-            ("limits", lambda: findings_summary.limits(study, results)),
+            ("findings", lambda: sentences.findings(results)),
+            ("limits", lambda: sentences.limits(study, results)),
             ("methods", lambda: methods(study, results)),
         )
     }
@@ -147,21 +152,21 @@ def _page(
 ) -> str:
     sections_: list[tuple[str, Callable[[], Iterable[str]]]] = [
         ("In short", lambda: _short(texts, results)),
-        *((found.title, partial(block_section.block, found, results, drawn, failures)) for found in results.blocks),
+        *((found.title, partial(sections.block, found, results, drawn, failures)) for found in results.blocks),
         *(
-            (title, partial(question_section.section, where, study, results, drawn))
-            for where, title in question_section.places(results).items()
+            (title, partial(sections.question_section, where, study, results, drawn))
+            for where, title in sections.places(results).items()
         ),
-        ("What the words mean", lambda: block_section.verdicts_mean(results)),
-        ("Groups", lambda: conduct_section.groups(study, results)),
-        ("Sites", lambda: conduct_section.groups(study, results, "site")),
-        ("Motion and force", lambda: conduct_section.motion(results)),
-        ("How it was run", lambda: conduct_section.conduct(study, results)),
+        ("What the words mean", lambda: sections.verdicts_mean(results)),
+        ("Groups", lambda: sections.groups(study, results)),
+        ("Sites", lambda: sections.groups(study, results, "site")),
+        ("Motion and force", lambda: sections.motion(results)),
+        ("How it was run", lambda: sections.conduct(study, results)),
         ("Preregistration", lambda: preregistration_section(study)),
         ("Methods, to paste", lambda: (heading(2, "Methods, to paste"), box([paragraph(str(texts["methods"]))]))),
         ("Reproducing this report", lambda: _again(study, results)),
         ("Licence and citation", lambda: (heading(2, "Licence and citation"), bullets(credit_lines(study)))),
-        ("Answers, counted", lambda: block_section.answers(results)),
+        ("Answers, counted", lambda: sections.answers(results)),
     ]
     first = failures.attempt("first page", lambda: first_page(results, texts["limits"], failures))
     parts: list[dict[str, Any]] = []
@@ -213,7 +218,7 @@ def _short(texts: Mapping[str, Any], results: Results) -> Iterator[str]:
         return
     yield heading(2, "In short: every finding in a sentence")
     found = texts["findings"]
-    yield bullets(found) if found else paragraph(findings_summary.none_found(results))
+    yield bullets(found) if found else paragraph(sentences.none_found(results))
 
 
 def _again(study: Study, results: Results) -> Iterator[str]:

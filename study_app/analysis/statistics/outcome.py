@@ -1,17 +1,20 @@
-"""What every test returns, and the rules that all of them share for missing answers.
+"""What every test returns, exact distributions, intervals and corrections that tests share.
 
 A result never holds NaN: what cannot be computed is None, and ``note`` or ``no_interval`` says why.
 """
 
+from __future__ import annotations
+
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import binomtest
+from scipy.stats import binomtest, false_discovery_control, rankdata
+from scipy.stats import t as student
 
 from study_app.errors import AnalysisError
 
@@ -140,3 +143,136 @@ def percentiles(samples: Array) -> Interval:
     """Return the 95 % percentile interval of bootstrapped values."""
     low, high = np.quantile(samples, [0.025, 0.975])
     return Interval(float(low), float(high), 0.95, f"percentile bootstrap over participants, {SAMPLES} samples")
+
+
+COMPARED: Final = 20_000
+"""Up to so many pairs of values ranks are counted, which is quicker than sorting."""
+
+SPARSE: Final = 8
+"""Up to so many values a convolution is quicker as so many shifted sums."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """Probabilities of ``start``, ``start`` + 1, …; the first and the last are not 0."""
+
+    start: int
+    probabilities: Array
+
+    def plus(self, other: Lattice) -> Lattice:
+        """Return the distribution of the sum of this and an independent ``other``."""
+        held = np.flatnonzero(other.probabilities)
+        if len(held) > SPARSE:
+            summed = np.convolve(self.probabilities, other.probabilities)
+        else:
+            summed = np.zeros(len(self.probabilities) + len(other.probabilities) - 1)
+            for shift in held:
+                summed[shift : shift + len(self.probabilities)] += other.probabilities[shift] * self.probabilities
+        return Lattice(self.start + other.start, summed)
+
+    def at_least(self, value: int) -> float:
+        """Return the probability of ``value`` or more."""
+        return min(1.0, float(self.probabilities[max(0, value - self.start) :].sum()))
+
+    @property
+    def highest(self) -> float:
+        """The probability of the highest value: the smallest that ``at_least`` can give."""
+        return float(self.probabilities[-1])
+
+    @property
+    def mean(self) -> float:
+        """The expected value."""
+        return float(np.average(self.start + np.arange(len(self.probabilities)), weights=self.probabilities))
+
+    @property
+    def variance(self) -> float:
+        """The variance."""
+        values = self.start + np.arange(len(self.probabilities))
+        return float(np.average((values - self.mean) ** 2, weights=self.probabilities))
+
+
+NOTHING: Final = Lattice(0, np.ones(1))
+"""The sum of no number."""
+
+
+def total(parts: Iterable[Lattice]) -> Lattice:
+    """Return the distribution of the sum of independent ``parts``."""
+    summed = NOTHING
+    for part in parts:
+        summed = summed.plus(part)
+    return summed
+
+
+def of_values(values: Iterable[int]) -> Lattice:
+    """Return the distribution of one of ``values``, each equally likely."""
+    numbers = np.fromiter(values, dtype=np.int64)
+    counts = np.bincount(numbers - numbers.min())
+    return Lattice(int(numbers.min()), counts / len(numbers))
+
+
+def doubled_ranks(values: Array) -> Whole:
+    """Return twice the ranks (n, k) within each row of ``values`` (n, k): whole numbers, with mid-ranks for ties."""
+    if not values.size:
+        return np.zeros(values.shape, dtype=np.int64)
+    if values.shape[0] * values.shape[1] ** 2 <= COMPARED:
+        below, equal = (compare(values[:, None], values[:, :, None]).sum(axis=2) for compare in (np.less, np.equal))
+        return np.asarray(2 * below + equal + 1)
+    ranks: Whole = np.rint(2 * rankdata(values, axis=1)).astype(np.int64)
+    return ranks
+
+
+ROUNDING: Final = 1e-12
+"""Values that differ by less than this share of them are equal."""
+
+
+def student_interval(values: Array) -> tuple[float | None, float | None]:
+    """Return the 95 % interval of a mean (Student 1908); None for a single value and for equal ones."""
+    n = len(values)
+    if n < 2 or (spread := float(np.std(values, ddof=1))) <= ROUNDING * float(np.abs(values).max()):
+        return None, None
+    half = float(student.ppf(0.975, n - 1)) * spread / math.sqrt(n)
+    return float(values.mean()) - half, float(values.mean()) + half
+
+
+def holm(ps: Sequence[float | None]) -> tuple[float | None, ...]:
+    """Return Holm's adjusted p of each test of a family (Holm 1979, Scand. J. Stat. 6, 65–70).
+
+    None, a test that gave no p, stays None and counts as a member: it was asked.
+
+    Raises
+    ------
+    AnalysisError
+        A p is not between 0 and 1.
+    """
+    known = _known(ps)
+    adjusted: list[float | None] = [None] * len(ps)
+    highest = 0.0
+    for place, member in enumerate(sorted(known, key=lambda member: known[member])):
+        highest = max(highest, min(1.0, (len(ps) - place) * known[member]))
+        adjusted[member] = highest
+    return tuple(adjusted)
+
+
+def false_discovery(ps: Sequence[float | None]) -> tuple[float | None, ...]:
+    """Return the p adjusted for the rate of false discoveries (Benjamini & Hochberg 1995), for exploratory blocks.
+
+    None stays None and counts as a test with p = 1.
+
+    Raises
+    ------
+    AnalysisError
+        A p is not between 0 and 1.
+    """
+    known = _known(ps)
+    if not known:
+        return (None,) * len(ps)
+    adjusted = false_discovery_control(np.array([known.get(member, 1.0) for member in range(len(ps))]))
+    return tuple(float(adjusted[member]) if member in known else None for member in range(len(ps)))
+
+
+def _known(ps: Sequence[float | None]) -> dict[int, float]:
+    known = {member: p for member, p in enumerate(ps) if p is not None}
+    for p in known.values():
+        if not 0.0 <= p <= 1.0:
+            raise AnalysisError(f"p = {p} cannot be adjusted; give a p between 0 and 1, or None where a test gave none")
+    return known

@@ -17,19 +17,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import norm
 
-from study_app.analysis.statistics.exact_distributions import Lattice, doubled_ranks, total
 from study_app.analysis.statistics.outcome import (
     FEW,
     NO_VARIATION,
     TOO_FEW,
     Array,
     Interval,
+    Lattice,
     Outcome,
     Whole,
     checked,
     complete,
+    doubled_ranks,
     percentiles,
     resamples,
+    total,
 )
 from study_app.errors import AnalysisError
 from study_app.number_text import counted

@@ -11,11 +11,9 @@ from typing import Final, Literal, TypeAlias, get_args
 
 import numpy as np
 
-from study_app.analysis.power.plan import Plan
-from study_app.analysis.power.simulated_studies import Opinions, people
-from study_app.analysis.tables.compared_blocks import Block, Setting
-from study_app.analysis.tables.measures import Array
-from study_app.analysis.tables.planned_analysis import Decided
+from study_app.analysis.data.blocks import Block, Decided, Setting
+from study_app.analysis.data.measures import Array
+from study_app.analysis.planning.simulated_studies import Opinions, Plan, people
 from study_app.protocol.model import Protocol
 
 Generator: TypeAlias = Literal["answer model", "ordinal probit"]

@@ -8,7 +8,7 @@ from typing import Final, Literal, TypeAlias
 
 from scipy.stats import binomtest
 
-from study_app.analysis.power.power_curves import interval
+from study_app.analysis.planning.power_curves import interval
 from study_app.store.tables.csv_files import csv_text_of
 
 Limit: TypeAlias = Literal["none", "at most 5 %", "at least 93 %", "at least 77 %", "at most 83 %", "counted"]

@@ -7,10 +7,9 @@ from typing import Final, TypeAlias
 import numpy as np
 from scipy.special import expit
 
-from study_app.analysis.statistics.equivalence.power import participants_needed
-from study_app.analysis.statistics.equivalence.tost import tost
-from study_app.analysis.statistics.psychometrics.threshold import noticed
-from study_app.analysis.tables.measures import Array
+from study_app.analysis.data.measures import Array
+from study_app.analysis.statistics.equivalence import participants_needed, tost
+from study_app.analysis.statistics.psychometrics import noticed
 from study_app.validation.report_rates.rates import Limit, Rate
 
 Case: TypeAlias = tuple[str, int]

@@ -6,18 +6,17 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from study_app.analysis.designs.block_tests import Asked, of_tables
+from study_app.analysis.data.blocks import Block
+from study_app.analysis.data.measures import Array
 from study_app.analysis.evaluate import found_in
+from study_app.analysis.findings.block_tests import Asked, of_tables
 from study_app.analysis.findings.delay_answers import common_ms
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay
+from study_app.analysis.findings.finding import FOUND
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, OverAll, Pairs, SettingsDiffer, over_all
-from study_app.analysis.report.first_page.answer import FOUND
-from study_app.analysis.report.first_page.claims import answers as answered
-from study_app.analysis.results.block_results import BlockFound, Results
-from study_app.analysis.results.section_failures import Failures
-from study_app.analysis.tables.compared_blocks import Block
-from study_app.analysis.tables.measures import Array
+from study_app.analysis.report.first_page import answers as answered
+from study_app.analysis.results import BlockFound, Failures, Results
 from study_app.validation.report_rates.known_effects import (
     Extent,
     Generator,

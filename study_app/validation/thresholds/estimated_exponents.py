@@ -12,8 +12,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.analysis.designs.estimated_exponents import estimate_slope
-from study_app.analysis.statistics.student_interval import student_interval
+from study_app.analysis.levels.thresholds import estimate_slope
+from study_app.analysis.statistics.outcome import student_interval
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.steady_state import steady
 from study_app.protocol.blocks import Block

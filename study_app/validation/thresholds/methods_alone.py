@@ -11,10 +11,9 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.designs.thresholds import thresholds
-from study_app.analysis.designs.weber_exponents import jnd_slope
-from study_app.analysis.results.level_results import ThresholdFound
-from study_app.analysis.tables.level_blocks import LevelBlock
+from study_app.analysis.data.blocks import LevelBlock
+from study_app.analysis.levels.results import ThresholdFound
+from study_app.analysis.levels.thresholds import jnd_slope, thresholds
 from study_app.protocol.orders.schedule import build_schedule, draw_key
 from study_app.protocol.streams import Key, draw_secret, stream
 from study_app.protocol.trials.methods import Heard

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from study_app.analysis.power.power_curves import interval
+from study_app.analysis.planning.power_curves import interval
 from study_app.store.tables.csv_files import csv_text_of
 from study_app.validation.thresholds.methods_alone import PEOPLE, StudyFound, slopes
 from study_app.validation.thresholds.planted import Planted

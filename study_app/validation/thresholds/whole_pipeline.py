@@ -7,10 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from study_app.analysis.designs.estimated_exponents import estimated_exponents
-from study_app.analysis.designs.thresholds import thresholds
-from study_app.analysis.tables.study_tables import Study, load_study
-from study_app.analysis.tables.tracks import tracks
+from study_app.analysis.data.study_tables import Study, load_study
+from study_app.analysis.levels.thresholds import estimated_exponents, thresholds, tracks
 from study_app.evaluation.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind

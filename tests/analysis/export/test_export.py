@@ -6,9 +6,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from study_app.analysis.export.delivered import Delivered
 from study_app.analysis.export.export import export
-from study_app.analysis.export.table_formats import table_bytes
+from study_app.analysis.export.table_files import table_bytes
+from study_app.analysis.export.tables import Delivered
 from study_app.errors import AnalysisError
 from study_app.store.output_files import write_files
 from study_app.store.tables.columns import SEALED

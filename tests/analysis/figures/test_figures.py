@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from study_app import figure_style as style
-from study_app.analysis.figures import answer_figures, movement_plots, plotting, small_multiples
-from study_app.analysis.tables.study_tables import load_study
+from study_app.analysis.data.study_tables import load_study
+from study_app.analysis.figures import answer_figures, delay_figures, study_figures
 from study_app.errors import AnalysisError
 from tests.analysis.conftest import HIDDEN, Answer, Results, twelve
 
@@ -129,12 +129,12 @@ def test_no_text_leaves_the_figure_or_touches_another(rek: Results, fonts, opene
 
 def test_nothing_hidden_is_in_any_blinded_file(small: Results, tmp_path: Path) -> None:
     small.add("A", lambda *_: 3)
-    for path in plotting.plot(small.folder, tmp_path / "out"):
+    for path in study_figures.plot(small.folder, tmp_path / "out"):
         content = path.read_bytes().lower()
         for word in HIDDEN:
             assert word.encode() not in content, path.name
     small.open()
-    plotting.plot(small.folder, tmp_path / "out")
+    study_figures.plot(small.folder, tmp_path / "out")
     assert b"Lightquorn" not in (tmp_path / "out" / "liquids.svg").read_bytes()
     assert b">Quorn<" in (tmp_path / "out" / "liquids.svg").read_bytes()
 
@@ -142,7 +142,7 @@ def test_nothing_hidden_is_in_any_blinded_file(small: Results, tmp_path: Path) -
 def test_without_a_completed_session_plot_says_so_and_writes_nothing(rek: Results, tmp_path: Path) -> None:
     rek.add("P001", lambda *_: 4, status="unfinished", trials=3)
     with pytest.raises(AnalysisError, match="P001 session 1 unfinished"):
-        plotting.plot(rek.folder, tmp_path / "out")
+        study_figures.plot(rek.folder, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
@@ -164,8 +164,8 @@ def test_the_lowest_delay_is_marked_at_its_place_on_the_true_scale(rek: Results,
 
 def test_motion_is_drawn_for_every_participant_with_its_own_scale() -> None:
     values = np.array([[0.8, 0.9, 1.0], [0.85, np.nan, 1.1]])
-    figure = movement_plots.draw(
-        [movement_plots.Measured("Time, s", values), movement_plots.Measured("Flat", np.ones((2, 3)))],
+    figure = delay_figures.draw_movement(
+        [delay_figures.Measured("Time, s", values), delay_figures.Measured("Flat", np.ones((2, 3)))],
         [0.0, 100.0, 200.0],
         title="Motion",
         marks=[],
@@ -187,8 +187,8 @@ def test_motion_is_drawn_for_every_participant_with_its_own_scale() -> None:
 def test_of_many_participants_some_are_drawn_and_the_median_is_of_all() -> None:
     values = np.tile(np.array([1.0, 2.0, 3.0]), (500, 1))
     values[::2] += 1
-    figure = movement_plots.draw(
-        [movement_plots.Measured("Time, s", values)],
+    figure = delay_figures.draw_movement(
+        [delay_figures.Measured("Time, s", values)],
         [0.0, 100.0, 200.0],
         title="Motion",
         marks=[],
@@ -198,11 +198,11 @@ def test_of_many_participants_some_are_drawn_and_the_median_is_of_all() -> None:
     ).figure
     gids = {str(line.get_gid()): line for line in figure.axes[0].lines}
     drawn = [gid for gid in gids if "participant" in gid]
-    assert len(drawn) == small_multiples.MOST_LINES
+    assert len(drawn) == delay_figures.MOST_LINES
     assert {"measure1-participant1", "measure1-participant500"} <= set(drawn)
     assert np.asarray(gids["measure1-median"].get_ydata()).tolist() == [1.5, 2.5, 3.5]
-    assert small_multiples.line_words(500) == "60 of the 500 participants, evenly chosen in the order of their ids"
-    assert small_multiples.line_words(60) == "participants"
+    assert delay_figures.line_words(500) == "60 of the 500 participants, evenly chosen in the order of their ids"
+    assert delay_figures.line_words(60) == "participants"
 
 
 def words(figure: Figure) -> list[str]:

@@ -4,17 +4,16 @@ from collections.abc import Mapping
 
 import pytest
 
+from study_app.analysis.data.blocks import NOTHING, Direction, Item, Setting
+from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.findings.delay_answers import by_delay, meaning, tempting_ms
 from study_app.analysis.findings.delays import ContrastsWithControl, ContrastWithControl, Lowest, LowestDelay
-from study_app.analysis.report.findings_summary import findings, limits
-from study_app.analysis.results.block_results import BlockFound
-from study_app.analysis.results.block_results import Results as Found
-from study_app.analysis.statistics.equivalence.tost import tost
-from study_app.analysis.statistics.multiple_comparisons import holm
+from study_app.analysis.report.sentences import findings, limits
+from study_app.analysis.results import BlockFound
+from study_app.analysis.results import Results as Found
+from study_app.analysis.statistics.equivalence import tost
+from study_app.analysis.statistics.outcome import holm
 from study_app.analysis.statistics.trend import step_down
-from study_app.analysis.tables.compared_blocks import Item, Setting
-from study_app.analysis.tables.planned_analysis import NOTHING, Direction
-from study_app.analysis.tables.study_tables import load_study
 from tests.analysis.conftest import Results
 
 CALM = [1, 1, 0, 0, -1] * 6

@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study_app.analysis.designs.level_summaries import levels_found
-from study_app.analysis.figures.levels.level_pictures import level_pictures
+from study_app.analysis.data.study_tables import Study, load_study
+from study_app.analysis.figures.level_figures import level_pictures
 from study_app.analysis.figures.picture import Picture
-from study_app.analysis.results.level_results import LevelsFound
-from study_app.analysis.tables.study_tables import Study, load_study
-from study_app.analysis.tables.tracks import TRACK, answers_of, tracks
+from study_app.analysis.levels.results import LevelsFound
+from study_app.analysis.levels.summaries import levels_found
+from study_app.analysis.levels.thresholds import TRACK, answers_of, tracks
 
 pytestmark = pytest.mark.slow
 

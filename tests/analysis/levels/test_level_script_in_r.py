@@ -10,12 +10,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study_app.analysis.designs.sensitivities import sensitivities
-from study_app.analysis.report.answers.level_r_script import level_lines
-from study_app.analysis.report.r_script import START
-from study_app.analysis.results.level_results import LevelsFound
-from study_app.analysis.tables.study_tables import Study
-from study_app.protocol.trials.designs import default_design
+from study_app.analysis.data.study_tables import Study
+from study_app.analysis.levels.results import LevelsFound
+from study_app.analysis.levels.summaries import sensitivities
+from study_app.analysis.report.number_files import START, level_lines
+from study_app.protocol.trials.kinds import default_design
 from study_app.protocol.trials.presentation import arrangement_text
 from tests.analysis.levels.level_studies import ONE, ROVING, block
 from tests.analysis.report.read_report import numbers, run_in_r

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from study_app.analysis.designs.level_conduct import catch_answers, level_conduct
-from study_app.analysis.results.level_results import CatchAnswers, LevelConduct
+from study_app.analysis.levels.results import CatchAnswers, LevelConduct
+from study_app.analysis.levels.summaries import catch_answers, level_conduct
 from tests.analysis.levels.level_studies import block
 
 TRIALS = [  # participant, session, trial, standard, level, level_delivered, analysed, catch, right

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from study_app.analysis.export.export import export
-from study_app.analysis.figures.plotting import plot
+from study_app.analysis.figures.study_figures import plot
 from study_app.analysis.report.write_report import report
 from study_app.protocol.load import load
 from study_app.store.blinded.blinding import opened, read_key, whole_protocol

@@ -9,15 +9,12 @@ import numpy as np
 import pytest
 
 from study_app import figure_style
-from study_app.analysis.figures.levels.level_pictures import level_pictures
-from study_app.analysis.report.answers import level_section
-from study_app.analysis.report.answers.level_limits import level_limits
-from study_app.analysis.report.answers.level_methods import level_methods
-from study_app.analysis.report.answers.level_r_script import level_lines
-from study_app.analysis.report.findings_summary import level_findings
-from study_app.analysis.results.level_results import (
+from study_app.analysis.data.blocks import LevelBlock
+from study_app.analysis.figures.level_figures import level_pictures
+from study_app.analysis.levels.results import (
     CatchAnswers,
     ExponentFound,
+    GroupAnswers,
     LevelAnswers,
     LevelConduct,
     LevelsFound,
@@ -29,11 +26,15 @@ from study_app.analysis.results.level_results import (
     ThresholdFound,
     WithheldForce,
 )
-from study_app.analysis.results.question_answers import GroupAnswers
-from study_app.analysis.results.section_failures import Failures
-from study_app.analysis.tables.level_blocks import LevelBlock
-from study_app.protocol.trials.designs import Rated, default_design
-from study_app.protocol.trials.methods import Constant, QuestPlus, UpDown
+from study_app.analysis.report import level_sections
+from study_app.analysis.report.number_files import level_lines
+from study_app.analysis.report.sentences import level_findings, level_limits, level_methods
+from study_app.analysis.results import Failures
+from study_app.protocol.trials.designs import Rated
+from study_app.protocol.trials.kinds import default_design
+from study_app.protocol.trials.methods.constant import Constant
+from study_app.protocol.trials.methods.questplus import QuestPlus
+from study_app.protocol.trials.methods.updown import UpDown
 from study_app.protocol.trials.stimuli import Stimulus
 from tests.analysis.made_up import delays, everybody, study
 from tests.analysis.outputs import GOLDEN
@@ -187,7 +188,7 @@ def lines_of(number: int) -> Iterator[str]:
     assert not failures.found, str(failures.found)
     for picture in pictures:
         yield from (picture.name, picture.caption, *figure_of(picture.files["png"]))
-    yield from page_lines("".join(level_section.section(found, pictures, ("kalman", None)[number % 2])))
+    yield from page_lines("".join(level_sections.level_section(found, pictures, ("kalman", None)[number % 2])))
     yield from level_findings(found)
     yield from level_limits(found)
     yield from level_methods([made], [found])

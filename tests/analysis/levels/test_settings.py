@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study_app.analysis.designs.adjustment_settings import settings
+from study_app.analysis.data.blocks import LevelBlock
+from study_app.analysis.levels.summaries import settings
 from study_app.analysis.report.write_report import report
-from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.protocol.trials.designs import Adjusted
 from study_app.protocol.trials.methods import default_method
 from study_app.protocol.trials.stimuli import Stimulus

@@ -6,17 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from study_app.analysis.power import permutation_tests
-from study_app.analysis.statistics import multiple_comparisons
-from study_app.analysis.statistics.equivalence.tost import tost
-from study_app.analysis.statistics.friedman import friedman
-from study_app.analysis.statistics.global_permutation import global_permutation
-from study_app.analysis.statistics.paired import paired
+from study_app.analysis.planning import simulated_studies
+from study_app.analysis.statistics import outcome
+from study_app.analysis.statistics.equivalence import tost
+from study_app.analysis.statistics.rank_tests import friedman, global_permutation, paired
 from study_app.analysis.statistics.trend import page
 
 pytestmark = pytest.mark.slow
 
-CLOSE = 5 * np.sqrt(0.25 / permutation_tests.DRAWS)
+CLOSE = 5 * np.sqrt(0.25 / simulated_studies.PLANNED_DRAWS)
 """Five standard errors of a drawn p, at most."""
 
 
@@ -34,7 +32,7 @@ def rng() -> np.random.Generator:
 @pytest.mark.parametrize(("n", "k"), [(5, 3), (9, 3), (6, 4)])
 def test_friedman_is_the_reports(n: int, k: int) -> None:
     answers = answered(2, (20, n, k, 2), rise=0.5)
-    ps, of_all = permutation_tests.friedman(permutation_tests.ranks(answers), rng())
+    ps, of_all = simulated_studies.friedman(simulated_studies.ranks(answers), rng())
     expected = [[friedman(study[:, :, item]).p for item in range(2)] for study in answers]
     assert np.abs(ps - np.array(expected)).max() < CLOSE
     together = [global_permutation(study.transpose(2, 0, 1)).p for study in answers]
@@ -44,27 +42,27 @@ def test_friedman_is_the_reports(n: int, k: int) -> None:
 @pytest.mark.parametrize("n", [5, 14])
 def test_page_is_the_reports(n: int) -> None:
     answers = answered(3, (20, n, 7, 2), rise=0.15)
-    ps = permutation_tests.trend(permutation_tests.ranks(answers), rng())
+    ps = simulated_studies.trend(simulated_studies.ranks(answers), rng())
     expected = [[page(study[:, :, item], seed=None).p for item in range(2)] for study in answers]
     assert np.abs(ps - np.array(expected)).max() < CLOSE
 
 
 def test_signed_ranks_are_the_reports() -> None:
     answers = answered(4, (20, 9, 2, 3), rise=0.6)
-    ps = permutation_tests.signed(answers, rng())
+    ps = simulated_studies.signed(answers, rng())
     expected = [[paired(study[:, 0, item], study[:, 1, item]).p or 1.0 for item in range(3)] for study in answers]
     assert np.abs(ps - np.array(expected)).max() < CLOSE
 
 
 def test_where_everybody_answers_alike_nothing_is_found() -> None:
     same = np.full((2, 11, 3, 2), 4.0)
-    ps, of_all = permutation_tests.friedman(permutation_tests.ranks(same), rng())
+    ps, of_all = simulated_studies.friedman(simulated_studies.ranks(same), rng())
     assert (ps == 1).all()
     assert (of_all == 1).all()
-    assert (permutation_tests.trend(permutation_tests.ranks(same), rng()) == 1).all()
-    assert (permutation_tests.signed(same[:, :, :2], rng()) == 1).all()
-    assert permutation_tests.equivalent(same[:, :, 0] - same[:, :, 1], 1.0, 0.05, rng()).all()  # eleven zeros
-    assert not permutation_tests.equivalent((same[:, :, 0] - same[:, :, 1])[:, :10], 1.0, 0.05, rng()).any()
+    assert (simulated_studies.trend(simulated_studies.ranks(same), rng()) == 1).all()
+    assert (simulated_studies.signed(same[:, :, :2], rng()) == 1).all()
+    assert simulated_studies.equivalent(same[:, :, 0] - same[:, :, 1], 1.0, 0.05, rng()).all()  # eleven zeros
+    assert not simulated_studies.equivalent((same[:, :, 0] - same[:, :, 1])[:, :10], 1.0, 0.05, rng()).any()
 
 
 @pytest.mark.variants(1)
@@ -73,7 +71,7 @@ def test_where_everybody_answers_alike_nothing_is_found() -> None:
 def test_equivalence_is_the_reports(n: int, bound: float) -> None:
     answers = answered(5, (200, n, 2, 2), rise=0.4)
     differences = answers[:, :, 1] - answers[:, :, 0]
-    found = permutation_tests.equivalent(differences, bound, 0.05, rng()).ravel()
+    found = simulated_studies.equivalent(differences, bound, 0.05, rng()).ravel()
     by_t = 0
     for one, shown in zip(differences.transpose(0, 2, 1).reshape(-1, n), found, strict=True):
         whole = tost(one, bound)
@@ -90,8 +88,8 @@ def test_equivalence_is_the_reports(n: int, bound: float) -> None:
 def test_families_are_the_reports(ps: np.ndarray) -> None:
     for alpha in (0.05, 0.1):
         for ours, theirs in (
-            (permutation_tests.holm, multiple_comparisons.holm),
-            (permutation_tests.false_discovery, multiple_comparisons.false_discovery),
+            (simulated_studies.holm, outcome.holm),
+            (simulated_studies.false_discovery, outcome.false_discovery),
         ):
             expected = [[p is not None and p <= alpha + 1e-9 for p in theirs(family.tolist())] for family in ps]
             assert ours(ps, alpha).tolist() == expected

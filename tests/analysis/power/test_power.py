@@ -8,12 +8,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.power.batch_counts import BATCH, FULL, Counts, count, sweep
-from study_app.analysis.power.plan import Plan, plan
-from study_app.analysis.power.power_curves import Curve, Powers, interval, powers
-from study_app.analysis.power.power_files import write
-from study_app.analysis.power.power_tables import power_csv, power_markdown
-from study_app.analysis.power.simulated_studies import people
+from study_app.analysis.planning.power_curves import Curve, Powers, interval, power_csv, power_markdown, powers, write
+from study_app.analysis.planning.simulated_studies import BATCH, FULL, Counts, Plan, count, people, plan, sweep
 from study_app.analysis.statistics.trend import step_down
 from study_app.cli import commands
 from study_app.errors import AnalysisError

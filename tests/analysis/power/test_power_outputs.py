@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from study_app.analysis.power.batch_counts import count
-from study_app.analysis.power.plan import plan
-from study_app.analysis.power.power_curves import powers
-from study_app.analysis.power.power_files import write
-from study_app.analysis.power.threshold_tables import threshold_csv, threshold_markdown
+from study_app.analysis.planning.power_curves import powers, write
+from study_app.analysis.planning.simulated_studies import count, plan
+from study_app.analysis.planning.threshold_studies import threshold_csv, threshold_markdown
 from study_app.protocol.load import load, parse
 from tests.analysis.conftest import SMALL
 from tests.analysis.outputs import GOLDEN

@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.power.threshold_studies import BATCH, plans, sweep
-from study_app.analysis.power.threshold_tables import Precisions, threshold_markdown
+from study_app.analysis.planning.threshold_studies import BATCH, Precisions, plans, sweep, threshold_markdown
 from study_app.cli import commands
 from study_app.errors import AnalysisError
 from study_app.protocol.checks.expected_precision import expected_mean, mean_plan

@@ -5,10 +5,17 @@ from pathlib import Path
 
 import pytest
 
-from study_app.analysis.preregistration.commitment import CATCH, FILE, Commitment, written
-from study_app.analysis.preregistration.deviations import Deviations, deviations, section
+from study_app.analysis.data.study_tables import load_study
+from study_app.analysis.planning.preregistration import (
+    CATCH,
+    FILE,
+    Commitment,
+    Deviations,
+    deviations,
+    deviations_section,
+    written,
+)
 from study_app.analysis.report.write_report import report
-from study_app.analysis.tables.study_tables import load_study
 from study_app.errors import AnalysisError
 from study_app.store.exclusions import Exclusion, exclusion_bytes, exclusions
 from study_app.store.folders import StudyFolder
@@ -48,7 +55,7 @@ def found_in(results: Results) -> tuple[str, ...]:
 def test_a_study_that_kept_to_it_has_no_deviation(answered: Results) -> None:
     committed(answered)
     assert found_in(answered) == ()
-    text = " ".join(map(str, section(load_study(answered.folder))))
+    text = " ".join(map(str, deviations_section(load_study(answered.folder))))
     assert "No difference was found" in text
     assert HASH in text
 

@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.preregistration import commitment
-from study_app.analysis.preregistration.document import preregistration
+from study_app.analysis.planning.preregistration import FILE, commitment, preregistration, read
 from study_app.cli import commands
 from study_app.protocol.load import load, protocol_hash, shipped, source_bytes
 from tests.protocol.trials.level_studies import FIVE_POINTS, study
@@ -40,9 +39,8 @@ def test_every_shipped_study_has_all_sections_and_its_hash(name: str, tmp_path: 
     questions = text[places[0] : places[1]].strip().splitlines()[2:]
     assert len(questions) >= 1
     assert all(line.startswith("- ") for line in questions)
-    (tmp_path / commitment.FILE).write_text(text, encoding="utf-8")
-    read = commitment.read(tmp_path)
-    assert read == commitment.commitment(load(name), digest)
+    (tmp_path / FILE).write_text(text, encoding="utf-8")
+    assert read(tmp_path) == commitment(load(name), digest)
     assert read is not None
     assert (read.study, read.protocol_hash) == (load(name).study.name, digest)
 
@@ -101,5 +99,5 @@ def test_a_folder_without_this_studys_power_is_a_usage_error(content: str | None
 
 def test_it_is_written_into_a_folder(tmp_path: Path) -> None:
     to = tmp_path / "results" / "demo"
-    assert written("demo", "--to", str(to)).strip() == str(to / commitment.FILE)
-    assert (to / commitment.FILE).read_text(encoding="utf-8") == written("demo")
+    assert written("demo", "--to", str(to)).strip() == str(to / FILE)
+    assert (to / FILE).read_text(encoding="utf-8") == written("demo")

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
+from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.report.write_report import report
 from study_app.analysis.study_worker import carry_out
-from study_app.analysis.tables.study_tables import Study, load_study
 from study_app.analysis.worker_messages import FigureDrawn, ReadStudy
 from study_app.protocol.load import load
 from study_app.protocol.simulated_observer import TrialFeatures

@@ -9,13 +9,13 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton, QWidget
 
-from study_app.analysis.designs import question_measures as measured
+from study_app.analysis.data import questions as measured
+from study_app.analysis.data.questions import Measure, counts_of_missing
 from study_app.analysis.figures import question_figures
 from study_app.analysis.figures.page_layout import Sheet
-from study_app.analysis.figures.questions.group_rows import Look, QuestionFigure, rows
-from study_app.analysis.measures.measure import Measure, counts_of_missing
+from study_app.analysis.figures.question_figures import Look, QuestionFigure, rows
+from study_app.analysis.levels.results import QuestionFound
 from study_app.analysis.report.write_report import report
-from study_app.analysis.results.question_answers import QuestionFound
 from study_app.gui.participant.forms import fields
 from study_app.gui.participant.forms.question_field import QuestionField
 from study_app.gui.participant.window import ParticipantWindow

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.tables.study_tables import load_study
+from study_app.analysis.data.study_tables import load_study
 from study_app.cli import commands
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.sessions.recovery import rebuild

@@ -6,19 +6,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from study_app.analysis.data.blocks import Decided
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.findings.delay_answers import common_ms
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay, equivalent_up_to
+from study_app.analysis.findings.finding import Answer
 from study_app.analysis.findings.recognition import LiquidRecognition, RecognitionResult, given, recognised
 from study_app.analysis.findings.statement_tests import OverAll, Pairs
-from study_app.analysis.report.first_page.answer import Answer
-from study_app.analysis.report.first_page.claims import answers
-from study_app.analysis.report.first_page.first_page import first_page
-from study_app.analysis.report.measured import CLAIMS, STUDIES, empty_studies
-from study_app.analysis.results.block_results import Results
-from study_app.analysis.results.section_failures import Failures
+from study_app.analysis.report.first_page import CLAIMS, STUDIES, answers, empty_studies, first_page
+from study_app.analysis.results import Failures, Results
 from study_app.analysis.statistics.recognition import recognition
-from study_app.analysis.tables.planned_analysis import Decided
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
 
 pytestmark = pytest.mark.slow

@@ -5,11 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from study_app.analysis.data.study_tables import group_counts, group_means, load_study
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.report.methods_paragraph import methods
+from study_app.analysis.report.sentences import methods
 from study_app.analysis.report.write_report import report
-from study_app.analysis.tables.group_means import group_counts, group_means
-from study_app.analysis.tables.study_tables import load_study
 from study_app.errors import AnalysisError
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.simulated_observer import NO_FEATURES

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from fontTools.ttLib import TTFont
 
+from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.report.write_report import report
-from study_app.analysis.tables.study_tables import load_study
 from study_app.errors import AnalysisError
 from tests.analysis.conftest import HIDDEN, Results, twelve
 from tests.analysis.report.read_report import answered_by_two, numbers, read, run_in_r

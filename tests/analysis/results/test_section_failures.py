@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.findings.statement_tests import OverAll
-from study_app.analysis.report.json_values import plain
-from study_app.analysis.tables.study_tables import load_study
+from study_app.analysis.report.number_files import plain
 from study_app.cli import commands
 from study_app.protocol.load import load
 from tests.analysis.conftest import Results, make_results, twelve
@@ -17,9 +17,9 @@ from tests.analysis.conftest import Results, make_results, twelve
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 TESTS = {
-    "tables.study_tables.Study.aggregate": ("liquids", "measures of settings"),
-    "designs.block_tests.presented": ("delays", "counts of answers"),
-    "designs.block_tests.session_numbers": ("delays", "numbers of sessions"),
+    "data.study_tables.Study.aggregate": ("liquids", "measures of settings"),
+    "findings.block_tests.presented": ("delays", "counts of answers"),
+    "findings.block_tests.session_numbers": ("delays", "numbers of sessions"),
     "findings.statement_tests.friedman": ("liquids", "test of settings"),
     "findings.statement_tests.global_permutation": ("liquids", "test over all statements"),
     "findings.recognition.recognition": ("liquids", "test of recognition"),
@@ -32,11 +32,11 @@ TESTS = {
 WRITING = {
     "figures.answer_figures.render": "figure liquids",
     "report.write_report.methods": "texts: methods",
-    "report.write_report.findings_summary.findings": "texts: findings",
+    "report.write_report.sentences.findings": "texts: findings",
     "report.write_report.r_script": "report.R",
     "report.number_files.motion_csv": "motion.csv",
     "findings.delays.table": "lowest delay",
-    "report.write_report.conduct_section.conduct": "section “How it was run”",
+    "report.write_report.sections.conduct": "section “How it was run”",
 }
 
 

@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 from scipy.stats import kruskal
 
-from study_app.analysis.designs.site_thresholds import site_thresholds
+from study_app.analysis.data.study_tables import Study, load_study, pooled
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.export import export
 from study_app.analysis.findings.statement_tests import SitesDiffer
-from study_app.analysis.preregistration.commitment import FILE, Commitment, written
-from study_app.analysis.preregistration.deviations import deviations
+from study_app.analysis.levels.results import LevelsFound, ThresholdFound
+from study_app.analysis.levels.thresholds import site_thresholds
+from study_app.analysis.planning.preregistration import FILE, Commitment, deviations, written
 from study_app.analysis.report.write_report import report
-from study_app.analysis.results.level_results import LevelsFound, ThresholdFound
-from study_app.analysis.tables.study_tables import Study, load_study, pooled
 from study_app.errors import StoreError
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind, unblind_folder

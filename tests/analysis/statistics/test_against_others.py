@@ -6,14 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study_app.analysis.statistics.agreement import kappa
-from study_app.analysis.statistics.equivalence.tost import tost
-from study_app.analysis.statistics.friedman import friedman
-from study_app.analysis.statistics.multiple_comparisons import false_discovery, holm
-from study_app.analysis.statistics.ordinal import ordinal
-from study_app.analysis.statistics.paired import paired
-from study_app.analysis.statistics.psychometrics.threshold import threshold
-from study_app.analysis.statistics.random_effects import group_mean
+from study_app.analysis.statistics.equivalence import tost
+from study_app.analysis.statistics.mixed_model import ordinal
+from study_app.analysis.statistics.outcome import false_discovery, holm
+from study_app.analysis.statistics.psychometrics import threshold
+from study_app.analysis.statistics.rank_tests import friedman, paired
+from study_app.analysis.statistics.recognition import kappa
+from study_app.analysis.statistics.thresholds import group_mean
 from study_app.analysis.statistics.trend import page
 
 pytestmark = pytest.mark.slow

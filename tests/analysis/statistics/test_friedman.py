@@ -7,12 +7,10 @@ from hypothesis import strategies as st
 from scipy.stats import f as f_distribution
 from scipy.stats import friedmanchisquare
 
-from study_app.analysis.statistics import friedman as module
-from study_app.analysis.statistics import skillings_mack as missing
-from study_app.analysis.statistics.agreement import kappa
-from study_app.analysis.statistics.friedman import friedman
-from study_app.analysis.statistics.global_permutation import global_permutation
-from study_app.analysis.statistics.skillings_mack import skillings_mack
+from study_app.analysis.statistics import rank_tests as missing
+from study_app.analysis.statistics import rank_tests as module
+from study_app.analysis.statistics.rank_tests import friedman, global_permutation, skillings_mack
+from study_app.analysis.statistics.recognition import kappa
 from study_app.errors import AnalysisError
 
 # Times to first base of 22 players by three methods (Hollander & Wolfe 1973; R, friedman.test).

@@ -11,15 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom
 
-from study_app.analysis.statistics.equivalence.tost import tost
-from study_app.analysis.statistics.friedman import friedman
-from study_app.analysis.statistics.global_permutation import global_permutation
-from study_app.analysis.statistics.ordinal import ordinal
+from study_app.analysis.statistics.equivalence import tost
+from study_app.analysis.statistics.mixed_model import ordinal
 from study_app.analysis.statistics.outcome import Outcome
-from study_app.analysis.statistics.paired import paired
-from study_app.analysis.statistics.psychometrics.threshold import noticed
+from study_app.analysis.statistics.psychometrics import noticed
+from study_app.analysis.statistics.rank_tests import friedman, global_permutation, paired, skillings_mack
 from study_app.analysis.statistics.recognition import UNANSWERED, UNDECIDED, Recognition, named, recognition
-from study_app.analysis.statistics.skillings_mack import skillings_mack
 from study_app.analysis.statistics.trend import page, step_down
 from study_app.errors import AnalysisError
 

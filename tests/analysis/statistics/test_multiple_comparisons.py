@@ -7,10 +7,10 @@ import pandas as pd
 import pytest
 from scipy.stats import false_discovery_control, kruskal, rankdata
 
-from study_app.analysis.statistics import independent_groups as module
-from study_app.analysis.statistics.independent_groups import groups_differ
-from study_app.analysis.statistics.multiple_comparisons import false_discovery, holm
-from study_app.analysis.tables import measures
+from study_app.analysis.data import measures
+from study_app.analysis.statistics import rank_tests as module
+from study_app.analysis.statistics.outcome import false_discovery, holm
+from study_app.analysis.statistics.rank_tests import groups_differ
 from study_app.errors import AnalysisError
 
 
@@ -144,7 +144,7 @@ def test_the_smallest_p_is_that_of_groups_without_overlap() -> None:
 
 def test_a_drawn_p_is_near_the_exact_one(monkeypatch: pytest.MonkeyPatch) -> None:
     exact = groups_differ(ANSWERS[:, None], GROUPS).p
-    monkeypatch.setattr(module, "EXACT_UP_TO", 1)
+    monkeypatch.setattr(module, "EXACT_GROUPS", 1)
     drawn = groups_differ(ANSWERS[:, None], GROUPS, seed=3)
     assert drawn.p == pytest.approx(exact, abs=4 * np.sqrt(0.25 / 9999))
     assert drawn.method == "Monte Carlo permutation of participants, 9999 draws, seed 3"

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from study_app.analysis.statistics.cumulative import Answers, fit, log_likelihood
-from study_app.analysis.statistics.ordinal import ordinal
+from study_app.analysis.statistics.mixed_model import Answers, fit, log_likelihood, ordinal
 from study_app.errors import AnalysisError
 
 pytestmark = pytest.mark.slow

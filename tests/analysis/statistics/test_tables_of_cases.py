@@ -8,21 +8,15 @@ import numpy as np
 import pytest
 
 from study_app.analysis.statistics import (
-    agreement,
-    friedman,
-    global_permutation,
-    independent_groups,
-    multiple_comparisons,
-    ordinal,
+    equivalence,
+    mixed_model,
     outcome,
-    paired,
-    random_effects,
+    psychometrics,
+    rank_tests,
     recognition,
-    skillings_mack,
+    thresholds,
     trend,
 )
-from study_app.analysis.statistics.equivalence import power, tost
-from study_app.analysis.statistics.psychometrics import goodness, posterior, settings, threshold
 from study_app.errors import AnalysisError
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.stimuli import analysis_grid, assumed_for
@@ -86,9 +80,9 @@ def named_(number: int, count: int) -> dict[str, Any]:
 
 
 def of_settings() -> Iterator[str]:
-    yield from results(friedman.friedman, SAMPLES)
-    yield from results(friedman.friedman, {"long": answers(60, 5, 1, 0.2)}, draws=500, seed=2)
-    yield from results(skillings_mack.skillings_mack, SAMPLES)
+    yield from results(rank_tests.friedman, SAMPLES)
+    yield from results(rank_tests.friedman, {"long": answers(60, 5, 1, 0.2)}, draws=500, seed=2)
+    yield from results(rank_tests.skillings_mack, SAMPLES)
     yield from results(trend.page, SAMPLES)
     yield from results(trend.page, SAMPLES, "decreasing")
     yield from results(trend.page, {"long": answers(210, 3, 2, 0.1)}, seed=None)
@@ -96,47 +90,47 @@ def of_settings() -> Iterator[str]:
     yield from results(trend.step_down, wide)
     yield from results(trend.step_down, wide, "decreasing", alpha=0.2)
     stacked = {name: np.stack([one, one[::-1], 8 - one]) for name, one in SAMPLES.items() if name != "half"}
-    yield from results(global_permutation.global_permutation, stacked, draws=300)
+    yield from results(rank_tests.global_permutation, stacked, draws=300)
 
 
 def of_pairs() -> Iterator[str]:
     pairs = {name: (one[:, 0], one[:, -1]) for name, one in SAMPLES.items()}
-    yield from results(paired.paired, pairs)
-    yield from results(paired.paired, {"few": pairs["few"]}, alpha=0.2)
-    yield from results(paired.paired, {"lengths": ([1.0], [1.0, 2.0])})
+    yield from results(rank_tests.paired, pairs)
+    yield from results(rank_tests.paired, {"few": pairs["few"]}, alpha=0.2)
+    yield from results(rank_tests.paired, {"lengths": ([1.0], [1.0, 2.0])})
     groups = {name: (one, ["A", "B", "C"][: len(one)] * len(one)) for name, one in SAMPLES.items()}
     groups = {name: (values, sites[: len(values)]) for name, (values, sites) in groups.items()}
-    yield from results(independent_groups.groups_differ, groups)
-    yield from results(multiple_comparisons.holm, {str(ps): (ps,) for ps in PS})
-    yield from results(multiple_comparisons.false_discovery, {str(ps): (ps,) for ps in (*PS, (1.2,))})
+    yield from results(rank_tests.groups_differ, groups)
+    yield from results(outcome.holm, {str(ps): (ps,) for ps in PS})
+    yield from results(outcome.false_discovery, {str(ps): (ps,) for ps in (*PS, (1.2,))})
     tables = {"2": [[5, 1], [2, 7]], "0": [[0, 0], [0, 0]], "3": [[3, 0, 1], [0, 4, 0], [2, 0, 5]], "wide": [[1, 2]]}
-    yield from results(agreement.kappa, tables)
+    yield from results(recognition.kappa, tables)
     yield from results(recognition.named, named_(1, 3))
     names = {name: (recognition.named(one), (0, 1, None)) for name, one in named_(2, 3).items()}
     yield from results(recognition.recognition, names, labels=4)
-    yield from results(settings.student_interval, {name: np.asarray(one, float) for name, one in DIFFERENCES.items()})
-    yield from results(random_effects.group_mean, {
+    yield from results(thresholds.student_interval, {name: np.asarray(one, float) for name, one in DIFFERENCES.items()})
+    yield from results(thresholds.group_mean, {
         "one": ([1.0], [0.1]), "two": ([1.0, 2.0], [0.1, 0.2]), "alike": ([1.0, 1.01, 0.99], [0.5, 0.4, 0.6]),
         "apart": ([1.0, 4.0, 9.0, 2.0], [0.01, 0.02, 0.01, 0.03]), "none": ([], []),
     })  # fmt: skip
     yield from results(outcome.draws_for, {f"{a} {m}": (a, 1000, m) for a, m in product((0.05, 0.001, 1e-6), (1, 40))})
     yield from results(outcome.clopper_pearson, {f"{c} of {n}": (c, n) for c, n in ((0, 5), (5, 5), (3, 10), (0, 1))})
-    yield from results(friedman.doubled_ranks, SAMPLES)
+    yield from results(rank_tests.doubled_ranks, SAMPLES)
 
 
 def of_equivalence() -> Iterator[str]:
     cases = {name: np.asarray(one, float) for name, one in DIFFERENCES.items()}
     for bound, alpha in ((1.0, 0.05), (0.5, 0.05), (3.0, 0.2)):
-        yield from results(tost.tost, cases, bound, alpha=alpha)
-    yield from results(tost.tost, {"small": cases["small"]}, 1.0, checks=False)
-    yield from results(tost.tost, cases, 1.0, verdict_only=True)
-    yield from results(tost.fewest, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01)})
-    yield from results(tost.fewest, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01)}, equal=True)
-    yield from results(tost.resamples_for, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01, 0.001, 1e-5)})
+        yield from results(equivalence.tost, cases, bound, alpha=alpha)
+    yield from results(equivalence.tost, {"small": cases["small"]}, 1.0, checks=False)
+    yield from results(equivalence.tost, cases, 1.0, verdict_only=True)
+    yield from results(equivalence.fewest, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01)})
+    yield from results(equivalence.fewest, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01)}, equal=True)
+    yield from results(equivalence.resamples_for, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01, 0.001, 1e-5)})
     rows = {name: one[None] for name, one in cases.items() if len(one) > 2 and not np.isnan(one).any()}
-    yield from results(tost.p_within, rows, 1.0, 3, 200)
-    yield from results(power.sizes, rows)
-    yield from results(power.equivalent, rows, 1.0, 0.05, np.random.default_rng(1), 200)
+    yield from results(equivalence.p_within, rows, 1.0, 3, 200)
+    yield from results(equivalence.sizes, rows)
+    yield from results(equivalence.equivalent, rows, 1.0, 0.05, np.random.default_rng(1), 200)
 
 
 def of_thresholds() -> Iterator[str]:
@@ -144,45 +138,49 @@ def of_thresholds() -> Iterator[str]:
         name: (one, LEVELS[: one.shape[1]]) for name, one in SAMPLES.items()
         if name in ("none", "one", "ties", "few", "rise", "fall", "missing", "all missing", "ends", "one setting")
     }  # fmt: skip
-    yield from results(threshold.noticed, rising)
+    yield from results(psychometrics.noticed, rising)
     for successes, failures in COUNTS:
         case = {f"{successes} {failures}": (U, successes, failures, GRID)}
-        yield from results(posterior.fitted, case)
-        yield from results(posterior.band, {name: (*given, np.linspace(-1.7, -0.2, 4)) for name, given in case.items()})
-    yield from results(posterior.narrowing, {"": (U, [0, 1, 2, 3, 2, 1], [False, True, True, True, False, True], GRID)})
+        yield from results(thresholds.fitted, case)
+        yield from results(
+            thresholds.band, {name: (*given, np.linspace(-1.7, -0.2, 4)) for name, given in case.items()}
+        )
+    yield from results(
+        thresholds.narrowing, {"": (U, [0, 1, 2, 3, 2, 1], [False, True, True, True, False, True], GRID)}
+    )
     expected = np.array([0.55, 0.7, 0.9])
     for right in ([1, 4, 9], [5, 7, 10], [0, 0, 10]):
-        yield from results(goodness.deviances, {str(right): (right, [10] * 3, expected)})
-        yield from results(goodness.p_of_fit, {str(right): (right, [10] * 3, expected)})
+        yield from results(thresholds.deviances, {str(right): (right, [10] * 3, expected)})
+        yield from results(thresholds.p_of_fit, {str(right): (right, [10] * 3, expected)})
     flags = ([True] * 4, [True, False, False, False], [False, True, True, True], [True])
     shares = ([0.9, 0.6, 0.7, 0.8], [0.7] * 4)
     drifting = {f"{given} {own}": (given, own[: len(given)]) for given, own in product(flags, shares)}
-    yield from results(goodness.drift, drifting)
+    yield from results(thresholds.drift, drifting)
     yield from results(
-        goodness.drifts, {f"{drift} {n}": (drift, n) for drift in (None, 0.2, -0.3) for n in (1, 30, 100, 101)}
+        thresholds.drifts, {f"{drift} {n}": (drift, n) for drift in (None, 0.2, -0.3) for n in (1, 30, 100, 101)}
     )
     made = {n: np.linspace(-1, 1, n) ** 3 for n in range(1, 6)}
-    yield from results(settings.setting_statistics, {
+    yield from results(thresholds.setting_statistics, {
         f"{n} {high}": (one, np.arange(n) % 2 == high) for n, one in made.items() for high in (0, 1, 2)
     })  # fmt: skip
 
 
 def of_models() -> Iterator[str]:
     names = ("none", "one", "ties", "few", "one setting", "all missing", "missing")
-    yield from results(ordinal.ordinal, {name: SAMPLES[name] for name in names})
+    yield from results(mixed_model.ordinal, {name: SAMPLES[name] for name in names})
     few = answers(10, 2, 1, 0.8)
-    yield from results(ordinal.ordinal, {"ten": few, "above": np.tile([1.0, 7.0], (11, 1))})
-    yield from results(ordinal.ordinal, {"sessions": few}, sessions=np.arange(20).reshape(10, 2) // 10)
+    yield from results(mixed_model.ordinal, {"ten": few, "above": np.tile([1.0, 7.0], (11, 1))})
+    yield from results(mixed_model.ordinal, {"sessions": few}, sessions=np.arange(20).reshape(10, 2) // 10)
 
 
 def of_larger_models() -> Iterator[str]:
     some = {"half": SAMPLES["half"], "gone": answers(14, 4, 3, 0.9, 0.1), "falls": answers(12, 3, 5, -1.5)}
-    yield from results(ordinal.ordinal, some)
-    yield from results(ordinal.ordinal, some, intercepts=False)
-    yield from results(ordinal.ordinal, {"sites": some["falls"]}, sites=list("AABBBAABBBAA"))
-    yield from results(ordinal.ordinal, {"columns": some["falls"]}, np.array([[0.0], [0.0], [1.0]]))
+    yield from results(mixed_model.ordinal, some)
+    yield from results(mixed_model.ordinal, some, intercepts=False)
+    yield from results(mixed_model.ordinal, {"sites": some["falls"]}, sites=list("AABBBAABBBAA"))
+    yield from results(mixed_model.ordinal, {"columns": some["falls"]}, np.array([[0.0], [0.0], [1.0]]))
     needed = {name: np.asarray(DIFFERENCES[name], float) for name in ("small", "large", "outlier", "wide")}
-    yield from results(power.participants_needed, needed, 1.0, 0.05)
+    yield from results(equivalence.participants_needed, needed, 1.0, 0.05)
 
 
 TABLES = [

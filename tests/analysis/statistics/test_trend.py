@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import page_trend_test, spearmanr, wilcoxon
 
-from study_app.analysis.statistics import paired as module
+from study_app.analysis.statistics import rank_tests as module
 from study_app.analysis.statistics import trend
-from study_app.analysis.statistics.paired import paired
+from study_app.analysis.statistics.rank_tests import paired
 from study_app.analysis.statistics.trend import page, step_down
 from study_app.errors import AnalysisError
 

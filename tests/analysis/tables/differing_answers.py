@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from study_app.analysis.tables.study_tables import load_study
+from study_app.analysis.data.study_tables import load_study
 from study_app.errors import AnalysisError
 from tests.analysis.conftest import Answer
 

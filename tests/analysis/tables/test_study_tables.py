@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from study_app.analysis.tables.study_tables import Study, load_study
+from study_app.analysis.data.study_tables import Study, load_study
 from study_app.errors import AnalysisError, StoreError
 from study_app.protocol.load import parse, source_bytes
 from study_app.store.tables.columns import RESPONSES, TRIALS

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study_app.analysis.tables import measures
-from study_app.analysis.tables.typed_files import tables
+from study_app.analysis.data import measures
+from study_app.analysis.data.session_files import tables
 from study_app.errors import AnalysisError
 from study_app.store.tables.csv_files import MISSING, Column, problems
 

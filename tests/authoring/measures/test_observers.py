@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study_app.analysis.power.threshold_studies import Case, study_batch
+from study_app.analysis.planning.threshold_studies import Case, study_batch
 from study_app.app.designer.measures.measures_worker import Measuring
 from study_app.app.designer.measures.wanted import wanted_of
 from study_app.authoring.measures.observers import OBSERVERS, PLANTED, GivenUp, measurable, observe

@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import psutil
 
-from study_app.analysis.power.batch_counts import BATCH, count
-from study_app.analysis.power.plan import Plan, plan
+from study_app.analysis.planning.simulated_studies import BATCH, Plan, count, plan
+from study_app.protocol.forms.simulated_observer import TrialFeatures
 from study_app.protocol.load import load
 from study_app.protocol.simulated_observer import TrialFeatures
 from study_app.workers.environment import environment

@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 from scipy.stats import norm
 
-from study_app.analysis.designs.sensitivities import sensitivities
-from study_app.analysis.tables.level_blocks import LevelBlock
-from study_app.protocol.checks.expected_precision import (
+from study_app.analysis.data.blocks import LevelBlock
+from study_app.analysis.levels.summaries import sensitivities
+from study_app.protocol.checks.expected_means import (
     EstimationPlan,
     MeanPlan,
     RatingPlan,

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.tables.study_tables import load_study
+from study_app.analysis.data.study_tables import load_study
 from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.protocol.load import load

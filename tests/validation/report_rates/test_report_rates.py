@@ -2,13 +2,14 @@
 
 import pytest
 
-from study_app.analysis.designs.block_tests import of_tables
 from study_app.analysis.evaluate import found_in
+from study_app.analysis.findings.block_tests import of_tables
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay
 from study_app.analysis.findings.other_assumptions import SameWithOtherAssumptions
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer
-from study_app.analysis.power.plan import plan
+from study_app.analysis.planning.simulated_studies import plan
+from study_app.protocol.forms.simulated_observer import TrialFeatures
 from study_app.protocol.load import load
 from study_app.protocol.simulated_observer import TrialFeatures
 from study_app.validation.report_rates import known_effects as studies

@@ -16,8 +16,8 @@ from study_app.workers.messages import Stopped
 from study_app.workers.server import Send, Stop
 
 if TYPE_CHECKING:
-    from study_app.analysis.power import threshold_studies
-    from study_app.session.simulated.rehearsal import ConditionFeatures
+    from study_app.analysis.planning import threshold_studies
+    from study_app.session.simulated.trial_features import ConditionFeatures
 
 SEED: Final = 1
 """That of ``power`` where none is given."""
@@ -187,7 +187,7 @@ def _studies(plan: ThresholdPlan, sizes: Sequence[int], watch: Watch, turn: tupl
 
     ``turn`` is how often as many studies were simulated before, and how many there will be in all.
     """
-    from study_app.analysis.power import threshold_studies  # noqa: PLC0415 - loads scipy: only in this process
+    from study_app.analysis.planning import threshold_studies  # noqa: PLC0415 - loads scipy: only in this process
 
     total = threshold_studies.Found()
     for number in range(THRESHOLD_STUDIES // threshold_studies.BATCH):
@@ -198,9 +198,8 @@ def _studies(plan: ThresholdPlan, sizes: Sequence[int], watch: Watch, turn: tupl
 
 
 def _detectable(wanted: Detecting, watch: Watch) -> Detectable | None:
-    from study_app.analysis.power.batch_counts import BATCH, Counts, count  # noqa: PLC0415 - loads scipy
-    from study_app.analysis.power.plan import HIGHEST, compares_statements, plan  # noqa: PLC0415
-    from study_app.analysis.power.power_curves import powers  # noqa: PLC0415
+    from study_app.analysis.planning.power_curves import powers  # noqa: PLC0415
+    from study_app.analysis.planning.simulated_studies import BATCH, HIGHEST, Counts, compares_statements, count, plan  # noqa: PLC0415 - loads scipy  # noqa: PLC0415
 
     protocol = wanted.protocol
     if not compares_statements(protocol):

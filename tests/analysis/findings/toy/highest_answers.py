@@ -7,19 +7,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.stats import binomtest
 
-from study_app.analysis.designs.block_tests import Asked
-from study_app.analysis.designs.verdicts import alone
 from study_app.analysis.figures.page_layout import Sheet
 from study_app.analysis.figures.picture import Drawing, Picture
-from study_app.analysis.findings.finding import Absent, Finding
+from study_app.analysis.findings.block_tests import Asked, alone
+from study_app.analysis.findings.finding import Absent, Answer, Finding
 from study_app.analysis.findings.statement_tests import table_of_tests
-from study_app.analysis.report.first_page.answer import Answer
-from study_app.analysis.report.r_syntax import r_text
-from study_app.analysis.report.test_rows import judged_row
-from study_app.analysis.results.block_results import BlockFound
-from study_app.analysis.results.item_test import Tested
-from study_app.analysis.results.not_tested import NotTested
-from study_app.analysis.results.words import lead, listed, short
+from study_app.analysis.report.test_rows import judged_row, r_text
+from study_app.analysis.results import BlockFound, NotTested, Tested, lead, listed, short
 from study_app.analysis.statistics.outcome import Outcome, clopper_pearson
 
 HIGHEST: Final = 7

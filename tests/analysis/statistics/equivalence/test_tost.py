@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, wilcoxon
 
-from study_app.analysis.statistics.equivalence.power import participants_needed
-from study_app.analysis.statistics.equivalence.tost import fewest, tost
+from study_app.analysis.statistics.equivalence import fewest, participants_needed, tost
 from study_app.errors import AnalysisError
 
 # Hours of sleep gained by ten patients with two drugs (Student 1908; R, sleep).

@@ -6,10 +6,8 @@ from scipy.optimize import minimize
 from scipy.special import expit, ndtri
 from scipy.stats import binom, ttest_1samp
 
-from study_app.analysis.statistics.psychometrics.goodness import deviances, drift, drifts, p_of_fit
-from study_app.analysis.statistics.psychometrics.psychometric import Counts, Curve, fit, share
-from study_app.analysis.statistics.psychometrics.settings import setting_statistics
-from study_app.analysis.statistics.psychometrics.threshold import DROP, noticed, threshold
+from study_app.analysis.statistics.psychometrics import DROP, Counts, Curve, fit, noticed, share, threshold
+from study_app.analysis.statistics.thresholds import deviances, drift, drifts, p_of_fit, setting_statistics
 from study_app.errors import AnalysisError
 
 pytestmark = pytest.mark.slow

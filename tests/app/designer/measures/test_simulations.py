@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from PySide6.QtCore import QSize, Qt
 
-from study_app.analysis.power.threshold_studies import plans, sweep
+from study_app.analysis.planning.threshold_studies import plans, sweep
 from study_app.app.designer.measures.measures_worker import (
     THRESHOLD_STUDIES,
     Advising,

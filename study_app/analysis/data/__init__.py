@@ -1,0 +1,1 @@
+"""Results folders read into tables: what was asked, sessions and trials, and measures of them."""

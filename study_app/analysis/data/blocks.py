@@ -1,0 +1,504 @@
+"""What a study asks: blocks, their settings, statements, levels and questions, and what was decided beforehand.
+
+While the key is sealed a setting is its code and nothing else. Texts are in English where the study has it, otherwise
+in its first language.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal, TypeAlias, get_args
+
+from study_app.errors import AnalysisError
+from study_app.protocol.analysis_plan import Published
+from study_app.protocol.blocks import Compared, Phase
+from study_app.protocol.forms.kinds import question_of
+from study_app.protocol.forms.scale import Scale
+from study_app.protocol.instruments.scores import Score
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.block_orders import every_step_of
+from study_app.protocol.questions.question import Context, Question
+from study_app.protocol.questions.statement import Statement
+from study_app.protocol.texts import text_in
+from study_app.protocol.trials.designs import Design
+from study_app.protocol.trials.kinds import DESIGN_KINDS, default_design
+from study_app.protocol.trials.method import Method
+from study_app.protocol.trials.presentation import link_words
+from study_app.protocol.trials.psychometric import Assumed, assumed_for, rises
+from study_app.protocol.trials.stimuli import OF_LINK, Stimulus
+from study_app.protocol.trials.tracks import design_of, has_correct_answer, method_of, stimulus_of, success_name
+from study_app.store.blinded.blinding import Key
+from study_app.store.blinded.whole_protocol import whole_protocol
+
+Kind: TypeAlias = Compared
+
+KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
+
+DELAY_PREFIX: Final = "D"
+"""Codes of delay settings are D1, D2 …: what tells a block of delays in sealed receipts of earlier versions."""
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """One statement: its id, its words, and a few words for figures."""
+
+    id: str
+    text: str
+    short: str
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What was presented under a code; all but the code is None until the key is opened.
+
+    ``label`` is the item that names what was felt, where one does, ``link`` how its force was sent if not promptly,
+    ``view`` what was seen, empty for the drawn tank. A track ("8/1") has neither liquid nor delay.
+    """
+
+    code: str
+    condition: str | None = None
+    liquid: str | None = None
+    delay_ms: float | None = None
+    label: str | None = None
+    link: str = ""
+    view: str = ""
+
+    @property
+    def standard(self) -> str | None:
+        """What a track's comparisons are compared with; None of a condition, and of a track without a standard."""
+        standard, is_track, _ = (self.condition or "").partition("/")
+        return standard or None if is_track else None
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A main block with a questionnaire: ``settings`` in code order, once known in the order of the conditions.
+
+    ``kind`` is what the block compares, as its receipt says. ``labels`` name the seven levels, lowest first;
+    ``cannot_judge`` is the answer off the scale, or None.
+    """
+
+    id: str
+    title: str
+    kind: Kind
+    settings: tuple[Setting, ...]
+    items: tuple[Item, ...]
+    labels: tuple[str, ...]
+    cannot_judge: str | None
+
+    @property
+    def codes(self) -> tuple[str, ...]:
+        """The codes of the settings, in their order."""
+        return tuple(setting.code for setting in self.settings)
+
+    @property
+    def columns(self) -> dict[str, int]:
+        """The column of each code in tables of answers: conditions of one delay are replicates of it, in one column."""
+        if self.kind == "delays" and self.revealed:
+            return {setting.code: self.delays_ms.index(setting.delay_ms or 0.0) for setting in self.settings}
+        return {code: place for place, code in enumerate(self.codes)}
+
+    @property
+    def delays_ms(self) -> tuple[float, ...]:
+        """The delays of the settings, each once, shortest first; 0 while they are not known."""
+        return tuple(sorted({setting.delay_ms or 0.0 for setting in self.settings}))
+
+    @property
+    def codes_as_dealt(self) -> tuple[str, ...]:
+        """The codes of the settings in the order of the codes."""
+        return tuple(sorted(self.codes, key=lambda code: (len(code), code)))
+
+    @property
+    def revealed(self) -> bool:
+        """Whether the settings' conditions are known."""
+        return all(setting.condition is not None for setting in self.settings)
+
+    def name(self, setting: Setting) -> str:
+        """Return what a figure calls a setting."""
+        return setting_name(setting, self.settings)
+
+
+def settings_of(key: Key) -> dict[tuple[str, str], Setting]:
+    """Return what the opened key says of every code: (block id, code) → setting."""
+    return {
+        (block, code): _setting(key, block, code, presented)
+        for block, codes in key.codes.items()
+        for code, presented in codes.items()
+    }
+
+
+def _setting(key: Key, block: str, code: str, presented: str) -> Setting:
+    """Return what a code stands for: a condition, or a track of a design such as "8/1", with its standard."""
+    condition = key.tables["conditions"].get(presented)
+    if condition is None:
+        return Setting(code, presented)
+    liquids = " + ".join(key.liquids(block, code))
+    link = ", ".join(link_words(*(condition.get(name, 0.0) for name in OF_LINK)))
+    view = condition.get("view", "tank") + (" alone" if condition.get("overlay") == "hidden" else "")
+    view = "" if view == "tank" else view
+    return Setting(code, presented, liquids, key.delay_ms(block, code), condition.get("label"), link, view)
+
+
+def main_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[Block, ...]:
+    """Read the main blocks that ask something, in the order of the session.
+
+    Parameters
+    ----------
+    protocol : mapping
+        The protocol as a receipt holds it: without conditions, blocks with their codes.
+    """
+    asked = [protocol["blocks"][step] for step in every_step_of(protocol) if step in protocol["blocks"]]
+    return tuple(
+        _block(protocol, block, spoken(protocol), key)
+        for block in asked
+        if block["phase"] == "main" and block["questionnaire"] is not None and _statements(protocol, block)
+    )
+
+
+def _statements(protocol: Mapping[str, Any], block: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the statements of a block's questionnaire, which have no kind."""
+    return [item for item in protocol["questionnaires"][block["questionnaire"]]["items"] if "kind" not in item]
+
+
+def spoken(protocol: Mapping[str, Any]) -> str:
+    """Return the language of figures and tables: English where the study has it, otherwise its first."""
+    languages = list(protocol["study"]["languages"])
+    return "en" if "en" in languages else str(languages[0])
+
+
+def _block(protocol: Mapping[str, Any], block: Mapping[str, Any], language: str, key: Key | None) -> Block:
+    questionnaire = protocol["questionnaires"][block["questionnaire"]]
+    scale = protocol["scales"][questionnaire["scale"]]
+    off_scale = scale["cannot_judge"]
+    settings = settings_in(protocol, block["id"], key)
+    kind: Kind = block.get("compares") or ("delays" if block["code_prefix"] == DELAY_PREFIX else "liquids")
+    if key is not None:
+        kind = _opened(key, block["id"], block["codes"], block.get("compares"))[1]
+    return Block(
+        id=block["id"],
+        title=text_in(block["title"], language),
+        kind=kind,
+        settings=settings,
+        items=tuple(
+            Item(item["id"], text_in(item["text"], language), text_in(item["short"], language))
+            for item in _statements(protocol, block)
+        ),
+        labels=tuple(scale["labels"][language]),
+        cannot_judge=None if off_scale is None else text_in(off_scale, language),
+    )
+
+
+def settings_in(protocol: Mapping[str, Any], block: str, key: Key | None) -> tuple[Setting, ...]:
+    """Return the settings of a block: in code order, once known in the order of the conditions."""
+    table = protocol["blocks"][block]
+    if key is None:
+        return tuple(Setting(code) for code in table["codes"])
+    return _opened(key, block, table["codes"], table.get("compares"))[0]
+
+
+def setting_name(setting: Setting, others: Sequence[Setting]) -> str:
+    """Return what a figure calls a setting: its code, or its liquid and, where they differ, its view and delay."""
+    if setting.liquid is None or setting.delay_ms is None:
+        return setting.code if setting.standard is None else f"Standard {setting.standard}"
+    liquid = setting.liquid.replace("_", " ")
+    named = liquid[:1].upper() + liquid[1:]
+    named = f"{named}, {setting.view or 'tank'}" if len({other.view for other in others}) > 1 else named
+    named = f"{named}, {setting.delay_ms:g} ms" if len({other.delay_ms for other in others}) > 1 else named
+    return f"{named}, {setting.link}" if setting.link else named
+
+
+def _opened(key: Key, block: str, codes: Sequence[str], kind: Kind | None) -> tuple[tuple[Setting, ...], Kind]:
+    """Return the settings by name: delays ascending, others in the order of the protocol's conditions.
+
+    Without ``kind``, in receipts of earlier versions, one liquid under several delays is a block of delays.
+    """
+    known = settings_of(key)
+    settings = [known[block, code] for code in codes]
+    if kind is None:
+        delays = {setting.delay_ms for setting in settings}
+        kind = "delays" if len(delays) > 1 and len({setting.liquid for setting in settings}) == 1 else "liquids"
+    if kind == "delays":
+        return tuple(sorted(settings, key=lambda setting: setting.delay_ms or 0.0)), "delays"
+    order = list(key.tables["conditions"])
+    if any(setting.condition not in order for setting in settings):  # tracks, by their standards
+        return tuple(sorted(settings, key=lambda one: float((one.condition or "").partition("/")[0] or 0))), "liquids"
+    return tuple(sorted(settings, key=lambda setting: order.index(setting.condition))), kind
+
+
+@dataclass(frozen=True, slots=True)
+class LevelBlock:
+    """A block with a design.
+
+    ``stimulus`` is what it varies, ``method`` how its levels were chosen: None where it compares conditions, and while
+    the key is sealed; ``published`` are the values of other studies that the protocol compares it with;
+    ``wrong_most`` is the share of incorrect answers to catch trials that is permitted, None without catch trials.
+    """
+
+    id: str
+    title: str
+    phase: Phase
+    design: Design
+    stimulus: Stimulus | None
+    settings: tuple[Setting, ...]
+    method: Method | None = None
+    published: tuple[Published, ...] = ()
+    wrong_most: float | None = None
+
+    @property
+    def has_correct_answer(self) -> bool:
+        """Whether an answer can be correct."""
+        return has_correct_answer(self.design, self.stimulus)
+
+    @property
+    def counts(self) -> str:
+        """What the share of answers at a level is of."""
+        return success_name(self.design, self.stimulus)
+
+    @property
+    def standards_rove(self) -> bool:
+        """Whether trials of several standards alternate."""
+        standards = {one.standard for one in self.settings}
+        return len(standards) > 1 and self.method is not None and self.method.order == "interleaved"
+
+    @property
+    def assumed(self) -> Assumed | None:
+        """What is assumed about its psychometric function; None where no answer enters one, or the key is sealed."""
+        if self.stimulus is None or not rises(self.stimulus, self.design):
+            return None
+        if self.method is None:
+            return assumed_for(self.stimulus, self.design)
+        return self.method.assumed(self.stimulus, self.design)
+
+    def presents_modulus(self, index: int) -> bool:
+        """Return whether the trial at this place in the block presents the modulus, which is not analysed."""
+        return self.design.first is not None and index == 1
+
+
+def level_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[LevelBlock, ...]:
+    """Return the blocks with a design of the protocol in a receipt, in the order of the session; ``key`` is open.
+
+    Raises
+    ------
+    KeyError, TypeError, AttributeError, ValueError
+        They give no protocol that this version knows.
+    """
+    steps = [step for step in every_step_of(protocol) if "slots" in protocol["blocks"].get(step, {})]
+    whole = whole_protocol(protocol, key) if key is not None and steps else None
+    return tuple(_level_block(protocol, step, key, whole) for step in steps)
+
+
+def _level_block(protocol: Mapping[str, Any], step: str, key: Key | None, whole: Protocol | None) -> LevelBlock:
+    table = protocol["blocks"][step]
+    stimulus: Stimulus | None = None
+    method: Method | None = None
+    published: tuple[Published, ...] = ()
+    if whole is not None:
+        block = whole.blocks[step]
+        design = design_of(whole, block)
+        if block.stimulus is not None:
+            stimulus, method = stimulus_of(whole, block), method_of(whole, block)
+        if whole.analysis is not None:
+            published = tuple(one for one in whole.analysis.published if one.block == step)
+    elif (written := protocol.get("designs", {}).get(table["design"])) is not None:
+        design = DESIGN_KINDS[written["kind"]].model_validate(written)
+    else:
+        design = default_design(table["design"])
+    title = text_in(table["title"], spoken(protocol))
+    return LevelBlock(
+        step, title, table["phase"], design, stimulus, settings_in(protocol, step, key), method, published,
+        (table.get("catch") or {}).get("wrong_most"),
+    )  # fmt: skip
+
+
+Direction: TypeAlias = Literal["increasing", "decreasing"]
+
+
+@dataclass(frozen=True, slots=True)
+class Decided:
+    """The protocol's table ``analysis``.
+
+    ``made`` is False where there was none; ``changed`` where sessions were run under different ones, of which this is
+    the first: in both cases everything found is exploratory.
+    """
+
+    made: bool
+    changed: bool
+    alpha: float
+    equivalence_bound: float | None
+    primary: tuple[str, ...]
+    names: tuple[str, ...]
+    rising: tuple[str, ...]
+    falling: tuple[str, ...]
+    noticed: str | None
+
+    @property
+    def binding(self) -> bool:
+        """Whether it was decided before the first session, and kept to."""
+        return self.made and not self.changed
+
+    def is_primary(self, item: str) -> bool:
+        """Whether a statement is one that the study is about."""
+        return self.binding and (not self.primary or item in self.primary)
+
+    def direction(self, item: str) -> Direction | None:
+        """Return where answers to a statement were expected to go as delay grows; None: nothing was expected."""
+        return "increasing" if item in self.rising else "decreasing" if item in self.falling else None
+
+    def named_in(self, block: Block) -> bool:
+        """Return whether the statements that name a liquid are those of a block."""
+        return bool(self.names) and set(self.names) <= {item.id for item in block.items}
+
+
+NOTHING: Final = Decided(False, False, 0.05, None, (), (), (), (), None)
+
+
+def read(tables: Sequence[Mapping[str, Any] | None]) -> Decided:
+    """Return what the sessions' receipts say was decided.
+
+    Raises
+    ------
+    AnalysisError
+        A receipt's table is none.
+    """
+    first = tables[0]
+    changed = any(table != first for table in tables)
+    if first is None:
+        return replace(NOTHING, changed=changed)
+    try:
+        bound, noticed = first["equivalence_bound"], first["noticed"]
+        return Decided(
+            made=True,
+            changed=changed,
+            alpha=float(first["alpha"]),
+            equivalence_bound=None if bound is None else float(bound),
+            primary=tuple(map(str, first["primary"])),
+            names=tuple(map(str, first["names"])),
+            rising=tuple(map(str, first["rising"])),
+            falling=tuple(map(str, first["falling"])),
+            noticed=None if noticed is None else str(noticed),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise AnalysisError(
+            f"a receipt does not say what was decided about the analysis ({type(error).__name__}: {error}): it was "
+            "changed, or written by another version of the program; restore it from a copy"
+        ) from error
+
+
+@dataclass(frozen=True, slots=True)
+class AskedIn:
+    """Where questions were asked: after the trials of a block, with its ``settings``, or in a form, which has none."""
+
+    id: str
+    title: str
+    is_form: bool
+    settings: tuple[Setting, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class AskedQuestion:
+    """A question, and where it was asked."""
+
+    where: AskedIn
+    question: Question
+    context: Context
+
+    @property
+    def id(self) -> str:
+        """The id of its item."""
+        return self.question.id
+
+    @property
+    def text(self) -> str:
+        """Its words."""
+        return self.context.text(self.question.text)
+
+    @property
+    def short(self) -> str:
+        """A few words for it."""
+        return self.context.text(self.question.short)
+
+    @property
+    def levels(self) -> dict[str, str]:
+        """All answers with their words, where these are few."""
+        return self.question.levels(self.context)
+
+    @property
+    def bounds(self) -> tuple[float, float] | None:
+        """The smallest and the largest number it can be answered with."""
+        return self.question.bounds(self.context)
+
+    @property
+    def cannot_judge(self) -> str | None:
+        """The answer off the scale, or None."""
+        return getattr(self.question.view(0, self.context), "cannot_judge", None)
+
+
+@dataclass(frozen=True, slots=True)
+class AskedScore:
+    """A score of a questionnaire, with the questions that it is computed of."""
+
+    where: AskedIn
+    name: str
+    instrument: str | None
+    score: Score
+    questions: tuple[AskedQuestion, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class AskedQuestions:
+    """What a study asked besides statements after trials."""
+
+    questions: tuple[AskedQuestion, ...] = ()
+    scores: tuple[AskedScore, ...] = ()
+
+
+NOTHING_ELSE: Final = AskedQuestions()
+
+
+def asked_questions(protocol: Mapping[str, Any], key: Key | None) -> AskedQuestions:
+    """Read them from a protocol as a receipt holds it, in the order of the session.
+
+    Raises
+    ------
+    AnalysisError
+        A question is of a kind that this version does not know, or not one of its kind.
+    """
+    if protocol.get("format", 1) < 2:
+        return NOTHING_ELSE
+    questions: list[AskedQuestion] = []
+    scores: list[AskedScore] = []
+    scales = {name: Scale.model_validate(table) for name, table in protocol["scales"].items()}
+    for where, table in _questionnaires(protocol, key):
+        context = Context(scales, table.get("scale"), spoken(protocol))
+        found = tuple(AskedQuestion(where, _question(item, where), context) for item in table["items"])
+        questions += [one for one in found if where.is_form or not isinstance(one.question, Statement)]
+        scores += [
+            AskedScore(where, name, table.get("instrument"), Score.model_validate(score), found)
+            for name, score in table.get("scores", {}).items()
+        ]
+    return AskedQuestions(tuple(questions), tuple(scores))
+
+
+def _questionnaires(protocol: Mapping[str, Any], key: Key | None) -> Iterator[tuple[AskedIn, Mapping[str, Any]]]:
+    language = spoken(protocol)
+    for step in every_step_of(protocol):
+        if step in protocol["blocks"]:
+            block = protocol["blocks"][step]
+            if block["phase"] == "main" and block["questionnaire"] is not None:
+                title = text_in(block["title"], language)
+                where = AskedIn(step, title, False, settings_in(protocol, step, key))
+                yield where, protocol["questionnaires"][block["questionnaire"]]
+        elif step in protocol["questionnaires"]:
+            table = protocol["questionnaires"][step]
+            titled = table["title"] is not None
+            title = text_in(table["title"], language) if titled else step.replace("_", " ").capitalize()
+            yield AskedIn(step, title, True, ()), table
+
+
+def _question(table: Mapping[str, Any], where: AskedIn) -> Question:
+    try:
+        return question_of(table)
+    except (KeyError, ValueError) as error:
+        raise AnalysisError(
+            f"question {table.get('id')!r} of {where.id!r} is of no kind that this version knows "
+            f"({table.get('kind')}): use the version that ran the study"
+        ) from error

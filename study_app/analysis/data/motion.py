@@ -1,0 +1,338 @@
+"""How participants moved and what force they felt: from one target to the next, and over whole trials.
+
+Times and places are the device's, undelayed: the same clock that decided when a target was reached.
+
+Measures of trials stand in the trials' tables; those of reaches come out of the recordings, where they were kept. The
+first reach of a trial begins wherever the hand was and is left out.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.signal import butter, find_peaks, sosfiltfilt
+
+from study_app.analysis.data.blocks import Block
+from study_app.analysis.data.measures import Array, quartiles
+from study_app.analysis.data.study_tables import Study
+from study_app.errors import StoreError
+from study_app.haptics.model.layout import LIMITER_NAMES
+from study_app.store.recordings import read_samples
+from study_app.store.sites.merged import session_in
+
+CUTOFF_HZ: Final = 10.0
+"""Below this lies what a hand does on purpose; speeds are low-passed here (Butterworth, both ways, order 4 in all)."""
+
+PROMINENCE: Final = 0.1
+"""A peak of speed counts as a submovement if it stands out by this share of the reach's highest speed."""
+
+SHORTEST: Final = 32
+"""So many samples are needed to be filtered; a shorter reach is one submovement."""
+
+REACH_DEFINITIONS: Final = {
+    "movement_time_s": "from the lighting of a target to the entry that was held; the dwell itself is not in it",
+    "path_mm": "length of the hand's path in that time",
+    "overshoot_mm": "farthest place beyond the far edge of the target, along the line between the targets; 0: never",
+    "submovements": "peaks of the hand's speed until the target was reached "
+    f"(low-pass {CUTOFF_HZ:g} Hz) that stand out by {100 * PROMINENCE:g} % of the highest; 1 is one smooth movement",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Targets:
+    """A task of reaching: ``centres_m`` (targets, 3) in the hand's frame, their radius and how long to stay."""
+
+    centres_m: Array
+    radius_m: float
+    dwell_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """One reach: its ``target``, when it was lit and when it was reached [s, from the trial's first sample]."""
+
+    target: int
+    lit_s: float
+    reached_s: float
+    movement_time_s: float
+    path_mm: float
+    overshoot_mm: float
+    submovements: int
+
+
+def targets_of(task: Mapping[str, Any]) -> Targets:
+    """Return the targets of a task as a receipt holds it."""
+    return Targets(np.asarray(task["targets_mm"], dtype=float) / 1000, task["radius_mm"] / 1000, task["dwell_s"])
+
+
+def reaches(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -> tuple[Reach, ...]:
+    """Return the completed reaches of a trial.
+
+    Parameters
+    ----------
+    times_ns : (n,) array
+        From the task's first sample to its last.
+    positions_m : (n, 3) array
+        Places of the hand.
+    """
+    seconds = (times_ns - times_ns[0]) / 1e9 if len(times_ns) else np.zeros(0)
+    found = []
+    for number, (lit, entered, reached) in enumerate(_held(times_ns, positions_m, targets)):
+        target = number % len(targets.centres_m)
+        way = positions_m[lit : entered + 1]
+        found.append(
+            Reach(
+                target=target,
+                lit_s=round(float(seconds[lit]), 9),
+                reached_s=round(float(seconds[reached]), 9),
+                movement_time_s=round(float(seconds[entered] - seconds[lit]), 9),
+                path_mm=1000 * path_length_m(way),
+                overshoot_mm=1000 * _overshoot_m(positions_m[lit : reached + 1], targets, target),
+                submovements=submovements(seconds[lit : reached + 1], positions_m[lit : reached + 1]),
+            )
+        )
+    return tuple(found)
+
+
+def _held(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -> Iterator[tuple[int, int, int]]:
+    """Yield, as samples, when each target was lit, entered for good, and reached."""
+    dwell_ns = round(targets.dwell_s * 1e9)
+    lit = number = 0
+    while lit < len(times_ns):
+        centre = targets.centres_m[number % len(targets.centres_m)]
+        first = lit if number == 0 else lit + 1  # a target is entered after the sample that lit it
+        inside = ((positions_m[first:] - centre) ** 2).sum(axis=1) <= targets.radius_m**2
+        edges = np.flatnonzero(np.diff(inside, prepend=False, append=False)) + first
+        for entered, left in zip(edges[::2], edges[1::2], strict=True):
+            reached = int(np.searchsorted(times_ns, times_ns[entered] + dwell_ns))
+            if reached < left:
+                yield lit, int(entered), reached
+                lit, number = reached, number + 1
+                break
+        else:
+            return
+
+
+def path_length_m(positions_m: Array) -> float:
+    """Return the length of a path (n, 3)."""
+    return float(np.linalg.norm(np.diff(positions_m, axis=0), axis=1).sum())
+
+
+def submovements(seconds: Array, positions_m: Array) -> int:
+    """Return how many peaks the speed along a path (n, 3) at ``seconds`` (n,) has; at least 1."""
+    if len(seconds) < SHORTEST:
+        return 1
+    rate_hz = (len(seconds) - 1) / (seconds[-1] - seconds[0])
+    if rate_hz <= 2 * CUTOFF_HZ:
+        return 1
+    speed = np.linalg.norm(np.gradient(positions_m, seconds, axis=0), axis=1)
+    smooth = sosfiltfilt(butter(2, CUTOFF_HZ, fs=rate_hz, output="sos"), speed)
+    peaks, _ = find_peaks(smooth, prominence=PROMINENCE * float(smooth.max()))
+    return max(1, len(peaks))
+
+
+def _overshoot_m(way: Array, targets: Targets, target: int) -> float:
+    """Return how far a path went beyond the far edge of its target, seen from the target before."""
+    line = targets.centres_m[target] - targets.centres_m[target - 1]
+    length = float(np.linalg.norm(line))
+    if length == 0.0:
+        return 0.0
+    beyond = (way - targets.centres_m[target]) @ (line / length)
+    return max(0.0, float(beyond.max()) - targets.radius_m)
+
+
+OF_TRIALS: Final = ("duration_s", "path_m", "force_mean_n", "force_peak_n", "at_limit_percent")
+OF_REACHES: Final = ("movement_time_s", "path_mm", "overshoot_mm", "submovements")
+TRIAL_DEFINITIONS: Final = {
+    "duration_s": "from the trial's beginning to its end",
+    "path_m": "length of the hand's path in the trial",
+    "force_mean_n": "mean force on the hand in the trial",
+    "force_peak_n": "largest force on the hand in the trial",
+    "at_limit_percent": "share of the trial's ticks in which the force was cut to the force limit",
+}
+
+GLITCH: Final = 1 << LIMITER_NAMES.index("glitch")
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """One measure under one setting: over ``n`` participants, each of whom counts by his or her median."""
+
+    block: str
+    code: str
+    measure: str
+    n: int
+    median: float | None
+    q1: float | None
+    q3: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Reached:
+    """The reaches of one counted trial, the first left out."""
+
+    participant: str
+    session: int
+    trial: int
+    block: str
+    code: str
+    valid: bool | None
+    found: tuple[Reach, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Performance:
+    """All measures. ``reaching`` are the blocks whose task is one of reaching: only there are there reaches.
+
+    ``trials`` of reaching count, of which ``recorded`` have a recording that was read.
+
+    ``unread`` says of the others why, a line each kind. Of ``judged`` trials it is known whether they kept to the
+    protocol's limits of timing; ``invalid`` ones did not, and are in the measures all the same.
+    """
+
+    moved: tuple[Moved, ...]
+    reaching: tuple[str, ...]
+    reached: tuple[Reached, ...]
+    trials: int
+    recorded: int
+    judged: int
+    invalid: int
+    unread: tuple[str, ...]
+
+    def recorded_in(self, block: str) -> bool:
+        """Return whether there is any reach of a block."""
+        return any(trial.block == block for trial in self.reached)
+
+    def by_participant(self, people: Sequence[str], block: Block, measure: str) -> Array:
+        """Return the medians of a measure of reaches (participants, settings), NaN where there is none."""
+        values = np.full((len(people), len(block.codes)), np.nan)
+        found: dict[tuple[int, int], list[float]] = {}
+        for trial in self.reached:
+            if trial.block == block.id:
+                place = people.index(trial.participant), block.codes.index(trial.code)
+                found.setdefault(place, []).extend(getattr(reach, measure) for reach in trial.found)
+        for place, numbers in found.items():
+            if numbers:
+                values[place] = np.median(numbers)
+        return values
+
+
+def performance(study: Study, each: Callable[[int, int], object] = lambda _done, _of: None) -> Performance:
+    """Measure the trials that count; ``each`` receives how many recordings of how many were read.
+
+    Raises
+    ------
+    Exception
+        What ``each`` raises ends it.
+    """
+    rows = study.trials[study.trials["counted"]]
+    tasks = {block.id: _targets(study.protocol, block) for block in study.blocks}
+    where = tuple(name for name, targets in tasks.items() if targets is not None)
+    reaching = rows[rows["block"].isin(where)]
+    found: list[Reached] = []
+    unread: dict[str, int] = {}
+    for number, row in enumerate(reaching.to_dict("records")):
+        each(number, len(reaching))
+        targets = tasks[str(row["block"])]
+        one = _why_not(study.folder, row) if targets is None else _reached(study.folder, row, targets)
+        if isinstance(one, str):
+            unread[one] = unread.get(one, 0) + 1
+        else:
+            found.append(one)
+    moved = [*_of_trials(study, rows)]
+    whole = Performance((), where, tuple(found), 0, 0, 0, 0, ())
+    for block in study.blocks:
+        if block.id in where and found:
+            for measure in OF_REACHES:
+                moved += _summarised(block, measure, whole.by_participant(study.people, block, measure))
+    return Performance(
+        moved=tuple(moved),
+        reaching=where,
+        reached=tuple(found),
+        trials=len(reaching),
+        recorded=len(found),
+        judged=int(rows["valid"].notna().sum()),
+        invalid=int((~rows["valid"].fillna(value=True)).sum()),
+        unread=tuple(f"{count} × {reason}" for reason, count in unread.items()),
+    )
+
+
+def _targets(protocol: Mapping[str, Any], block: Block) -> Targets | None:
+    """Return the targets of a block's task, None where it has none."""
+    named = protocol.get("blocks", {}).get(block.id, {}).get("task")
+    task = protocol.get("tasks", {}).get(named, {})
+    return targets_of(task) if task.get("kind") == "reach" else None
+
+
+def _reached(folder: Path, row: Mapping[Any, Any], targets: Targets) -> Reached | str:
+    """Return the reaches of a trial, or why they are not known."""
+    if reason := _why_not(folder, row):
+        return reason
+    try:
+        samples = read_samples(_file(folder, row))
+    except StoreError:
+        return "recording is damaged (liquid-study verify says which)"
+    if len(samples):
+        samples = samples[(samples["scene"] == samples["scene"][-1]) & (samples["limiters"] & GLITCH == 0)]
+    if len(samples):
+        end_ns = samples["time_ns"][0] + round(float(row["duration_s"]) * 1e9)
+        samples = samples[samples["time_ns"] <= end_ns]
+    return Reached(
+        participant=str(row["participant"]),
+        session=int(row["session"]),
+        trial=int(row["trial"]),
+        block=str(row["block"]),
+        code=str(row["code"]),
+        valid=None if pd.isna(row["valid"]) else bool(row["valid"]),
+        found=reaches(samples["time_ns"], samples["position_m"], targets)[1:],
+    )
+
+
+def _why_not(folder: Path, row: Mapping[Any, Any]) -> str:
+    if pd.isna(row["recording"]):
+        return "no recording was kept"
+    if pd.isna(row["duration_s"]):
+        return "the trial has no duration"
+    return "" if _file(folder, row).is_file() else "recording is not in the folder"
+
+
+def _file(folder: Path, row: Mapping[Any, Any]) -> Path:
+    return session_in(folder, str(row["participant"]), int(row["session"])).path / str(row["recording"])
+
+
+def _of_trials(study: Study, rows: pd.DataFrame) -> list[Moved]:
+    table = pd.DataFrame(
+        {
+            "participant": rows["participant"],
+            "block": rows["block"],
+            "code": rows["code"],
+            "duration_s": rows["duration_s"],
+            "path_m": rows["path_length_m"],
+            "force_mean_n": rows["force_mean_n"],
+            "force_peak_n": rows["force_peak_n"],
+            "at_limit_percent": 100 * rows["limiter_norm"].astype("Float64") / rows["ticks"].replace(0, pd.NA),
+        }
+    )
+    medians = table.groupby(["block", "code", "participant"])[list(OF_TRIALS)].median().reset_index()
+    found = []
+    for block in study.blocks:
+        here = medians[(medians["block"] == block.id) & medians["code"].isin(block.codes)]
+        for measure in OF_TRIALS:
+            wide = here.pivot_table(index="participant", columns="code", values=measure, dropna=False)
+            values = wide.reindex(columns=list(block.codes)).to_numpy(dtype=float, na_value=np.nan)
+            found += _summarised(block, measure, values)
+    return found
+
+
+def _summarised(block: Block, measure: str, values: Array) -> list[Moved]:
+    """Return a measure's quartiles over participants (participants, settings) for each setting."""
+    found = []
+    for code, column in zip(block.codes, values.T, strict=True):
+        n = int((~np.isnan(column)).sum())
+        q1, median, q3 = quartiles(column) if n else (None, None, None)
+        found.append(Moved(block.id, code, measure, n, median, q1, q3))
+    return found

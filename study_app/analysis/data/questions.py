@@ -1,0 +1,225 @@
+"""Questions that no block of statements holds: their answers, measures and scores."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+import pandas as pd
+
+from study_app.analysis.data.blocks import AskedIn, AskedQuestion, AskedScore, setting_name
+from study_app.analysis.data.measures import quartiles_or_none
+from study_app.analysis.data.study_tables import Study
+from study_app.analysis.levels.results import GroupAnswers, QuestionFound, ScoreFound
+from study_app.analysis.results import number
+from study_app.protocol.instruments.instrument import instrument, instruments
+from study_app.protocol.instruments.scores import score
+
+Numbers: TypeAlias = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Measure:
+    """A measure.
+
+    ``of`` returns the numbers of a group of answers, by name: rows with ``response``, ``value`` and ``cannot_judge``.
+    ``cells`` returns the cells of a table's row by their headings; a measure without any lists its ``texts``.
+    """
+
+    id: str
+    of: Callable[[AskedQuestion, pd.DataFrame], Numbers]
+    cells: Callable[[AskedQuestion, Numbers], Mapping[str, str]] | None
+
+
+def given(answers: pd.DataFrame) -> pd.DataFrame:
+    """Return the answers that were given, without those off the scale."""
+    return answers[answers["response"].notna()]
+
+
+def counts_of_missing(answers: pd.DataFrame) -> dict[str, Any]:
+    """Return how many answers and participants there are, and how many answers are missing or off the scale."""
+    valid = given(answers)
+    cannot_judge = int(answers["cannot_judge"].sum())
+    return {
+        "n": len(valid),
+        "participants": int(valid["participant"].nunique()),
+        "cannot_judge": cannot_judge,
+        "missing": len(answers) - len(valid) - cannot_judge,
+    }
+
+
+def quartile_cells(numbers: Numbers) -> dict[str, str]:
+    """Return median and quartiles as cells."""
+    low, high = numbers["q1"], numbers["q3"]
+    return {
+        "median": number(numbers["median"], 1),
+        "quartiles": "–" if low is None else f"{number(low, 1)} – {number(high, 1)}",
+    }
+
+
+def _distribution(_asked: AskedQuestion, answers: pd.DataFrame) -> Numbers:
+    values = given(answers)["value"].to_numpy(dtype=float)
+    low, middle, high = quartiles_or_none(values)
+    return {
+        **counts_of_missing(answers),
+        "median": middle,
+        "q1": low,
+        "q3": high,
+        "smallest": float(values.min()) if len(values) else None,
+        "largest": float(values.max()) if len(values) else None,
+        "values": sorted(float(value) for value in values),
+    }
+
+
+def _distribution_cells(_asked: AskedQuestion, numbers: Numbers) -> dict[str, str]:
+    least, most = numbers["smallest"], numbers["largest"]
+    return {
+        "n": str(numbers["n"]),
+        "missing": str(numbers["missing"]),
+        **quartile_cells(numbers),
+        "range": "–" if least is None else f"{number(least, 1)} – {number(most, 1)}",
+    }
+
+
+DISTRIBUTION: Final = Measure("distribution", _distribution, _distribution_cells)
+
+
+def _option_counts(asked: AskedQuestion, answers: pd.DataFrame) -> Numbers:
+    chosen = [asked.question.counted(str(response)) for response in given(answers)["response"]]
+    return {
+        **counts_of_missing(answers),
+        "counts": {option: sum(option in one for one in chosen) for option in asked.levels},
+    }
+
+
+def _option_cells(asked: AskedQuestion, numbers: Numbers) -> dict[str, str]:
+    total = numbers["n"] or 1
+    return {
+        **{
+            words: f"{(count := numbers['counts'][option])} ({100 * count / total:.0f} %)"
+            for option, words in asked.levels.items()
+        },
+        "n": str(numbers["n"]),
+        "missing": str(numbers["missing"]),
+    }
+
+
+OPTION_COUNTS: Final = Measure("counts", _option_counts, _option_cells)
+
+
+def _point_counts(asked: AskedQuestion, answers: pd.DataFrame) -> Numbers:
+    chosen = given(answers)["response"].value_counts()
+    low, middle, high = quartiles_or_none(given(answers)["value"].to_numpy(dtype=float))
+    return {
+        **counts_of_missing(answers),
+        "counts": {point: int(chosen.get(point, 0)) for point in asked.levels},
+        "median": middle,
+        "q1": low,
+        "q3": high,
+    }
+
+
+def _point_cells(_asked: AskedQuestion, numbers: Numbers) -> dict[str, str]:
+    return {
+        **{point: str(count) for point, count in numbers["counts"].items()},
+        "n": str(numbers["n"]),
+        "missing": str(numbers["missing"] + numbers["cannot_judge"]),
+        **quartile_cells(numbers),
+    }
+
+
+POINT_COUNTS: Final = Measure("rating", _point_counts, _point_cells)
+
+
+def _texts(_asked: AskedQuestion, answers: pd.DataFrame) -> Numbers:
+    texts = given(answers).sort_values(["participant", "session"], kind="stable")
+    pairs = zip(texts["participant"], texts["response"], strict=True)
+    return {**counts_of_missing(answers), "texts": [f"{person}: {text}" for person, text in pairs]}
+
+
+TEXTS: Final = Measure("texts", _texts, None)
+
+
+MEASURES: Final = {one.id: one for one in (POINT_COUNTS, OPTION_COUNTS, DISTRIBUTION, TEXTS)}
+"""Every measure by the id that a kind of question names it by."""
+
+_ONE: Final = ["participant", "session", "trial"]
+
+
+def questions_found(study: Study) -> tuple[QuestionFound, ...]:
+    """Return the numbers of every question, in the order of the session."""
+    return tuple(_question_found(study, asked) for asked in study.others.questions)
+
+
+def scores_found(study: Study) -> tuple[ScoreFound, ...]:
+    """Return every score, in the order of the session."""
+    return tuple(_score(study, asked) for asked in study.others.scores)
+
+
+def _question_found(study: Study, asked: AskedQuestion) -> QuestionFound:
+    measure = MEASURES[asked.question.measure]
+    return QuestionFound(
+        where=asked.where.id,
+        title=asked.where.title,
+        is_form=asked.where.is_form,
+        item=asked.id,
+        text=asked.text,
+        short=asked.short,
+        kind=asked.question.kind_id,
+        measure=measure.id,
+        figure=asked.question.figure,
+        groups=tuple(
+            GroupAnswers(code, name, measure.of(asked, rows))
+            for code, name, rows in _groups(asked.where, study.answers_to(asked))
+        ),
+    )
+
+
+def _groups(where: AskedIn, answers: pd.DataFrame) -> Iterator[tuple[str | None, str, pd.DataFrame]]:
+    """Yield the answers about each setting, or of a form all, with code and name."""
+    if where.is_form:
+        yield None, "All", answers
+    for setting in where.settings:
+        yield setting.code, setting_name(setting, where.settings), answers[answers["code"] == setting.code]
+
+
+def scored(study: Study, asked: AskedScore) -> pd.DataFrame:
+    """Return a row for every time that a questionnaire was answered: ``participant``, ``code`` and ``score``."""
+    rows = pd.concat([study.answers_to(one) for one in asked.questions])
+    bounds = {one.id: one.bounds for one in asked.questions}
+    found: list[dict[str, Any]] = []
+    for (participant, *_), answers in rows.groupby(_ONE, dropna=False, sort=True):
+        answered = {
+            str(item): str(response) if pd.isna(value) else float(value)
+            for item, response, value in zip(answers["item"], answers["response"], answers["value"], strict=True)
+            if not pd.isna(response)
+        }
+        code = None if asked.where.is_form else str(answers["code"].iloc[0])
+        found.append({"participant": participant, "code": code, "score": score(asked.score, answered, bounds)})
+    return pd.DataFrame(found, columns=["participant", "code", "score"])
+
+
+def _score(study: Study, asked: AskedScore) -> ScoreFound:
+    known = asked.instrument is not None and asked.instrument in instruments()
+    return ScoreFound(
+        where=asked.where.id,
+        title=asked.where.title,
+        name=asked.name,
+        instrument=asked.instrument,
+        source=str(instrument(asked.instrument)["source"]) if known and asked.instrument is not None else None,
+        groups=tuple(
+            GroupAnswers(code, name, _summary(rows["score"].dropna().to_numpy(dtype=float)))
+            for code, name, rows in _groups(asked.where, scored(study, asked))
+        ),
+    )
+
+
+def _summary(values: Any) -> dict[str, Any]:
+    n = len(values)
+    return {
+        "n": n,
+        "mean": float(values.mean()) if n else None,
+        "sd": float(np.std(values, ddof=1)) if n > 1 else None,
+        "smallest": float(values.min()) if n else None,
+        "largest": float(values.max()) if n else None,
+    }

@@ -1,0 +1,362 @@
+"""The sessions of a results folder as typed tables, checked against their receipts, excluded rows marked."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from study_app.analysis.data.blocks import (
+    NOTHING_ELSE,
+    AskedQuestions,
+    Block,
+    LevelBlock,
+    asked_questions,
+    level_blocks,
+    main_blocks,
+    spoken,
+)
+from study_app.analysis.levels.results import OwnDynamics
+from study_app.errors import AnalysisError
+from study_app.protocol.texts import text_in
+from study_app.store.atomic import read_regular
+from study_app.store.blinded.blinding import Key
+from study_app.store.exclusions import Exclusion, named
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.journals.parsing import check_study_name, parse_json
+from study_app.store.tables.column import MISSING, Column, header
+from study_app.store.tables.columns import LATER, columns_held, tables_of
+from study_app.store.tables.csv_files import cells
+
+DTYPES: Final[dict[str, Any]] = {
+    "text": "string",
+    "time": "string",
+    "integer": "Int64",
+    "number": "Float64",
+    "flag": "boolean",
+}
+
+Whole: TypeAlias = NDArray[np.int64]
+
+
+def tables(paths: Sequence[Path], columns: tuple[Column, ...]) -> tuple[pd.DataFrame, Whole]:
+    """Read one table of many sessions; every column typed by the dictionary, ``n/a`` as missing.
+
+    Returns
+    -------
+    DataFrame, (files,) array
+        The rows of all files in their order, and how many each holds. Columns that the version which wrote a file did
+        not have yet, or that are sealed, are missing.
+
+    Raises
+    ------
+    AnalysisError
+        A file cannot be read, or is not the table the dictionary describes: names the file, the row (1 is the
+        header), the column and the value.
+    """
+    values: dict[str, list[Any]] = {column.name: [] for column in columns}
+    known: dict[str, dict[str, Any]] = {column.name: {} for column in columns}
+    lengths = []
+    for path in paths:
+        texts, rows = _texts(path, columns)
+        lengths.append(rows)
+        for column in columns:
+            of_file = texts.get(column.name, [MISSING] * rows)
+            values[column.name] += _values(column, of_file, known[column.name], path)
+    typed = {column.name: pd.array(values[column.name], dtype=DTYPES[column.kind]) for column in columns}
+    return pd.DataFrame(typed), np.array(lengths, dtype=np.int64)
+
+
+def _texts(path: Path, columns: tuple[Column, ...]) -> tuple[Mapping[str, Sequence[str]], int]:
+    """Return the cells of a file by column, and how many rows it has."""
+    try:
+        names, *rows = cells(read_regular(path))
+    except OSError as error:
+        raise unreadable(path, error, _again(path)) from error
+    except ValueError as error:
+        raise AnalysisError(f"{path} {error}: it was cut off or changed; {_again(path)}") from error
+    held = columns_held(names, columns, LATER | {column.name for column in columns if column.sealed})
+    if tuple(names) != header(held):
+        raise AnalysisError(
+            f"{path} does not begin with the columns of this table: it was changed, or written by another version of "
+            f"the program (expected {', '.join(header(held)[:4])} …, {len(held)} columns); {_again(path)}"
+        )
+    return (dict(zip(names, zip(*rows, strict=True), strict=True)) if rows else {}), len(rows)
+
+
+def _values(column: Column, texts: Sequence[str], known: dict[str, Any], path: Path) -> list[Any]:
+    """Return the values of a column in a file; ``known`` keeps the value of each text of all files."""
+    for text in dict.fromkeys(texts):
+        try:
+            if text not in known:
+                known[text] = None if text == MISSING and column.sealed else column.value(text)
+        except ValueError as error:
+            row = texts.index(text) + 2
+            raise AnalysisError(f"{path}, row {row}, column {column.name}: {error}; {_again(path)}") from error
+    return [known[text] for text in texts]
+
+
+def _again(path: Path) -> str:
+    return f"make it again from the journal: liquid-study rebuild {path.parent}"
+
+
+def document(path: Path) -> dict[str, Any]:
+    """Read a JSON object.
+
+    Raises
+    ------
+    AnalysisError
+        It cannot be read or is none.
+    """
+    try:
+        found = parse_json(read_regular(path))
+    except OSError as error:
+        raise unreadable(path, error) from error
+    except ValueError as error:
+        raise AnalysisError(f"{path} is damaged ({error}): restore it from a copy") from error
+    if not isinstance(found, dict):
+        raise AnalysisError(f"{path} is damaged (no JSON object): restore it from a copy")
+    return found
+
+
+def unreadable(path: Path, error: OSError, remedy: str = "restore it from a copy") -> AnalysisError:
+    """Return the error for a file that cannot be read."""
+    return AnalysisError(
+        f"{path} cannot be read ({error.strerror or type(error).__name__}): {remedy}, or correct its permissions"
+    )
+
+
+@dataclass(frozen=True)
+class Session:
+    """What was asked, what was answered, and the facts of the visit (``facts``: one row of ``Study.participants``).
+
+    ``own_dynamics`` are the device's own damping [N·s/m], friction [N] and mass [kg], means over axes; None where they
+    were not measured. ``device_velocity`` is whether the device measured its velocity, in place of the estimator.
+    """
+
+    folder: SessionFolder
+    study: str
+    title: str
+    version: str
+    protocol: Mapping[str, Any]
+    blocks: tuple[Block, ...]
+    facts: Mapping[str, Any]
+    others: AskedQuestions = NOTHING_ELSE
+    levels: tuple[LevelBlock, ...] = ()
+    own_dynamics: tuple[float, float, float] | None = None
+    device_velocity: bool = False
+
+    @property
+    def asked(self) -> tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...]:
+        """Block, codes and items, and forms with their items: what must be alike in sessions that are pooled."""
+        blocks = ((block.id, block.codes_as_dealt, tuple(item.id for item in block.items)) for block in self.blocks)
+        others = ((one.where.id, (one.id,), (one.question.kind_id,)) for one in self.others.questions)
+        return (*blocks, *others)
+
+    @property
+    def protocol_format(self) -> int:
+        """The format of the study's protocol."""
+        return int(self.protocol.get("format", 1))
+
+
+def read_session(folder: SessionFolder, key: Key | None, like: Session | None = None) -> Session:
+    """Read a session's receipt; ``key`` is the study's once it was opened.
+
+    ``like`` is another session of the study: of what is the same in both one copy is kept.
+
+    Raises
+    ------
+    AnalysisError
+        The receipt is missing or damaged.
+    """
+    receipt = document(folder.receipt)
+    try:
+        protocol = receipt["protocol"]
+        if like is not None and protocol == like.protocol:
+            protocol = like.protocol
+        head = protocol["study"]
+        study, title, version = (
+            check_study_name(head["name"]),
+            text_in(head["title"], spoken(protocol)),
+            str(head["version"]),
+        )
+        facts = {
+            "participant": folder.participant,
+            "session": folder.number,
+            **{name: receipt[name] for name in ("simulated", "pilot", "status", "language", "started_at", "ended_at")},
+            "device": receipt["device"].get("name"),
+            "motors_masked": _masking(receipt.get("motors_masked")),
+            "protocol_version": version,
+            "key_hash": receipt["key_hash"],
+            **{name: receipt.get(name) for name in ("seed", "protocol_hash", "version")},
+        }
+        own_dynamics = _own_dynamics(receipt["device"].get("bench"))
+        device_velocity = receipt["device"].get("estimator") == "device"
+        alike = like is not None and protocol is like.protocol
+        blocks = like.blocks if like is not None and alike else main_blocks(protocol, key)
+        others = like.others if like is not None and alike else asked_questions(protocol, key)
+        levels = like.levels if like is not None and alike else level_blocks(protocol, key)
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        raise AnalysisError(
+            f"{folder.receipt} does not describe the session ({type(error).__name__}: {error}): it was changed, or "
+            "written by another version of the program; restore it from a copy"
+        ) from error
+    return Session(
+        folder, study, title, version, protocol, blocks, facts, others, levels, own_dynamics, device_velocity
+    )
+
+
+def _own_dynamics(bench: Mapping[str, Any] | None) -> tuple[float, float, float] | None:
+    """Return damping, friction and mass of a receipt's bench, each the mean over its axes."""
+    if bench is None:
+        return None
+    damping_nspm, friction_n, mass_kg = (
+        float(np.mean([float(value) for value in bench[name]])) for name in ("damping_nspm", "friction_n", "mass_kg")
+    )
+    return damping_nspm, friction_n, mass_kg
+
+
+def estimators_of(records: Sequence[Session]) -> str | None:
+    """Return the names of the velocity estimators of all sessions: "kalman", "device" or "kalman or device"."""
+    own = records[0].protocol.get("scene", {}).get("velocity", {}).get("kind")
+    measured = [one.device_velocity for one in records]
+    names = [*([] if all(measured) or own is None else [str(own)]), *(["device"] if any(measured) else [])]
+    return " or ".join(names) or None
+
+
+def mean_dynamics(records: Sequence[Session]) -> OwnDynamics | None:
+    """Return the mean of what sessions know of the device's own dynamics; None where none knows them."""
+    known = [one.own_dynamics for one in records if one.own_dynamics is not None]
+    if not known:
+        return None
+    damping_nspm, friction_n, mass_kg = np.mean(known, axis=0).tolist()
+    return OwnDynamics(damping_nspm, friction_n, mass_kg, len(known), len(records))
+
+
+def _masking(answer: Mapping[str, Any] | None) -> str | None:
+    """Return how motors were masked in words, None where that was not asked."""
+    if answer is None:
+        return None
+    level = answer.get("noise_db")
+    return str(answer["means"]) if level is None else f"{answer['means']} of {level} dB"
+
+
+def read_tables(sessions: Sequence[Session], name: str) -> pd.DataFrame:
+    """Read table ``name`` of sessions that were asked alike, with ``session_status`` added; rows in their order.
+
+    Raises
+    ------
+    AnalysisError
+        A file is missing, damaged or of another session, or answers what was not asked.
+    """
+    paths = [session.folder.table(session.study, name) for session in sessions]
+    table, lengths = tables(paths, tables_of(sessions[0].protocol_format)[name])
+    _check_own(sessions, paths, table, lengths)
+    if name == "responses":
+        _check_answers(sessions, paths, table, lengths)
+    status = np.repeat([session.facts["status"] for session in sessions], lengths)
+    return table.assign(session_status=pd.array(status, dtype="string"))
+
+
+def _check_own(sessions: Sequence[Session], paths: Sequence[Path], table: pd.DataFrame, lengths: Whole) -> None:
+    """Refuse rows that are not of the session whose file they stand in."""
+    own: dict[str, list[Any]] = {
+        "study": [session.study for session in sessions],
+        "participant": [session.folder.participant for session in sessions],
+        "session": [session.folder.number for session in sessions],
+    }
+    for column, values in own.items():
+        found = table[column].to_numpy()
+        foreign = np.flatnonzero(found != np.repeat(np.array(values, dtype=object), lengths))
+        if len(foreign):
+            which, row = _place(lengths, int(foreign[0]))
+            raise AnalysisError(
+                f"{paths[which]}, row {row}, column {column}: {str(found[foreign[0]])!r} instead of "
+                f"{str(values[which])!r}: the file belongs elsewhere; restore this session's own from a copy"
+            )
+
+
+def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd.DataFrame, lengths: Whole) -> None:
+    """Refuse answers to what was not asked, and answers given twice."""
+    blocks = sessions[0].blocks
+    asked = {(block.id, code, item.id) for block in blocks for code in block.codes for item in block.items}
+    asked |= {
+        (one.where.id, setting.code, one.id) for one in sessions[0].others.questions for setting in one.where.settings
+    }
+    main = np.flatnonzero(table["phase"].eq("main").fillna(False).to_numpy(dtype=bool))
+    answered = zip(*(table[name].to_numpy()[main] for name in ("block", "code", "item")), strict=True)
+    for index, (block, code, item) in zip(main, answered, strict=True):
+        if (block, code, item) not in asked:
+            which, row = _place(lengths, int(index))
+            raise AnalysisError(
+                f"{paths[which]}, row {row}: the receipt knows no statement {item!r} on a setting {code!r} in block "
+                f"{block!r}: the file was changed or belongs to another study; make it again from the journal: "
+                f"liquid-study rebuild {sessions[which].folder.path}"
+            )
+    which_one = [name for name in ("participant", "session", "form", "trial", "attempt", "item") if name in table]
+    twice = np.flatnonzero(table.duplicated(which_one))
+    if len(twice):
+        which, row = _place(lengths, int(twice[0]))
+        answer = table.iloc[int(twice[0])]
+        raise AnalysisError(
+            f"{paths[which]}, row {row}: the answer to {answer['item']!r} in trial {answer['trial']} stands there "
+            f"twice; make the table again from the journal: liquid-study rebuild {sessions[which].folder.path}"
+        )
+
+
+def _place(lengths: Whole, index: int) -> tuple[int, int]:
+    """Return the session of the row at ``index``, and the row's number in its file, the header's being 1."""
+    ends = np.cumsum(lengths)
+    which = int(np.searchsorted(ends, index, side="right"))
+    return which, int(index - ends[which] + lengths[which]) + 2
+
+
+def with_excluded(table: pd.DataFrame, listed: Sequence[Exclusion]) -> pd.DataFrame:
+    """Return the table with ``excluded`` and ``exclusion_reason`` added.
+
+    Parameters
+    ----------
+    table : DataFrame
+        ``participant`` and ``session`` of every row; where the rows are of trials, ``trial`` too.
+    listed : sequence of Exclusion
+        What is left out: a session with all its trials, or one trial with all its attempts.
+    """
+    if not listed:
+        return table.assign(excluded=False, exclusion_reason=pd.Series(pd.NA, index=table.index, dtype="string"))
+    trials = table["trial"] if "trial" in table.columns else [None] * len(table)
+    found = [
+        list(_about(listed, str(participant), int(session), None if pd.isna(trial) else trial))
+        for participant, session, trial in zip(table["participant"], table["session"], trials, strict=True)
+    ]
+    reasons = ["; ".join(one.reason for one in of_row if one.reason) or None for of_row in found]
+    return table.assign(
+        excluded=pd.Series([bool(of_row) for of_row in found], index=table.index, dtype=bool),
+        exclusion_reason=pd.Series(reasons, index=table.index, dtype="string"),
+    )
+
+
+def _about(listed: Sequence[Exclusion], participant: str, session: int, trial: int | None) -> Iterator[Exclusion]:
+    """Yield what leaves out a row: its session's exclusion before its trial's."""
+    for which in dict.fromkeys((None, trial)):
+        yield from (one for one in listed if one.what == (participant, session, which))
+
+
+def check_there(study: StudyFolder, trials: pd.DataFrame, listed: Sequence[Exclusion]) -> None:
+    """Refuse a list that leaves out what is not there, such as a mistyped id: what was meant would count.
+
+    Raises
+    ------
+    AnalysisError
+        Names the first such row.
+    """
+    sessions = {(session.participant, session.number) for session in study.sessions()}
+    presented = set(zip(trials["participant"], trials["session"], trials["trial"], strict=True))
+    for one in listed:
+        if (one.participant, one.session) not in sessions or (one.trial is not None and one.what not in presented):
+            raise AnalysisError(
+                f"{study.exclusions} excludes {named(one)}, which does not exist: correct or remove the row, so "
+                "that the intended data are excluded"
+            )

@@ -1,0 +1,564 @@
+"""A study as tables: every session of a results folder, pooled over sites, and its groups of participants.
+
+Each site has a key of its own, so that L1 of one is not L1 of another. Until all keys are open a code is SITE-CODE, and
+each site has settings of its own; then a code is the id of its condition, and the sites have the same settings.
+
+Everything recorded is kept; the column ``counted`` says what enters measures and figures: main trials of completed
+sessions, of a repeated trial the last attempt, without what ``exclusions.csv`` leaves out. Practice and baseline stay
+apart by their ``phase``.
+
+Without groups or sites, and until the study is unblinded, there is nothing.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Final, Literal, TypeAlias, TypeVar
+
+import numpy as np
+import pandas as pd
+
+from study_app.analysis.data import blocks as decided
+from study_app.analysis.data import measures
+from study_app.analysis.data.blocks import (
+    NOTHING_ELSE,
+    AskedIn,
+    AskedQuestion,
+    AskedQuestions,
+    AskedScore,
+    Block,
+    Decided,
+    Kind,
+    LevelBlock,
+    Setting,
+    settings_of,
+)
+from study_app.analysis.data.session_files import (
+    Session,
+    check_there,
+    estimators_of,
+    mean_dynamics,
+    read_session,
+    read_tables,
+    with_excluded,
+)
+from study_app.analysis.levels.results import OwnDynamics
+from study_app.errors import AnalysisError, StoreError
+from study_app.protocol.questions import STATEMENT
+from study_app.store.blinded import blinding
+from study_app.store.blinded.blinding import Key
+from study_app.store.blinded.unblinding import all_opened
+from study_app.store.exclusions import Exclusion, exclusions
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.sessions.folder_lock import never_begun
+from study_app.store.sessions.open_session import Place
+from study_app.store.sites.merged import DASH, Merged, read_merged
+from study_app.store.tables.columns import INTERVALS, SEALED
+from study_app.store.tables.study_files import has_intervals
+from study_app.store.verification.verify_session import Doubt, doubts
+from study_app.store.withdrawals import tombstones
+
+Settings: TypeAlias = Mapping[tuple[str, str], Setting]
+AnyBlock = TypeVar("AnyBlock", Block, LevelBlock)
+
+
+def renamed(site: str, setting: Setting) -> Setting:
+    """Return a site's setting with its code in the merged study."""
+    code = f"{site}{DASH}{setting.code}" if setting.condition is None else setting.condition
+    return replace(setting, code=code)
+
+
+def _all(each: Mapping[str, Iterable[Setting]]) -> tuple[Setting, ...]:
+    """Return the settings of all sites, each once, in the order of the first site that has it."""
+    return tuple(dict.fromkeys(renamed(site, one) for site, settings in each.items() for one in settings))
+
+
+def pooled_settings(sites: Mapping[str, Settings]) -> Settings:
+    """Return what every (block, code) of the merged study stands for; nothing while the sites are sealed."""
+    return {
+        (block, own.code): own
+        for site, settings in sites.items()
+        for (block, _), one in settings.items()
+        for own in [renamed(site, one)]
+    }
+
+
+def pooled_blocks(sites: Mapping[str, Sequence[AnyBlock]]) -> tuple[AnyBlock, ...]:
+    """Return the blocks, which all sites have, with the settings of all sites."""
+    first = next(iter(sites.values()))
+    return tuple(
+        replace(block, settings=_all({site: blocks[place].settings for site, blocks in sites.items()}))
+        for place, block in enumerate(first)
+    )
+
+
+def pooled_questions(sites: Mapping[str, AskedQuestions]) -> AskedQuestions:
+    """Return the other questions, which all sites were asked, with the settings of all sites."""
+
+    def where(wheres: Mapping[str, AskedIn]) -> AskedIn:
+        settings = _all({site: one.settings for site, one in wheres.items()})
+        return replace(next(iter(wheres.values())), settings=settings)
+
+    def questions(asked: Mapping[str, Sequence[AskedQuestion]]) -> tuple[AskedQuestion, ...]:
+        return tuple(
+            replace(one, where=where({site: those[place].where for site, those in asked.items()}))
+            for place, one in enumerate(next(iter(asked.values())))
+        )
+
+    scores: tuple[AskedScore, ...] = tuple(
+        replace(
+            score,
+            where=where({site: asked.scores[place].where for site, asked in sites.items()}),
+            questions=questions({site: asked.scores[place].questions for site, asked in sites.items()}),
+        )
+        for place, score in enumerate(next(iter(sites.values())).scores)
+    )
+    return AskedQuestions(questions({site: asked.questions for site, asked in sites.items()}), scores)
+
+
+def pooled_table(sites: Mapping[str, tuple[Settings, pd.DataFrame]]) -> pd.DataFrame:
+    """Return a table of all sites, with the site in the participants' IDs and the merged study's codes."""
+    return pd.concat([_own(site, *of_site) for site, of_site in sites.items()], ignore_index=True)
+
+
+def _own(site: str, settings: Settings, table: pd.DataFrame) -> pd.DataFrame:
+    if "participant" not in table:
+        return table
+    table = table.assign(participant=f"{site}{DASH}" + table["participant"])
+    if "code" not in table:
+        return table
+    pairs = list(zip(table["block"].to_numpy(), table["code"].to_numpy(), strict=True))
+    places = {pair: place for place, pair in enumerate(dict.fromkeys(pairs))}
+    codes = [_code(site, settings, *pair) for pair in places]
+    which = np.fromiter((places[pair] for pair in pairs), dtype=np.int64, count=len(pairs))
+    return table.assign(code=pd.array(codes, dtype="string").take(which))
+
+
+def _code(site: str, settings: Settings, block: object, code: object) -> str | None:
+    """Return the code of a row in the merged study; None of an answer in a form."""
+    if pd.isna(code):  # type: ignore[call-overload]
+        return None
+    return renamed(site, settings.get((str(block), str(code)), Setting(str(code)))).code
+
+
+def pooled_dynamics(sites: Iterable[OwnDynamics | None], sessions: int) -> OwnDynamics | None:
+    """Return the mean of what the sessions of all sites know of their devices' own dynamics; None of nothing."""
+    known = [one for one in sites if one is not None]
+    if not known:
+        return None
+    weights = [one.sessions for one in known]
+    damping_nspm, friction_n, mass_kg = (
+        float(np.average([getattr(one, name) for one in known], weights=weights))
+        for name in ("damping_nspm", "friction_n", "mass_kg")
+    )
+    return OwnDynamics(damping_nspm, friction_n, mass_kg, sum(weights), sessions)
+
+
+COMPLETED: Final = "completed"
+_TRIAL: Final = ["participant", "session", "trial"]
+
+
+@dataclass(frozen=True)
+class Study:
+    """All sessions of one study.
+
+    ``responses`` and ``trials`` have the columns of ``store.tables.columns``, with ``session_status``, ``excluded``,
+    ``exclusion_reason`` and ``counted`` added; ``participants`` has a row a session, with the last three. ``blocks``
+    are the main blocks that ask something; ``settings`` says what every (block, code) stands for, and is empty while
+    the key is sealed; ``exclusions`` is what was decided to leave out; ``doubts`` are files that are not as they were
+    recorded, and are used as they are. ``decided`` is what the protocol decided about the analysis, ``protocol`` the
+    first session's, as its receipt holds it. ``levels`` are the blocks with a design, ``intervals`` the
+    intervals of their trials; ``others`` are the questions that no block of statements holds;
+    ``answered`` has the rows of all questions as they were recorded, of which ``responses`` are those of statements;
+    ``own_dynamics`` are the device's, where receipts record a measurement; ``estimator`` names that of the velocity,
+    "device" where the device measured it; None where receipts do not say it. ``withdrawn`` is how many participants
+    withdrew, so that their data were erased. ``sites`` are the names of the sites of a merged study, whose participants
+    are SITE-ID.
+    """
+
+    folder: Path
+    name: str
+    title: str
+    version: str
+    blocks: tuple[Block, ...]
+    settings: Mapping[tuple[str, str], Setting]
+    responses: pd.DataFrame
+    trials: pd.DataFrame
+    participants: pd.DataFrame
+    exclusions: tuple[Exclusion, ...]
+    doubts: tuple[Doubt, ...] = ()
+    decided: Decided = decided.NOTHING
+    others: AskedQuestions = NOTHING_ELSE
+    answered: pd.DataFrame = field(default_factory=pd.DataFrame)
+    levels: tuple[LevelBlock, ...] = ()
+    intervals: pd.DataFrame = field(default_factory=pd.DataFrame)
+    protocol: Mapping[str, Any] = field(default_factory=dict)
+    own_dynamics: OwnDynamics | None = None
+    estimator: str | None = None
+    withdrawn: int = 0
+    sites: tuple[str, ...] = ()
+
+    @property
+    def people(self) -> tuple[str, ...]:
+        """The participants of sessions that count, in the order of their ids."""
+        return tuple(sorted(self.participants.loc[self.participants["counted"], "participant"].unique()))
+
+    def site_of(self, participant: str) -> str:
+        """Return the site of a participant of a merged study; otherwise nothing."""
+        return participant.partition(DASH)[0] if self.sites else ""
+
+    @property
+    def n(self) -> int:
+        """How many participants are in the measures."""
+        return len(self.people)
+
+    @property
+    def left_out(self) -> int:
+        """How many sessions are not, since they were not completed."""
+        return int((~self.participants["counted"] & ~self.participants["excluded"]).sum())
+
+    @property
+    def excluded_sessions(self) -> pd.DataFrame:
+        """The rows of ``participants`` that were decided to be left out, completed or not."""
+        return self.participants[self.participants["excluded"]]
+
+    @property
+    def versions(self) -> tuple[str, ...]:
+        """The versions of the protocol under which the sessions that count were run; of none, the first session's."""
+        counted = self.participants.loc[self.participants["counted"], "protocol_version"]
+        return tuple(sorted(set(map(str, counted)))) or (self.version,)
+
+    @property
+    def simulated(self) -> bool:
+        """Whether any participant was simulated."""
+        return bool(self.participants["simulated"].any())
+
+    @property
+    def pilot(self) -> bool:
+        """Whether these are pilot sessions."""
+        return bool(self.participants["pilot"].any())
+
+    @property
+    def revealed(self) -> bool:
+        """Whether the key was opened, so that settings have names."""
+        return bool(self.settings)
+
+    def tell_doubts(self, warn: Callable[[str], object] | None) -> None:
+        """Warn, in one line per file, of every file that differs from its recorded state."""
+        if warn is None:
+            return
+        for doubt in self.doubts:
+            warn(f"warning: {doubt}; used here as it is")
+
+    def blocks_of(self, kind: Kind) -> tuple[Block, ...]:
+        """Return the blocks that compare liquids, delays or views."""
+        return tuple(block for block in self.blocks if block.kind == kind)
+
+    def answers(self, block: Block) -> pd.DataFrame:
+        """Return the rows of ``responses`` that count, of one block."""
+        return self.responses[self.responses["counted"] & (self.responses["block"] == block.id)]
+
+    def answers_to(self, asked: AskedQuestion) -> pd.DataFrame:
+        """Return the rows of ``answered`` that count, of a question that no block of statements holds."""
+        place = self.answered["form" if asked.where.is_form else "block"] == asked.where.id
+        return self.answered[self.answered["counted"] & place.fillna(False) & (self.answered["item"] == asked.id)]
+
+    @property
+    def protocol_format(self) -> int:
+        """The format of the study's protocol."""
+        return int(self.protocol.get("format", 1))
+
+    def presented(self, block: Block) -> dict[str, int]:
+        """Return how often each setting of a block was presented in trials that count."""
+        rows = self.trials[self.trials["counted"] & (self.trials["block"] == block.id)]
+        return {code: int((rows["code"] == code).sum()) for code in block.codes}
+
+    def excluded_trials(self, block: Block) -> pd.DataFrame:
+        """Return the trials of a block that are left out one by one: last attempts, in sessions that count."""
+        rows = self.trials[self.trials["excluded"] & (self.trials["block"] == block.id)]
+        here = self.participants.loc[self.participants["counted"], ["participant", "session"]]
+        return (
+            rows.sort_values("attempt").drop_duplicates(_TRIAL, keep="last").merge(here, on=["participant", "session"])
+        )
+
+    def aggregate(self, block: Block) -> pd.DataFrame:
+        """Return the measures of a block: see ``measures.aggregate``."""
+        items = [item.id for item in block.items]
+        excluded = Counter(map(str, self.excluded_trials(block)["code"]))
+        return measures.aggregate(self.answers(block), self.presented(block), block.codes, items, excluded)
+
+
+def load_study(folder: Path) -> Study:
+    """Read the results of a study.
+
+    A merged study (see `store.sites.merged`) is sealed until the key of every site was opened.
+
+    Raises
+    ------
+    AnalysisError
+        The folder holds no sessions, a file in it is missing, damaged or of another study, or what is excluded is not
+        there: says which, where in it, and what to do.
+    StoreError
+        The key was opened, and is now missing or changed; ``exclusions.csv`` cannot be read; or the folder of a site
+        is missing.
+
+    Examples
+    --------
+    >>> study = load_study(Path("results/sample-rek2024"))
+    >>> study.n, len(study.trials)
+    (12, 144)
+    >>> study.responses.loc[:1, ["participant", "code", "item", "response"]]
+      participant code          item  response
+    0        P001   L2  feels_liquid         6
+    1        P001   L2     immersive         5
+    """
+    merged = read_merged(Path(folder))
+    return _load(Path(folder)) if merged is None else _load_sites(merged)
+
+
+def _load_sites(merged: Merged) -> Study:
+    """Read a merged study; a site from which all participants withdrew has nothing to read."""
+    places = {name: StudyFolder(merged.folder(name)) for name in merged.names}
+    if missing := [place.path for place in places.values() if not place.path.is_dir()]:
+        raise StoreError(f"{missing[0]} is missing, but {merged.manifest.name} lists it: restore it from a copy")
+    opened = all_opened(merged.path)
+    sites = {name: _load(place.path, sealed=not opened) for name, place in places.items() if place.sessions()}
+    if not sites:
+        raise AnalysisError(f"{merged.path} holds no sessions: all participants of its sites withdrew")
+    return pooled(merged.path, sites, sum(len(tombstones(place)) for place in places.values()))
+
+
+def pooled(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Study:
+    """Return a merged study from those of its sites, by their names; all of them are revealed, or none."""
+    studies = list(sites.values())
+    estimators = [one.estimator.split(" or ") for one in studies if one.estimator is not None]
+
+    def table(name: str) -> pd.DataFrame:
+        return pooled_table({site: (one.settings, getattr(one, name)) for site, one in sites.items()})
+
+    return replace(
+        studies[0],
+        folder=folder,
+        sites=tuple(sites),
+        blocks=pooled_blocks({site: one.blocks for site, one in sites.items()}),
+        levels=pooled_blocks({site: one.levels for site, one in sites.items()}),
+        others=pooled_questions({site: one.others for site, one in sites.items()}),
+        settings=pooled_settings({site: one.settings for site, one in sites.items()}),
+        responses=table("responses"),
+        trials=table("trials"),
+        participants=table("participants"),
+        answered=table("answered"),
+        intervals=table("intervals"),
+        exclusions=tuple(
+            replace(row, participant=f"{site}{DASH}{row.participant}")
+            for site, one in sites.items()
+            for row in one.exclusions
+        ),
+        doubts=tuple(doubt for one in studies for doubt in one.doubts),
+        decided=replace(studies[0].decided, changed=any(one.decided.changed for one in studies)),
+        own_dynamics=pooled_dynamics(
+            (one.own_dynamics for one in studies), sum(len(one.participants) for one in studies)
+        ),
+        estimator=" or ".join(dict.fromkeys(part for parts in estimators for part in parts)) or None,
+        withdrawn=withdrawn,
+    )
+
+
+def _load(folder: Path, *, sealed: bool = False) -> Study:
+    """Read the results in a folder that is not merged; ``sealed``: as if its key was not opened."""
+    place = StudyFolder(folder)
+    sessions = [session for session in place.sessions() if not never_begun(session.path)]
+    if not sessions:
+        raise AnalysisError(_no_sessions(place.path))
+    key = None if sealed else _key(place, sessions)
+    listed = exclusions(place.path)
+    records = [read_session(sessions[0], key)]
+    records += [read_session(session, key, like=records[0]) for session in sessions[1:]]
+    for session in records[1:]:
+        _check_alike(records[0], session)
+    responses, trials = read_tables(records, "responses"), read_tables(records, "trials")
+    if key is None:  # tables of earlier versions have these columns
+        trials = _without(trials, SEALED)
+    check_there(place, trials, listed)
+    after_trials = responses[responses["trial"].notna()]
+    both = pd.concat([after_trials, trials])[[*_TRIAL, "attempt"]]
+    last = both.groupby(_TRIAL)["attempt"].max().rename("last_attempt")
+    counted = _with_counted(with_excluded(after_trials, listed), last)
+    of_forms = with_excluded(responses[responses["trial"].isna()], listed)
+    answered = pd.concat([counted, _of_completed(of_forms)]).sort_index() if len(of_forms) else counted
+    return Study(
+        folder=place.path,
+        name=records[0].study,
+        title=records[0].title,
+        version=records[0].version,
+        blocks=records[0].blocks,
+        settings={} if key is None else settings_of(key),
+        responses=_of_statements(counted),
+        answered=answered,
+        levels=records[0].levels,
+        intervals=_intervals(records, listed, last, opened=key is not None),
+        trials=_with_counted(with_excluded(trials, listed), last),
+        participants=_sessions(with_excluded(pd.DataFrame([session.facts for session in records]), listed)),
+        exclusions=listed,
+        doubts=tuple(doubt for one in records for doubt in doubts(Place(place, one.folder, one.study))),
+        others=records[0].others,
+        decided=decided.read([session.protocol.get("analysis") for session in records]),
+        protocol=records[0].protocol,
+        own_dynamics=mean_dynamics(records),
+        estimator=estimators_of(records),
+        withdrawn=len(tombstones(place)),
+    )
+
+
+def _intervals(
+    records: Sequence[Session], listed: Sequence[Exclusion], last: pd.Series[int], *, opened: bool
+) -> pd.DataFrame:
+    """Return the intervals of all sessions; an empty table in a study without designs."""
+    if not has_intervals(records[0].protocol):
+        return pd.DataFrame()
+    table = read_tables(records, "intervals")
+    table = table if opened else _without(table, {column.name for column in INTERVALS if column.sealed})
+    return _with_counted(with_excluded(table, listed), last)
+
+
+def _without(table: pd.DataFrame, columns: AbstractSet[str]) -> pd.DataFrame:
+    """Return a table in which these columns are empty."""
+    return table.assign(**{name: table[name].mask(table[name].notna()) for name in columns & {*table.columns}})
+
+
+def _key(place: StudyFolder, sessions: Sequence[SessionFolder]) -> Key | None:
+    """Return the opened key; a session of another study is named as such, and not as one under another key."""
+    try:
+        return blinding.revealed_key(place.path)
+    except StoreError:
+        first, *others = [read_session(session, None) for session in sessions]
+        for other in others:
+            if other.study != first.study:
+                raise AnalysisError(_other_study(other, first)) from None
+        raise
+
+
+def _no_sessions(path: Path) -> str:
+    if not path.is_dir():
+        return (
+            f"{path} is not a folder: give a study's folder, such as results/rek2024, or a name that "
+            "liquid-study studies lists"
+        )
+    inside = sorted(found.name for found in path.iterdir() if found.is_dir() and StudyFolder(found).sessions())
+    if inside:
+        return f"{path} holds no sessions itself, but studies that do ({', '.join(inside)}): give {path / inside[0]}"
+    return (
+        f"{path} holds no sessions (data/sub-…/ses-…): give a study's folder, such as results/rek2024, in which at "
+        "least one session was begun"
+    )
+
+
+def _other_study(other: Session, first: Session) -> str:
+    return (
+        f"{other.folder.path} is of the study {other.study!r}, {first.folder.path} of {first.study!r}: keep each study "
+        "in a folder of its own"
+    )
+
+
+def _check_alike(first: Session, other: Session) -> None:
+    """Refuse to pool what was not asked alike, or not under one key."""
+    if other.study != first.study:
+        raise AnalysisError(_other_study(other, first))
+    if other.facts["key_hash"] != first.facts["key_hash"]:
+        raise AnalysisError(
+            f"{other.folder.path} and {first.folder.path} ran under different sealed keys, so that one code does not "
+            "mean one thing: keep them in folders of their own"
+        )
+    if other.asked != first.asked:
+        raise AnalysisError(
+            f"{other.folder.path} (version {other.version}) was asked other statements than {first.folder.path} "
+            f"(version {first.version}): keep the versions of a study in folders of their own"
+        )
+
+
+def _with_counted(table: pd.DataFrame, last: pd.Series[int]) -> pd.DataFrame:
+    """Add what counts: main trials of completed sessions, of each trial the last attempt, unless it is excluded."""
+    joined = table.join(last, on=_TRIAL)
+    counted = (
+        (joined["phase"] == "main")
+        & (joined["session_status"] == COMPLETED)
+        & (joined["attempt"] == joined["last_attempt"])
+        & ~joined["excluded"]
+    )
+    return table.assign(counted=counted.astype(bool))
+
+
+def _of_completed(table: pd.DataFrame) -> pd.DataFrame:
+    """Add what counts of forms: those of completed sessions, unless these are excluded."""
+    return table.assign(counted=((table["session_status"] == COMPLETED) & ~table["excluded"]).astype(bool))
+
+
+def _of_statements(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the answers to statements as points of their scale."""
+    if "kind" not in table:
+        return table
+    statements = table[table["kind"] == STATEMENT]
+    return statements.assign(response=statements["value"].astype("Int64"))
+
+
+def _sessions(table: pd.DataFrame) -> pd.DataFrame:
+    """Add which sessions count: the completed ones that are not excluded."""
+    return table.assign(counted=(table["status"] == COMPLETED) & ~table["excluded"])
+
+
+By: TypeAlias = Literal["group", "site"]
+
+
+@dataclass(frozen=True, slots=True)
+class GroupMean:
+    """Answers of one group, or site, to one statement on one setting; each participant's mean counts once.
+
+    ``mean`` is in points of the scale; ``sd``, between participants, is None for one participant.
+    """
+
+    block: str
+    item: str
+    code: str
+    group: str
+    n: int
+    mean: float
+    sd: float | None
+
+
+def group_counts(study: Study, by: By = "group") -> dict[str, int]:
+    """Return how many participants that count each group, or site, has, by name."""
+    counts = _members(study, by)[by].value_counts()
+    return {str(group): int(counts[group]) for group in sorted(counts.index)}
+
+
+def group_means(study: Study, by: By = "group") -> Iterator[GroupMean]:
+    """Yield the answers to each statement of each block, by group or site, in the order of the blocks."""
+    members = _members(study, by)
+    if members.empty:
+        return
+    rows = study.responses[study.responses["counted"]].merge(members, on="participant")
+    rows = rows.assign(response=rows["response"].astype("Float64")).dropna(subset=["response"])
+    for block in study.blocks:
+        own = rows[rows["block"] == block.id]
+        for item in block.items:
+            for code in block.codes:
+                here = own[(own["item"] == item.id) & (own["code"] == code)]
+                for group, answers in here.groupby(by):
+                    means = answers.groupby("participant")["response"].mean().astype(float)
+                    sd = float(means.std()) if len(means) > 1 else None
+                    yield GroupMean(block.id, item.id, code, str(group), len(means), float(means.mean()), sd)
+
+
+def _members(study: Study, by: By) -> pd.DataFrame:
+    """Return participant and group, or site, of everybody who counts."""
+    if by == "site":
+        people = study.people if study.sites and study.revealed else ()
+        return pd.DataFrame({"participant": people, "site": [study.site_of(one) for one in people]}, dtype="string")
+    if "group" not in study.trials or not study.revealed:
+        return pd.DataFrame(columns=["participant", "group"])
+    rows = study.trials[study.trials["counted"] & study.trials["group"].notna()]
+    return rows[["participant", "group"]].drop_duplicates()

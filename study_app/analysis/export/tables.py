@@ -1,0 +1,449 @@
+"""The tables that are handed out, as typed frames with a description of every column.
+
+Settings are codes until the key was opened, and the sealed columns are left out; then condition, liquid and delay
+(asked for, and achieved) are columns.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+
+from study_app.analysis.data.blocks import AskedQuestion, AskedScore, Block, Item, Setting, setting_name
+from study_app.analysis.data.measures import AGREEMENT, LEVELS, QUARTILES, Array, by_participant
+from study_app.analysis.data.questions import scored
+from study_app.analysis.data.study_tables import Study
+from study_app.analysis.levels.results import ExponentFound, LevelsFound, SettingFound
+from study_app.analysis.levels.summaries import levels_found
+from study_app.analysis.levels.thresholds import OF_INTERVALS, tracks
+from study_app.store.tables.column import Column, Kind, header, optional, unsealed
+from study_app.store.tables.columns import INTERVALS, PARTICIPANTS, RESPONSES, TRIALS_2, tables_of
+from study_app.store.tables.level_columns import EXPONENTS, OF_TRACKS, SETTINGS, THRESHOLDS
+
+_STATUS: Final = next(column for column in PARTICIPANTS if column.name == "status")
+
+JUDGED: Final = (
+    Column("session_status", "text", "How the row's session ended.", levels=_STATUS.levels),
+    Column("excluded", "flag", "true where exclusions.csv leaves out the row's session or trial."),
+    optional("exclusion_reason", "text", "Why it is left out."),
+    Column(
+        "counted",
+        "flag",
+        "true where the row is in the aggregate and the figures: main trial, completed session, last attempt, not "
+        "excluded.",
+    ),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Delivered:
+    """A table: its name, its columns in their order, and a frame that has them."""
+
+    name: str
+    columns: tuple[Column, ...]
+    frame: pd.DataFrame
+
+
+SITE: Final = Column("site", "text", "The site whose participant this is: the part of the ID before the dash.")
+
+
+def with_site(study: Study, table: Delivered) -> Delivered:
+    """Return a table of a merged study with the column ``site`` after that of participants; any other as it is."""
+    if not study.sites or "participant" not in header(table.columns):
+        return table
+    place = header(table.columns).index("participant") + 1
+    sites = pd.array([study.site_of(str(one)) for one in table.frame["participant"]], dtype="string")
+    columns = (*table.columns[:place], SITE, *table.columns[place:])
+    return delivered(table.name, columns, table.frame.assign(site=sites))
+
+
+def delivered(name: str, columns: tuple[Column, ...], frame: pd.DataFrame) -> Delivered:
+    """Return a table with these columns of a frame."""
+    return Delivered(name, columns, frame[list(header(columns))])
+
+
+_OF_TRIAL: Final = ("study", "participant", "session", "simulated", "pilot", "group", "trial", "attempt", "block")
+_OF_BLOCK: Final = ("phase", "part", "index", "code")
+_LEVEL_COLUMNS: Final = {column.name: column for column in (*TRIALS_2, *INTERVALS)}
+
+_OF_PERSON: Final = tuple(_LEVEL_COLUMNS[name] for name in ("study", "participant", "simulated", "pilot", "group"))
+_OF_THRESHOLD: Final = (
+    "n", "threshold", "low", "high", "beyond", "width", "lapse", "reversal_mean", "target_percent", "fit_p", "drift",
+)  # fmt: skip
+TYPES: Final = {"text": "string", "number": "Float64", "integer": "Int64", "flag": "boolean"}
+
+TRACKS: Final = (*(_LEVEL_COLUMNS[name] for name in (*_OF_TRIAL, *_OF_BLOCK)), *JUDGED, *OF_TRACKS)
+
+
+def level_tables(study: Study) -> Iterator[Delivered]:
+    """Yield the tables of a study with levels; none of any other."""
+    if not study.levels:
+        return
+    intervals = tables_of(study.protocol_format)["intervals"]
+    intervals = intervals if study.revealed else unsealed(intervals)
+    yield delivered("intervals", (*intervals, *JUDGED), study.intervals)
+    if study.revealed:
+        frame = tracks(study).rename(columns={"level": "level_asked"})
+        yield delivered("tracks", (*TRACKS, *_of_intervals(study)), frame)
+        found = levels_found(study, frame.rename(columns={"level_asked": "level"}))
+        yield delivered("thresholds", (*_OF_PERSON, *THRESHOLDS), _thresholds(study, frame, found))
+        if any(block.design.adjusts for block in study.levels):
+            own = [(one.block, setting) for one in found for setting in one.own_settings]
+            yield _of_people(study, frame, "settings", SETTINGS, own)
+        if any(block.design.reply == "number" for block in study.levels):
+            exponents = [(one.block, exponent) for one in found for exponent in one.own_power_exponents]
+            yield _of_people(study, frame, "exponents", EXPONENTS, exponents)
+
+
+def _of_people(
+    study: Study,
+    tracks: pd.DataFrame,
+    name: str,
+    columns: tuple[Column, ...],
+    own: Sequence[tuple[str, SettingFound | ExponentFound]],
+) -> Delivered:
+    """Return a table of what was found for each participant in a block, named first."""
+    rows = [
+        _person(study, tracks, one.participant) | {"block": block, "levels": one.n, **_values_of(one, header(columns))}
+        for block, one in own
+    ]
+    return delivered(name, (*_OF_PERSON, *columns), _frame(rows, (*_OF_PERSON, *columns)))
+
+
+def _values_of(one: SettingFound | ExponentFound, names: Sequence[str]) -> dict[str, Any]:
+    return {name: getattr(one, name) for name in names if hasattr(one, name)}
+
+
+def _person(study: Study, tracks: pd.DataFrame, participant: str | None) -> dict[str, Any]:
+    """Return what every row about a participant begins with."""
+    groups = dict(zip(tracks["participant"], tracks["group"], strict=True))
+    return {
+        "study": study.name,
+        "participant": participant,
+        "simulated": study.simulated,
+        "pilot": study.pilot,
+        "group": groups[participant],
+    }
+
+
+def _frame(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]) -> pd.DataFrame:
+    frame = pd.DataFrame(rows, columns=list(header(tuple(columns))))
+    return frame.astype({column.name: TYPES[column.kind] for column in columns})
+
+
+def _thresholds(study: Study, tracks: pd.DataFrame, levels: Sequence[LevelsFound]) -> pd.DataFrame:
+    """Return a row per participant and standard, or condition that is compared, of the main blocks."""
+    rows = [
+        _person(study, tracks, participant)
+        | {"block": found.block, "standard": standard, "condition": condition}
+        | _measured(found, participant, standard, condition)
+        for found in levels
+        for participant, standard, condition in _estimated(found)
+    ]
+    return _frame(rows, (*_OF_PERSON, *THRESHOLDS))
+
+
+def _estimated(found: LevelsFound) -> list[tuple[str | None, float | None, str | None]]:
+    """Return participant, standard and compared condition of each row; a block of ratings has none."""
+    return [
+        (one.participant, one.standard, one.comparison)
+        for one in found.sensitivities
+        if one.participant is not None and one.level is None
+    ]
+
+
+def _measured(found: LevelsFound, *which: str | float | None) -> dict[str, Any]:
+    threshold = next((one for one in found.own_thresholds if (one.participant, one.standard, None) == which), None)
+    sensitivity = next(
+        (one for one in found.sensitivities if (one.participant, one.standard, one.comparison) == which), None
+    )
+    held: dict[str, Any] = {}
+    if sensitivity is not None:
+        held = {name: getattr(sensitivity, name) for name in ("n", "d_prime", "criterion")}
+        held |= {"d_prime_model": sensitivity.model, "d_prime_other": sensitivity.other}
+        held["share_first"] = next(iter(sensitivity.shares.values()), None)
+    if threshold is not None:
+        held |= {name: getattr(threshold, name) for name in _OF_THRESHOLD}
+        held["flat_width_threshold"] = threshold.flat_width
+        exponents = {one.participant: one.exponent for one in found.exponents}
+        held["weber_exponent"] = exponents.get(threshold.participant)
+    return held
+
+
+def _of_intervals(study: Study) -> tuple[Column, ...]:
+    """Return the columns of force and speed, one for each interval that a trial has at most."""
+    most = max(block.design.intervals for block in study.levels)
+    return tuple(
+        replace(column, name=f"{name}_{number}", description=f"{column.description} In interval {number}.")
+        for name in OF_INTERVALS
+        for column in (_LEVEL_COLUMNS[name],)
+        for number in range(1, most + 1)
+    )
+
+
+def names_of_sealed(study: Study) -> set[str]:
+    """Return the columns of intervals that no table has before the key is opened."""
+    return {column.name for column in INTERVALS if column.sealed} if study.levels else set()
+
+
+OF_A_FORM: Final = Setting("")
+"""Stands for the setting of an answer in a form, which has none."""
+
+_BY_NAME: Final = {column.name: column for column in (*TRIALS_2, *RESPONSES)}
+
+OPENED: Final = (
+    Column("condition", "text", "Id of the condition that the code stands for."),
+    Column("liquid", "text", "Id of the liquid that was presented."),
+    Column("delay_ms", "number", "Requested visual delay.", "ms", minimum=0),
+)
+ACHIEVED: Final = optional(
+    "delay_achieved_ms", "number", "Visual delay that was achieved: asked for, plus the trial's mean error.", "ms"
+)
+_QUARTILE: Final = f"quartiles {QUARTILES}"
+MEASURED: Final = (
+    Column("item", "text", "Id of the statement; its words are in the codebook."),
+    Column("short", "text", "A few words for the statement."),
+    Column("participants", "integer", "Participants who gave a valid answer.", minimum=0),
+    Column("presented", "integer", "Presentations after which the statement was to be answered.", minimum=0),
+    Column(
+        "presented_excluded",
+        "integer",
+        "Presentations besides these that exclusions.csv leaves out one by one, with their answers.",
+        minimum=0,
+    ),
+    Column("n", "integer", "Valid answers.", minimum=0),
+    Column("cannot_judge", "integer", "Answers off the scale.", minimum=0),
+    Column("missing", "integer", "Presentations without any answer.", minimum=0),
+    *(Column(f"count_{level}", "integer", f"Answers at level {level}.", minimum=0) for level in LEVELS),
+    optional("median", "number", "Median of the valid answers.", minimum=1, maximum=7),
+    optional("q1", "number", f"Lower quartile; {_QUARTILE}.", minimum=1, maximum=7),
+    optional("q3", "number", f"Upper quartile; {_QUARTILE}.", minimum=1, maximum=7),
+    optional(
+        "agree_percent",
+        "number",
+        f"Share of the valid answers that agree (levels {AGREEMENT[0]} to {AGREEMENT[-1]}).",
+        "%",
+        minimum=0,
+        maximum=100,
+    ),
+)
+
+
+def _may_miss(columns: tuple[Column, ...]) -> tuple[Column, ...]:
+    """Return columns about a trial's setting where some rows have none: those of forms, and of tracks."""
+    return tuple(replace(column, may_miss=True) for column in columns)
+
+
+def deliver(study: Study) -> tuple[Delivered, ...]:
+    """Return responses, trials and aggregate of a study; with levels, also intervals, opened tracks and thresholds."""
+    opened = OPENED if study.revealed else ()
+    achieved = (*OPENED, ACHIEVED) if study.revealed else ()
+    trials = tables_of(study.protocol_format)["trials"]
+    trials = trials if study.revealed else unsealed(trials)
+    responses = tables_of(study.protocol_format)["responses"]
+    about = achieved if responses is RESPONSES else _may_miss(achieved)
+    tables = (
+        delivered("responses", (*responses, *JUDGED, *about), _named(study, _with_delay_error(study))),
+        delivered(
+            "trials",
+            (*trials, *JUDGED, *(_may_miss(achieved) if study.levels else achieved)),
+            _named(study, study.trials),
+        ),
+        delivered("aggregate", (*_aggregate_head(), *opened, *MEASURED), _aggregate(study)),
+        *level_tables(study),
+    )
+    return tuple(with_site(study, table) for table in tables)
+
+
+def _named(study: Study, table: pd.DataFrame) -> pd.DataFrame:
+    """Add what the code stood for, where the key is open."""
+    if not study.revealed:
+        return table
+    pairs = list(zip(table["block"].to_numpy(), table["code"].to_numpy(), strict=True))
+    places = {pair: place for place, pair in enumerate(dict.fromkeys(pairs))}
+    which = np.fromiter((places[pair] for pair in pairs), dtype=np.int64, count=len(pairs))
+    settings = [OF_A_FORM if pd.isna(pair[0]) else study.settings[pair] for pair in places]
+    delay_ms = _delays_ms(settings)[which]
+    return table.assign(
+        condition=pd.array([one.condition for one in settings], dtype="string").take(which),
+        liquid=pd.array([one.liquid for one in settings], dtype="string").take(which),
+        delay_ms=delay_ms,
+        delay_achieved_ms=(table["delay_error_mean_ms"] + delay_ms).round(6),
+    )
+
+
+def _delays_ms(settings: list[Setting]) -> Any:
+    return np.array(
+        [np.nan if setting.delay_ms is None else setting.delay_ms for setting in settings], dtype=np.float64
+    )
+
+
+def _with_delay_error(study: Study) -> pd.DataFrame:
+    """Return the responses with the delay error of the trial each followed."""
+    if not study.revealed:
+        return study.answered
+    trial = ["participant", "session", "trial", "attempt"]
+    return study.answered.merge(study.trials[[*trial, "delay_error_mean_ms"]], on=trial, how="left")
+
+
+def _aggregate_head() -> tuple[Column, ...]:
+    return tuple(_BY_NAME[name] for name in ("study", "simulated", "pilot", "block", "code"))
+
+
+def _aggregate(study: Study) -> pd.DataFrame:
+    frames = []
+    for block in study.blocks:
+        settings = {setting.code: setting for setting in block.settings}
+        found = study.aggregate(block)
+        presented = [settings[code] for code in found["code"]]
+        frames.append(
+            found.assign(
+                study=study.name,
+                simulated=study.simulated,
+                pilot=study.pilot,
+                block=block.id,
+                condition=pd.array([setting.condition for setting in presented], dtype="string"),
+                liquid=pd.array([setting.liquid for setting in presented], dtype="string"),
+                delay_ms=np.array([setting.delay_ms for setting in presented], dtype=np.float64),
+                short=found["item"].map({item.id: item.short for item in block.items}),
+            )
+        )
+    if not frames:
+        names = [*header(_aggregate_head()), *header(OPENED), *header(MEASURED)]
+        return pd.DataFrame({name: pd.Series(dtype=object) for name in names})
+    return pd.concat(frames, ignore_index=True)
+
+
+_PARTICIPANT = next(column for column in RESPONSES if column.name == "participant")
+_SIMULATED = next(column for column in RESPONSES if column.name == "simulated")
+
+
+@dataclass(frozen=True, slots=True)
+class Cells:
+    """What a column of the wide table holds: answers to an item about a setting of a block."""
+
+    block: Block
+    setting: Setting
+    item: Item
+
+
+@dataclass(frozen=True, slots=True)
+class QuestionCells:
+    """What a column holds of another question: answers about a setting, or in a form; or a score of a questionnaire."""
+
+    asked: AskedQuestion | AskedScore
+    setting: Setting | None
+
+
+def wide(study: Study) -> tuple[Delivered, dict[str, Cells | QuestionCells]]:
+    """Return the wide table of all answers that count, and what each of its columns holds.
+
+    Columns are ``item__condition``, or ``item__code`` until the key was opened; where a study has blocks that would
+    give the same name, ``block__item__condition``. A repeated setting gives the median, as in the analysis, of options
+    and texts the last one. Questions of forms are ``form__item``, scores ``form__score``.
+    """
+    cells = [
+        Cells(block, setting, item) for block in study.blocks for setting in block.settings for item in block.items
+    ]
+    often = Counter(_name(one) for one in cells)
+    named = {_name(one) if often[_name(one)] == 1 else f"{one.block.id}__{_name(one)}": one for one in cells}
+    people = list(study.people)
+    simulated = dict(zip(study.participants["participant"], study.participants["simulated"], strict=True))
+    frame = pd.DataFrame(
+        {
+            "participant": pd.array(people, dtype="string"),
+            "simulated": pd.array([bool(simulated[person]) for person in people], dtype="boolean"),
+            **{name: _answers(study, one, people) for name, one in named.items()},
+        }
+    )
+    others = _others(study)
+    frame = frame.assign(**{name: _question_answers(study, one, people) for name, one in others.items()})
+    columns = (
+        _PARTICIPANT,
+        _SIMULATED,
+        *(_column(name, one, frame) for name, one in named.items()),
+        *(_question_column(name, one, frame) for name, one in others.items()),
+    )
+    return with_site(study, Delivered("wide", columns, frame)), {**named, **others}
+
+
+def _others(study: Study) -> dict[str, QuestionCells]:
+    """Return the columns of other questions and of scores, by name."""
+    found: dict[str, QuestionCells] = {}
+    asked: tuple[AskedQuestion | AskedScore, ...] = (*study.others.questions, *study.others.scores)
+    levels = {block.id for block in study.levels}  # their answers are pooled by no track: see the table of tracks
+    for one in (one for one in asked if one.where.id not in levels):
+        called = one.name if isinstance(one, AskedScore) else one.id
+        for setting in one.where.settings or (None,):
+            ending = "" if setting is None else f"__{setting.condition or setting.code}"
+            found[f"{one.where.id}__{called}{ending}"] = QuestionCells(one, setting)
+    return found
+
+
+def _question_answers(study: Study, cells: QuestionCells, people: list[str]) -> pd.api.extensions.ExtensionArray:
+    if isinstance(cells.asked, AskedScore):
+        return _medians(_about(scored(study, cells.asked), cells), "score", people)
+    answers = _about(study.answers_to(cells.asked), cells)
+    if cells.asked.question.value_type != "text":
+        return _medians(answers, "value", people)
+    given_answers = answers.sort_values(["session", "trial"]).groupby("participant")["response"].last()
+    return pd.array([given_answers.get(person, pd.NA) for person in people], dtype="string")
+
+
+def _about(answers: pd.DataFrame, cells: QuestionCells) -> pd.DataFrame:
+    return answers if cells.setting is None else answers[answers["code"] == cells.setting.code]
+
+
+def _medians(answers: pd.DataFrame, column: str, people: list[str]) -> pd.api.extensions.ExtensionArray:
+    """Return the median of each participant's numbers."""
+    given_answers = answers[answers[column].notna()].assign(number=lambda rows: rows[column].astype(float))
+    found = given_answers.groupby("participant")["number"].median()
+    values = np.array([found.get(person, np.nan) for person in people], dtype=np.float64)
+    return _numbers(values)
+
+
+def _question_column(name: str, cells: QuestionCells, frame: pd.DataFrame) -> Column:
+    asked, setting = cells.asked, cells.setting
+    kind: Kind = "integer" if pd.api.types.is_integer_dtype(frame[name]) else "number"
+    about = "" if setting is None else f" About {setting_name(setting, asked.where.settings)}."
+    if isinstance(asked, AskedScore):
+        of = f" of {asked.instrument}" if asked.instrument else ""
+        return optional(name, kind, f"Score {asked.name}{of}, in {asked.where.title}.{about}")
+    text = asked.text if asked.text.endswith((".", "?", "!")) else f"{asked.text}."
+    described = f"{text} In {asked.where.title}.{about}"
+    if asked.question.value_type == "text":
+        return optional(name, "text", described)
+    least, most = asked.bounds or (None, None)
+    return optional(name, kind, described, minimum=least, maximum=most)
+
+
+def _name(cells: Cells) -> str:
+    return f"{cells.item.id}__{cells.setting.condition or cells.setting.code}"
+
+
+def _answers(study: Study, cells: Cells, people: list[str]) -> pd.api.extensions.ExtensionArray:
+    answers = study.answers(cells.block)
+    here = answers[(answers["code"] == cells.setting.code) & (answers["item"] == cells.item.id)]
+    return _numbers(by_participant(here, people, {cells.setting.code: 0}, cells.item.id)[:, 0])
+
+
+def _numbers(values: Array) -> pd.api.extensions.ExtensionArray:
+    """Return numbers with missing ones, whole where all are."""
+    missing = np.isnan(values)
+    known = np.where(missing, 0, values)
+    if (known == np.floor(known)).all():
+        return pd.arrays.IntegerArray(known.astype(np.int64), missing)
+    return pd.arrays.FloatingArray(known, missing)
+
+
+def _column(name: str, cells: Cells, frame: pd.DataFrame) -> Column:
+    return optional(
+        name,
+        "integer" if pd.api.types.is_integer_dtype(frame[name]) else "number",
+        f"{cells.item.text} About {cells.block.name(cells.setting)}, in {cells.block.title}.",
+        minimum=1,
+        maximum=7,
+    )

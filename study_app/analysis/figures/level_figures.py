@@ -1,0 +1,687 @@
+"""The figures of blocks of levels: answers over levels, tracks, settings and Weber fractions."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any, Final, TypeAlias, cast
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from study_app import figure_style as style
+from study_app.analysis.data.study_tables import Study
+from study_app.analysis.figures import answer_figures
+from study_app.analysis.figures.page_layout import MARGIN_PT, Sheet
+from study_app.analysis.figures.picture import Picture, attempted, files_of, sample_words
+from study_app.analysis.levels.results import LevelAnswers, LevelsFound, SettingFound, ThresholdFound
+from study_app.analysis.levels.thresholds import Flags, TrackCourse, courses, psychometric_bands, tracks
+from study_app.analysis.results import Failures, counted
+from study_app.analysis.statistics.outcome import Array
+from study_app.psychophysics.families import Family, success
+
+COLUMNS: Final = 4
+PANEL_PT: Final = 84.0
+LEFT_PT: Final = 40.0
+GAP_PT: Final = 16.0
+HEAD_PT: Final = 42.0
+ROW_GAP_PT: Final = 36.0
+LEAST_LEVELS: Final = 3
+"""Ticks at 1, 2 and 5 in each decade, as long as so many lie within the axis."""
+
+
+def sheet_of_panels(
+    study: Study, title: str, above: str, panels: int, fonts: Sequence[str], *, foot_pt: float = 28.0
+) -> Sheet:
+    """Return a sheet with room for ``panels``, its heading, and what the vertical axes show."""
+    rows = math.ceil(panels / COLUMNS)
+    height = HEAD_PT + rows * PANEL_PT + (rows - 1) * ROW_GAP_PT + foot_pt + 14
+    sheet = Sheet(style.PAGE_WIDTH_PT, height, fonts)
+    sheet.heading(title, answer_figures.marks(study), (counted(study.n, "participant"),))
+    sheet.text(MARGIN_PT, 28, above, size=7, colour=style.TEXT_SOFT)
+    return sheet
+
+
+def draw_panels(
+    sheet: Sheet, names: Sequence[tuple[str, str]], draw: Callable[[Axes, int, bool], None], below: str
+) -> Sheet:
+    """Draw a panel under each name and the words after it, and say below what the horizontal axes show.
+
+    ``draw`` takes the axes, the panel's place, and whether it is the first of its row.
+    """
+    width = (sheet.width_pt - LEFT_PT - MARGIN_PT - (COLUMNS - 1) * GAP_PT) / COLUMNS
+    for place, (name, words) in enumerate(names):
+        row, column = divmod(place, COLUMNS)
+        x, y = LEFT_PT + column * (width + GAP_PT), HEAD_PT + row * (PANEL_PT + ROW_GAP_PT)
+        sheet.text(x, y - 4, name, size=7, weight="bold")
+        if words:
+            aside = sheet.text_width(name, 7, "bold") + 6
+            sheet.text(x + aside, y - 4, words, size=7, colour=style.TEXT_SOFT)
+        axes = sheet.axes(x, y, width, PANEL_PT)
+        draw(axes, place, column == 0)
+        for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
+            label.set_fontproperties(sheet.font(6.5))
+    sheet.text(LEFT_PT, sheet.height_pt - 10, below, size=7, colour=style.TEXT_SOFT)
+    return sheet
+
+
+def over_trials(axes: Axes, found: LevelsFound, trials: int, ends: tuple[float, float], *, first: bool) -> None:
+    """Give axes ticks for trials from 1 and, between ``ends``, for levels."""
+    axes.set_xticks([1, *(place for place in (round(trials / 2), trials) if place > 1)])
+    if found.spacing == "log":
+        axes.set_yscale("log")
+        axes.minorticks_off()
+    axes.set_ylim(*ends)
+    ticks = _level_ticks(found, ends)
+    axes.set_yticks(ticks, [f"{tick:g}" if first else "" for tick in ticks])
+    axes.hlines(ticks, *axes.get_xlim(), color=style.GRID, linewidth=0.6, zorder=0)
+
+
+def _level_ticks(found: LevelsFound, ends: tuple[float, float]) -> list[float]:
+    """Return round levels between the ends of an axis: from 1, 2 and 5, in decades where levels are spaced so."""
+    low, high = ends
+    if found.spacing == "linear":
+        step = 10.0 ** math.floor(math.log10(high - low))
+        step *= next(times for times in (0.1, 0.2, 0.5, 1.0, 2.0) if (high - low) / (step * times) <= 6)
+        return [float(f"{number * step:.12g}") for number in range(math.ceil(low / step), math.floor(high / step) + 1)]
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    for digits in ((1,), (1, 3), (1, 2, 5), (1, 2, 3, 5, 7), tuple(range(1, 10))):
+        found_ = [float(f"{digit}e{decade}") for decade in decades for digit in digits]
+        inside = [tick for tick in found_ if low <= tick <= high]
+        if len(inside) >= LEAST_LEVELS:
+            return inside
+    return inside
+
+
+MOST_PEOPLE: Final = 23
+"""Participants with a panel of their own; the others are in the first panel and in the table."""
+FOOT_PT: Final = 26.0
+MOST_TICKS: Final = 5
+FEWEST_TICKS: Final = 2
+SIZE_PT2: Final = 2.0
+"""Area of a circle for each answer at a level."""
+ASIDE: Final = 0.025
+"""How far the points of one standard are from those of the next, as a share of the axis."""
+BELOW: Final = 0.03
+"""How far the interval of one standard's threshold is drawn below that of the one before, as a share correct."""
+COLOURS: Final = (style.ACCENT, "#b35600", style.TEXT, "#6d1007", "#5d8aa8", "#b75a26", "#02256d", style.AXIS)
+LEVELS: Final[Mapping[str | None, str]] = {"weber": "Weber fraction of ", "difference": "difference of ", "value": ""}
+UNITLESS: Final = "weber"
+
+
+def level_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
+    """Draw the answers over levels of a block."""
+    bands = _bands(study, found)
+    files = files_of(partial(_draw, study, found, bands), forms, f"{study.name}: {found.title}")
+    own = len(found.people) - MOST_PEOPLE
+    left_out = f" {counted(own, 'more participant')} in the table alone." if own > 0 else ""
+    caption = (
+        f"{found.title}: {summary_words(found)} at each level. {_panels(found, bool(bands))}{_chance(found)}{left_out} "
+        f"{sample_words(study, len(found.people))}"
+    )
+    return Picture(found.block, name, caption, files)
+
+
+def _bands(study: Study, found: LevelsFound) -> Mapping[str, Array]:
+    """Return the bands of the participants' functions, where there is one in each panel."""
+    if not found.own_thresholds or len(_standards(found)) > 1:
+        return {}
+    block = next(block for block in study.levels if block.id == found.block)
+    return psychometric_bands(block, tracks(study), found.people[:MOST_PEOPLE], _limits(found, _places(found)))
+
+
+def _panels(found: LevelsFound, banded: bool) -> str:
+    band = ", with the 95 % band" if banded else ""
+    crosses = "; crosses: catch trials" if found.has_catch_trials else ""
+    if found.own_thresholds:
+        return (
+            f"Curves: psychometric functions at the posterior medians{band}; bars: 95 % intervals of the thresholds, "
+            "those of several standards one below another; "
+            f"circles: answers at each level, area by their number{crosses}. First panel: all participants."
+        )
+    units = ", without the unit that each chose" if found.own_units else ""
+    return (
+        f"First panel: {mean_words(found)} over the participants, bars: its 95 % interval (Student's t); thin: "
+        f"participants{units}. Other panels: each participant with the 95 % interval of the answers{crosses}."
+    )
+
+
+def summary_words(found: LevelsFound) -> str:
+    """Return what a value at a level is: "share correct", "mean rating", "geometric mean of the numbers"."""
+    if found.summary == "share":
+        return "share correct" if found.counts == "correct" else f"share “{found.counts}”"
+    return "mean rating" if found.summary == "mean" else "geometric mean of the numbers"
+
+
+def mean_words(found: LevelsFound) -> str:
+    """Return what a value of all participants is."""
+    return "geometric mean" if found.summary == "geometric mean" else "mean"
+
+
+def level_words(found: LevelsFound) -> str:
+    """Return what a level is, with its unit: "Weber fraction of viscosity", "Viscosity [Pa·s]", "Condition"."""
+    if found.quantity is None:
+        return "Condition"
+    words = f"{LEVELS[found.level_kind]}{found.quantity}"
+    unit = "" if found.level_kind == UNITLESS or not found.unit else f" [{found.unit}]"
+    return words[:1].upper() + words[1:] + unit
+
+
+def with_unit(found: LevelsFound, value: float) -> str:
+    """Return a value of the varied number with its unit."""
+    return f"{value:g} {found.unit or ''}".rstrip()
+
+
+def _chance(found: LevelsFound) -> str:
+    return "" if found.guess_rate is None else f" Dashed: chance ({100 * found.guess_rate:.0f} %)."
+
+
+@style.own_settings()
+def _draw(study: Study, found: LevelsFound, bands: Mapping[str, Array], fonts: Sequence[str]) -> Sheet:
+    people = found.people[:MOST_PEOPLE]
+    words = summary_words(found)
+    above = words[:1].upper() + words[1:]
+    sheet = sheet_of_panels(study, found.title, above, 1 + len(people), fonts, foot_pt=FOOT_PT)
+    _keys(sheet, found)
+
+    def draw(axes: Axes, place: int, first: bool) -> None:
+        person = people[place - 1] if place else None
+        _panel(axes, found, person, first=first)
+        if person is not None and person in bands:
+            u, lower, upper = bands[person]
+            axes.fill_between(u, lower, upper, color=style.BAND, linewidth=0, zorder=1)
+
+    return draw_panels(sheet, [(name, "") for name in ("All", *people)], draw, level_words(found))
+
+
+def _keys(sheet: Sheet, found: LevelsFound) -> None:
+    """Write which colour is which standard."""
+    standards = _standards(found)
+    if len(standards) < 2:
+        return
+    x = sheet.width_pt - MARGIN_PT
+    for standard, colour in reversed(list(zip(standards, COLOURS, strict=False))):
+        words = f"standard {with_unit(found, standard)}"
+        x -= sheet.text_width(words, 7)
+        sheet.text(x, 28, words, size=7, colour=colour)
+        x -= 10
+
+
+def _standards(found: LevelsFound) -> list[float]:
+    return sorted({one.standard for one in found.answers if one.standard is not None})
+
+
+def _panel(axes: Axes, found: LevelsFound, person: str | None, *, first: bool) -> None:
+    places = _places(found)
+    _frame(axes, found, places, first=first)
+    groups: Sequence[float | None] = _standards(found) or [None]
+    for number, (standard, colour) in enumerate(zip(groups, COLOURS, strict=False)):
+        for one in found.own_thresholds:
+            if one.standard == standard and person in {None, one.participant}:
+                grey = person is None and len(groups) == 1
+                _curve(axes, found, one, style.PARTICIPANT if grey else colour)
+                if person is not None:
+                    _interval(axes, found, one, colour, number)
+        if person is None and found.adaptive:
+            continue
+        span = 0.0 if found.own_thresholds else max(places.values()) - min(places.values())
+        aside = ASIDE * (number - (len(groups) - 1) / 2) * span
+        shown = [one for one in found.answers if one.standard == standard and not one.catch]
+        if person is None and len(groups) == 1 and not found.own_thresholds:
+            for somebody in found.people:
+                _line(axes, shown, somebody, places, found)
+        shifted = {level: place + aside for level, place in places.items()}
+        _points(axes, [one for one in shown if one.participant == person], shifted, found, colour)
+        caught = [one for one in found.answers if one.standard == standard and one.catch and one.participant == person]
+        heights = [_height(found, one.value) for one in caught]
+        axes.plot([shifted[_where(one)] for one in caught], heights, "x", color=colour, markersize=4, zorder=4)
+
+
+def _line(
+    axes: Axes, shown: Sequence[LevelAnswers], person: str, places: Mapping[Any, float], found: LevelsFound
+) -> None:
+    """Draw a participant's answers; numbers without the unit that the participant chose."""
+    points = [one for one in shown if one.participant == person]
+    heights = np.array([_height(found, one.value) for one in points])
+    if found.own_units and points:
+        heights += np.mean([_height(found, one.value) for one in shown if one.participant is None]) - heights.mean()
+    axes.plot([places[_where(one)] for one in points], heights, color=style.PARTICIPANT, linewidth=0.5, alpha=0.7)
+
+
+def _curve(axes: Axes, found: LevelsFound, one: ThresholdFound, colour: str) -> None:
+    """Draw a participant's psychometric function."""
+    low, high = axes.get_xlim()
+    u = np.linspace(low, high, 120)
+    middle = _coordinate(found, one.threshold)
+    shape = cast("Family", found.family)
+    psi = success(shape, u, middle, one.width or 1.0, one.guess or 0.0, one.lapse or 0.0)
+    axes.plot(u, psi, color=colour, linewidth=0.9, zorder=2)
+
+
+def _interval(axes: Axes, found: LevelsFound, one: ThresholdFound, colour: str, number: int) -> None:
+    """Draw the interval of a threshold at the height of the function there, each standard's below the one before."""
+    if one.low is None or one.high is None:
+        return
+    guess = one.guess or 0.0
+    height = guess + (1.0 - guess - (one.lapse or 0.0)) / 2 - BELOW * number
+    ends = [_coordinate(found, one.low), _coordinate(found, one.high)]
+    axes.plot(ends, [height, height], color=colour, linewidth=1.2, solid_capstyle="butt", zorder=2)
+
+
+def _coordinate(found: LevelsFound, level: float) -> float:
+    return math.log10(level) if found.spacing == "log" else level
+
+
+def _points(
+    axes: Axes, points: Sequence[LevelAnswers], places: Mapping[Any, float], found: LevelsFound, colour: str
+) -> None:
+    xs, ys = [places[_where(one)] for one in points], [_height(found, one.value) for one in points]
+    if found.own_thresholds:
+        sizes = [SIZE_PT2 * one.n for one in points]
+        axes.scatter(xs, ys, s=sizes, facecolors="none", edgecolors=colour, linewidths=0.7, zorder=3)
+        return
+    joined = "none" if found.vary is None else "-"
+    axes.plot(xs, ys, marker="o", markersize=3, color=colour, linewidth=0.9, linestyle=joined)
+    for x, one in zip(xs, points, strict=True):
+        if one.low is not None and one.high is not None:
+            axes.plot([x, x], [_height(found, one.low), _height(found, one.high)], color=colour, linewidth=0.9)
+
+
+def _where(one: LevelAnswers) -> Any:
+    return one.comparison if one.level is None else one.level
+
+
+def _height(found: LevelsFound, value: float) -> float:
+    return math.log10(value) if found.summary == "geometric mean" else value
+
+
+def _places(found: LevelsFound) -> dict[Any, float]:
+    """Return the place of each level on the horizontal axis: its logarithm where levels are spaced so."""
+    levels = list(dict.fromkeys(_where(one) for one in found.answers if one.participant is None))
+    if found.vary is None:
+        return {level: float(place) for place, level in enumerate(levels)}
+    if found.spacing == "linear":
+        return {level: float(level) for level in levels}
+    logs = {level: math.log10(level) for level in levels if level > 0}
+    step = (max(logs.values()) - min(logs.values())) / max(1, len(logs) - 1) if len(logs) > 1 else 0.3
+    return {level: logs.get(level, min(logs.values(), default=0.0) - step) for level in levels}  # 0: left of the least
+
+
+def _frame(axes: Axes, found: LevelsFound, places: Mapping[Any, float], *, first: bool) -> None:
+    """Draw the axes: levels below, shares, points or numbers at the left."""
+    axes.set_xlim(*_limits(found, places))
+    shown = _shown_levels(found, places)
+    axes.set_xticks(
+        list(shown.values()), [level.replace("_", " ") if isinstance(level, str) else f"{level:.3g}" for level in shown]
+    )
+    ticks = _ticks(found)
+    low, high = ticks[0][0], ticks[-1][0]
+    axes.set_ylim(low - 0.04 * (high - low), high + 0.04 * (high - low))
+    axes.set_yticks([at for at, _ in ticks], [words if first else "" for _, words in ticks])
+    axes.hlines([at for at, _ in ticks], *axes.get_xlim(), color=style.GRID, linewidth=0.6, zorder=0)
+    if found.guess_rate is not None:
+        axes.axhline(found.guess_rate, color=style.AXIS, linewidth=0.6, linestyle=(0, (4, 3)), zorder=1)
+
+
+def _limits(found: LevelsFound, places: Mapping[Any, float]) -> tuple[float, float]:
+    """Return the ends of the horizontal axis."""
+    low, high = min(places.values()), max(places.values())
+    margin = 0.5 if found.vary is None else 0.06 * ((high - low) or 1.0)
+    return low - margin, high + margin
+
+
+def _shown_levels(found: LevelsFound, places: Mapping[Any, float]) -> Mapping[Any, float]:
+    """Return the levels that are named below the axis, with their places: of many on log spacing, round ones."""
+    named = sorted(places, key=lambda level: places[level])
+    if found.vary is None or len(named) <= MOST_TICKS:
+        return {level: places[level] for level in named}
+    if found.spacing == "log":
+        low, high = places[named[0]], places[named[-1]]
+        decades = range(math.floor(low), math.ceil(high) + 1)
+        round_levels = [digit * 10.0**decade for decade in decades for digit in (1, 2, 5)]
+        inside = {level: math.log10(level) for level in round_levels if low <= math.log10(level) <= high}
+        if len(inside) >= FEWEST_TICKS:
+            return inside
+    return {level: places[level] for level in named[:: math.ceil(len(named) / MOST_TICKS)]}
+
+
+def _ticks(found: LevelsFound) -> list[tuple[float, str]]:
+    if found.summary == "share":
+        return [(share, f"{100 * share:.0f} %") for share in (0.0, 0.25, 0.5, 0.75, 1.0)]
+    ends = [end for one in found.answers for end in (one.value, one.low, one.high) if end is not None]
+    if found.summary == "mean":
+        low, high = found.bounds or (min(ends), max(ends))
+        return [(float(point), str(point)) for point in range(math.floor(low), math.ceil(high) + 1)]
+    decades = range(math.floor(math.log10(min(ends))), math.ceil(math.log10(max(ends))) + 1)
+    known = [(math.log10(step) + decade, f"{step * 10.0**decade:g}") for decade in decades for step in (1, 2, 5)]
+    least = max((at for at, _ in known if at <= math.log10(min(ends))), default=known[0][0])
+    most = min((at for at, _ in known if at >= math.log10(max(ends))), default=known[-1][0])
+    inside = [one for one in known if least <= one[0] <= most]
+    return inside if len(inside) <= 2 * MOST_TICKS else [one for one in inside if one[0] == math.floor(one[0])]
+
+
+MOST_PANELS: Final = 24
+MARK_PT2: Final = 7.0
+RING_PT2: Final = 26.0
+CROSS_PT2: Final = 11.0
+"""Areas of the marks of answers, reversals and catch trials."""
+
+
+def track_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
+    """Draw the tracks of a block whose levels answers chose, once the key is open."""
+    block = next(block for block in study.levels if block.id == found.block)
+    shown = list(courses(block, tracks(study), MOST_PANELS))
+    files = files_of(partial(_draw_tracks, study, found, shown), forms, f"{study.name}: {found.title}, tracks")
+    rest = len(found.own_thresholds) - len(shown)
+    left_out = f" {counted(rest, 'more panel')} not shown." if rest > 0 else ""
+    success = "correct" if found.counts == "correct" else f"“{found.counts}”"
+    marks = " Colours: tracks." if any(one.tracks.max() > 1 for one in shown) else ""
+    marks += " Rings: reversals." if any(one.reversals.any() for one in shown) else ""
+    marks += " × and +: catch trials, answered correctly and not." if any(one.catches.any() for one in shown) else ""
+    caption = (
+        f"{found.title}: the level of each trial. Filled: {success}; hollow: not.{marks} Band: 95 % interval of "
+        f"the threshold from the answers so far.{left_out} {sample_words(study, len(found.people))}"
+    )
+    return Picture(found.block, name, caption, files)
+
+
+@style.own_settings()
+def _draw_tracks(study: Study, found: LevelsFound, shown: Sequence[TrackCourse], fonts: Sequence[str]) -> Sheet:
+    sheet = sheet_of_panels(study, f"{found.title}: tracks", level_words(found), len(shown), fonts)
+    standards = len({one.standard for one in shown}) > 1
+    names = [(one.participant, f"standard {one.standard:g}" if standards else "") for one in shown]
+    ends = _ends(found, shown)
+
+    def draw(axes: Axes, place: int, first: bool) -> None:
+        n = len(shown[place].levels)
+        axes.set_xlim(0.5 - 0.02 * n, n + 0.5 + 0.02 * n)
+        over_trials(axes, found, n, ends, first=first)
+        _track_panel(axes, shown[place])
+
+    return draw_panels(sheet, names, draw, "Trial at the standard" if standards else "Trial")
+
+
+def _ends(found: LevelsFound, shown: Sequence[TrackCourse]) -> tuple[float, float]:
+    """Return the ends of the axis: all levels and the last intervals, with a margin."""
+    levels = np.concatenate([(*one.levels, one.low[-1], one.high[-1]) for one in shown])
+    levels = levels[levels > 0] if found.spacing == "log" else levels
+    low, high = float(levels.min()), float(levels.max())
+    if found.spacing == "log":
+        factor = max((high / low) ** 0.12, 1.1)
+        return low / factor, high * factor
+    margin = 0.06 * ((high - low) or 1.0)
+    return low - margin, high + margin
+
+
+def _track_panel(axes: Axes, course: TrackCourse) -> None:
+    """Draw the interval, a line for each track, and a mark for each answer; levels of zero lie on the lower edge."""
+    trials = np.arange(1.0, len(course.levels) + 1)
+    low, high = axes.get_ylim()
+    axes.fill_between(
+        trials, np.clip(course.low, low, high), np.clip(course.high, low, high), color=style.BAND, linewidth=0, zorder=1
+    )
+    levels = np.maximum(course.levels, low)
+    for track, colour in zip(sorted(set(course.tracks.tolist())), COLOURS, strict=False):
+        of_track = course.tracks == track
+        own = of_track & ~course.catches
+        chosen = own & ~course.noises
+        axes.plot(trials[chosen], levels[chosen], color=colour, linewidth=0.6)
+        _marks(axes, trials, levels, own & course.successes, colour, colour)
+        _marks(axes, trials, levels, own & ~course.successes, "white", colour)
+        _marks(axes, trials, levels, own & course.reversals, "none", colour, RING_PT2)
+        for marker, answered in (("x", course.successes), ("+", ~course.successes)):
+            which = of_track & course.catches & answered
+            axes.scatter(
+                trials[which], levels[which], s=CROSS_PT2, marker=marker, color=colour, linewidths=0.8, clip_on=False
+            )
+
+
+def _marks(
+    axes: Axes, trials: Array, levels: Array, which: Flags, face: str, edge: str, size: float = MARK_PT2
+) -> None:
+    """Draw circles; those at an edge are not cut off."""
+    axes.scatter(
+        trials[which], levels[which], s=size, facecolors=face, edgecolors=edge, linewidths=0.6, zorder=4, clip_on=False
+    )
+
+
+MARGIN: Final = 0.08
+"""Of the axis beyond the lowest and the highest setting, as a share of the span."""
+
+
+def settings_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
+    """Draw the settings of a block whose levels participants set, once the key is open."""
+    files = files_of(partial(_draw_settings, study, found), forms, f"{study.name}: {found.title}, settings")
+    rest = len(found.own_settings) - MOST_PANELS
+    left_out = f" {counted(rest, 'more panel')} not shown." if rest > 0 else ""
+    compared = any(one.constant_error is not None for one in found.own_settings)
+    standard = " Dashed: standard." if compared else ""
+    caption = (
+        f"{found.title}: the levels that participants set, in their order. Filled: started high; hollow: started low. "
+        f"Line and band: point of subjective equality with its 95 % interval (Student's t).{standard}{left_out} "
+        f"{sample_words(study, len(found.people))}"
+    )
+    return Picture(found.block, name, caption, files)
+
+
+@style.own_settings()
+def _draw_settings(study: Study, found: LevelsFound, fonts: Sequence[str]) -> Sheet:
+    shown = found.own_settings[:MOST_PANELS]
+    sheet = sheet_of_panels(study, f"{found.title}: settings", level_words(found), len(shown), fonts)
+    standards = len({one.standard for one in shown}) > 1
+    names = [
+        (
+            str(one.participant),
+            f"standard {with_unit(found, one.standard)}" if standards and one.standard is not None else "",
+        )
+        for one in shown
+    ]
+    ends = _settings_ends(found, shown)
+
+    def draw(axes: Axes, place: int, first: bool) -> None:
+        axes.set_xlim(0.4, shown[place].n + 0.6)
+        over_trials(axes, found, shown[place].n, ends, first=first)
+        _settings_panel(axes, shown[place])
+
+    return draw_panels(sheet, names, draw, "Setting")
+
+
+def _compared(one: SettingFound) -> float | None:
+    """Return the standard as a level that can be drawn among the settings; None where none was presented."""
+    return one.standard if one.constant_error is not None else None
+
+
+def _settings_ends(found: LevelsFound, shown: Sequence[SettingFound]) -> tuple[float, float]:
+    """Return the ends of the axis: all settings and standards, with a margin."""
+    levels = [level for one in shown for level in (*one.levels, one.low, one.high, _compared(one)) if level is not None]
+    if found.spacing == "log":
+        low, high = min(level for level in levels if level > 0), max(levels)
+        factor = max((high / low) ** MARGIN, 1.05)
+        return low / factor, high * factor
+    low, high = min(levels), max(levels)
+    margin = MARGIN * ((high - low) or 1.0)
+    return low - margin, high + margin
+
+
+def _settings_panel(axes: Axes, one: SettingFound) -> None:
+    """Draw the PSE with its interval, the standard, and a circle for each setting."""
+    if one.low is not None and one.high is not None:
+        axes.axhspan(one.low, one.high, color=style.BAND, linewidth=0, zorder=1)
+    axes.axhline(one.pse, color=style.ACCENT, linewidth=1.0, zorder=2)
+    if (standard := _compared(one)) is not None:
+        axes.axhline(standard, color=style.AXIS, linewidth=0.8, linestyle=(0, (4, 3)), zorder=2)
+    places, levels = np.arange(1, one.n + 1), np.array(one.levels)
+    high = np.array(one.started_high, dtype=bool)
+    for which, face in ((high, style.ACCENT), (~high, "white")):
+        axes.scatter(
+            places[which],
+            levels[which],
+            s=MARK_PT2,
+            facecolors=face,
+            edgecolors=style.ACCENT,
+            linewidths=0.6,
+            zorder=4,
+            clip_on=False,
+        )
+
+
+WEBER_LEFT_PT: Final = 34.0
+RIGHT_PT: Final = 10.0
+TOP_PT: Final = 40.0
+WEBER_FOOT_PT: Final = 32.0
+HEIGHT_PT: Final = 190.0
+FRACTIONS: Final = tuple(digit * 10.0**decade for decade in range(-4, 4) for digit in (1, 2, 5))
+Point = tuple[float, float, float | None, float | None]
+"""Standard, Weber fraction, and the ends of its interval."""
+
+
+def weber_fractions(found: LevelsFound, participant: str | None) -> list[Point]:
+    """Return the Weber fractions of a participant or, of None, of the group, by standard.
+
+    A threshold that is a difference is divided by its standard; standards of zero and levels that are values have none.
+    Where the percentage of the published values is known, the level at it is in the threshold's place.
+    """
+    if found.level_kind not in {"weber", "difference"}:
+        return []
+    points, at_threshold = [], found.compared_percent is None
+    for one in found.thresholds:
+        shown = (one.threshold, one.low, one.high)
+        level, *ends = shown if at_threshold else (one.compared, one.compared_low, one.compared_high)
+        if one.participant != participant or one.standard is None or one.standard <= 0 or level is None or level <= 0:
+            continue
+        unit = one.standard if found.level_kind == "difference" else 1.0
+        low, high = (None if end is None or end <= 0 else end / unit for end in ends)
+        points.append((one.standard, level / unit, low, high))
+    return points
+
+
+def _at(found: LevelsFound) -> str:
+    """Return at which percentage Weber fractions are shown."""
+    percent = found.compared_percent
+    if percent is None and found.guess_rate is not None:
+        percent = 50 * (1 + found.guess_rate)
+    return "" if percent is None else f" at {percent:.3g} % {found.counts}"
+
+
+def weber_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
+    """Draw the Weber fractions of a block with thresholds at two standards or more."""
+    files = files_of(partial(_draw_fractions, study, found), forms, f"{study.name}: {found.title}, Weber fractions")
+    caption = (
+        f"{found.title}: Weber fraction of {found.quantity}{_at(found)}, over the standard. Thin: participants; "
+        f"thick: random-effects mean with its 95 % interval.{_published_words(found)} "
+        f"{sample_words(study, len(found.people))}"
+    )
+    return Picture(found.block, name, caption, files)
+
+
+@style.own_settings()
+def _draw_fractions(study: Study, found: LevelsFound, fonts: Sequence[str]) -> Sheet:
+    sheet = Sheet(style.PAGE_WIDTH_PT / 2, HEIGHT_PT, fonts)
+    sheet.heading(found.title, answer_figures.marks(study), (counted(study.n, "participant"), f"n = {study.n}"))
+    sheet.text(MARGIN_PT, 28, f"Weber fraction{_at(found)}", size=7, colour=style.TEXT_SOFT)
+    axes = sheet.axes(
+        WEBER_LEFT_PT, TOP_PT, sheet.width_pt - WEBER_LEFT_PT - RIGHT_PT, sheet.height_pt - TOP_PT - WEBER_FOOT_PT
+    )
+    group = weber_fractions(found, None)
+    own = [weber_fractions(found, person) for person in found.people]
+    published = published_fractions(found)
+    _fractions_frame(axes, group, own, published)
+    _published(axes, published, sheet)
+    for points in own:
+        axes.plot(
+            [one[0] for one in points], [one[1] for one in points], color=style.PARTICIPANT, linewidth=0.5, alpha=0.7
+        )
+    _group(axes, group)
+    for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
+        label.set_fontproperties(sheet.font(6.5))
+    below = f"Standard of {found.quantity}" + (f" [{found.unit}]" if found.unit else "")
+    sheet.text(WEBER_LEFT_PT, sheet.height_pt - 8, below, size=7, colour=style.TEXT_SOFT)
+    return sheet
+
+
+def _group(axes: Axes, points: Sequence[Point]) -> None:
+    xs = [one[0] for one in points]
+    axes.plot(xs, [one[1] for one in points], marker="o", markersize=3.5, color=style.ACCENT, linewidth=1.2, zorder=3)
+    for x, _, low, high in points:
+        if low is not None and high is not None:
+            axes.plot([x, x], [low, high], color=style.ACCENT, linewidth=1.2, zorder=3)
+
+
+def published_fractions(found: LevelsFound) -> list[tuple[float | None, float]]:
+    """Return standard and Weber fraction of the published values that are one; a standard of None: of all."""
+    points = []
+    for one in found.published:
+        if one.measure == "weber":
+            points.append((one.standard, one.value))
+        elif one.measure == "threshold" and found.level_kind == "difference" and one.standard:
+            points.append((one.standard, one.value / one.standard))
+    return points
+
+
+def _published_words(found: LevelsFound) -> str:
+    listed = "; ".join(one.in_words() for one in found.published)
+    return f" Open circles and dotted lines: published values, {listed}." if published_fractions(found) else ""
+
+
+def _published(axes: Axes, points: Sequence[tuple[float | None, float]], sheet: Sheet) -> None:
+    """Draw published values: a circle at a standard, a dotted line over all, which is named above the axes."""
+    over_all = [f"{fraction:g}" for standard, fraction in points if standard is None]
+    if over_all:
+        words = f"dotted: published {', '.join(over_all)}"
+        x = sheet.width_pt - MARGIN_PT - sheet.text_width(words, 7)
+        sheet.text(x, 28, words, size=7, colour=style.TEXT_SOFT)
+    for standard, fraction in points:
+        if standard is None:
+            axes.axhline(fraction, color=style.TEXT_SOFT, linewidth=1.0, linestyle=":", zorder=2)
+        else:
+            axes.plot([standard], [fraction], "o", markersize=5, fillstyle="none", color=style.TEXT_SOFT, zorder=4)
+
+
+def _fractions_frame(
+    axes: Axes, group: Sequence[Point], own: Sequence[Sequence[Point]], published: Sequence[tuple[float | None, float]]
+) -> None:
+    """Draw logarithmic axes: the standards below, round fractions at the left."""
+    values = [value for points in own for _, value, _, _ in points]
+    values += [value for point in group for value in point[1:] if value is not None]
+    values += [value for _, value in published]
+    low = max((tick for tick in FRACTIONS if tick <= min(values)), default=min(values))
+    high = min((tick for tick in FRACTIONS if tick >= max(values)), default=max(values))
+    standards = [one[0] for one in group]
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.minorticks_off()
+    margin = (standards[-1] / standards[0]) ** 0.08
+    axes.set_xlim(standards[0] / margin, standards[-1] * margin)
+    axes.set_ylim(low, high)
+    axes.set_xticks(standards, [f"{standard:g}" for standard in standards])
+    ticks = [tick for tick in FRACTIONS if low <= tick <= high]
+    axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.hlines(ticks, *axes.get_xlim(), color=style.GRID, linewidth=0.6, zorder=0)
+
+
+Draw: TypeAlias = Callable[[Study, LevelsFound, Sequence[str], str], Picture]
+
+FIGURES: Final[tuple[tuple[str, Callable[[LevelsFound], object], Draw], ...]] = (
+    ("levels", lambda found: found.answers, level_picture),
+    ("tracks", lambda found: found.adaptive and found.own_thresholds, track_picture),
+    ("weber", lambda found: len(weber_fractions(found, None)) >= 2, weber_picture),
+    ("settings", lambda found: found.own_settings, settings_picture),
+)
+"""What a figure is called, of which blocks there is one, and what draws it."""
+
+
+def level_pictures(
+    study: Study, levels: Sequence[LevelsFound], forms: Sequence[str] = style.FORMATS, failures: Failures | None = None
+) -> Iterator[Picture]:
+    """Draw every figure of every block that has one, in each of ``forms``.
+
+    A figure that fails is left out, and kept in ``failures``.
+    """
+    yield from attempted(
+        (
+            (found.block, f"{what}-{found.block}", partial(draw, study, found, forms))
+            for what, applies, draw in FIGURES
+            for found in levels
+            if applies(found)
+        ),
+        failures,
+    )

@@ -1,0 +1,108 @@
+"""Every figure of a study: of its answers as files, and of its findings for a report."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import chain
+from pathlib import Path
+
+from study_app import figure_style as style
+from study_app.analysis.data.blocks import KINDS
+from study_app.analysis.data.questions import questions_found
+from study_app.analysis.data.study_tables import Study, load_study
+from study_app.analysis.figures import answer_figures
+from study_app.analysis.figures.answer_figures import render
+from study_app.analysis.figures.level_figures import level_pictures
+from study_app.analysis.figures.picture import Drawing, Picture
+from study_app.analysis.figures.question_figures import question_pictures
+from study_app.analysis.findings import all_findings
+from study_app.analysis.findings.delays import LowestDelay
+from study_app.analysis.levels.summaries import levels_found
+from study_app.analysis.results import Failure, Failures, Results
+from study_app.errors import AnalysisError
+from study_app.store.withdrawals.output_log import write_output
+
+
+def pictures(
+    study: Study, results: Results, forms: Sequence[str] = style.FORMATS, failures: Failures | None = None
+) -> Iterator[Picture]:
+    """Draw every figure that there are answers or recordings for, block by block, in each of ``forms``.
+
+    A figure that fails is left out, and kept in ``failures``.
+    """
+    held = Failures() if failures is None else failures
+    for block, found in zip(study.blocks, results.blocks, strict=True):
+        if not found.n:
+            continue
+        several = len(study.blocks_of(block.kind)) > 1
+        drawing = Drawing(study, block, found, results, block.kind, forms)
+        for what, draw in _of_block(drawing):
+            name = f"{what}-{block.id}" if several else what
+            drawn = held.attempt(f"figure {name}", partial(draw, replace(drawing, name=name)), block=block.id)
+            if drawn is not None and not isinstance(drawn, Failure):
+                yield drawn
+
+
+def _of_block(drawing: Drawing) -> Iterator[tuple[str, Callable[[Drawing], Picture | None]]]:
+    """Yield what a block's figures are called, and how each is drawn."""
+    yield drawing.block.kind, _answers
+    for finding in all_findings():
+        if finding.figure_name:
+            yield finding.figure_name, finding(drawing.found, drawing.results).figure
+
+
+def _answers(drawing: Drawing) -> Picture:
+    study, block, found = drawing.study, drawing.block, drawing.found
+    lowest = {one.item: one.over_all_ms for one in LowestDelay.of(found) if one.over_all_ms is not None}
+    caption = answer_figures.caption(study, block)
+    if lowest:
+        caption += (
+            " Dashed: lowest delay at which stepping down still shows a trend, with the error rate held over all "
+            "statements; an upper bound of the delay that is noticed."
+        )
+    files = {form: answer_figures.render(study, block, form, lowest) for form in drawing.forms}
+    return Picture(block.id, drawing.name, caption, files)
+
+
+def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None) -> tuple[Path, ...]:
+    """Write every figure of a study as PNG, SVG and PDF, each with its caption as text, into the folder ``to``.
+
+    The same results give the same bytes. Returns the files written. Files that are not as they were recorded are used
+    as they are: ``warn`` receives each, and the captions say how many.
+
+    Raises
+    ------
+    AnalysisError
+        The results cannot be evaluated, or ``to`` cannot be written; nothing was.
+    StoreError
+        The key was opened, and is now missing or changed; or ``exclusions.csv`` cannot be read.
+    """
+    study = load_study(folder)
+    if not study.blocks and not study.others.questions:
+        raise AnalysisError(f"{folder}: the study {study.name!r} asks nothing, so there is nothing to draw")
+    files: dict[str, bytes] = {}
+    for picture in chain(_of_statements(study), _of_others(study)):
+        files |= {f"{picture.name}.{form}": content for form, content in picture.files.items()}
+        files[f"{picture.name}.txt"] = f"{picture.caption}\n".encode()
+    if not files:
+        raise AnalysisError(f"{folder}: no completed session with answers yet: there is nothing to draw")
+    written = write_output(study.folder, Path(to), files)
+    study.tell_doubts(warn)
+    return written
+
+
+def _of_statements(study: Study) -> Iterator[Picture]:
+    for kind in KINDS:
+        blocks = study.blocks_of(kind)
+        for block in blocks:
+            name = kind if len(blocks) == 1 else f"{kind}-{block.id}"
+            files = {form: render(study, block, form) for form in style.FORMATS}
+            yield Picture(block.id, name, answer_figures.caption(study, block), files)
+
+
+def _of_others(study: Study) -> Iterator[Picture]:
+    failures = Failures()
+    yield from question_pictures(study, questions_found(study), failures=failures)
+    yield from level_pictures(study, levels_found(study), failures=failures)
+    if failures.found:
+        raise AnalysisError(f"a figure cannot be drawn: {failures.found[0]}")

@@ -1,0 +1,1 @@
+"""Blocks of levels: thresholds, exponents, sensitivities and settings of participants and groups."""

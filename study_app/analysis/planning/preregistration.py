@@ -1,0 +1,459 @@
+"""The preregistration of a study in Markdown, from its protocol alone, and where the study left it."""
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from study_app import __version__
+from study_app.analysis.data.blocks import spoken
+from study_app.analysis.data.study_tables import Study
+from study_app.analysis.planning.simulated_studies import compares_statements
+from study_app.analysis.report.html_page import bullets, heading, paragraph
+from study_app.analysis.results import counted, listed
+from study_app.errors import AnalysisError
+from study_app.protocol.analysis_plan import Analysis
+from study_app.protocol.blocks import Block
+from study_app.protocol.checks.expected_precision import expected_of, precision_plan, precision_rows, threshold_plan
+from study_app.protocol.describe import describe, limit_rows
+from study_app.protocol.model import Protocol
+from study_app.protocol.quantities import quantity, quantity_words
+from study_app.protocol.texts import text_in
+from study_app.protocol.trials.psychometric import Family, family_of
+from study_app.protocol.trials.tracks import design_of, method_of, standards_of, stimulus_of
+from study_app.psychophysics.precision import BETWEEN_PEOPLE
+from study_app.store.exclusions import named
+from study_app.store.journals.parsing import parse_json
+from study_app.store.sites.merged import DASH, folders_of
+
+FILE: Final = "preregistration.md"
+"""Its name in a study's folder."""
+CATCH: Final = "catch"
+"""The rule of exclusion that `unblind` applies."""
+_BLOCK: Final = re.compile(r"^```json\n(\{.*?\})\n```$", re.MULTILINE | re.DOTALL)
+
+
+@dataclass(frozen=True, slots=True)
+class Commitment:
+    """What was committed to.
+
+    Attributes
+    ----------
+    participants : int or None
+        How many are planned.
+    precision : float or None
+        Half the 95 % interval of the group's mean that is planned, as a share of the mean.
+    rules : tuple of str
+        Names of the rules that exclude sessions.
+    """
+
+    study: str
+    version: str
+    protocol_hash: str
+    participants: int | None
+    precision: float | None
+    rules: tuple[str, ...]
+
+
+def commitment(protocol: Protocol, protocol_hash: str) -> Commitment:
+    """Return what a protocol commits to."""
+    decided = protocol.analysis
+    return Commitment(
+        protocol.study.name,
+        protocol.study.version,
+        protocol_hash,
+        None if decided is None else decided.participants,
+        None if decided is None else decided.precision,
+        (CATCH,) if any(block.catch is not None for block in protocol.main_blocks) else (),
+    )
+
+
+def written(one: Commitment) -> str:
+    """Return it as the last lines of a preregistration."""
+    return f"```json\n{json.dumps(asdict(one), indent=1)}\n```\n"
+
+
+def read(folder: Path) -> Commitment | None:
+    """Return what the preregistration in a study's folder commits to; None: there is none.
+
+    Raises
+    ------
+    AnalysisError
+        It cannot be read.
+    """
+    path = folder / FILE
+    try:
+        found = _BLOCK.findall(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except (OSError, UnicodeDecodeError) as error:
+        raise AnalysisError(f"{path} cannot be read ({error}): restore it from a copy") from error
+    try:
+        values: dict[str, Any] = parse_json(found[-1])
+        one = Commitment(**{**values, "rules": tuple(values["rules"])})
+        _check_types(one)
+    except (IndexError, KeyError, TypeError, ValueError) as error:
+        raise AnalysisError(
+            f"{path} does not end with what `liquid-study preregister` writes there ({type(error).__name__}): restore "
+            "it from a copy, or remove it"
+        ) from error
+    return one
+
+
+def _check_types(one: Commitment) -> None:
+    """Refuse what `written` never writes (TypeError)."""
+    texts = all(isinstance(text, str) for text in (one.study, one.version, one.protocol_hash, *one.rules))
+    if not (texts and isinstance(one.participants, int | None) and isinstance(one.precision, int | float | None)):
+        raise TypeError("values of other types")
+
+
+DEFAULTS: Final = Analysis()
+FAMILIES: Final[dict[Family, str]] = {"weibull": "Weibull", "normal": "cumulative normal", "logistic": "logistic"}
+
+
+def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
+    """Yield what each main block asks; what a test would show is marked as a hypothesis."""
+    for block in protocol.main_blocks:
+        if block.design is not None:
+            yield from _of_intervals(protocol, block)
+        else:
+            yield from _of_statements(protocol, block, language)
+    for one in () if protocol.analysis is None else protocol.analysis.published:
+        yield f"Published value to compare with: {one.described()}."
+
+
+def _of_intervals(protocol: Protocol, block: Block) -> Iterator[str]:
+    design = design_of(protocol, block)
+    if block.stimulus is None:
+        yield f"Block {block.id}: how well can {listed(block.conditions)} be discriminated from {block.standard} (d′)?"
+        return
+    stimulus = stimulus_of(protocol, block)
+    what, unit = quantity_words(stimulus.vary), quantity(stimulus.vary).unit
+    standards = [one for one in standards_of(protocol, block) if one is not None]
+    if threshold_plan(protocol, block) is None:
+        asked = {"number": "With which exponent do estimates grow with", "rating": "How do ratings change with"}
+        yield f"Block {block.id}: {asked.get(design.reply, 'How do answers change with')} {what}?"
+        return
+    at = f" at {listed([f'{one:g}' for one in standards])} {unit}".rstrip() if standards else ""
+    kind = "Weber fraction" if stimulus.level_kind == "weber" else "threshold"
+    yield f"Block {block.id}: what is the {kind} of {what}{at}? An estimate with its interval; no test."
+    if len(standards) > 1:
+        yield (
+            f"Block {block.id}: is the just-noticeable difference proportional to the standard (exponent 1, Weber's "
+            "law) or constant (exponent 0)?"
+        )
+
+
+def _of_statements(protocol: Protocol, block: Block, language: str) -> Iterator[str]:
+    questionnaire, decided = protocol.questionnaire_of(block.id), protocol.analysis or DEFAULTS
+    if questionnaire is None or len(block.conditions) < 2:
+        return
+    texts = {item.id: text_in(item.text, language) for item in questionnaire.statements}
+    if protocol.compared_in(block.id) == "delays":
+        for name, words in texts.items():
+            if name in decided.rising or name in decided.falling:
+                moves = "rises" if name in decided.rising else "falls"
+                yield f"Hypothesis, block {block.id}: agreement with “{words}” ({name}) {moves} with the delay."
+        if decided.noticed in texts:
+            yield f"Block {block.id}: from which delay on is it noticed (agreement, 5 to 7, with {decided.noticed})?"
+        if decided.equivalence_bound is not None:
+            yield (
+                f"Block {block.id}: which delays are equivalent to none, within ±{decided.equivalence_bound:g} points?"
+            )
+        return
+    primary = [name for name in texts if not decided.primary or name in decided.primary]
+    yield (
+        f"Hypothesis, block {block.id}: {listed(block.conditions)} differ in agreement with "
+        f"{listed([f'“{texts[name]}” ({name})' for name in primary])}."
+    )
+    labels = [f"{name} by {one.label}" for name, one in protocol.conditions.items() if one.label in texts]
+    if labels and protocol.analysis is not None:
+        yield f"Block {block.id}: are the liquids recognised ({listed(labels)}) more often than by chance?"
+
+
+def analyses(protocol: Protocol) -> Iterator[str]:
+    """Yield how each block is analysed."""
+    for block in protocol.main_blocks:
+        plan = threshold_plan(protocol, block)
+        if plan is not None:
+            stimulus, design = stimulus_of(protocol, block), design_of(protocol, block)
+            method = method_of(protocol, block)
+            yield (
+                f"Block {block.id} ({design.paper_name}, {method.paper_name}): for each participant and standard the "
+                f"posterior median of the threshold ({FAMILIES[family_of(stimulus, design)]} function) with its "
+                "equal-tailed 95 % interval, at the delivered levels; the median under a flat prior of the width is "
+                "reported, too; goodness of fit by 999 simulated sets of answers, drift over trials."
+            )
+            yield (
+                f"Block {block.id}, group: random-effects mean of logarithmic thresholds (Paule–Mandel) with the "
+                "Hartung–Knapp 95 % interval."
+            )
+            if plan.standards > 1:
+                yield f"Block {block.id}, exponent: slope of ln JND over ln standard of each participant, t interval."
+        elif block.design is not None and block.stimulus is not None:
+            yield (
+                f"Block {block.id}: answers at each level, as means of participants' (of logarithms, where numbers are "
+                "estimated; the exponent is the slope over the logarithm of the level) with Student's 95 % interval."
+            )
+            if design_of(protocol, block).reply == "rating":
+                yield f"Block {block.id}: d_a of each level against the lowest, from the area under the ROC curve."
+        elif block.design is not None:
+            yield f"Block {block.id}: d′ of each participant, from rates with the log-linear correction."
+    asked = [block for block in protocol.main_blocks if block.design is None and block.questionnaire is not None]
+    if not asked:
+        return
+    decided = protocol.analysis or DEFAULTS
+    kinds = {protocol.compared_in(block.id) for block in asked}
+    if "delays" in kinds:
+        yield (
+            "Delays: Page's permutation test in the stated direction, stepping down from the longest delay; "
+            "equivalence to no delay by two one-sided tests, where a bound is given; the detection threshold from "
+            "agreement."
+        )
+    if others := kinds - {None, "delays"}:
+        yield (
+            f"{' and '.join(sorted(map(str, others))).capitalize()}: Friedman's permutation test of each statement, "
+            "signed ranks where two conditions are compared."
+        )
+    yield (
+        f"α = {decided.alpha:g}; primary statements ({', '.join(decided.primary) or 'all'}) are corrected by Holm, the "
+        "others, exploratory, by Benjamini and Hochberg."
+        if protocol.analysis is not None
+        else "Nothing is decided (there is no table [analysis]): all results are exploratory."
+    )
+
+
+def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = None) -> str:
+    """Return the text: hypotheses, design, sample size, exclusions, analysis, the protocol in words.
+
+    Parameters
+    ----------
+    power : str, optional
+        The Markdown that ``liquid-study power`` wrote.
+    """
+    one = commitment(protocol, protocol_hash)
+    study = protocol.study
+    language = spoken({"study": {"languages": study.languages}})
+    lines = [
+        f"# Preregistration: {text_in(study.title, language)}",
+        "",
+        f"Study {study.name}, version {study.version}; protocol file with SHA-256 `{protocol_hash}`. Written by "
+        f"liquid-study {__version__} from this file alone. Register it before the first session.",
+        "",
+        "## Hypotheses and questions",
+        "",
+        *(f"- {line}" for line in hypotheses(protocol, language)),
+        "",
+        "## Design",
+        "",
+        *(f"- {line}" for line in _design(protocol)),
+        "",
+        "## Participants",
+        "",
+        *_participants(protocol, one, power),
+        "",
+        "## Exclusions",
+        "",
+        *(f"- {line}" for line in _exclusions(protocol)),
+        "",
+        "## Analysis",
+        "",
+        *(f"- {line}" for line in analyses(protocol)),
+        "",
+        "## The protocol in words",
+        "",
+        "```text",
+        describe(protocol),
+        "```",
+        "",
+        "## Values that the report compares with",
+        "",
+        written(one),
+    ]
+    return "\n".join(lines)
+
+
+def _design(protocol: Protocol) -> Iterator[str]:
+    study = protocol.study
+    yield (
+        "Conditions are known by codes until the key is opened; double-blind: the operator sees no force."
+        if study.blinding == "double"
+        else "Conditions are known by codes until the key is opened; the operator sees force and wake (single-blind)."
+    )
+    if protocol.groups:
+        shares = ", ".join(f"{name} (share {group.share})" for name, group in protocol.groups.items())
+        yield f"Participants are allocated at random, in permuted blocks, to the groups {shares}."
+    yield "Orders are drawn for each participant from the session's seed, as described for each block below."
+    for block in protocol.main_blocks:
+        rows = dict(precision_rows(protocol, block))
+        kind = "levels" if block.stimulus is not None else "conditions"
+        of_block = f"Block {block.id}: {kind}, see below"
+        yield f"{of_block}; expected: {rows['Expected precision']}." if rows else f"{of_block}."
+
+
+def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Iterator[str]:
+    """Yield how many participants there are and why."""
+    planned = "Their number is not decided." if one.participants is None else f"{one.participants} are planned."
+    wanted = (
+        ""
+        if one.precision is None
+        else f" The aim is a 95 % interval of the group's mean within ±{100 * one.precision:g} %."
+    )
+    yield planned + wanted
+    reasons = []
+    for block in protocol.main_blocks:
+        plan = precision_plan(protocol, block)
+        found = None if plan is None else expected_of(plan)
+        if plan is None or found is None or not found.measured:
+            continue
+        reached = ""
+        if one.participants is not None:
+            half = 100 * found.of_group(one.participants)
+            reached = f" {one.participants} participants give ±{half:.0f} %."
+        needed = None if one.precision is None else found.participants_for(one.precision)
+        enough = "" if needed is None else f" The aim takes {counted(needed, 'participant')}."
+        reasons.append(
+            f"- Block {block.id}: from simulated answers, {found.trials} trials{plan.per}, people who differ by a "
+            f"factor of {BETWEEN_PEOPLE:g}.{reached}{enough}"
+        )
+    if reasons:
+        yield from ("", *reasons)
+    if power is not None:
+        yield from ("", *(f"##{line}" if line.startswith("#") else line for line in power.rstrip().splitlines()))
+    elif compares_statements(protocol):
+        yield ""
+        yield (
+            f"No power was computed for this text: `liquid-study power {protocol.study.name} --to DIR` computes it, "
+            "and `--power DIR` includes it here."
+        )
+
+
+def _exclusions(protocol: Protocol) -> Iterator[str]:
+    yield "Sessions that are not completed are left out of every number."
+    for block in protocol.main_blocks:
+        if block.catch is not None:
+            yield (
+                f'Rule "catch": a session with more than {100 * block.catch.wrong_most:g} % incorrect answers to the '
+                f"catch trials of block {block.id} is excluded; the program applies it when the key is opened."
+            )
+    limits = "; ".join(f"{what} {value}" for value, what in limit_rows(protocol))
+    has_intervals = any(block.design is not None for block in protocol.main_blocks)
+    if has_intervals:
+        attempts = protocol.limits.attempts
+        times = "" if attempts is None else f", up to {attempts} times"
+        yield f"A trial of intervals beyond a limit is not asked about and is presented again{times}."
+    if any(block.design is None for block in protocol.main_blocks):
+        yield f"{'Other trials' if has_intervals else 'Trials'} beyond a limit are counted and reported."
+    yield f"Limits: {limits}."
+    yield "Any other exclusion is a deviation: the report lists it with its reason and date."
+
+
+SHOWN = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Deviations:
+    """What was preregistered, and each point at which the study differs from it, in words.
+
+    ``commitment`` is None where no preregistration is in the study's folder; then only the planned number of
+    participants is compared.
+    """
+
+    commitment: Commitment | None
+    found: tuple[str, ...]
+
+
+def deviations(study: Study) -> Deviations | None:
+    """Return where a study left what was planned; None: nothing was preregistered, nor a number of people planned.
+
+    Raises
+    ------
+    AnalysisError
+        The preregistration cannot be read.
+    """
+    sites = {prefix.removesuffix(DASH): read(place) for prefix, place in folders_of(study.folder).items()}
+    committed = next(filter(None, sites.values()), None)
+    planned = (study.protocol.get("analysis") or {}).get("participants")
+    if committed is None:
+        return None if planned is None else Deviations(None, tuple(_other_participants(study, planned)))
+    return Deviations(
+        committed,
+        (
+            *_sites(sites, committed),
+            *_protocol(study, committed),
+            *_other_participants(study, committed.participants),
+            *_other_exclusions(study, committed),
+            *_decisions(study),
+        ),
+    )
+
+
+def _sites(sites: Mapping[str, Commitment | None], committed: Commitment) -> Iterator[str]:
+    """Yield the sites of a merged study that have no preregistration, or another one than the one compared with."""
+    for site, own in sites.items():
+        if own is None:
+            yield f"site {site} has no {FILE}"
+        elif own != committed:
+            yield f"the preregistration of site {site} is another one than that of the first site, used here"
+
+
+def _protocol(study: Study, committed: Commitment) -> Iterator[str]:
+    if study.name != committed.study:
+        yield f"the preregistration is that of another study, {committed.study}"
+    rows = study.participants
+    other = rows[rows["counted"] & (rows["protocol_hash"] != committed.protocol_hash)]
+    if len(other):
+        versions = listed(sorted(set(map(str, other["protocol_version"]))))
+        who = listed([f"{row.participant}/{row.session}" for row in other.head(SHOWN).itertuples()])
+        more = "" if len(other) <= SHOWN else f" and {len(other) - SHOWN} more"
+        yield (
+            f"{counted(len(other), 'session')} ran under another protocol (version {versions}) than the preregistered "
+            f"one (version {committed.version}, SHA-256 {committed.protocol_hash[:12]}…): {who}{more}"
+        )
+
+
+def _other_participants(study: Study, planned: int | None) -> Iterator[str]:
+    if planned is not None and study.n != planned:
+        kind = "fewer" if study.n < planned else "more"
+        yield f"{kind} participants: {study.n} are analysed, {planned} were planned"
+
+
+def _other_exclusions(study: Study, committed: Commitment) -> Iterator[str]:
+    other = [one for one in study.exclusions if one.rule_or_person not in committed.rules]
+    for one in other[:SHOWN]:
+        yield f"an exclusion by no preregistered rule: {named(one)}: {one.reason} ({one.rule_or_person})"
+    if len(other) > SHOWN:
+        yield f"{len(other) - SHOWN} more exclusions by no preregistered rule, in report.json"
+
+
+def _decisions(study: Study) -> Iterator[str]:
+    if study.decided.changed:
+        yield "the decisions about the analysis differ between sessions: all results are exploratory"
+
+
+def deviations_section(study: Study) -> Iterator[str]:
+    """Yield the report's section; nothing where nothing was planned."""
+    compared = deviations(study)
+    if compared is None:
+        return
+    yield heading(2, "Preregistration")
+    if (committed := compared.commitment) is None:
+        yield paragraph(
+            f"The study's folder has no {FILE}. Compared with the protocol's planned number of participants:"
+        )
+    else:
+        yield paragraph(
+            f"Preregistered: {committed.study}, version {committed.version}, protocol with SHA-256 "
+            f"{committed.protocol_hash}."
+        )
+    if compared.found:
+        yield paragraph("The study differs from it in:")
+        yield bullets(compared.found)
+    else:
+        yield paragraph(
+            "No difference was found in protocol, number of participants, exclusions or decisions."
+            if compared.commitment is not None
+            else "As many participants as planned."
+        )

@@ -1,0 +1,447 @@
+"""What a protocol plans, simulated studies of it, and counts of what its tests find in them.
+
+A smaller effect draws the opinions of a person on all settings nearer to their mean; leanings and noise stay. The same
+people with the same noise answer at every size of the effect, and the first of them are the smaller studies, so that
+curves are smooth; the studies are independent of each other.
+
+All of them meet the same random rearrangements of participants' answers; sums over participants are then products of
+matrices of whole numbers, exact in single precision. Each p is (1 + those as extreme) / (1 + ``DRAWS``).
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study_app.analysis.data import blocks as decided
+from study_app.analysis.data.blocks import Decided, Item, Kind, spoken
+from study_app.analysis.data.measures import Array
+from study_app.analysis.statistics.equivalence import equivalent as shows_equivalence
+from study_app.analysis.statistics.equivalence import sizes
+from study_app.errors import AnalysisError
+from study_app.protocol.blocks import Block
+from study_app.protocol.forms.scale import POINTS
+from study_app.protocol.forms.simulated_observer import OPINIONS, Rater, TrialFeatures, opinions, rater
+from study_app.protocol.groups.session_steps import groups_with
+from study_app.protocol.model import Protocol
+from study_app.protocol.questions.question import Question
+from study_app.protocol.texts import text_in
+
+ConditionFeatures: TypeAlias = Mapping[tuple[str, str], Sequence[TrialFeatures]]
+"""(Block, condition) → what was felt there in rehearsed trials."""
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A main block that asks something.
+
+    ``names`` are of its settings, in the order of the tests: delays ascending. ``delays_ms`` is None where liquids are
+    compared. ``felt`` has what was felt in each setting. ``groups`` are those that have the block, where not all do.
+    """
+
+    id: str
+    title: str
+    kind: Kind
+    names: tuple[str, ...]
+    delays_ms: tuple[float, ...] | None
+    items: tuple[Item, ...]
+    felt: tuple[tuple[TrialFeatures, ...], ...]
+    repetitions: int
+    groups: tuple[str, ...] = ()
+
+    @property
+    def k(self) -> int:
+        """How many settings there are."""
+        return len(self.names)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A study that is planned."""
+
+    name: str
+    title: str
+    version: str
+    blocks: tuple[Planned, ...]
+    decided: Decided
+
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """The items that the answer model knows nothing of, so that no effect on them is simulated."""
+        return tuple(item.id for block in self.blocks for item in block.items if item.id not in OPINIONS)
+
+
+def plan(protocol: Protocol, felt: ConditionFeatures) -> Plan:
+    """Return what can be planned of a protocol.
+
+    Raises
+    ------
+    AnalysisError
+        No block of it compares settings and asks about them.
+    """
+    language = spoken({"study": {"languages": protocol.study.languages}})
+    asked = _compared(protocol)
+    if not asked:
+        raise AnalysisError(
+            f"{protocol.study.name} compares nothing: power needs a main block of two or more conditions and a "
+            "questionnaire with statements"
+        )
+    table = None if protocol.analysis is None else protocol.analysis.model_dump(mode="json")
+    return Plan(
+        protocol.study.name,
+        text_in(protocol.study.title, language),
+        protocol.study.version,
+        tuple(_planned(protocol, block, felt, language) for block in asked),
+        decided.read([table]),
+    )
+
+
+def compares_statements(protocol: Protocol) -> bool:
+    """Return whether a main block compares conditions by statements."""
+    return bool(_compared(protocol))
+
+
+def _compared(protocol: Protocol) -> list[Block]:
+    return [block for block in protocol.main_blocks if _statements(protocol, block) and len(block.conditions) > 1]
+
+
+def _planned(protocol: Protocol, block: Block, felt: ConditionFeatures, language: str) -> Planned:
+    conditions = list(block.conditions)
+    delays = {name: protocol.conditions[name].delay_ms for name in conditions}
+    kind = protocol.compared_in(block.id)
+    assert kind is not None  # noqa: S101 - a main block
+    having = groups_with(protocol, block.id)
+    if kind == "delays":
+        conditions.sort(key=delays.__getitem__)
+    return Planned(
+        id=block.id,
+        title=text_in(block.title, language),
+        kind=kind,
+        names=tuple(f"{delays[name]:g} ms" if kind == "delays" else name.replace("_", " ") for name in conditions),
+        delays_ms=tuple(delays[name] for name in conditions) if kind == "delays" else None,
+        items=tuple(
+            Item(item.id, text_in(item.text, language), text_in(item.short, language))
+            for item in _statements(protocol, block)
+        ),
+        felt=tuple(tuple(felt[block.id, name]) for name in conditions),
+        repetitions=block.repetitions,
+        groups=having if len(having) < len(protocol.groups) else (),
+    )
+
+
+def _statements(protocol: Protocol, block: Block) -> tuple[Question, ...]:
+    """Return the statements that a block asks about; power is planned for no other questions."""
+    questionnaire = protocol.questionnaire_of(block.id)
+    return () if questionnaire is None else questionnaire.statements
+
+
+LOWEST, HIGHEST = 1, POINTS
+
+
+UNIFORM = 12
+"""The answer model's noise is the sum of so many uniform numbers, less six."""
+
+
+@dataclass(frozen=True)
+class Opinions:
+    """What people think in a block, and what else is in their answers (participants, repetitions, settings, items)."""
+
+    thought: Array
+    noise: Array
+
+    def answers(self, effect: float) -> Array:
+        """Return the answers (participants, settings, items) where settings differ ``effect`` times as much.
+
+        The median over repetitions, as everywhere in the analysis.
+        """
+        middle = self.thought.mean(axis=2, keepdims=True)
+        points = middle + effect * (self.thought - middle) + self.noise
+        given = np.clip(np.floor(points + 0.5), LOWEST, HIGHEST)
+        return np.asarray(given[:, 0] if given.shape[1] == 1 else np.median(given, axis=1))
+
+
+def people(plan: Plan, participants: int, seed: int, study: int) -> tuple[Opinions, ...]:
+    """Return what the participants of simulated study number ``study`` think in each block of the plan."""
+    rng = np.random.default_rng([seed, study])
+    found: list[list[tuple[Array, Array]]] = [[] for _ in plan.blocks]
+    for _ in range(participants):
+        person = rater(rng.random)
+        for place, block in enumerate(plan.blocks):
+            found[place].append(_person(block, person, rng))
+    return tuple(
+        Opinions(np.array([thought for thought, _ in block]), np.array([noise for _, noise in block]))
+        for block in found
+    )
+
+
+def _person(block: Planned, person: Rater, rng: np.random.Generator) -> tuple[Array, Array]:
+    items = [item.id for item in block.items]
+    drawn = rng.random((block.repetitions, block.k))
+    thought = [
+        [
+            opinions(items, felt[int(len(felt) * part)], person)
+            for felt, part in zip(block.felt, parts.tolist(), strict=True)
+        ]
+        for parts in drawn
+    ]
+    noise = rng.random((block.repetitions, block.k, len(items), UNIFORM)).sum(axis=-1) - UNIFORM / 2
+    return np.array(thought), person.leaning + person.noise * noise
+
+
+def together(studies: Sequence[tuple[Opinions, ...]], place: int, effects: Sequence[float]) -> Array:
+    """Return one block's answers (effects, studies, participants, settings, items)."""
+    return np.array([[one[place].answers(effect) for one in studies] for effect in effects])
+
+
+PLANNED_DRAWS: Final = 1999
+"""Rearrangements; the report goes through all of them, or draws more."""
+
+Single = NDArray[np.float32]
+
+
+def ranks(answers: Array) -> Single:
+    """Return (doubled) ranks among the settings of ``answers`` (…, settings, items): (…, settings, items)."""
+    found: Any = np.ones(answers.shape, dtype=np.float32)
+    for other in range(answers.shape[-2]):
+        there = answers[..., other : other + 1, :]
+        found += (there < answers) * np.float32(2) + (there == answers)
+    return np.asarray(found)
+
+
+def friedman(ranked: Single, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Return Friedman's p of every item, and of the sum of their statistics over all items (global test).
+
+    Parameters
+    ----------
+    ranked : (studies, participants, settings, items) array
+
+    Returns
+    -------
+    (studies, items), (studies,) array
+    """
+    studies, n, k, items = ranked.shape
+    orders = rng.random((PLANNED_DRAWS, n, k)).argsort(axis=-1)
+    columns = np.ascontiguousarray(ranked.transpose(1, 2, 0, 3)).reshape(n * k, studies * items)
+    middle = np.float32(n * (k + 1))
+    seen = ((ranked.sum(axis=1) - middle) ** 2).sum(axis=1)
+    squares = np.zeros((PLANNED_DRAWS, studies * items), dtype=np.float32)
+    picked = np.zeros((PLANNED_DRAWS, n, k), dtype=np.float32)
+    for setting in range(k):
+        picked[:] = 0
+        np.put_along_axis(picked, orders[..., setting : setting + 1], np.float32(1), axis=-1)
+        sums = picked.reshape(PLANNED_DRAWS, n * k) @ columns
+        sums -= middle
+        sums *= sums
+        squares += sums
+    squares = squares.reshape(PLANNED_DRAWS, studies, items)
+    spread = ((ranked - np.float32(k + 1)) ** 2).sum(axis=(1, 2))
+    weights = np.divide(1.0, spread, out=np.zeros(spread.shape), where=spread > 0)
+    of_all = np.einsum("dsi,si->ds", squares, weights.astype(np.float32))
+    seen_of_all = np.einsum("si,si->s", seen, weights.astype(np.float32))
+    return _p(squares, seen), _p(of_all, seen_of_all * np.float32(1 - 1e-5))
+
+
+def trend(ranked: Single, rng: np.random.Generator) -> Array:
+    """Return Page's one-sided p (studies, items) that answers rise; ``ranked``: (studies, people, settings, items)."""
+    studies, n, k, items = ranked.shape
+    weights = (rng.random((PLANNED_DRAWS, n, k)).argsort(axis=-1) + 1).astype(np.float32)
+    columns = np.ascontiguousarray(ranked.transpose(1, 2, 0, 3)).reshape(n * k, studies * items)
+    drawn = (weights.reshape(PLANNED_DRAWS, n * k) @ columns).reshape(PLANNED_DRAWS, studies, items)
+    seen = np.einsum("snki,k->si", ranked, np.arange(1, k + 1, dtype=np.float32))
+    return _p(drawn, seen)
+
+
+def signed(answers: Array, rng: np.random.Generator) -> Array:
+    """Return the p (studies, items) of Wilcoxon's signed ranks for ``answers`` (studies, people, 2, items)."""
+    differences = answers[:, :, 0] - answers[:, :, 1]
+    studies, n, items = differences.shape
+    flat = differences.transpose(0, 2, 1).reshape(-1, n)
+    ranked = sizes(flat).astype(np.float32)
+    whole = ranked.sum(axis=1)
+    up = (rng.random((PLANNED_DRAWS, n)) < 0.5).astype(np.float32) @ ranked.T
+    seen = np.where(flat > 0, ranked, 0).sum(axis=1)
+    p = _p(np.maximum(up, whole - up), np.maximum(seen, whole - seen))
+    return p.reshape(studies, items)
+
+
+def _p(drawn: Single, seen: Single) -> Array:
+    """Return the share of drawn statistics (draws, …) that are as extreme as those seen (…)."""
+    return np.asarray((1 + (drawn >= seen).sum(axis=0)) / (1 + PLANNED_DRAWS))
+
+
+def equivalent(differences: Array, bound: float, alpha: float, rng: np.random.Generator) -> NDArray[np.bool_]:
+    """Return whether equivalence within ± ``bound`` is shown as in the report.
+
+    Parameters
+    ----------
+    differences : (studies, participants, …) array
+    """
+    rows = np.moveaxis(differences, 1, -1)
+    shown = shows_equivalence(rows.reshape(-1, rows.shape[-1]), bound, alpha, rng, PLANNED_DRAWS)
+    return np.asarray(shown.reshape(rows.shape[:-1]))
+
+
+def holm(ps: Array, alpha: float) -> NDArray[np.bool_]:
+    """Return which tests of families (…, members) Holm's procedure rejects."""
+    return _rejected(ps, alpha / np.arange(ps.shape[-1], 0, -1), stops=True)
+
+
+def false_discovery(ps: Array, alpha: float) -> NDArray[np.bool_]:
+    """Return which tests of families (…, members) Benjamini and Hochberg's procedure rejects."""
+    members = ps.shape[-1]
+    return _rejected(ps, alpha * np.arange(1, members + 1) / members, stops=False)
+
+
+def _rejected(ps: Array, limits: Array, *, stops: bool) -> NDArray[np.bool_]:
+    """Return the tests whose sorted p keep the ``limits``: up to the first that does not, or to the last that does."""
+    order = ps.argsort(axis=-1)
+    kept = np.take_along_axis(ps, order, axis=-1) <= limits + 1e-12
+    if stops:
+        found = np.logical_and.accumulate(kept, axis=-1)
+    else:
+        found = np.logical_or.accumulate(kept[..., ::-1], axis=-1)[..., ::-1]
+    back = np.empty(ps.shape, dtype=bool)
+    np.put_along_axis(back, order, found, axis=-1)
+    return back
+
+
+EFFECTS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.75, 1.0, 1.5, 2.0, 4.0, 8.0)
+"""How many times the effects of the answer model; at 0 every finding is a false alarm."""
+
+FULL: Final = EFFECTS.index(1.0)
+BATCH: Final = 20
+"""Studies that are tested together; which studies these are does not depend on how many are asked for."""
+
+Counts: TypeAlias = dict[tuple[str, str], NDArray[np.float64]]
+"""(Block, what is counted) → numbers of studies.
+
+``found`` (sizes, effects, items): a test of the statement shows it; ``any``, ``all`` (sizes, effects): at least one
+does, the test over all does; ``lowest`` (sizes, items, delays): a trend is shown up to this delay or a shorter one;
+``equivalent`` (sizes, 2, items, delays): to the shortest, without effect and with the full one. ``means`` (effects,
+settings, items) are sums of mean answers.
+"""
+
+
+def count(plan: Plan, sizes: Sequence[int], seed: int, batch: int, studies: int) -> Counts:
+    """Simulate the studies of one batch and count what is found at every size.
+
+    Parameters
+    ----------
+    batch : number of the batch, from 0
+    studies : how many of its studies, at most ``BATCH``
+    """
+    held = [people(plan, max(sizes), seed, batch * BATCH + number) for number in range(studies)]
+    counts: Counts = {}
+    for place, block in enumerate(plan.blocks):
+        answers = together(held, place, EFFECTS)
+        rngs = [np.random.default_rng([seed, batch, place, n]) for n in sizes]
+        judge = _delays if block.kind == "delays" else _liquids
+        found = judge(block, plan.decided, answers, sizes, rngs)
+        found["means"] = answers.mean(axis=2).sum(axis=1)
+        counts |= {(block.id, what): np.asarray(number, dtype=np.float64) for what, number in found.items()}
+    return counts
+
+
+def _liquids(
+    block: Planned, decided: Decided, answers: Array, sizes: Sequence[int], rngs: Sequence[np.random.Generator]
+) -> dict[str, Array]:
+    effects, studies, _, k, items = answers.shape
+    flat = answers.reshape(effects * studies, *answers.shape[2:])
+    ranked = ranks(flat)
+    found, over_all = [], []
+    for n, rng in zip(sizes, rngs, strict=True):
+        if k == 2:
+            ps, p_all = signed(flat[:, :n], rng), None
+        else:
+            ps, p_all = friedman(ranked[:, :n], rng)
+        found.append(_family(block, decided, ps, range(len(block.items))).reshape(effects, studies, items))
+        if p_all is not None:
+            over_all.append((p_all <= decided.alpha).reshape(effects, studies))
+    counted = {"found": np.array([one.sum(axis=1) for one in found])}
+    counted["any"] = np.array([one.any(axis=2).sum(axis=1) for one in found])
+    if over_all:
+        counted["all"] = np.array([one.sum(axis=1) for one in over_all])
+    return counted
+
+
+def _delays(
+    block: Planned, decided: Decided, answers: Array, sizes: Sequence[int], rngs: Sequence[np.random.Generator]
+) -> dict[str, Array]:
+    effects, studies, _, _, items = answers.shape
+    flat = answers.reshape(effects * studies, *answers.shape[2:])
+    directed = [place for place, item in enumerate(block.items) if decided.direction(item.id) is not None]
+    rising = flat[..., directed] * _signs(block, decided, directed)
+    ranked = ranks(rising)
+    counted: dict[str, list[Array]] = {}
+    for n, rng in zip(sizes, rngs, strict=True):
+        if directed:
+            only = _family(block, decided, trend(ranked[:, :n], rng), directed)
+            found = np.zeros((effects, studies, items), dtype=bool)
+            found[..., directed] = only.reshape(effects, studies, len(directed))
+            lowest = np.zeros((items, len(block.names)))
+            full = rising.reshape(effects, studies, *rising.shape[1:])[FULL, :, :n]
+            lowest[directed] = _step_down(full, found[FULL][:, directed], decided.alpha, rng)
+            counted.setdefault("found", []).append(found.sum(axis=1))
+            counted.setdefault("any", []).append(found.any(axis=2).sum(axis=1))
+            counted.setdefault("lowest", []).append(lowest)
+        if decided.equivalence_bound is not None:
+            here = answers[[0, FULL], :, :n]
+            away = here[:, :, :, 1:] - here[:, :, :, :1]
+            bound = decided.equivalence_bound
+            shown = [equivalent(one, bound, decided.alpha, rng).sum(axis=0) for one in away]
+            counted.setdefault("equivalent", []).append(np.array(shown).transpose(0, 2, 1))
+    return {what: np.array(numbers) for what, numbers in counted.items()}
+
+
+def _signs(block: Planned, decided: Decided, directed: Sequence[int]) -> Array:
+    return np.array([1.0 if decided.direction(block.items[place].id) == "increasing" else -1.0 for place in directed])
+
+
+def _step_down(rising: Array, shown: NDArray[np.bool_], alpha: float, rng: np.random.Generator) -> Array:
+    """Return how often a trend is shown up to each delay or a shorter one (items, delays).
+
+    ``shown`` (studies, items) says where the trend over all delays is; the steps after it are not corrected.
+    """
+    _, _, k, items = rising.shape
+    counted = np.zeros((items, k))
+    going = shown
+    for longest in range(k - 1, 0, -1):
+        if longest < k - 1:
+            going = going & (trend(ranks(rising[:, :, : longest + 1]), rng) <= alpha)
+        counted[:, longest] = going.sum(axis=0)
+    return counted
+
+
+def _family(block: Planned, decided: Decided, ps: Array, places: Sequence[int]) -> NDArray[np.bool_]:
+    """Return what is significant of ``ps`` (studies, tests): primary statements by Holm, the others by their rate.
+
+    Without any decision all are tested as if they were primary: planning asks what the study could show.
+    """
+    primary = np.array([not decided.made or decided.is_primary(block.items[place].id) for place in places])
+    found = np.zeros(ps.shape, dtype=bool)
+    if primary.any():
+        found[:, primary] = holm(ps[:, primary], decided.alpha)
+    if not primary.all():
+        found[:, ~primary] = false_discovery(ps[:, ~primary], decided.alpha)
+    return found
+
+
+def sweep(
+    plan: Plan, sizes: Sequence[int], studies: int, seed: int, executor: Executor
+) -> Iterator[tuple[int, Counts]]:
+    """Yield after every batch how many studies of each size were simulated so far, and what was counted in them all.
+
+    Every batch draws from a stream of its own, so the counts do not depend on the executor.
+    """
+    starts = range(0, studies, BATCH)
+    sizes_of_batches = [min(BATCH, studies - first) for first in starts]
+    counted = executor.map(partial(count, plan, tuple(sizes), seed), range(len(starts)), sizes_of_batches)
+    done, total = 0, Counts()
+    for many, numbers in zip(sizes_of_batches, counted, strict=True):
+        done += many
+        total = {what: total.get(what, 0) + number for what, number in numbers.items()}
+        yield done, total

@@ -1,0 +1,339 @@
+"""The precision of thresholds that a study can expect, in simulated studies and in tables.
+
+The observers answer through the block's method; what they show is estimated as in the report. The people of a study
+differ by a factor of 1.2: in their thresholds about a mean that is drawn from the middle half of the levels, in d′, d_a
+and exponents about the value that `check` assumes.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study_app import __version__
+from study_app.analysis.data.blocks import spoken
+from study_app.analysis.data.measures import Array
+from study_app.analysis.planning.power_curves import interval
+from study_app.analysis.statistics.outcome import student_interval
+from study_app.analysis.statistics.thresholds import FEWEST, group_mean
+from study_app.errors import AnalysisError
+from study_app.protocol.checks.expected_means import MeanPlan, RatingPlan, SensitivityPlan
+from study_app.protocol.checks.expected_precision import ThresholdPlan, precision_plan
+from study_app.protocol.model import Protocol
+from study_app.protocol.texts import text_in
+from study_app.psychophysics.precision import BETWEEN_PEOPLE, ESTIMATE_NOISE
+from study_app.store.tables.column import Column, optional
+from study_app.store.tables.csv_files import csv_bytes
+
+BATCH: Final = 10
+"""Studies of one case; which studies these are does not depend on how many are asked for."""
+TRACKS_AT_ONCE: Final = 200
+
+Plan: TypeAlias = ThresholdPlan | MeanPlan
+PrecisionPlans: TypeAlias = Mapping[str, Mapping[int, Plan]]
+"""Block → trials of each standard → what is simulated."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A batch of studies of one block with so many trials for each standard."""
+
+    block: str
+    plan: Plan
+    seed: tuple[int, ...]
+
+
+@dataclass
+class Found:
+    """What studies of one block found with so many trials for each standard.
+
+    Attributes
+    ----------
+    errors : list of array
+        Of each study the errors of the participants' thresholds, (people, standards), in natural logarithms; as shares
+        of the threshold on linear spacing, of the mean d′, d_a or exponent.
+    halves : list of array
+        Of each study half the group's 95 % interval as a share of the mean, (sizes,); NaN below three participants,
+        infinite where limits clip the levels above the mean threshold.
+    """
+
+    errors: list[Array] = field(default_factory=list)
+    halves: list[Array] = field(default_factory=list)
+
+    @property
+    def spread(self) -> float:
+        """The standard deviation of one participant's error at one standard; infinite where nothing is measured."""
+        errors = np.concatenate([one.ravel() for one in self.errors])
+        return float(np.std(errors[np.isfinite(errors)])) if np.isfinite(errors).any() else math.inf
+
+    def half(self, place: int) -> float:
+        """Return the median of half the group's interval at one of the sizes."""
+        return float(np.median([one[place] for one in self.halves]))
+
+    def within(self, place: int, precision: float) -> float:
+        """Return the share of studies whose half interval is within the precision, at one of the sizes."""
+        return float(np.mean([one[place] <= precision for one in self.halves]))
+
+
+def plans(protocol: Protocol, trials: Sequence[int]) -> PrecisionPlans:
+    """Return for each block of thresholds, d′, d_a or exponents the plan for each number of trials.
+
+    Without numbers it is the protocol's.
+
+    Raises
+    ------
+    AnalysisError
+        A method cannot have so few trials.
+    """
+    found = {}
+    for block in protocol.main_blocks:
+        plan = precision_plan(protocol, block)
+        if plan is None:
+            continue
+        changed: list[Plan] = [plan.with_trials(one) for one in trials] or [plan]
+        for asked, one in zip(trials, changed, strict=False):
+            if abs(one.trials - asked) > max(1, asked / 2):
+                raise AnalysisError(
+                    f"{asked} trials cannot be divided among the tracks and levels of {block.id}: give at least "
+                    f"{one.trials}"
+                )
+        found[block.id] = {one.trials: one for one in changed}
+    return found
+
+
+def study_batch(case: Case, sizes: Sequence[int]) -> Found:
+    """Return what the studies of a batch find.
+
+    ``sizes`` ascend; smaller studies have the first participants of the largest.
+    """
+    plan, rng, people = case.plan, np.random.default_rng(case.seed), sizes[-1]
+    if not isinstance(plan, ThresholdPlan):
+        return _means(plan, sizes, rng)
+    low, high = plan.stimulus.domain
+    means = low + (high - low) * (0.25 + 0.5 * rng.random((BATCH, 1, 1)))
+    apart = math.log(BETWEEN_PEOPLE) * rng.standard_normal((BATCH, people, 1))
+    log = plan.stimulus.spacing == "log"
+    own = means + apart / math.log(10) if log else means * np.exp(apart)
+    shape = (BATCH, people, plan.standards)
+    each, truth = plan.each_standard(), np.broadcast_to(own, shape)
+    parts = [
+        _estimates(one, part.reshape(-1), rng) for one, part in zip(each, np.split(truth, len(each), 2), strict=True)
+    ]
+    medians, variances = (
+        np.concatenate([one.reshape(BATCH, people, -1) for one in it], 2) for it in zip(*parts, strict=True)
+    )
+    errors = (medians - truth) * (math.log(10) if log else 1 / truth)
+    found = Found()
+    full = plan.measures(means)
+    for one, median, variance, measured in zip(errors, medians, variances, full.ravel().tolist(), strict=True):
+        of_people, of_variances = median.mean(axis=1), variance.sum(axis=1) / plan.standards**2
+        halves = []
+        for n in sizes:
+            group = group_mean(of_people[:n].tolist(), of_variances[:n].tolist()) if n >= FEWEST else None
+            if group is None or group.low is None or group.high is None:
+                halves.append(math.nan)
+            elif not measured:
+                halves.append(math.inf)
+            else:
+                half = (group.high - group.low) / 2
+                halves.append(10.0**half - 1 if log else half / abs(group.mean))
+        found.errors.append(one if measured else np.full_like(one, math.inf))
+        found.halves.append(np.array(halves))
+    return found
+
+
+def _means(plan: MeanPlan, sizes: Sequence[int], rng: np.random.Generator) -> Found:
+    """Return what the studies of a batch find of d′, d_a or exponents: their means have Student's interval."""
+    people, found = sizes[-1], Found()
+    truth = plan.value * np.exp(math.log(BETWEEN_PEOPLE) * rng.standard_normal((BATCH, people)))
+    estimates = plan.estimates(truth.reshape(-1), rng).reshape(BATCH, people)
+    for own, true in zip(estimates, truth, strict=True):
+        halves = []
+        for n in sizes:
+            low, high = student_interval(own[:n])
+            halves.append(math.nan if low is None or high is None else (high - low) / 2 / abs(own[:n].mean()))
+        found.errors.append((own - true)[:, None] / plan.value)
+        found.halves.append(np.array(halves))
+    return found
+
+
+def _estimates(plan: ThresholdPlan, truth: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Return posterior medians and variances of observers with these thresholds [u]."""
+    medians: list[NDArray[np.float64]] = []
+    variances: list[NDArray[np.float64]] = []
+    for first in range(0, len(truth), TRACKS_AT_ONCE):
+        found = plan.simulate(truth[first : first + TRACKS_AT_ONCE], rng)
+        if found is None:
+            raise AnalysisError(f'power simulates no tracks of the method "{plan.method.name}"')
+        medians.append(found.medians)
+        variances.append(found.variances)
+    return np.concatenate(medians), np.concatenate(variances)
+
+
+def sweep(
+    planned: PrecisionPlans, sizes: Sequence[int], studies: int, seed: int, executor: Executor
+) -> Iterator[tuple[int, dict[tuple[str, int], Found]]]:
+    """Yield after every round of batches how many studies were simulated so far, and what was found in them all.
+
+    ``studies`` is how many there are for each block and number of trials; ``sizes`` ascend. Every batch draws from a
+    seed of its own, so the numbers do not depend on the executor.
+    """
+    keys = [(block, trials) for block, of_trials in planned.items() for trials in of_trials]
+    rounds = math.ceil(studies / BATCH)
+    cases = [
+        Case(block, planned[block][trials], (seed, place, trials, number))
+        for number in range(rounds)
+        for place, block in enumerate(planned)
+        for trials in planned[block]
+    ]
+    total = {key: Found() for key in keys}
+    found = executor.map(study_batch, cases, [tuple(sizes)] * len(cases))
+    for number, (case, one) in enumerate(zip(cases, found, strict=True), start=1):
+        done = (number - 1) // len(keys) * BATCH
+        kept = min(BATCH, studies - done)
+        held = total[case.block, case.plan.trials]
+        held.errors += one.errors[:kept]
+        held.halves += one.halves[:kept]
+        if number % len(keys) == 0:
+            yield done + kept, total
+
+
+COLUMNS: Final = (
+    Column("study", "text", "Short name of the study, from its protocol."),
+    Column("simulated", "flag", "true: all of these answers come from a model, none from people."),
+    Column("block", "text", "Id of the block of trials."),
+    Column(
+        "trials",
+        "integer",
+        "Trials of each standard, comparison or rated level; of magnitude estimation, all.",
+        minimum=1,
+    ),
+    Column("participants", "integer", "Participants of each study.", minimum=2),
+    Column("studies", "integer", "Simulated studies.", minimum=1),
+    optional(
+        "spread",
+        "number",
+        "Standard deviation of the logarithm of one participant's threshold; of d′, d_a and exponents, as a share of "
+        "them; empty where limits clip the levels.",
+        minimum=0,
+    ),
+    optional(
+        "half_interval",
+        "number",
+        "Half the 95 % interval of the group's mean, as a share of it: median of the studies.",
+        minimum=0,
+    ),
+    optional("precision", "number", "The planned half interval; n/a: none.", minimum=0),
+    optional("within", "number", "Share of the studies that reach it.", minimum=0, maximum=1),
+    optional("within_low", "number", "Lower end of the share's 95 % interval.", minimum=0, maximum=1),
+    optional("within_high", "number", "Upper end of it.", minimum=0, maximum=1),
+)
+
+
+@dataclass(frozen=True)
+class Precisions:
+    """What so many simulated studies of each size found.
+
+    ``found`` is by block and trials of each standard; ``asked`` says how many studies were to be simulated.
+    """
+
+    protocol: Protocol
+    sizes: tuple[int, ...]
+    studies: int
+    asked: int
+    seed: int
+    found: Mapping[tuple[str, int], Found]
+
+    @property
+    def precision(self) -> float | None:
+        """The planned half interval, as a share of the mean."""
+        decided = self.protocol.analysis
+        return None if decided is None else decided.precision
+
+
+def threshold_csv(precisions: Precisions) -> bytes:
+    """Return a row for every block, number of trials and size."""
+    return csv_bytes(COLUMNS, _rows(precisions))
+
+
+def _rows(all_of_it: Precisions) -> Iterator[dict[str, Any]]:
+    precision = all_of_it.precision
+    for (block, trials), found in all_of_it.found.items():
+        for place, size in enumerate(all_of_it.sizes):
+            half = found.half(place)
+            known = precision is not None and not math.isnan(half)
+            within = found.within(place, precision) if precision is not None and known else None
+            low, high = (None, None) if within is None else interval(within, all_of_it.studies)
+            yield {
+                "study": all_of_it.protocol.study.name,
+                "simulated": True,
+                "block": block,
+                "trials": trials,
+                "participants": size,
+                "studies": all_of_it.studies,
+                "spread": round(found.spread, 4) if math.isfinite(found.spread) else None,
+                "half_interval": round(half, 4) if math.isfinite(half) else None,
+                "precision": precision,
+                "within": None if within is None else round(within, 4),
+                "within_low": None if low is None else round(low, 4),
+                "within_high": None if high is None else round(high, 4),
+            }
+
+
+def threshold_markdown(precisions: Precisions) -> str:
+    """Return a table for each block, with what it is based on."""
+    study, precision = precisions.protocol.study, precisions.precision
+    language = spoken({"study": {"languages": study.languages}})
+    lines = [
+        f"# Expected precision of {text_in(study.title, language)} ({study.name} {study.version})",
+        "",
+        f"**SIMULATED.** {precisions.studies} studies for each row (seed {precisions.seed}, liquid-study "
+        f"{__version__}). People differ by a factor of {BETWEEN_PEOPLE:g}. Results are estimated as in the report.",
+    ]
+    if precisions.studies < precisions.asked:
+        lines += ["", f"**Ended early: {precisions.studies} of {precisions.asked} studies.**"]
+    wanted = [] if precision is None else [f"studies within ±{100 * precision:g} %"]
+    heads = ["participants", "SD of one participant", "half the group's 95 % interval", *wanted]
+    planned = plans(precisions.protocol, ())
+    blocks = precisions.protocol.blocks
+    for block in dict.fromkeys(block for block, _ in precisions.found):
+        lines += ["", f"## {text_in(blocks[block].title, language)} (block {block})", "", _assumed(planned[block]), ""]
+        trials_of = "trials" + next(iter(planned[block].values())).per
+        lines += [f"| {' | '.join((trials_of, *heads))} |", "|---:" * (1 + len(heads)) + "|"]
+        for (of_block, trials), found in precisions.found.items():
+            if of_block != block:
+                continue
+            for place, size in enumerate(precisions.sizes):
+                half = found.half(place)
+                share = "–" if math.isnan(half) else f"{found.within(place, precision or 0.0):.0%}"
+                spread = f"{found.spread:.0%}" if math.isfinite(found.spread) else "–"
+                cells = (str(trials), str(size), spread, f"±{half:.0%}" if math.isfinite(half) else "–")
+                lines.append(f"| {' | '.join((*cells, *([share] if wanted else [])))} |")
+    return "\n".join(lines) + "\n"
+
+
+def _assumed(plans_of_block: Mapping[int, Plan]) -> str:
+    """Return what the simulated people of a block are like, and what the group's interval is."""
+    plan = next(iter(plans_of_block.values()))
+    if isinstance(plan, ThresholdPlan):
+        return (
+            "Observers answer by a psychometric function with a lapse rate of 2 %; the mean of their thresholds is in "
+            "the middle half of the levels. The group's interval is that of the mean over all standards "
+            "(Hartung–Knapp)."
+        )
+    group = "The group's interval is that of the mean (Student)."
+    if isinstance(plan, SensitivityPlan):
+        return f"Observers are unbiased, with a mean d′ of {plan.value:g}; SD as a share of it. {group}"
+    if isinstance(plan, RatingPlan):
+        return (
+            f"Observers have a mean d_a of {plan.value:g} between a level and the lowest, and use all {plan.points} "
+            f"points of the scale about equally often; SD as a share of d_a. {group}"
+        )
+    return (
+        f"Observers follow a power law with a mean exponent of {plan.value:g}; ln answers have a standard deviation of "
+        f"{ESTIMATE_NOISE:g}; SD as a share of the exponent. {group}"
+    )

@@ -1,1 +1,0 @@
-"""Sections of the report on answers other than those to statements: questions, scores, levels."""

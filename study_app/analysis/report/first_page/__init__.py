@@ -1,1 +1,0 @@
-"""The report's first page: three answers, each with direction, size and interval."""

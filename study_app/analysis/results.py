@@ -1,0 +1,429 @@
+"""What an evaluation finds, as frozen values, and how numbers and findings are put into words.
+
+Nothing in them is NaN or infinite: what does not exist is None.
+"""
+
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final, Literal, TypeAlias, TypeVar
+
+import pandas as pd
+
+from study_app.analysis.data.blocks import Block, Decided, Item, Kind, Setting
+from study_app.analysis.data.motion import Performance
+from study_app.analysis.data.study_tables import Study
+from study_app.analysis.levels.results import LevelsFound, QuestionFound, ScoreFound
+from study_app.analysis.statistics.equivalence import UNSEEN, UNSEEN_EQUAL, Equivalence, fewest
+from study_app.analysis.statistics.outcome import Interval, Outcome
+from study_app.analysis.statistics.rank_tests import GroupsDiffer, Paired
+from study_app.protocol.orders.balance import Evenness, evenness
+
+
+@dataclass(frozen=True, slots=True)
+class NotTested:
+    """What is not there, and why: while the key is sealed, or for good."""
+
+    what: str
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Delivered:
+    """How far what was shown under one setting differed from what was asked for; ms, over trials.
+
+    Of ``judged`` trials it is known whether they kept to the protocol's limits of timing; ``valid`` ones did.
+    """
+
+    block: str
+    code: str | None
+    delay_ms: float | None
+    trials: int
+    measured: int
+    judged: int
+    valid: int
+    error_mean_ms: float | None
+    error_worst_ms: float | None
+    achieved_ms: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class SiteThresholds:
+    """Thresholds of a block's participants at one ``standard``.
+
+    ``medians`` are those of the sites named ``sites``; ``thresholds`` and ``of_sites`` have an entry per participant.
+    """
+
+    block: str
+    title: str
+    standard: float | None
+    sites: tuple[str, ...]
+    medians: tuple[float, ...]
+    thresholds: tuple[float, ...]
+    of_sites: tuple[str, ...]
+    outcome: GroupsDiffer
+
+
+T = TypeVar("T")
+Progress: TypeAlias = Callable[[str, float], object]
+"""Receives what is being done, and which share of all is done (0 to 1); what it raises ends the evaluation."""
+
+
+def silent(_what: str, _share: float) -> None:
+    """Report nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A part (``what``, of a block or of none) that could not be computed: the error, and where it was raised."""
+
+    what: str
+    error: str
+    where: str
+    block: str | None = None
+
+    @property
+    def why(self) -> str:
+        """What a report says in the place of the part."""
+        return f"its computation failed ({self.error}; {self.where}); this is a fault of the program, please report it"
+
+    def __str__(self) -> str:
+        return f"{self.what}{f' of block {self.block}' if self.block else ''}: {self.why}"
+
+
+class Ended(BaseException):
+    """The evaluation is to end: what a progress function raised is no failure of the part that called it."""
+
+    def __init__(self, error: BaseException) -> None:
+        super().__init__(str(error))
+        self.error = error
+
+
+class Failures:
+    """Collects the failures of one report."""
+
+    def __init__(self, found: Iterable[Failure] = ()) -> None:
+        self.found = list(found)
+
+    def attempt(self, what: str, compute: Callable[[], T], *, block: str | None = None) -> T | Failure:
+        """Return what ``compute`` returns, or the failure, which is kept."""
+        try:
+            return compute()
+        except Exception as error:  # noqa: BLE001 - one part must not take the report with it
+            last = traceback.extract_tb(error.__traceback__)[-1]
+            failure = Failure(
+                what, f"{type(error).__name__}: {error}", f"{Path(last.filename).name}, line {last.lineno}", block
+            )
+            self.found.append(failure)
+            return failure
+
+
+Verdict: TypeAlias = Literal["shown", "suggested", "not shown", "out of reach", "not tested"]
+"""What may be said: ``shown`` (primary), ``suggested`` (exploratory), ``not shown``, ``out of reach`` of so few
+participants however they had answered, or ``not tested``. None of them says that there is nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tested:
+    """A test of one statement within its family of ``members``, with p adjusted by ``correction``."""
+
+    item: str
+    outcome: Outcome
+    family: str
+    members: int
+    correction: str
+    p_adjusted: float | None
+    primary: bool
+    verdict: Verdict
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlockFound:
+    """What was found in one block.
+
+    ``settings`` are in their order, ``delays_ms`` theirs once known where the block compares delays. ``measures`` has a
+    row a setting and statement. ``findings`` are the values of what was tested, by the keys of the descriptors in
+    ``analysis.findings``. ``presentations`` are the fewest and the most single answers that one participant gave to a
+    statement on one setting; ``replicated_ms`` the delays that several conditions present; ``sessions`` the numbers of
+    the sessions.
+    """
+
+    id: str
+    title: str
+    kind: Kind
+    revealed: bool
+    n: int
+    settings: tuple[Setting, ...]
+    names: tuple[str, ...]
+    items: tuple[Item, ...]
+    labels: tuple[str, ...]
+    measures: tuple[Mapping[str, Any], ...]
+    findings: Mapping[str, Any] = field(default_factory=dict)
+    absent: tuple[NotTested, ...] = ()
+    presentations: tuple[int, int] = (1, 1)
+    replicated_ms: tuple[float, ...] = ()
+    sessions: tuple[int, ...] = (1,)
+
+    @property
+    def delays_ms(self) -> tuple[float, ...]:
+        """The delays asked for, in order, each once; empty while they are not known or where liquids are compared."""
+        if self.kind != "delays" or not self.revealed:
+            return ()
+        return tuple(sorted({setting.delay_ms or 0.0 for setting in self.settings}))
+
+
+@dataclass(frozen=True, slots=True)
+class Results:
+    """All that was found in a study; ``failures`` are the parts that could not be computed.
+
+    ``questions`` and ``scores`` are the answers to questions other than statements, ``levels`` the blocks of levels,
+    ``site_thresholds`` their thresholds at the sites of a merged study; JSON omits them where there are none.
+    """
+
+    decided: Decided
+    people: tuple[str, ...]
+    blocks: tuple[BlockFound, ...]
+    delivered: tuple[Delivered, ...]
+    orders: Mapping[str, Evenness]
+    performance: Performance | None
+    seed: int
+    failures: tuple[Failure, ...] = ()
+    questions: tuple[QuestionFound, ...] = ()
+    scores: tuple[ScoreFound, ...] = ()
+    levels: tuple[LevelsFound, ...] = ()
+    site_thresholds: tuple[SiteThresholds, ...] = ()
+
+
+def delivered(study: Study) -> tuple[Delivered, ...]:
+    """Return the check of the manipulation: by setting, or over all settings of a block while they are sealed.
+
+    Errors by code would tell little, and delays nothing may tell before the key is opened.
+    """
+    return tuple(one for block in study.blocks for one in _delivered(study, block))
+
+
+def _delivered(study: Study, block: Block) -> Iterator[Delivered]:
+    rows = study.trials[study.trials["counted"] & (study.trials["block"] == block.id)]
+    if not block.revealed:
+        yield _measured(block, None, None, rows)
+        return
+    for setting in block.settings:
+        yield _measured(block, setting.code, setting.delay_ms, rows[rows["code"] == setting.code])
+
+
+def _measured(block: Block, code: str | None, delay_ms: float | None, rows: pd.DataFrame) -> Delivered:
+    errors = rows["delay_error_mean_ms"].dropna().astype(float)
+    mean = float(errors.mean()) if len(errors) else None
+    return Delivered(
+        block=block.id,
+        code=code,
+        delay_ms=delay_ms,
+        trials=len(rows),
+        measured=len(errors),
+        judged=int(rows["valid"].notna().sum()),
+        valid=int(rows["valid"].fillna(value=False).sum()),
+        error_mean_ms=mean,
+        error_worst_ms=float(errors.iloc[errors.abs().argmax()]) if len(errors) else None,
+        achieved_ms=None if delay_ms is None or mean is None else delay_ms + mean,
+    )
+
+
+def orders(study: Study) -> dict[str, Evenness]:
+    """Return how even the orders of trials were, as run (block id → counts), excluded trials included.
+
+    Of a merged study that is sealed nothing is known, since each site has codes of its own.
+    """
+    if study.sites and not study.revealed:
+        return {}
+    here = study.participants.loc[study.participants["counted"], ["participant", "session"]]
+    rows = study.trials[study.trials["phase"] == "main"].merge(here, on=["participant", "session"])
+    rows = rows.drop_duplicates(["participant", "session", "trial"], keep="last")
+    rows = rows.sort_values(["participant", "session", "index"])
+    return {
+        block.id: evenness(
+            block.codes_as_dealt,
+            [
+                list(map(str, session["code"]))
+                for _, session in rows[rows["block"] == block.id].groupby(["participant", "session"])
+            ],
+        )
+        for block in study.blocks
+    }
+
+
+_SMALL: Final = "no one two three four five six seven eight nine ten eleven twelve"
+NUMBERS: Final = tuple(_SMALL.split())
+
+VERDICTS_MEAN: Final = (
+    "Shown: adjusted p at most {alpha}. Suggested: the same in a statement that was not decided on before the study, "
+    "which is a reason to look again and no finding. Not shown: these data do not settle it; that is not evidence of "
+    "sameness. Out of reach: however these answers had been arranged within participants, they could not have shown "
+    "it, the other p of the family being what they are: adjusted p depends on those too."
+)
+
+
+def counted(number: int, noun: str) -> str:
+    """Return "three statements", "1 statement"."""
+    text = NUMBERS[number] if 1 < number < len(NUMBERS) else str(number)
+    return f"{text} {noun}" + ("" if number == 1 else "s")
+
+
+def all_of(number: int, noun: str) -> str:
+    """Return "all three statements", "both statements", "the one statement"."""
+    if number < 3:
+        return f"the one {noun}" if number == 1 else f"both {noun}s"
+    return f"all {counted(number, noun)}"
+
+
+def number(value: float | None, digits: int = 2) -> str:
+    """Return a number with so many decimals and a real minus sign, a dash where there is none."""
+    if value is None:
+        return "–"
+    text = f"{value:.{digits}f}"
+    return "0" + text[2:] if text.strip("-0.") == "" and text.startswith("-") else text.replace("-", "−")
+
+
+def p_value(p: float | None) -> str:
+    """Return a p as journals print it: .023, < .0001; a dash where there is none."""
+    if p is None:
+        return "–"
+    if p < 0.0001:
+        return "< .0001"
+    text = f"{p:.4f}" if p < 0.001 else f"{p:.3f}"
+    return text.removeprefix("0") if p < 0.9995 else "1"
+
+
+def p_equals(p: float) -> str:
+    """Return a p within a sentence: p = .023, p < .0001."""
+    text = p_value(p)
+    return f"p {text}" if text.startswith("<") else f"p = {text}"
+
+
+def interval(ends: Interval | None, digits: int = 2) -> str:
+    """Return an interval in brackets; a dash where there is none."""
+    return "–" if ends is None else f"[{number(ends.low, digits)}, {number(ends.high, digits)}]"
+
+
+def percent(share: float) -> str:
+    """Return a share in percent, with as many decimals as it takes: 90 %, 99.9 %."""
+    return f"{round(100 * share, 6):g} %"
+
+
+def beyond(tested: Equivalence) -> str:
+    """Return how many participants differ by more than the bound, and the interval of their share."""
+    if tested.beyond is None:
+        return "–"
+    ends = tested.beyond.interval
+    return f"{tested.beyond.count} of {tested.beyond.n} [{100 * ends.low:.0f}, {100 * ends.high:.0f}] %"
+
+
+def listed(words: Sequence[str]) -> str:
+    """Return "a, b and c"."""
+    return " and ".join(words) if len(words) < 3 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def ms(delay_ms: float) -> str:
+    """Return a delay with its unit."""
+    return f"{delay_ms:g} ms"
+
+
+def settings_noun(found: BlockFound | Block) -> str:
+    """Return what the settings of a block are called."""
+    return found.kind.removesuffix("s") if found.revealed else "setting"
+
+
+def short(found: BlockFound, item: str) -> str:
+    """Return the few words for a statement."""
+    return next(one.short for one in found.items if one.id == item)
+
+
+def name(found: BlockFound, code: str) -> str:
+    """Return what a setting is called: a delay by its milliseconds alone, since its block has one liquid."""
+    for setting, text in zip(found.settings, found.names, strict=True):
+        if setting.code == code:
+            return ms(setting.delay_ms or 0.0) if found.delays_ms else text
+    raise KeyError(code)
+
+
+def lead(found: BlockFound) -> str:
+    """Return how sentences about a block begin."""
+    return f"{found.title} ({settings_noun(found)}s)" if found.revealed else found.title
+
+
+def statistic(outcome: Outcome) -> str:
+    """Return a statistic with its sign."""
+    text = {"chi2": "χ²", "sum of chi2": "sum of χ²", "likelihood ratio": "LR"}.get(
+        outcome.statistic_name, outcome.statistic_name
+    )
+    return f"{text} {number(outcome.statistic)}"
+
+
+def said_of_presentations(found: BlockFound) -> tuple[str, ...]:
+    """Return how many presentations an answer stands for, and what became of sessions; empty for one of each."""
+    fewest, most = found.presentations
+    lines = []
+    if found.replicated_ms:
+        delays = listed([ms(delay) for delay in found.replicated_ms])
+        lines.append(f"Several conditions present {delays}: they are taken as repeated presentations of one delay.")
+    if most > 1:
+        often = f"{most}" if fewest == most else f"{fewest} to {most}"
+        lines.append(
+            f"A participant answered each statement {often} times for one {settings_noun(found)}: tests of ranks, of "
+            "equivalence and of recognition take the median of these answers; the mixed model and the detection "
+            "threshold take every single one."
+        )
+    if len(found.sessions) > 1:
+        lines.append(
+            f"The answers are of sessions {listed(list(map(str, found.sessions)))}, which are compared with each other "
+            "and are a factor of the mixed model; the other tests pool them."
+        )
+    return tuple(lines)
+
+
+def least(alpha: float) -> str:
+    """Return how many participants equivalence needs at least."""
+    return f"at least {fewest(alpha)} participants ({fewest(alpha, equal=True)} where all differences are equal)"
+
+
+def enough(alpha: float) -> str:
+    """Return how many participants equivalence needs at least, and why."""
+    one_in, one_in_equal = (NUMBERS[round(1 / share)] for share in (UNSEEN, UNSEEN_EQUAL))
+    return (
+        f"{least(alpha)}: more than {percent(alpha)} of smaller samples contain no one from a group of one person in "
+        f"{one_in} (one in {one_in_equal})"
+    )
+
+
+def higher(found: BlockFound, outcome: Outcome) -> str:
+    """Return which of two settings was rated higher; empty where more are compared."""
+    if not isinstance(outcome, Paired) or len(found.names) != 2 or not outcome.effect:
+        return ""
+    first, second = (name(found, setting.code) for setting in found.settings)
+    return f"higher for {first if outcome.effect > 0 else second}, "
+
+
+def test_name(outcome: Outcome) -> str:
+    """Return a test as a sentence names it."""
+    return {
+        "Friedman": "Friedman's test",
+        "Kruskal-Wallis": "the Kruskal–Wallis test",
+        "Kruskal-Wallis of differences": "the Kruskal–Wallis test of differences between the two settings",
+        "permutation test of rank profiles": "a permutation test of the ranks of the settings",
+        "Wilcoxon signed ranks": "Wilcoxon's signed ranks",
+        "Page's trend": "Page's test of a trend",
+    }.get(outcome.test, outcome.test)
+
+
+def missing(found: BlockFound) -> tuple[str, ...]:
+    """Return what is not there, and why, a sentence for each reason."""
+    reasons: dict[str, list[str]] = {}
+    for one in found.absent:
+        reasons.setdefault(one.why, []).append(one.what)
+    return tuple(f"no {listed(what)}: {why}." for why, what in reasons.items())
+
+
+def signed_difference(tested: Equivalence) -> str:
+    """Return the difference of two mean answers with its sign and interval."""
+    effect, ends = tested.effect or 0.0, tested.interval
+    return f"{'+' if effect > 0 else ''}{number(effect)} {'(no interval)' if ends is None else interval(ends)} points"

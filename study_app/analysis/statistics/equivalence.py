@@ -1,0 +1,503 @@
+"""Equivalence: two one-sided tests, without normality too, and their power.
+
+Efron & Tibshirani (1993), An Introduction to the Bootstrap, 12.5. Where only few participants answer strongly, many
+resamples hold none of them: their standard error is small, they lie far away, and the mean is then not shown to lie
+within the bound.
+
+Schuirmann (1987), J. Pharmacokinet. Biopharm. 15, 657–680; Lakens (2017), Soc. Psychol. Personal. Sci. 8, 355–362.
+A difference that is not significant is no evidence of equivalence; here it is called inconclusive.
+
+All studies meet the same random changes of signs; sums over participants are then products of matrices, exact in
+single precision for whole numbers and their halves.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, Final, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import stdtr, stdtrit
+from scipy.stats import norm
+from scipy.stats import t as t_distribution
+
+from study_app.analysis.statistics.outcome import (
+    DRAWS,
+    Array,
+    Interval,
+    Outcome,
+    checked,
+    clopper_pearson,
+    doubled_ranks,
+)
+from study_app.analysis.statistics.rank_tests import Alternative, signed, signed_p
+from study_app.errors import AnalysisError
+from study_app.number_text import counted
+
+RESAMPLES: Final = 1999
+MOST_RESAMPLES: Final = 100_000
+ROUNDING: Final = 1 / 6
+"""The variance that rounding to whole points hides in a difference of two answers; added to every variance, so that a
+resample without spread is not infinitely far away."""
+
+
+def p_within(differences: Array, bound: float, seed: int, resamples: int = RESAMPLES) -> Array:
+    """Return the larger of both one-sided p that the means lie above −``bound`` and below ``bound``.
+
+    Parameters
+    ----------
+    differences : (studies, participants) array
+        Paired differences, in points of the scale.
+    bound : float
+        In points of the scale.
+    seed : int
+        Of the resamples.
+    resamples : int
+        How many are drawn.
+    """
+    n = differences.shape[1]
+    shares = _shares(n, seed, resamples)
+    mean = differences.mean(axis=1)
+    centred = (differences - mean[:, None]).T.astype(np.float32)
+    drawn = shares @ centred
+    spread = shares @ centred**2
+    spread -= drawn**2
+    spread += np.float32(ROUNDING)
+    t = drawn / np.sqrt(np.maximum(spread, np.float32(ROUNDING)))
+    error = np.sqrt(differences.var(axis=1) + ROUNDING)
+    below, above = ((mean + side * bound) / error for side in (-1, 1))
+    reached = np.maximum((t <= below.astype(np.float32)).sum(axis=0), (t >= above.astype(np.float32)).sum(axis=0))
+    return np.asarray((1 + reached) / (1 + resamples))
+
+
+def resamples_for(alpha: float) -> int:
+    """Return how many resamples are drawn: so many that their number does not decide whether p reaches ``alpha``."""
+    return min(MOST_RESAMPLES, max(RESAMPLES, math.ceil(20 / alpha)))
+
+
+@lru_cache(maxsize=16)
+def _shares(n: int, seed: int, resamples: int) -> NDArray[np.float32]:
+    """Return the share of each of ``n`` participants in each resample (resamples, n)."""
+    counts = np.random.default_rng(seed).multinomial(n, np.full(n, 1 / n), size=resamples)
+    return np.asarray(counts / n, dtype=np.float32)
+
+
+Verdict: TypeAlias = Literal["equivalent", "different", "inconclusive", "out of reach"]
+
+ALL_SIGNS_UP_TO: Final = 14
+"""Up to so many participants all signs are gone through; beyond that they are drawn."""
+
+SAME: Final = 1e-9
+"""Differences that spread less than this are equal."""
+
+UNSEEN: Final = 1 / 5
+UNSEEN_EQUAL: Final = 1 / 4
+"""A group of this share of all people, who differ strongly, must not be missed by chance; the second where all
+differences are equal."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Beyond:
+    """How many of ``n`` participants differ by more than the bound: their ``share``, Clopper-Pearson interval."""
+
+    count: int
+    n: int
+    share: float
+    interval: Interval
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Equivalence(Outcome):
+    """Two one-sided t tests against ± ``bound``; ``p`` is the larger of ``p_lower`` and ``p_upper``.
+
+    Three more tests ask the same without normality: ``p_permutation`` (signs of the shifted differences), ``p_ranks``
+    (signed ranks, which bound the pseudo-median), both for differences that lie symmetrically, and ``p_bootstrap``
+    (bootstrap-t), for those that lean to one side. Where all differences are equal there is no t, and the signs and
+    ranks alone decide: ``p`` is the larger of theirs. No test sees people who are not in the sample: ``p_unseen`` is
+    the probability that it holds no member of a group of the share ``UNSEEN`` of all people.
+
+    ``verdict`` is "equivalent" where every p is at most alpha; else "different" where the larger p of a t test against
+    0 (``p_different``) and of signed ranks (``p_different_ranks``) is; else "out of reach" where no answers of so many
+    participants could have been either, else "inconclusive". ``smallest_check_p`` is the smallest p that signs and
+    ranks can give. ``beyond`` tells how many single participants differ by more than the bound: equivalent means say
+    nothing about them.
+    """
+
+    bound: float
+    alpha: float
+    verdict: Verdict
+    t: float | None = None
+    t_lower: float | None = None
+    t_upper: float | None = None
+    p_different: float | None = None
+    p_different_ranks: float | None = None
+    p_lower: float | None = None
+    p_upper: float | None = None
+    p_permutation: float | None = None
+    p_ranks: float | None = None
+    p_bootstrap: float | None = None
+    p_unseen: float | None = None
+    smallest_check_p: float | None = None
+    checks_agree: bool | None = None
+    sd: float | None = None
+    beyond: Beyond | None = None
+    n_needed: int | None = None
+
+    @property
+    def equal(self) -> bool:
+        """Whether every test for equivalence shows it, by enough participants."""
+        asked = (self.p, self.p_permutation, self.p_ranks, self.p_bootstrap, self.p_unseen)
+        return self.p is not None and all(p is None or p <= self.alpha for p in asked)
+
+    @property
+    def p_difference(self) -> float | None:
+        """P that the mean differs from 0: the larger of the t test's and the signed ranks', of those there are."""
+        return max((p for p in (self.p_different, self.p_different_ranks) if p is not None), default=None)
+
+    def judged(self, p_adjusted: float | None, members: int) -> Equivalence:
+        """Return this with the verdict that holds among ``members`` comparisons, whose p is ``p_adjusted`` here."""
+        if self.equal:
+            return replace(self, verdict="equivalent")
+        if p_adjusted is not None and p_adjusted <= self.alpha:
+            return replace(self, verdict="different")
+        hopeless = min(p_unseen(self.n, equal=True), 2 * members * 0.5**self.n) > self.alpha
+        return replace(self, verdict="out of reach" if hopeless else "inconclusive")
+
+
+def tost(
+    differences: ArrayLike,
+    bound: float,
+    *,
+    alpha: float = 0.05,
+    seed: int = 1,
+    checks: bool = True,
+    verdict_only: bool = False,
+) -> Equivalence:
+    """Test whether the mean of paired differences lies within ± ``bound``.
+
+    Parameters
+    ----------
+    differences : (participants,) array
+        NaN where an answer is missing: dropped.
+    bound : float
+        In points of the scale, set before the study.
+    alpha : float
+        Level of each one-sided test.
+    seed : int
+        Of the resamples.
+    checks : bool
+        Whether to ask without normality too, which takes long for many hundreds of participants.
+    verdict_only : bool
+        Whether to leave out those of these tests that cannot change the verdict: those for equivalence where the t
+        tests or ``p_unseen`` do not show it, and the one of a difference where the t test does not.
+
+    Raises
+    ------
+    AnalysisError
+        The bound is not above 0.
+    """
+    if not (bound > 0.0 and math.isfinite(bound)):
+        raise AnalysisError(f"a bound of equivalence of {bound} means nothing; give one above 0 in points of the scale")
+    array = checked(differences, "participants")
+    kept = np.sort(array[~np.isnan(array)])
+    found = _compared(tuple(kept.tolist()), float(bound), alpha, seed, checks, verdict_only)
+    return replace(found, dropped=len(array) - len(kept))
+
+
+def p_unseen(n: int, *, equal: bool) -> float:
+    """Return the probability that a group of the share ``UNSEEN`` is not among ``n`` participants at all.
+
+    The Clopper-Pearson upper bound of the share of people who differ strongly, where none of ``n`` does, is below
+    that share where this is at most alpha. ``equal``: all differences are equal.
+    """
+    return float((1 - (UNSEEN_EQUAL if equal else UNSEEN)) ** n)
+
+
+def fewest(alpha: float, *, equal: bool = False) -> int:
+    """Return how many participants it takes at least to show equivalence."""
+    return math.ceil(math.log(alpha) / math.log(p_unseen(1, equal=equal)) - 1e-9)
+
+
+@lru_cache(maxsize=4096)
+def _compared(
+    differences: tuple[float, ...], bound: float, alpha: float, seed: int, checks: bool, verdict_only: bool
+) -> Equivalence:
+    """Return the comparison of ascending ``differences``: answers in whole points repeat."""
+    kept = np.array(differences)
+    found = _described(kept, bound, alpha)
+    if not len(kept):
+        return found
+    if found.sd is not None and found.sd > SAME:
+        found = replace(found, no_interval="", **_by_t(kept, found.sd, bound, alpha))
+        if checks:
+            found = replace(found, **_without_normality(kept, found, seed, verdict_only))
+    elif len(kept) > 1:
+        found = replace(found, **_without_spread(kept, bound, seed))
+    if found.p_ranks is not None and found.t is not None:
+        asked = (found.p_permutation, found.p_ranks, found.p_bootstrap)
+        by_t = found.p is not None and found.p <= alpha
+        found = replace(found, checks_agree=all((p is None or p <= alpha) == by_t for p in asked))
+    found = found.judged(found.p_difference, 1)
+    return replace(found, note=_note(found)) if found.p is not None else found
+
+
+def _described(kept: Array, bound: float, alpha: float) -> Equivalence:
+    """Return what can be said before any test."""
+    n = len(kept)
+    reason = (
+        f"all {n} differences are equal: no spread for an interval"
+        if n > 1
+        else f"{counted(n, 'participant')}: no spread"
+    )
+    return Equivalence(
+        test="equivalence, two one-sided t tests",
+        n=n,
+        dropped=0,
+        statistic_name="t",
+        effect_name="mean difference",
+        effect=float(kept.mean()) if n else None,
+        no_interval=reason,
+        note=reason,
+        bound=bound,
+        alpha=alpha,
+        verdict="out of reach",
+        smallest_check_p=_smallest(n) if n else None,
+        sd=float(kept.std(ddof=1)) if n > 1 else None,
+        beyond=_beyond(kept, bound) if n else None,
+    )
+
+
+def _beyond(kept: Array, bound: float) -> Beyond:
+    count, n = int((np.abs(kept) > bound + SAME).sum()), len(kept)
+    return Beyond(count=count, n=n, share=count / n, interval=clopper_pearson(count, n))
+
+
+def _by_t(kept: Array, sd: float, bound: float, alpha: float) -> dict[str, Any]:
+    """Return what the t tests say."""
+    mean, error, df = float(kept.mean()), sd / math.sqrt(len(kept)), len(kept) - 1
+    lower, upper = ((mean + side * bound) / error for side in (1, -1))
+    p_lower, p_upper = float(stdtr(df, -lower)), float(stdtr(df, upper))
+    reach = float(stdtrit(df, 1 - alpha)) * error
+    return {
+        "statistic": min(lower, -upper),
+        "p": max(p_lower, p_upper),
+        "method": f"t({df}), bound ±{bound:g} points",
+        "interval": Interval(mean - reach, mean + reach, 1 - 2 * alpha, "t"),
+        "t": mean / error,
+        "t_lower": lower,
+        "t_upper": upper,
+        "p_different": 2 * float(stdtr(df, -abs(mean) / error)),
+        "p_lower": p_lower,
+        "p_upper": p_upper,
+        "p_unseen": p_unseen(len(kept), equal=False),
+        "smallest_check_p": None,
+    }
+
+
+def _without_normality(kept: Array, found: Equivalence, seed: int, verdict_only: bool) -> dict[str, Any]:
+    """Return what changing signs, signed ranks and the bootstrap say to the questions that the t tests answered."""
+    bound, alpha, asked = found.bound, found.alpha, dict[str, Any](smallest_check_p=_smallest(len(kept)))
+    if found.equal or not verdict_only:
+        asked["p_permutation"] = max(_signs(kept + bound, seed), _signs(bound - kept, seed))
+        asked["p_ranks"] = max(_ranks(kept + bound), _ranks(bound - kept))
+        asked["p_bootstrap"] = float(p_within(kept[None], bound, seed, resamples_for(alpha))[0])
+    if (found.p_different or 0.0) <= alpha or not verdict_only:
+        asked["p_different_ranks"] = _ranks(kept, "two-sided")
+    return asked
+
+
+def _without_spread(kept: Array, bound: float, seed: int) -> dict[str, Any]:
+    """Return what the tests that need no spread say where all differences are equal."""
+    permuted = max(_signs(kept + bound, seed), _signs(bound - kept, seed))
+    ranked = max(_ranks(kept + bound), _ranks(bound - kept))
+    return {
+        "p": max(permuted, ranked),
+        "method": f"signs and signed ranks, bound ±{bound:g} points: all differences are equal",
+        "p_permutation": permuted,
+        "p_ranks": ranked,
+        "p_different_ranks": _ranks(kept, "two-sided"),
+        "p_unseen": p_unseen(len(kept), equal=True),
+    }
+
+
+def _note(found: Equivalence) -> str:
+    p = found.p_difference
+    differs = p is not None and p <= found.alpha
+    if found.verdict == "equivalent":
+        return "different from 0, but within the bound" if differs else ""
+    if found.verdict == "different":
+        return "the difference is shown, and it is not shown to stay within the bound"
+    if max(p for p in (found.p, found.p_permutation, found.p_ranks, found.p_bootstrap, 0.0) if p is not None) <= (
+        found.alpha
+    ):
+        return f"too few participants to call it equivalent: {fewest(found.alpha)} are needed"
+    return "neither a difference nor equivalence is shown"
+
+
+def _smallest(n: int) -> float:
+    least = 0.5**n
+    return least if n <= ALL_SIGNS_UP_TO else max(least, 1 / (1 + DRAWS))
+
+
+def _ranks(shifted: Array, alternative: Alternative = "greater") -> float:
+    """Return the p of signed ranks that ``shifted`` lies above 0 (or elsewhere); 1 if all of it is 0."""
+    ranks, signs = signed(shifted)
+    p, _, _ = signed_p(ranks, int(ranks[signs > 0].sum()), alternative)
+    return 1.0 if p is None else p
+
+
+@lru_cache(maxsize=4)
+def _all_signs(n: int) -> Array:
+    return np.asarray(1.0 - 2.0 * (np.arange(2**n)[:, None] >> np.arange(n) & 1), dtype=np.float64)
+
+
+@lru_cache(maxsize=4)
+def _drawn_signs(n: int, seed: int) -> Array:
+    """Return random signs (draws, n)."""
+    return np.random.default_rng(seed).choice([-1.0, 1.0], (DRAWS, n))
+
+
+def _signs(shifted: Array, seed: int) -> float:
+    """Return the one-sided p that the mean of ``shifted`` (n,) is above 0, by changing signs."""
+    n, found = len(shifted), shifted.sum()
+    rounding = 1e-9 * np.abs(shifted).sum()
+    if n <= ALL_SIGNS_UP_TO:
+        return float((_all_signs(n) @ shifted >= found - rounding).mean())
+    return (1 + int((_drawn_signs(n, seed) @ shifted >= found - rounding).sum())) / (1 + DRAWS)
+
+
+PLANNED_DRAWS: Final = 499
+MOST_PLANNED_DRAWS: Final = 20_000
+AT_ONCE: Final = 500
+"""Studies that are resampled together: more take more memory."""
+
+POWER: Final = 0.80
+STUDIES: Final = 1000
+MOST_PARTICIPANTS: Final = 400
+"""No more participants than these are looked for."""
+
+FINENESS: Final = 0.04
+"""Spreads within 4 % of each other need the same number of participants."""
+
+
+def equivalent(
+    differences: Array, bound: float, alpha: float, rng: np.random.Generator, draws: int = PLANNED_DRAWS
+) -> NDArray[np.bool_]:
+    """Return whether each study shows equivalence within ± ``bound`` as ``tost`` does: by every one of its tests.
+
+    Parameters
+    ----------
+    differences : (studies, participants) array
+        Paired differences, in points of the scale.
+    bound : float
+        In points of the scale.
+    alpha : float
+        Level of each one-sided test.
+    rng : Generator
+        Draws the resamples.
+    draws : int
+        How many are drawn.
+    """
+    n = differences.shape[1]
+    spread = differences.std(axis=1, ddof=1) if n > 1 else np.zeros(len(differences))
+    mean = np.abs(differences.mean(axis=1))
+    flat = spread <= SAME
+    reach = float(t_distribution.ppf(1 - alpha, n - 1)) * spread / math.sqrt(n) if n > 1 else spread
+    many, many_equal = p_unseen(n, equal=False) <= alpha, p_unseen(n, equal=True) <= alpha
+    shown = np.asarray(np.where(flat, (mean < bound - SAME) & many_equal, (mean + reach <= bound) & many))
+    held = np.flatnonzero(shown & ~flat)
+    up = (rng.random((draws, n)) < 0.5).astype(np.float32)
+    for part in np.array_split(held, max(1, math.ceil(len(held) / AT_ONCE))):
+        rows = differences[part]
+        for side in (-1.0, 1.0):
+            shifted = bound + side * rows
+            shown[part] &= p_above(np.abs(shifted), shifted > 0, up) <= alpha
+            shown[part] &= p_above(sizes(shifted), shifted > 0, up) <= alpha
+        shown[part] &= p_within(rows, bound, 1, draws) <= alpha
+    return shown
+
+
+def sizes(differences: Array) -> Array:
+    """Return the (doubled) ranks of differences (rows, n) among those that are not 0, whose own are 0."""
+    if not len(differences):
+        return differences
+    ranked = doubled_ranks(np.abs(differences)) - 2 * (differences == 0).sum(axis=1, keepdims=True)
+    return np.where(differences == 0, 0, ranked)
+
+
+def p_above(values: Array, positive: NDArray[np.bool_], up: NDArray[np.float32]) -> Array:
+    """Return the one-sided p (rows,) that the ``positive`` of ``values`` (rows, n) outweigh the others.
+
+    ``up`` (draws, n) are the signs that are drawn, 1 for positive.
+    """
+    seen = np.where(positive, values, 0).sum(axis=1).astype(np.float32) * np.float32(1 - 1e-6)
+    drawn = up @ values.T.astype(np.float32)
+    return np.asarray((1 + (drawn >= seen).sum(axis=0)) / (1 + len(up)))
+
+
+def participants_needed(differences: Array, bound: float, alpha: float) -> int | None:
+    """Return how many participants show equivalence with 80 % power; None: more than ``MOST``.
+
+    Studies are simulated whose differences spread as these do about a true difference of 0, normally and then rounded
+    as these are: to whole points, to halves, or not at all.
+    """
+    kept = differences[~np.isnan(differences)]
+    step = next((size for size in (1.0, 0.5) if np.array_equal(kept / size, np.rint(kept / size))), 0.0)
+    sd = float(kept.std(ddof=1)) if len(kept) > 1 else 0.0
+    place = round(math.log(max(sd, 1e-3)) / FINENESS)
+    return _needed(place, step, bound, alpha)
+
+
+@lru_cache(maxsize=4096)
+def _needed(place: int, step: float, bound: float, alpha: float) -> int | None:
+    """Return the smallest number with enough power, which grows with it except at single steps of rounded answers."""
+    sd = math.exp(place * FINENESS)
+    normal = _before_rounding(sd, step)
+
+    def enough(n: int) -> bool:
+        return power(n, normal, step, bound, alpha) >= POWER
+
+    least = fewest(alpha, equal=True)
+    by_t = math.ceil((float(norm.ppf([1 - alpha, (1 + POWER) / 2]).sum()) * sd / bound) ** 2)
+    low, high = least - 1, max(least, by_t)
+    while high <= MOST_PARTICIPANTS and not enough(high):
+        low, high = high, high + max(1, high // 6)
+    if high > MOST_PARTICIPANTS:
+        return None
+    if low == least - 1 and high > least:
+        low = max(low, high * 4 // 5)
+        if enough(low):
+            low, high = least - 1, low
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if enough(middle) else (middle, high)
+    return high
+
+
+def power(n: int, sd: float, step: float, bound: float, alpha: float) -> float:
+    """Return the share of simulated studies of ``n`` participants that show equivalence, the true difference being 0.
+
+    ``sd`` is that of the normal differences before they are rounded to ``step`` (0: not at all).
+    """
+    rng = np.random.default_rng(n)
+    drawn = sd * rng.normal(size=(STUDIES, n))
+    rounded = step * np.rint(drawn / step) if step else drawn
+    draws = min(MOST_PLANNED_DRAWS, max(PLANNED_DRAWS, math.ceil(5 / alpha)))
+    return float(equivalent(rounded, bound, alpha, rng, draws).mean())
+
+
+def _before_rounding(sd: float, step: float) -> float:
+    """Return the spread of a normal number whose multiple of ``step`` nearest to it spreads by ``sd``."""
+    if not step:
+        return sd
+    levels = step * np.arange(1, 60)
+    low, high = 0.0, sd + step
+    for _ in range(40):
+        middle = (low + high) / 2
+        beyond = norm.sf((levels - step / 2) / middle)
+        spread = 2 * (levels**2 * -np.diff(beyond, append=0.0)).sum()
+        low, high = (middle, high) if spread < sd**2 else (low, middle)
+    return high

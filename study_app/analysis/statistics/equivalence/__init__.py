@@ -1,1 +1,0 @@
-"""Equivalence: two one-sided tests, without normality too, and their power."""

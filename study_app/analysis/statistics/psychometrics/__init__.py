@@ -1,1 +1,0 @@
-"""Psychometric functions of pooled answers: fit, test for a rise, detection threshold."""

@@ -1,0 +1,723 @@
+"""Tests of ranks: two or several settings within participants, all statements at once, and groups.
+
+Friedman (1937), J. Am. Stat. Assoc. 32, 675–701; ties: Conover (1999), Practical Nonparametric Statistics, p. 370.
+The exact distribution is built participant by participant over the sorted rank sums, so ties count as they are.
+
+Skillings & Mack (1981), Technometrics 23, 171–177. A participant contributes what he or she answered, if it is two
+settings or more; answers must be missing for reasons that have nothing to do with them.
+
+A participant's answers to all statements move together, so that statements may depend on each other in any way.
+The statistic is the sum of the statements' Friedman statistics (nonparametric combination; Pesarin & Salmaso 2010).
+
+One value per participant: Kruskal and Wallis (1952), J. Am. Stat. Assoc. 47, 583–621, corrected for ties. Several
+values of each (a profile): the same share of the sum of squares between groups, of their mean vectors (Anderson 2001,
+Austral Ecol. 26, 32–46, with Euclidean distances).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations, permutations
+from typing import Final, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import chdtrc, fdtrc
+from scipy.stats import chi2 as chi_square
+from scipy.stats import norm, rankdata
+
+from study_app.analysis.statistics.outcome import (
+    DRAWS,
+    NO_VARIATION,
+    Array,
+    Interval,
+    Lattice,
+    Outcome,
+    Whole,
+    checked,
+    complete,
+    doubled_ranks,
+)
+from study_app.errors import AnalysisError
+
+Alternative: TypeAlias = Literal["two-sided", "greater", "less"]
+
+EXACT_UP_TO: Final = 200
+"""Up to so many pairs p is exact; beyond that normal, corrected for ties."""
+
+INTERVAL_FROM: Final = 6
+"""Below so many pairs with a difference no test can be significant, and no interval is shown."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Paired(Outcome):
+    """Wilcoxon's V, the ranks of positive differences; ``effect`` is the matched rank-biserial correlation.
+
+    ``zeros`` pairs were equal. ``superiority`` is P(x > y) − P(x < y) over participants (Cliff's delta of pairs).
+    ``median_difference`` is that of all pairs.
+    """
+
+    zeros: int
+    superiority: float | None
+    median_difference: float | None
+
+
+def paired(x: ArrayLike, y: ArrayLike, *, alpha: float = 0.05) -> Paired:
+    """Compare answers of the same participants under two settings; equal pairs are left out, as by R and JASP.
+
+    Parameters
+    ----------
+    x, y : (participants,) arrays
+        NaN where an answer is missing: that pair is dropped.
+    alpha : float
+        What p is compared with: the note says where so few pairs cannot reach it.
+
+    Raises
+    ------
+    AnalysisError
+        ``x`` and ``y`` differ in length.
+    """
+    first, second = checked(x, "participants"), checked(y, "participants")
+    if len(first) != len(second):
+        raise AnalysisError(f"{len(first)} and {len(second)} answers are no pairs; give one of each per participant")
+    both = first - second
+    differences = both[~np.isnan(both)]
+    n, dropped = len(differences), int(np.isnan(both).sum())
+    ranks, signs = signed(differences)
+    v = int(ranks[signs > 0].sum())
+    all_ranks = int(ranks.sum())
+    effect = (2 * v - all_ranks) / all_ranks if len(ranks) else None
+    p, smallest, method = signed_p(ranks, v)
+    interval, reason = _fisher(effect, len(ranks))
+    return Paired(
+        test="Wilcoxon signed ranks",
+        n=n,
+        dropped=dropped,
+        statistic_name="V",
+        statistic=v / 2 if len(ranks) else None,
+        p=p,
+        smallest_p=smallest,
+        method=f"{method}, two-sided; equal pairs left out (Wilcoxon)",
+        effect_name="matched rank-biserial correlation",
+        effect=effect,
+        interval=interval,
+        no_interval=reason,
+        note=_note(n, len(ranks), smallest, effect, alpha),
+        zeros=int((differences == 0.0).sum()),
+        superiority=float(np.sign(differences).mean()) if n else None,
+        median_difference=float(np.median(differences)) if n else None,
+    )
+
+
+def signed(differences: Array) -> tuple[Whole, Array]:
+    """Return the (doubled) ranks and the signs of the differences that are not 0."""
+    kept = differences[differences != 0.0]
+    # Differences of decimals that should tie differ in the last bit: 0.3 - 0.1 and 0.2.
+    return doubled_ranks(np.round(np.abs(kept), 9)[None])[0], np.sign(kept)
+
+
+def signed_p(ranks: Whole, v: int, alternative: Alternative = "two-sided") -> tuple[float | None, float | None, str]:
+    """Return p of the (doubled) ranks ``v`` of positive differences, the smallest p, and the method.
+
+    None without any difference. Every sign of every rank is equally likely.
+    """
+    n, both = len(ranks), 2 if alternative == "two-sided" else 1
+    if n == 0:
+        return None, None, "none"
+    below = int(ranks.sum()) - v
+    tail = v if alternative == "greater" else below if alternative == "less" else max(v, below)
+    if n > EXACT_UP_TO:
+        deviation = (tail - ranks.sum() / 2) / math.sqrt(float((ranks.astype(float) ** 2).sum()) / 4)
+        return min(1.0, both * float(norm.sf(deviation))), None, "normal approximation, corrected for ties"
+    sums = _sums(tuple(sorted(ranks.tolist())))
+    return min(1.0, both * sums.at_least(tail)), min(1.0, both * sums.highest), "exact permutation of signs"
+
+
+@lru_cache(maxsize=4096)
+def _sums(ranks: tuple[int, ...]) -> Lattice:
+    """Return the distribution of the sum of the ranks that are positive, each of them with probability 1/2."""
+    ways, highest = np.zeros(sum(ranks) + 1), 0
+    ways[0] = 1.0
+    for rank in ranks:
+        ways[rank : highest + rank + 1] += ways[: highest + 1].copy()
+        highest += rank
+    return Lattice(0, ways / 2.0 ** len(ranks))
+
+
+def _fisher(effect: float | None, n: int) -> tuple[Interval | None, str]:
+    """Return the 95 % Fisher-z interval of a rank-biserial correlation of ``n`` pairs, or why there is none."""
+    if effect is None:
+        return None, "no interval: no pair differs"
+    if n < INTERVAL_FROM:
+        return None, f"no interval below {INTERVAL_FROM} pairs that differ: it would cover far less than it claims"
+    if abs(effect) == 1.0:
+        return None, f"no interval: all {n} pairs that differ went one way"
+    deviation = math.sqrt((2 * n**3 + 3 * n**2 + n) / 6) / (n * (n + 1) / 2)
+    reach = float(norm.ppf(0.975)) * deviation
+    low, high = math.tanh(math.atanh(effect) - reach), math.tanh(math.atanh(effect) + reach)
+    return Interval(low, high, 0.95, "Fisher z, approximate: covers about 90 % up to two dozen pairs"), ""
+
+
+def _note(n: int, different: int, smallest: float | None, effect: float | None, alpha: float) -> str:
+    if n == 0:
+        return "no participant answered under both settings"
+    if smallest is None:
+        return f"all {n} pairs are equal"
+    if smallest > alpha:
+        return f"cannot reach p ≤ {alpha:g}: {different} pairs that differ can give {smallest:.4g} at least"
+    return f"all {different} pairs that differ went one way" if effect is not None and abs(effect) == 1.0 else ""
+
+
+WORK: Final = 1_500_000
+"""So many sums may be formed for an exact distribution; beyond that p is drawn."""
+
+DRAWN_UP_TO: Final = 200
+"""Beyond so many participants the chi-square p is used: nearer to the exact one, far from 0.5, than a drawn p, which
+cannot fall below 1 / (1 + draws)."""
+
+APPROXIMATE: Final = f"chi-square approximation, corrected for ties, as always above {DRAWN_UP_TO} participants"
+
+DENSE: Final = 50_000
+"""Up to so many codes of rank sums are counted in a table, which is quicker than sorting them."""
+
+TABLED: Final = 7
+"""Up to so many settings all their orders fit into a table."""
+
+NO_INTERVAL: Final = "no interval for W: it cannot be negative, so that intervals for it cover less than they claim"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Friedman(Outcome):
+    """Friedman's chi-square with ``df`` degrees of freedom, ``effect`` Kendall's W.
+
+    ``p`` is exact or drawn, as ``method`` says; ``p_chi2`` and ``p_f`` (of ``f``) are the two approximations.
+    ``mean_ranks`` has one entry a setting.
+    """
+
+    test: str = "Friedman"
+    statistic_name: str = "chi2"
+    effect_name: str = "Kendall's W"
+    df: int
+    p_chi2: float | None = None
+    f: float | None = None
+    p_f: float | None = None
+    mean_ranks: tuple[float, ...]
+
+
+def friedman(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> Friedman:
+    """Test whether settings are answered alike.
+
+    Parameters
+    ----------
+    values : (participants, settings) array
+        NaN where an answer is missing; such participants are dropped.
+    draws, seed : int
+        For a drawn p, where the exact distribution would take too long.
+
+    Raises
+    ------
+    AnalysisError
+        There are fewer than three settings.
+    """
+    rows, dropped = complete(values, at_least=3, why=" for Friedman's test; compare two by the signed ranks of pairs")
+    n, k = rows.shape
+    ranks = doubled_ranks(rows)
+    spread = tied_spread(ranks)
+    sums = ranks.sum(axis=0)
+    if spread == 0:
+        note, middle = NO_VARIATION if n else "no participant answered under all settings", (k + 1) / 2
+        ranks_of_all = (middle,) * k if n else ()
+        return Friedman(n=n, dropped=dropped, no_interval=note, note=note, df=k - 1, mean_ranks=ranks_of_all)
+    squares = _squares(sums[None, :], n)[0]
+    statistic = (k - 1) * squares / spread
+    w = statistic / (n * (k - 1))
+    p, smallest, method = _p(ranks, int(squares), draws, seed)
+    approximate = float(chdtrc(k - 1, statistic))
+    f, p_f = _f(w, n, k)
+    return Friedman(
+        n=n,
+        dropped=dropped,
+        statistic=float(statistic),
+        p=approximate if p is None else p,
+        smallest_p=smallest,
+        method=method,
+        effect=float(w),
+        no_interval=NO_INTERVAL,
+        df=k - 1,
+        p_chi2=approximate,
+        f=f,
+        p_f=p_f,
+        mean_ranks=tuple(float(rank) for rank in sums / (2 * n)),
+    )
+
+
+def tied_spread(ranks: Whole) -> int:
+    """Return the sum over all (doubled) ranks (n, k) of their squared distance from the middle, 0 if all are tied."""
+    return int(((ranks - (ranks.shape[1] + 1)) ** 2).sum())
+
+
+def _squares(sums: Whole, n: int) -> Whole:
+    """Return the sum of squared distances of (doubled) rank sums (…, k) from n times the middle."""
+    squares: Whole = ((sums - n * (sums.shape[1] + 1)) ** 2).sum(axis=1)
+    return squares
+
+
+def _f(w: float, n: int, k: int) -> tuple[float | None, float | None]:
+    """Return the F that approximates W's distribution, and its p (Kendall & Babington Smith 1939)."""
+    if n < 2 or w >= 1.0:
+        return None, None
+    f = (n - 1) * w / (1 - w)
+    df = k - 1 - 2 / n
+    return float(f), float(fdtrc(df, (n - 1) * df, f))
+
+
+def _p(ranks: Whole, squares: int, draws: int, seed: int) -> tuple[float | None, float | None, str]:
+    """Return p (None: take the chi-square's), the smallest it could have been (None: any), and how it was found."""
+    n, k = ranks.shape
+    exact = distribution(tuple(sorted(tuple(sorted(row)) for row in ranks.tolist())))
+    if exact is not None:
+        support, tails = exact
+        return float(tails[np.searchsorted(support, squares)]), float(tails[-1]), "exact permutation"
+    if n > DRAWN_UP_TO:
+        return None, None, APPROXIMATE
+    least = math.exp((1 - n) * math.lgamma(k + 1))
+    drawn = _squares(drawn_sums(ranks, draws, seed), n)
+    p = (1 + int((drawn >= squares).sum())) / (1 + draws)
+    return p, max(least, 1 / (1 + draws)), f"Monte Carlo permutation, {draws} draws, seed {seed}"
+
+
+@lru_cache(maxsize=1024)
+def distribution(patterns: tuple[tuple[int, ...], ...]) -> tuple[Whole, Array] | None:
+    """Return every sum of squares that (doubled) ranks of these ``patterns`` (n × k) can have, ascending, and P(≥).
+
+    None if it would take more than ``WORK``. Rank sums are kept sorted, since every relabelling is equally likely.
+    """
+    n, k = len(patterns), len(patterns[0])
+    base = 2 * n * k + 1
+    if k > TABLED or base**k >= 2**62:
+        return None
+    powers = base ** np.arange(k, dtype=np.int64)
+    dense = base ** (k - 1) <= DENSE
+    states = np.zeros((1, k), dtype=np.int64)
+    weights: Array = np.ones(1)
+    work = 0
+    for pattern in patterns:
+        orders = _orders(pattern)
+        work += len(states) * len(orders)
+        if work > WORK:
+            return None
+        sums = np.sort((states[:, None, :] + orders[None, :, :]).reshape(-1, k), axis=1)
+        given = np.repeat(weights / len(orders), len(orders))
+        if dense:  # the last sum follows from the others: without it the codes are few enough to be counted
+            counted = np.bincount(sums[:, :-1] @ powers[:-1], given)
+            codes = np.flatnonzero(counted)
+            weights = counted[codes].astype(np.float64)
+            states = codes[:, None] // powers[:-1] % base
+            states = np.column_stack([states, sums[0].sum() - states.sum(axis=1)])
+            continue
+        codes, place = np.unique(sums @ powers, return_inverse=True)
+        weights = np.bincount(place.ravel(), given).astype(np.float64)
+        states = codes[:, None] // powers % base
+    support, place = np.unique(_squares(states, n), return_inverse=True)
+    chances = np.bincount(place.ravel(), weights=weights)
+    tails = np.minimum(1.0, np.cumsum(chances[::-1])[::-1])
+    return support, tails
+
+
+@lru_cache(maxsize=1024)
+def _orders(pattern: tuple[int, ...]) -> Whole:
+    """Return the distinct orders (orders, k) of a participant's ranks, all equally likely."""
+    return np.unique(np.array(list(permutations(pattern)), dtype=np.int64), axis=0)
+
+
+def shuffles(rng: np.random.Generator, draws: int, k: int) -> Whole:
+    """Return ``draws`` random orders (draws, k) of k settings."""
+    if k > TABLED:
+        return np.argsort(rng.random((draws, k)), axis=1)
+    table = _orders(tuple(range(k)))
+    return table[(rng.random(draws) * len(table)).astype(np.int64)]
+
+
+def drawn_sums(ranks: Whole, draws: int, seed: int) -> Whole:
+    """Return rank sums (draws, k) after shuffling each participant's ``ranks`` (n, k) at random."""
+    rng = np.random.default_rng(seed)
+    sums = np.zeros((draws, ranks.shape[1]), dtype=np.int64)
+    for row in ranks:
+        sums += row[shuffles(rng, draws, ranks.shape[1])]
+    return sums
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SkillingsMack(Outcome):
+    """Skillings and Mack's T with ``df`` degrees of freedom; ``p_chi2`` is its published approximation, without ties.
+
+    ``effect`` is T over its largest possible value, which without missing answers is Kendall's W. ``missing`` counts
+    the missing answers of the participants that were used. ``adjusted_sums`` has one entry a setting.
+    """
+
+    df: int
+    p_chi2: float | None
+    missing: int
+    adjusted_sums: tuple[float, ...]
+
+
+def skillings_mack(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> SkillingsMack:
+    """Test whether settings are answered alike, using participants that miss some.
+
+    Parameters
+    ----------
+    values : (participants, settings) array
+        NaN where an answer is missing.
+    draws : int
+        Rearrangements drawn where not all can be listed.
+    seed : int
+        Of the rearrangements.
+
+    Raises
+    ------
+    AnalysisError
+        There are fewer than three settings.
+    """
+    array = checked(values, "participants, settings")
+    k = array.shape[1]
+    if k < 3:
+        raise AnalysisError(f"{k} settings: at least 3 are needed; compare two by the signed ranks of pairs")
+    used = (~np.isnan(array)).sum(axis=1) >= 2
+    rows = array[used]
+    scores = _scores(rows)
+    inverse: Array = np.linalg.pinv(_covariance(~np.isnan(rows))).astype(np.float64)
+    sums = scores.sum(axis=0)
+    statistic = float(sums @ inverse @ sums)
+    df = int(np.linalg.matrix_rank(inverse)) if len(rows) else 0
+    note = "" if scores.any() else NO_VARIATION if len(rows) else "no participant answered under two settings"
+    p_chi2 = None if note else float(chi_square.sf(statistic, df))
+    p, smallest, method = (None, None, "none") if note else _p_with_gaps(scores, rows, inverse, draws, seed)
+    ideal = _scores(np.where(np.isnan(rows), np.nan, np.arange(k))).sum(axis=0)
+    return SkillingsMack(
+        test="Skillings-Mack",
+        n=len(rows),
+        dropped=int((~used).sum()),
+        statistic_name="T",
+        statistic=None if note else statistic,
+        p=p,
+        smallest_p=smallest,
+        method=method,
+        effect_name="T over the T of full agreement",
+        effect=None if note else statistic / float(ideal @ inverse @ ideal),
+        no_interval=note or NO_INTERVAL,
+        note=note,
+        df=df,
+        p_chi2=p_chi2,
+        missing=int(np.isnan(rows).sum()),
+        adjusted_sums=tuple(float(value) for value in sums),
+    )
+
+
+def _scores(rows: Array) -> Array:
+    """Return centred, scaled ranks (n, k) of the answers of ``rows``; 0 where one is missing."""
+    scores = np.zeros(rows.shape)
+    for row, values in enumerate(rows):
+        there = ~np.isnan(values)
+        count = int(there.sum())
+        scores[row, there] = (rankdata(values[there]) - (count + 1) / 2) * np.sqrt(12 / (count + 1))
+    return scores
+
+
+def _covariance(there: Array) -> Array:
+    """Return the covariance (k, k) of the adjusted sums: −(how many participants answered both), rows sum to 0."""
+    counts = there.astype(np.float64)
+    covariance: Array = -(counts.T @ counts)
+    np.fill_diagonal(covariance, 0.0)
+    np.fill_diagonal(covariance, -covariance.sum(axis=1))
+    return covariance
+
+
+def _tied_covariance(scores: Array, there: NDArray[np.bool_]) -> Array:
+    """Return the covariance (k, k) of the adjusted sums when each participant's own ``scores`` change places.
+
+    Without ties it is ``_covariance``.
+    """
+    counts = there.sum(axis=1)
+    spread = (scores**2).sum(axis=1) / (counts - 1) / counts
+    weighted: Array = there * np.sqrt(spread)[:, None]
+    covariance: Array = -(weighted.T @ weighted)
+    np.fill_diagonal(covariance, 0.0)
+    np.fill_diagonal(covariance, -covariance.sum(axis=1))
+    return covariance
+
+
+def _p_with_gaps(scores: Array, rows: Array, inverse: Array, draws: int, seed: int) -> tuple[float, float | None, str]:
+    """Return p by shuffling each participant's given answers, the smallest it could have been, and the method."""
+    sums = scores.sum(axis=0)
+    if len(rows) > DRAWN_UP_TO:
+        covariance = _tied_covariance(scores, ~np.isnan(rows))
+        reached = float(sums @ np.linalg.pinv(covariance) @ sums)
+        return float(chi_square.sf(reached, np.linalg.matrix_rank(covariance))), None, APPROXIMATE
+    found = float(sums @ inverse @ sums)
+    rng = np.random.default_rng(seed)
+    drawn = np.zeros((draws, rows.shape[1]))
+    for score, values in zip(scores, rows, strict=True):
+        there = np.flatnonzero(~np.isnan(values))
+        drawn[:, there] += score[there][shuffles(rng, draws, len(there))]
+    statistics = np.einsum("dk,kl,dl->d", drawn, inverse, drawn)
+    p = (1 + int((statistics >= found - 1e-9 * abs(found)).sum())) / (1 + draws)
+    return p, 1 / (1 + draws), f"Monte Carlo permutation, {draws} draws, seed {seed}"
+
+
+EXACT_OVER_ALL: Final = 50_000
+"""So many rearrangements are gone through (three settings: seven participants); beyond that p is drawn."""
+
+ROUNDING: Final = 1e-9
+"""Sums of the same numbers in another order differ by less than this, relatively."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GlobalPermutation(Outcome):
+    """The sum of Friedman's chi-square over ``items`` statements that vary; ``effect`` is their mean Kendall's W.
+
+    ``dropped`` participants completed no statement; ``incomplete`` counts the rows of single statements that were left
+    out of ``n`` × statements.
+    """
+
+    items: int
+    incomplete: int
+
+
+def global_permutation(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> GlobalPermutation:
+    """Test whether settings are answered alike in all statements.
+
+    Parameters
+    ----------
+    values : (items, participants, settings) array
+        NaN where an answer is missing: that participant's row of that statement is left out.
+    draws : int
+        Rearrangements drawn where not all can be listed.
+    seed : int
+        Of the rearrangements.
+
+    Raises
+    ------
+    AnalysisError
+        There are fewer than two settings.
+    """
+    array = checked(values, "items, participants, settings")
+    k = array.shape[2]
+    if k < 2:
+        raise AnalysisError(f"{k} settings: at least 2 are needed for a test of settings")
+    whole = np.asarray(~np.isnan(array).any(axis=2))
+    used = whole.any(axis=0)
+    array, whole = array[:, used], whole[:, used]
+    scores, n = _scores_over_all(array, whole), array.shape[1]
+    varying = scores.any(axis=(1, 2))
+    scores = scores[varying]
+    found = _statistic(scores.sum(axis=1)[None])[0] if len(scores) else None
+    p, smallest, method = (None, None, "none") if found is None else _p_over_all(scores, float(found), draws, seed)
+    rows = whole.sum(axis=1)[varying]
+    mean_w = None if found is None else _mean_w(scores, rows)
+    return GlobalPermutation(
+        test="global permutation over all statements",
+        n=n,
+        dropped=int((~used).sum()),
+        statistic_name="sum of chi2",
+        statistic=None if found is None else float(found),
+        p=p,
+        smallest_p=smallest,
+        method=method,
+        effect_name="mean Kendall's W",
+        effect=mean_w,
+        no_interval="no interval for W: it cannot be negative, so that intervals for it cover less than they claim",
+        note="" if found is not None else "no participant completed a statement" if n == 0 else NO_VARIATION,
+        items=int(varying.sum()),
+        incomplete=int((~whole).sum()),
+    )
+
+
+def _scores_over_all(array: Array, whole: NDArray[np.bool_]) -> Array:
+    """Return centred ranks (items, n, k), scaled so that squared column sums add up to Friedman's chi-square."""
+    k = array.shape[2]
+    scores = np.zeros(array.shape)
+    for item, (values, kept) in enumerate(zip(array, whole, strict=True)):
+        ranks = doubled_ranks(values[kept])
+        spread = tied_spread(ranks)
+        if spread:
+            scores[item, kept] = (ranks - (k + 1)) * math.sqrt((k - 1) / spread)
+    return scores
+
+
+def _statistic(sums: Array) -> Array:
+    """Return the sums of chi-squares (…) of column sums (…, items, k)."""
+    squares: Array = (sums**2).sum(axis=(-2, -1))
+    return squares
+
+
+def _mean_w(scores: Array, rows: Whole) -> float:
+    chi2 = (scores.sum(axis=1) ** 2).sum(axis=1)
+    return float((chi2 / (rows * (scores.shape[2] - 1))).mean())
+
+
+def _p_over_all(scores: Array, found: float, draws: int, seed: int) -> tuple[float, float, str]:
+    """Return p, the smallest it could have been, and how it was found."""
+    items, n, k = scores.shape
+    people = scores.transpose(1, 0, 2)
+    orders = math.factorial(k)
+    if (n - 1) * math.log(orders) <= math.log(EXACT_OVER_ALL):
+        reached = _all(people)
+        highest = reached.max()
+        p = float((reached >= found * (1 - ROUNDING)).mean())
+        return p, float((reached >= highest * (1 - ROUNDING)).mean()), "exact permutation"
+    rng = np.random.default_rng(seed)
+    sums = np.zeros((items, draws, k))
+    for person in people:
+        sums += person[:, shuffles(rng, draws, k)]
+    p = (1 + int((_statistic(sums.transpose(1, 0, 2)) >= found * (1 - ROUNDING)).sum())) / (1 + draws)
+    least = max(1 / (1 + draws), math.exp((1 - n) * math.log(orders)))
+    return p, least, f"Monte Carlo permutation, {draws} draws, seed {seed}"
+
+
+def _all(people: Array) -> Array:
+    """Return the statistic of every rearrangement of people (n, items, k); the first may stay as it is."""
+    sums = people[:1]
+    orders = np.array(list(permutations(range(people.shape[2]))))
+    for person in people[1:]:
+        moved = person[:, orders].transpose(1, 0, 2)
+        sums = (sums[:, None] + moved[None]).reshape(-1, *person.shape)
+    return _statistic(sums)
+
+
+EXACT_GROUPS: Final = 50_000
+"""So many allocations of participants to groups are gone through (two groups: of eight or nine); beyond, p is drawn."""
+
+AT_ONCE: Final = 500
+GROUPS_ROUNDING: Final = 1e-9
+"""Sums of the same numbers in another order differ by less than this, relatively."""
+
+NO_INTERVAL_OF_GROUPS: Final = "no interval for the share between groups: it cannot be negative"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GroupsDiffer(Outcome):
+    """H = (n − 1) · ``effect``, the share of the sum of squares of ranks that lies between groups (ε² of one value).
+
+    ``p_chi2`` is the approximate p of one value, with ``df`` degrees of freedom; None of a profile, which has none.
+    ``sizes`` are the numbers of participants in the groups.
+    """
+
+    statistic_name: str = "H"
+    effect_name: str = "share between groups"
+    df: int
+    p_chi2: float | None = None
+    sizes: tuple[int, ...] = ()
+
+
+def groups_differ(
+    values: ArrayLike, groups: Sequence[str], *, test: str = "Kruskal-Wallis", draws: int = DRAWS, seed: int = 1
+) -> GroupsDiffer:
+    """Test whether groups of participants have the same values.
+
+    Parameters
+    ----------
+    values : (participants, k) array
+        One value of each, which is ranked here; or several, used as they are. NaN where one is missing: such
+        participants are dropped.
+    groups : sequence of str
+        The group of each participant.
+    test : str
+        What the test is called.
+    draws, seed : int
+        For a drawn p, where going through all allocations would take too long.
+
+    Raises
+    ------
+    AnalysisError
+        There are more or fewer groups than participants.
+    """
+    array = checked(values, "participants, values")
+    if len(groups) != len(array):
+        raise AnalysisError(f"{len(array)} participants and {len(groups)} groups: give the group of each participant")
+    whole = ~np.isnan(array).any(axis=1)
+    names, labels = np.unique(np.asarray(groups, dtype=np.str_)[whole], return_inverse=True)
+    rows, n = array[whole], int(whole.sum())
+    ranks = rankdata(rows, axis=0) if rows.shape[1] == 1 else rows
+    centred = ranks - ranks.mean(axis=0) if n else ranks
+    total = float((centred**2).sum())
+    sizes = tuple(int(count) for count in np.bincount(labels, minlength=len(names)))
+    dropped, df = int((~whole).sum()), max(0, len(names) - 1)
+    if note := _impossible(len(names), n, total):
+        return GroupsDiffer(test=test, n=n, dropped=dropped, df=df, sizes=sizes, note=note, no_interval=note)
+    found = float(_between(centred, labels[None], len(names))[0])
+    p, smallest, method = _p_of_groups(centred, labels, found, draws, seed)
+    statistic = (n - 1) * found / total
+    return GroupsDiffer(
+        test=test,
+        n=n,
+        dropped=dropped,
+        statistic=statistic,
+        p=p,
+        smallest_p=smallest,
+        method=method,
+        effect=found / total,
+        no_interval=NO_INTERVAL_OF_GROUPS,
+        df=df,
+        p_chi2=float(chdtrc(df, statistic)) if rows.shape[1] == 1 else None,
+        sizes=sizes,
+    )
+
+
+def _impossible(groups: int, n: int, total: float) -> str:
+    if groups < 2:
+        return "fewer than two groups have participants with all answers"
+    if n == groups:
+        return "each group has one participant"
+    return "" if total > GROUPS_ROUNDING else "no variation: all participants answered alike"
+
+
+def _between(centred: Array, labels: NDArray[np.intp], groups: int) -> Array:
+    """Return the sums of squares between groups (allocations,) of centred values (n, k) for labels (allocations, n)."""
+    found: Array = np.zeros(len(labels))
+    for group in range(groups):
+        members = labels == group
+        sums = members.astype(np.float64) @ centred
+        found += (sums**2).sum(axis=1) / members.sum(axis=1)
+    return found
+
+
+def _p_of_groups(
+    centred: Array, labels: NDArray[np.intp], found: float, draws: int, seed: int
+) -> tuple[float, float, str]:
+    """Return p, the smallest it could have been, and how it was found."""
+    sizes = np.bincount(labels)
+    log_ways = math.lgamma(len(labels) + 1) - sum(math.lgamma(size + 1) for size in sizes)
+    reached_by = found * (1 - GROUPS_ROUNDING)
+    if log_ways <= math.log(EXACT_GROUPS):
+        every = np.array(list(_allocations(tuple(sizes.tolist()), len(labels))), dtype=np.intp)
+        reached = np.concatenate(
+            [_between(centred, every[at : at + AT_ONCE], len(sizes)) for at in range(0, len(every), AT_ONCE)]
+        )
+        p = float((reached >= reached_by).mean())
+        return p, float((reached >= reached.max() * (1 - GROUPS_ROUNDING)).mean()), "exact permutation of participants"
+    rng = np.random.default_rng(seed)
+    above = 0
+    for done in range(0, draws, AT_ONCE):
+        drawn = rng.permuted(np.tile(labels, (min(AT_ONCE, draws - done), 1)), axis=1)
+        above += int((_between(centred, drawn, len(sizes)) >= reached_by).sum())
+    least = max(1 / (1 + draws), math.exp(-log_ways))
+    return (1 + above) / (1 + draws), least, f"Monte Carlo permutation of participants, {draws} draws, seed {seed}"
+
+
+def _allocations(sizes: tuple[int, ...], n: int) -> Iterator[Whole]:
+    """Yield every allocation of n participants to groups of these sizes, as the group of each."""
+    labels = np.full(n, len(sizes) - 1, dtype=np.int64)
+
+    def fill(group: int, free: tuple[int, ...]) -> Iterator[Whole]:
+        if group == len(sizes) - 1:
+            yield labels.copy()
+            return
+        for chosen in combinations(free, sizes[group]):
+            labels[list(chosen)] = group
+            yield from fill(group + 1, tuple(one for one in free if one not in chosen))
+            labels[list(chosen)] = len(sizes) - 1
+
+    yield from fill(0, tuple(range(n)))

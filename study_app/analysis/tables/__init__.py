@@ -1,1 +1,0 @@
-"""Results folders read into tables, and measures of trials."""
