@@ -48,13 +48,7 @@ EVALUATION: Final = 0.7
 
 
 def carry_out(order: Order, send: Send, stop: Callable[[], bool]) -> Done:
-    """Carry out an order; ``stop`` is asked again and again whether to give up.
-
-    Raises
-    ------
-    StudyError
-        It cannot be carried out, or was given up; nothing was half-done.
-    """
+    """Carry out an order; ``stop`` is asked again and again whether to give up."""
     match order:
         case FindStudies():
             send(StudiesFound(tuple(_studies(order.results))))

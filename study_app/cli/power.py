@@ -160,13 +160,13 @@ def _of_thresholds(
 
 def _write(found: Powers | Precisions, to: Path | None) -> None:
     """Print the tables; write them and the figures into a folder."""
-    from study_app.analysis.planning.power_curves import Powers, power_markdown, write
+    from study_app.analysis.planning.power_curves import Powers, power_markdown, write_power
     from study_app.analysis.planning.threshold_studies import threshold_csv, threshold_markdown
     from study_app.store.output_files import write_files
 
     if isinstance(found, Powers):
         click.echo(power_markdown(found), nl=False)
-        written = write(found, to) if to is not None else ()
+        written = write_power(found, to) if to is not None else ()
     else:
         words = threshold_markdown(found)
         click.echo(words, nl=False)

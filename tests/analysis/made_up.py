@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from study_app.analysis.data.blocks import NOTHING, Block, Decided, Item, Setting
+from study_app.analysis.data.blocks import NOTHING_DECIDED, Block, Decided, Item, Setting
 from study_app.analysis.data.study_tables import Study
 from study_app.store.tables.column import Column
 from study_app.store.tables.columns import RESPONSES, TRIALS
@@ -16,7 +16,7 @@ from study_app.store.tables.csv_files import Column
 TYPES = {"text": "string", "time": "string", "integer": "Int64", "number": "Float64", "flag": "boolean"}
 ITEMS = ("different", "harder")
 DECIDED = replace(
-    NOTHING, made=True, equivalence_bound=1.0, rising=ITEMS[:1], falling=ITEMS[1:], noticed=ITEMS[0], names=()
+    NOTHING_DECIDED, made=True, equivalence_bound=1.0, rising=ITEMS[:1], falling=ITEMS[1:], noticed=ITEMS[0], names=()
 )
 
 Presented = tuple[str, int, str, Sequence[int | None]]

@@ -43,7 +43,7 @@ def read_workspace(_folder: Path) -> object:
 
 
 def use_commitment(folder: Path) -> object:
-    found = preregistration.read(folder)
+    found = preregistration.read_commitment(folder)
     return found and (found.protocol_hash[:12], set(found.rules))
 
 

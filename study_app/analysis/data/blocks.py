@@ -4,7 +4,7 @@ While the key is sealed a setting is its code and nothing else. Texts are in Eng
 in its first language.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, TypeAlias, get_args
 
@@ -225,6 +225,51 @@ def _opened(key: Key, block: str, codes: Sequence[str], kind: Kind | None) -> tu
 
 
 @dataclass(frozen=True, slots=True)
+class PublishedValue:
+    """A value of another study that the protocol names: see `protocol.analysis_plan.Published`."""
+
+    measure: str
+    value: float
+    standard: float | None
+    low: float | None
+    high: float | None
+    percent: float | None
+    n: int | None
+    source: str
+
+    def in_words(self) -> str:
+        """Return it with what is known of it."""
+        known = [
+            *([] if self.standard is None else [f"standard {self.standard:g}"]),
+            *([] if self.low is None or self.high is None else [f"{self.low:g} to {self.high:g}"]),
+            *([] if self.percent is None else [f"at {self.percent:g} % correct"]),
+            *([] if self.n is None else [f"n = {self.n}"]),
+        ]
+        source = f"{self.source}: " if self.source else ""
+        return f"{source}{self.measure} {self.value:g}" + (f" ({', '.join(known)})" if known else "")
+
+
+def compared_percent(published: Iterable[PublishedValue | Published]) -> float | None:
+    """Return the percentage of successes at which published thresholds were measured; None: unknown, or several."""
+    percents = {one.percent for one in published if one.measure in {"weber", "threshold"}}
+    return percents.pop() if len(percents) == 1 else None
+
+
+@dataclass(frozen=True, slots=True)
+class OwnDynamics:
+    """The device's own damping [N·s/m], friction [N] and mass [kg], as ``devices bench`` measured them.
+
+    Means over axes, and over those ``sessions`` of all ``of`` whose receipts record them.
+    """
+
+    damping_nspm: float
+    friction_n: float
+    mass_kg: float
+    sessions: int
+    of: int
+
+
+@dataclass(frozen=True, slots=True)
 class LevelBlock:
     """A block with a design.
 
@@ -274,13 +319,7 @@ class LevelBlock:
 
 
 def level_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[LevelBlock, ...]:
-    """Return the blocks with a design of the protocol in a receipt, in the order of the session; ``key`` is open.
-
-    Raises
-    ------
-    KeyError, TypeError, AttributeError, ValueError
-        They give no protocol that this version knows.
-    """
+    """Return the blocks with a design of the protocol in a receipt, in the order of the session; ``key`` is open."""
     steps = [step for step in every_step_of(protocol) if "slots" in protocol["blocks"].get(step, {})]
     whole = whole_protocol(protocol, key) if key is not None and steps else None
     return tuple(_level_block(protocol, step, key, whole) for step in steps)
@@ -348,21 +387,15 @@ class Decided:
         return bool(self.names) and set(self.names) <= {item.id for item in block.items}
 
 
-NOTHING: Final = Decided(False, False, 0.05, None, (), (), (), (), None)
+NOTHING_DECIDED: Final = Decided(False, False, 0.05, None, (), (), (), (), None)
 
 
-def read(tables: Sequence[Mapping[str, Any] | None]) -> Decided:
-    """Return what the sessions' receipts say was decided.
-
-    Raises
-    ------
-    AnalysisError
-        A receipt's table is none.
-    """
+def read_decided(tables: Sequence[Mapping[str, Any] | None]) -> Decided:
+    """Return what the sessions' receipts say was decided."""
     first = tables[0]
     changed = any(table != first for table in tables)
     if first is None:
-        return replace(NOTHING, changed=changed)
+        return replace(NOTHING_DECIDED, changed=changed)
     try:
         bound, noticed = first["equivalence_bound"], first["noticed"]
         return Decided(
@@ -451,19 +484,13 @@ class AskedQuestions:
     scores: tuple[AskedScore, ...] = ()
 
 
-NOTHING_ELSE: Final = AskedQuestions()
+NO_QUESTIONS: Final = AskedQuestions()
 
 
 def asked_questions(protocol: Mapping[str, Any], key: Key | None) -> AskedQuestions:
-    """Read them from a protocol as a receipt holds it, in the order of the session.
-
-    Raises
-    ------
-    AnalysisError
-        A question is of a kind that this version does not know, or not one of its kind.
-    """
+    """Read them from a protocol as a receipt holds it, in the order of the session."""
     if protocol.get("format", 1) < 2:
-        return NOTHING_ELSE
+        return NO_QUESTIONS
     questions: list[AskedQuestion] = []
     scores: list[AskedScore] = []
     scales = {name: Scale.model_validate(table) for name, table in protocol["scales"].items()}

@@ -222,13 +222,7 @@ class Performance:
 
 
 def performance(study: Study, each: Callable[[int, int], object] = lambda _done, _of: None) -> Performance:
-    """Measure the trials that count; ``each`` receives how many recordings of how many were read.
-
-    Raises
-    ------
-    Exception
-        What ``each`` raises ends it.
-    """
+    """Measure the trials that count; ``each`` receives how many recordings of how many were read."""
     rows = study.trials[study.trials["counted"]]
     tasks = {block.id: _targets(study.protocol, block) for block in study.blocks}
     where = tuple(name for name, targets in tasks.items() if targets is not None)

@@ -10,16 +10,16 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from study_app.analysis.data.blocks import (
-    NOTHING_ELSE,
+    NO_QUESTIONS,
     AskedQuestions,
     Block,
     LevelBlock,
+    OwnDynamics,
     asked_questions,
     level_blocks,
     main_blocks,
     spoken,
 )
-from study_app.analysis.levels.results import OwnDynamics
 from study_app.errors import AnalysisError
 from study_app.protocol.texts import text_in
 from study_app.store.atomic import read_regular
@@ -50,12 +50,6 @@ def tables(paths: Sequence[Path], columns: tuple[Column, ...]) -> tuple[pd.DataF
     DataFrame, (files,) array
         The rows of all files in their order, and how many each holds. Columns that the version which wrote a file did
         not have yet, or that are sealed, are missing.
-
-    Raises
-    ------
-    AnalysisError
-        A file cannot be read, or is not the table the dictionary describes: names the file, the row (1 is the
-        header), the column and the value.
     """
     values: dict[str, list[Any]] = {column.name: [] for column in columns}
     known: dict[str, dict[str, Any]] = {column.name: {} for column in columns}
@@ -104,13 +98,7 @@ def _again(path: Path) -> str:
 
 
 def document(path: Path) -> dict[str, Any]:
-    """Read a JSON object.
-
-    Raises
-    ------
-    AnalysisError
-        It cannot be read or is none.
-    """
+    """Read a JSON object."""
     try:
         found = parse_json(read_regular(path))
     except OSError as error:
@@ -144,7 +132,7 @@ class Session:
     protocol: Mapping[str, Any]
     blocks: tuple[Block, ...]
     facts: Mapping[str, Any]
-    others: AskedQuestions = NOTHING_ELSE
+    others: AskedQuestions = NO_QUESTIONS
     levels: tuple[LevelBlock, ...] = ()
     own_dynamics: tuple[float, float, float] | None = None
     device_velocity: bool = False
@@ -166,11 +154,6 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
     """Read a session's receipt; ``key`` is the study's once it was opened.
 
     ``like`` is another session of the study: of what is the same in both one copy is kept.
-
-    Raises
-    ------
-    AnalysisError
-        The receipt is missing or damaged.
     """
     receipt = document(folder.receipt)
     try:
@@ -245,13 +228,7 @@ def _masking(answer: Mapping[str, Any] | None) -> str | None:
 
 
 def read_tables(sessions: Sequence[Session], name: str) -> pd.DataFrame:
-    """Read table ``name`` of sessions that were asked alike, with ``session_status`` added; rows in their order.
-
-    Raises
-    ------
-    AnalysisError
-        A file is missing, damaged or of another session, or answers what was not asked.
-    """
+    """Read table ``name`` of sessions that were asked alike, with ``session_status`` added; rows in their order."""
     paths = [session.folder.table(session.study, name) for session in sessions]
     table, lengths = tables(paths, tables_of(sessions[0].protocol_format)[name])
     _check_own(sessions, paths, table, lengths)
@@ -345,13 +322,7 @@ def _about(listed: Sequence[Exclusion], participant: str, session: int, trial: i
 
 
 def check_there(study: StudyFolder, trials: pd.DataFrame, listed: Sequence[Exclusion]) -> None:
-    """Refuse a list that leaves out what is not there, such as a mistyped id: what was meant would count.
-
-    Raises
-    ------
-    AnalysisError
-        Names the first such row.
-    """
+    """Refuse a list that leaves out what is not there, such as a mistyped id: what was meant would count."""
     sessions = {(session.participant, session.number) for session in study.sessions()}
     presented = set(zip(trials["participant"], trials["session"], trials["trial"], strict=True))
     for one in listed:

@@ -22,10 +22,10 @@ from typing import Any, Final, Literal, TypeAlias, TypeVar
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.data import blocks as decided
 from study_app.analysis.data import measures
 from study_app.analysis.data.blocks import (
-    NOTHING_ELSE,
+    NO_QUESTIONS,
+    NOTHING_DECIDED,
     AskedIn,
     AskedQuestion,
     AskedQuestions,
@@ -34,7 +34,9 @@ from study_app.analysis.data.blocks import (
     Decided,
     Kind,
     LevelBlock,
+    OwnDynamics,
     Setting,
+    read_decided,
     settings_of,
 )
 from study_app.analysis.data.session_files import (
@@ -46,7 +48,6 @@ from study_app.analysis.data.session_files import (
     read_tables,
     with_excluded,
 )
-from study_app.analysis.levels.results import OwnDynamics
 from study_app.errors import AnalysisError, StoreError
 from study_app.protocol.questions import STATEMENT
 from study_app.store.blinded import blinding
@@ -191,8 +192,8 @@ class Study:
     participants: pd.DataFrame
     exclusions: tuple[Exclusion, ...]
     doubts: tuple[Doubt, ...] = ()
-    decided: Decided = decided.NOTHING
-    others: AskedQuestions = NOTHING_ELSE
+    decided: Decided = NOTHING_DECIDED
+    others: AskedQuestions = NO_QUESTIONS
     answered: pd.DataFrame = field(default_factory=pd.DataFrame)
     levels: tuple[LevelBlock, ...] = ()
     intervals: pd.DataFrame = field(default_factory=pd.DataFrame)
@@ -406,7 +407,7 @@ def _load(folder: Path, *, sealed: bool = False) -> Study:
         exclusions=listed,
         doubts=tuple(doubt for one in records for doubt in doubts(Place(place, one.folder, one.study))),
         others=records[0].others,
-        decided=decided.read([session.protocol.get("analysis") for session in records]),
+        decided=read_decided([session.protocol.get("analysis") for session in records]),
         protocol=records[0].protocol,
         own_dynamics=mean_dynamics(records),
         estimator=estimators_of(records),

@@ -34,13 +34,7 @@ _RESERVED: Final = frozenset(("ALL", "AND", "BY", "EQ", "GE", "GT", "LE", "LT", 
 
 
 def require() -> None:
-    """Refuse to begin where the library is missing.
-
-    Raises
-    ------
-    AnalysisError
-        It is not installed.
-    """
+    """Refuse to begin where the library is missing."""
     try:
         importlib.import_module("pyreadstat")
     except ImportError as error:

@@ -19,55 +19,37 @@ from study_app.store.tables.columns import SEALED
 from study_app.store.tables.csv_files import csv_bytes
 from study_app.store.tables.formulas import COMPUTED
 
-
-def table_bytes(table: Delivered) -> bytes:
-    """Return a table as CSV, as `csv_bytes` writes it."""
-    plain = table.frame.astype(object).where(table.frame.notna(), None)
-    return csv_bytes(
-        table.columns, (dict(zip(header(table.columns), row, strict=True)) for row in plain.itertuples(index=False))
-    )
-
-
-def parquet_bytes(table: Delivered) -> bytes:
-    """Return a table as Parquet; every column with its description and unit, points of a scale as Int8."""
-    import pyarrow as pa  # type: ignore[import-untyped]  # noqa: PLC0415 - takes long to load
-    from pyarrow import parquet  # noqa: PLC0415
-
-    types = {"integer": pa.int64(), "number": pa.float64(), "flag": pa.bool_()}
-    fields = [
-        pa.field(
-            one.name,
-            pa.int8() if one.kind == "integer" and (one.maximum or 128) < 128 else types.get(one.kind, pa.string()),
-            metadata={name: text for name in ("description", "unit") if (text := getattr(one, name))},
-        )
-        for one in table.columns
-    ]
-    target = io.BytesIO()
-    frame = pa.Table.from_pandas(table.frame, schema=pa.schema(fields), preserve_index=False, safe=True)
-    parquet.write_table(frame, target, compression="zstd")
-    return target.getvalue()
-
-
 CREDITS: Final = {"authors": "author", "license": "license", "citation": "citation", "funder": "funder", "url": "url"}
 """Keys of ``[study.credits]``, and the properties of schema.org that say the same."""
 
+Extra: TypeAlias = Literal["wide", "parquet", "sav", "psych-ds"]
+OPENED: Final = ("tracks", "thresholds", "settings", "exponents")
+"""Tables of levels that SPSS files are made of."""
 
-def stated_credits(study: Study) -> dict[str, Any]:
-    """Return what the study states, as properties of schema.org."""
-    stated = study.protocol.get("study", {}).get("credits") or {}
-    return {name: stated[key] for key, name in CREDITS.items() if stated.get(key)}
+NOTHING_ELSE: Final[frozenset[Extra]] = frozenset()
 
 
-def credit_lines(study: Study) -> tuple[str, str, str]:
-    """Return authors, licence and citation in a line each, which says so where the study does not state it."""
-    stated = stated_credits(study)
-    lines = (
-        f"Authors: {', '.join(stated.get('author', [])) or 'not stated'}.",
-        f"Licence: {stated.get('license', 'not stated; ask the authors before you use the data')}.",
-        f"How to cite: {stated.get('citation', 'not stated; name the study, its version and its authors')}.",
-    )
-    authors, licence, citation = (" ".join(line.split()) for line in lines)
-    return authors, licence, citation
+def table_files(
+    study: Study,
+    tables: Sequence[Delivered],
+    extras: Collection[Extra] = NOTHING_ELSE,
+    cells: Mapping[str, Cells | QuestionCells] = MappingProxyType({}),
+) -> dict[str, bytes]:
+    """Return tables of a study and their codebook, in the formats of ``extras``, too, by the names of their files.
+
+    With ``extras`` the wide table is the last of ``tables``, and ``cells`` says what its columns hold.
+    """
+    written = tables if "wide" in extras or not extras else tables[:-1]
+    files = {file_name(study, table, "csv"): table_bytes(table) for table in written}
+    columns = {file_name(study, table, "csv"): table.columns for table in written}
+    files["codebook.json"] = codebook_bytes(study, columns)
+    if "parquet" in extras:
+        files |= {file_name(study, table, "parquet"): parquet_bytes(table) for table in written}
+    if "sav" in extras:
+        files[file_name(study, tables[0], "sav")] = spss.long_sav(study, tables[0])
+        files[file_name(study, tables[-1], "sav")] = spss.wide_sav(study, tables[-1], cells)
+        files |= {file_name(study, one, "sav"): spss.plain_sav(study, one) for one in tables if one.name in OPENED}
+    return files
 
 
 def codebook_bytes(study: Study, files: Mapping[str, Iterable[Column]]) -> bytes:
@@ -77,26 +59,9 @@ def codebook_bytes(study: Study, files: Mapping[str, Iterable[Column]]) -> bytes
     return f"{text}\n".encode("utf-8", "backslashreplace")
 
 
-def head(study: Study) -> dict[str, Any]:
-    """Return what study it is, its authors, licence and citation, and how many took part."""
-    return {
-        "name": study.name,
-        "title": study.title,
-        "version": study.version,
-        **stated_credits(study),
-        "participants": study.n,
-        **({"sites": list(study.sites)} if study.sites else {}),
-        "sessions": len(study.participants),
-        "sessions_left_out": study.left_out,
-        "sessions_excluded": len(study.excluded_sessions),
-        "simulated": study.simulated,
-        "pilot": study.pilot,
-    }
-
-
 def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
     return {
-        "study": head(study),
+        "study": study_head(study),
         "program": f"liquid-study {__version__}",
         "format": "CSV: UTF-8, comma, decimal point, RFC 4180 quoting; a text that begins with "
         f"{COMPUTED} has an apostrophe before it",
@@ -130,7 +95,7 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
             }
             for block in study.blocks
         ],
-        **({"levels": [_levels(block) for block in study.levels]} if study.levels else {}),
+        **({"levels": [_levels_entry(block) for block in study.levels]} if study.levels else {}),
         **({"questions": _questions(study)} if study.others.questions else {}),
         **({"scores": _scores(study)} if study.others.scores else {}),
         "measures": {
@@ -144,20 +109,43 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _levels(block: LevelBlock) -> dict[str, Any]:
-    """Return how a block of levels is built and, once the key is open, what it varies."""
-    stimulus = block.stimulus
+def study_head(study: Study) -> dict[str, Any]:
+    """Return what study it is, its authors, licence and citation, and how many took part."""
     return {
-        "block": block.id,
-        "title": block.title,
-        "phase": block.phase,
-        "design": block.design.kind,
-        "item": block.design.name,
-        **(
-            {}
-            if stimulus is None
-            else {"vary": stimulus.vary, "level": stimulus.level_kind, "direction": stimulus.direction}
-        ),
+        "name": study.name,
+        "title": study.title,
+        "version": study.version,
+        **stated_credits(study),
+        "participants": study.n,
+        **({"sites": list(study.sites)} if study.sites else {}),
+        "sessions": len(study.participants),
+        "sessions_left_out": study.left_out,
+        "sessions_excluded": len(study.excluded_sessions),
+        "simulated": study.simulated,
+        "pilot": study.pilot,
+    }
+
+
+def stated_credits(study: Study) -> dict[str, Any]:
+    """Return what the study states, as properties of schema.org."""
+    stated = study.protocol.get("study", {}).get("credits") or {}
+    return {name: stated[key] for key, name in CREDITS.items() if stated.get(key)}
+
+
+def _presentations(study: Study, block: Block) -> dict[str, Any]:
+    """Return how many answers a participant gave to a statement on one setting, and in which sessions."""
+    answers = study.answers(block)
+    given = answers[answers["response"].notna()]
+    given = given.assign(column=given["code"].map(block.columns))
+    counts = given.groupby(["participant", "column", "item"]).size()
+    return {
+        "answers_per_participant_setting_and_item": [int(counts.min()), int(counts.max())] if len(counts) else [0, 0],
+        "sessions": sorted({int(number) for number in given["session"]}),
+        "replicates": [
+            codes
+            for place in sorted(set(block.columns.values()))
+            if len(codes := [code for code, column in block.columns.items() if column == place]) > 1
+        ],
     }
 
 
@@ -191,20 +179,20 @@ def _scores(study: Study) -> list[dict[str, Any]]:
     ]
 
 
-def _presentations(study: Study, block: Block) -> dict[str, Any]:
-    """Return how many answers a participant gave to a statement on one setting, and in which sessions."""
-    answers = study.answers(block)
-    given = answers[answers["response"].notna()]
-    given = given.assign(column=given["code"].map(block.columns))
-    counts = given.groupby(["participant", "column", "item"]).size()
+def _levels_entry(block: LevelBlock) -> dict[str, Any]:
+    """Return how a block of levels is built and, once the key is open, what it varies."""
+    stimulus = block.stimulus
     return {
-        "answers_per_participant_setting_and_item": [int(counts.min()), int(counts.max())] if len(counts) else [0, 0],
-        "sessions": sorted({int(number) for number in given["session"]}),
-        "replicates": [
-            codes
-            for place in sorted(set(block.columns.values()))
-            if len(codes := [code for code, column in block.columns.items() if column == place]) > 1
-        ],
+        "block": block.id,
+        "title": block.title,
+        "phase": block.phase,
+        "design": block.design.kind,
+        "item": block.design.name,
+        **(
+            {}
+            if stimulus is None
+            else {"vary": stimulus.vary, "level": stimulus.level_kind, "direction": stimulus.direction}
+        ),
     }
 
 
@@ -222,35 +210,46 @@ def _described(column: Column) -> dict[str, Any]:
     return described
 
 
-Extra: TypeAlias = Literal["wide", "parquet", "sav", "psych-ds"]
-OPENED: Final = ("tracks", "thresholds", "settings", "exponents")
-"""Tables of levels that SPSS files are made of."""
-NOTHING_ELSE: Final[frozenset[Extra]] = frozenset()
-
-
-def table_files(
-    study: Study,
-    tables: Sequence[Delivered],
-    extras: Collection[Extra] = NOTHING_ELSE,
-    cells: Mapping[str, Cells | QuestionCells] = MappingProxyType({}),
-) -> dict[str, bytes]:
-    """Return tables of a study and their codebook, in the formats of ``extras``, too, by the names of their files.
-
-    With ``extras`` the wide table is the last of ``tables``, and ``cells`` says what its columns hold.
-    """
-    written = tables if "wide" in extras or not extras else tables[:-1]
-    files = {file_name(study, table, "csv"): table_bytes(table) for table in written}
-    columns = {file_name(study, table, "csv"): table.columns for table in written}
-    files["codebook.json"] = codebook_bytes(study, columns)
-    if "parquet" in extras:
-        files |= {file_name(study, table, "parquet"): parquet_bytes(table) for table in written}
-    if "sav" in extras:
-        files[file_name(study, tables[0], "sav")] = spss.long_sav(study, tables[0])
-        files[file_name(study, tables[-1], "sav")] = spss.wide_sav(study, tables[-1], cells)
-        files |= {file_name(study, one, "sav"): spss.plain_sav(study, one) for one in tables if one.name in OPENED}
-    return files
-
-
 def file_name(study: Study, table: Delivered, ending: str) -> str:
     """Return the name of a table's file."""
     return f"study-{study.name}_description-{table.name}_data.{ending}"
+
+
+def table_bytes(table: Delivered) -> bytes:
+    """Return a table as CSV, as `csv_bytes` writes it."""
+    plain = table.frame.astype(object).where(table.frame.notna(), None)
+    return csv_bytes(
+        table.columns, (dict(zip(header(table.columns), row, strict=True)) for row in plain.itertuples(index=False))
+    )
+
+
+def parquet_bytes(table: Delivered) -> bytes:
+    """Return a table as Parquet; every column with its description and unit, points of a scale as Int8."""
+    import pyarrow as pa  # type: ignore[import-untyped]  # noqa: PLC0415 - takes long to load
+    from pyarrow import parquet  # noqa: PLC0415
+
+    types = {"integer": pa.int64(), "number": pa.float64(), "flag": pa.bool_()}
+    fields = [
+        pa.field(
+            one.name,
+            pa.int8() if one.kind == "integer" and (one.maximum or 128) < 128 else types.get(one.kind, pa.string()),
+            metadata={name: text for name in ("description", "unit") if (text := getattr(one, name))},
+        )
+        for one in table.columns
+    ]
+    target = io.BytesIO()
+    frame = pa.Table.from_pandas(table.frame, schema=pa.schema(fields), preserve_index=False, safe=True)
+    parquet.write_table(frame, target, compression="zstd")
+    return target.getvalue()
+
+
+def credit_lines(study: Study) -> tuple[str, str, str]:
+    """Return authors, licence and citation in a line each, which says so where the study does not state it."""
+    stated = stated_credits(study)
+    lines = (
+        f"Authors: {', '.join(stated.get('author', [])) or 'not stated'}.",
+        f"Licence: {stated.get('license', 'not stated; ask the authors before you use the data')}.",
+        f"How to cite: {stated.get('citation', 'not stated; name the study, its version and its authors')}.",
+    )
+    authors, licence, citation = (" ".join(line.split()) for line in lines)
+    return authors, licence, citation

@@ -309,7 +309,7 @@ def draw_agreement(
             _row_labels(sheet, wrapped, top, plot_pt)
         else:
             sheet.line((x, x), (top - 14, top + plot_pt + 10), color=style.BORDER, linewidth=0.5)
-        _panel(sheet, panel, widths, x + (panel_pt - widths.total) / 2, top, plot_pt)
+        _agreement_panel(sheet, panel, widths, x + (panel_pt - widths.total) / 2, top, plot_pt)
     return sheet
 
 
@@ -378,7 +378,7 @@ def _row_labels(sheet: Sheet, wrapped: Sequence[Sequence[str]], top: float, plot
     sheet.text(MARGIN_PT, top + plot_pt + 10, "counts of answers", size=6.5, colour=style.TEXT_SOFT)
 
 
-def _panel(sheet: Sheet, panel: Panel, widths: _Widths, x: float, top: float, plot_pt: float) -> None:
+def _agreement_panel(sheet: Sheet, panel: Panel, widths: _Widths, x: float, top: float, plot_pt: float) -> None:
     """Draw one panel; the axes' unit is one answer."""
     zero = x + widths.left
     base = zero + widths.right + NEUTRAL_GAP_PT
@@ -510,13 +510,7 @@ def delays(
 
 
 def render(study: Study, block: Block, form: str, lowest: Mapping[str, float] = MappingProxyType({})) -> bytes:
-    """Return the figure of a block as a file of ``form`` (png, svg or pdf); ``lowest`` as in :func:`delays`.
-
-    Raises
-    ------
-    AnalysisError
-        No session was completed.
-    """
+    """Return the figure of a block as a file of ``form`` (png, svg or pdf); ``lowest`` as in :func:`delays`."""
     fonts = style.fonts_for(form)
     drawn = (
         delays(study, block, fonts=fonts, lowest=lowest)

@@ -111,7 +111,7 @@ UNITLESS: Final = "weber"
 def level_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
     """Draw the answers over levels of a block."""
     bands = _bands(study, found)
-    files = files_of(partial(_draw, study, found, bands), forms, f"{study.name}: {found.title}")
+    files = files_of(partial(_draw_levels, study, found, bands), forms, f"{study.name}: {found.title}")
     own = len(found.people) - MOST_PEOPLE
     left_out = f" {counted(own, 'more participant')} in the table alone." if own > 0 else ""
     caption = (
@@ -176,7 +176,7 @@ def _chance(found: LevelsFound) -> str:
 
 
 @style.own_settings()
-def _draw(study: Study, found: LevelsFound, bands: Mapping[str, Array], fonts: Sequence[str]) -> Sheet:
+def _draw_levels(study: Study, found: LevelsFound, bands: Mapping[str, Array], fonts: Sequence[str]) -> Sheet:
     people = found.people[:MOST_PEOPLE]
     words = summary_words(found)
     above = words[:1].upper() + words[1:]
@@ -185,7 +185,7 @@ def _draw(study: Study, found: LevelsFound, bands: Mapping[str, Array], fonts: S
 
     def draw(axes: Axes, place: int, first: bool) -> None:
         person = people[place - 1] if place else None
-        _panel(axes, found, person, first=first)
+        _levels_panel(axes, found, person, first=first)
         if person is not None and person in bands:
             u, lower, upper = bands[person]
             axes.fill_between(u, lower, upper, color=style.BAND, linewidth=0, zorder=1)
@@ -210,9 +210,9 @@ def _standards(found: LevelsFound) -> list[float]:
     return sorted({one.standard for one in found.answers if one.standard is not None})
 
 
-def _panel(axes: Axes, found: LevelsFound, person: str | None, *, first: bool) -> None:
+def _levels_panel(axes: Axes, found: LevelsFound, person: str | None, *, first: bool) -> None:
     places = _places(found)
-    _frame(axes, found, places, first=first)
+    _levels_frame(axes, found, places, first=first)
     groups: Sequence[float | None] = _standards(found) or [None]
     for number, (standard, colour) in enumerate(zip(groups, COLOURS, strict=False)):
         for one in found.own_thresholds:
@@ -220,7 +220,7 @@ def _panel(axes: Axes, found: LevelsFound, person: str | None, *, first: bool) -
                 grey = person is None and len(groups) == 1
                 _curve(axes, found, one, style.PARTICIPANT if grey else colour)
                 if person is not None:
-                    _interval(axes, found, one, colour, number)
+                    _threshold_interval(axes, found, one, colour, number)
         if person is None and found.adaptive:
             continue
         span = 0.0 if found.own_thresholds else max(places.values()) - min(places.values())
@@ -230,7 +230,7 @@ def _panel(axes: Axes, found: LevelsFound, person: str | None, *, first: bool) -
             for somebody in found.people:
                 _line(axes, shown, somebody, places, found)
         shifted = {level: place + aside for level, place in places.items()}
-        _points(axes, [one for one in shown if one.participant == person], shifted, found, colour)
+        _answer_points(axes, [one for one in shown if one.participant == person], shifted, found, colour)
         caught = [one for one in found.answers if one.standard == standard and one.catch and one.participant == person]
         heights = [_height(found, one.value) for one in caught]
         axes.plot([shifted[_where(one)] for one in caught], heights, "x", color=colour, markersize=4, zorder=4)
@@ -257,7 +257,7 @@ def _curve(axes: Axes, found: LevelsFound, one: ThresholdFound, colour: str) -> 
     axes.plot(u, psi, color=colour, linewidth=0.9, zorder=2)
 
 
-def _interval(axes: Axes, found: LevelsFound, one: ThresholdFound, colour: str, number: int) -> None:
+def _threshold_interval(axes: Axes, found: LevelsFound, one: ThresholdFound, colour: str, number: int) -> None:
     """Draw the interval of a threshold at the height of the function there, each standard's below the one before."""
     if one.low is None or one.high is None:
         return
@@ -271,7 +271,7 @@ def _coordinate(found: LevelsFound, level: float) -> float:
     return math.log10(level) if found.spacing == "log" else level
 
 
-def _points(
+def _answer_points(
     axes: Axes, points: Sequence[LevelAnswers], places: Mapping[Any, float], found: LevelsFound, colour: str
 ) -> None:
     xs, ys = [places[_where(one)] for one in points], [_height(found, one.value) for one in points]
@@ -306,7 +306,7 @@ def _places(found: LevelsFound) -> dict[Any, float]:
     return {level: logs.get(level, min(logs.values(), default=0.0) - step) for level in levels}  # 0: left of the least
 
 
-def _frame(axes: Axes, found: LevelsFound, places: Mapping[Any, float], *, first: bool) -> None:
+def _levels_frame(axes: Axes, found: LevelsFound, places: Mapping[Any, float], *, first: bool) -> None:
     """Draw the axes: levels below, shares, points or numbers at the left."""
     axes.set_xlim(*_limits(found, places))
     shown = _shown_levels(found, places)

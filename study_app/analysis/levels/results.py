@@ -1,9 +1,10 @@
 """What is found in a block of levels, and of other questions, as frozen values."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, TypeAlias
+from typing import Any, Literal, TypeAlias
 
+from study_app.analysis.data.blocks import OwnDynamics, PublishedValue, compared_percent
 from study_app.analysis.statistics.thresholds import WORST, drifts
 
 
@@ -77,44 +78,6 @@ class LevelAnswers:
     low: float | None
     high: float | None
     catch: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class PublishedValue:
-    """A value of another study that the protocol names: see `protocol.analysis_plan.Published`."""
-
-    measure: str
-    value: float
-    standard: float | None
-    low: float | None
-    high: float | None
-    percent: float | None
-    n: int | None
-    source: str
-
-    def in_words(self) -> str:
-        """Return it with what is known of it."""
-        known = [
-            *([] if self.standard is None else [f"standard {self.standard:g}"]),
-            *([] if self.low is None or self.high is None else [f"{self.low:g} to {self.high:g}"]),
-            *([] if self.percent is None else [f"at {self.percent:g} % correct"]),
-            *([] if self.n is None else [f"n = {self.n}"]),
-        ]
-        source = f"{self.source}: " if self.source else ""
-        return f"{source}{self.measure} {self.value:g}" + (f" ({', '.join(known)})" if known else "")
-
-
-class _Published(Protocol):
-    @property
-    def measure(self) -> str: ...
-    @property
-    def percent(self) -> float | None: ...
-
-
-def compared_percent(published: Iterable[_Published]) -> float | None:
-    """Return the percentage of successes at which published thresholds were measured; None: unknown, or several."""
-    percents = {one.percent for one in published if one.measure in {"weber", "threshold"}}
-    return percents.pop() if len(percents) == 1 else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,20 +228,6 @@ class LevelConduct:
     error_largest: float | None
     pace_mps: float | None
     apparent_mass_kg: float | None
-
-
-@dataclass(frozen=True, slots=True)
-class OwnDynamics:
-    """The device's own damping [N·s/m], friction [N] and mass [kg], as ``devices bench`` measured them.
-
-    Means over axes, and over those ``sessions`` of all ``of`` whose receipts record them.
-    """
-
-    damping_nspm: float
-    friction_n: float
-    mass_kg: float
-    sessions: int
-    of: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,10 +19,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from study_app.analysis.data.blocks import LevelBlock
+from study_app.analysis.data.blocks import LevelBlock, compared_percent
 from study_app.analysis.data.measures import number_or_none
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.levels.results import ExponentFound, LevelsFound, ThresholdFound, compared_percent
+from study_app.analysis.levels.results import ExponentFound, LevelsFound, ThresholdFound
 from study_app.analysis.results import SiteThresholds
 from study_app.analysis.statistics.outcome import Array, student_interval
 from study_app.analysis.statistics.rank_tests import groups_differ

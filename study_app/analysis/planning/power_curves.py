@@ -115,8 +115,8 @@ def _curves(block: Planned, counts: Counts, studies: int) -> Iterator[Curve]:
                 float(effects[FULL]),
                 tuple(_detectable(found[at, :, place], effects) for at in range(len(found))) if known else None,
             )
-    yield from _lowest(block, counts, studies)
-    yield from _equivalent(block, counts, studies)
+    yield from _lowest_curves(block, counts, studies)
+    yield from _equivalence_curves(block, counts, studies)
 
 
 def _shares(shares: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -143,7 +143,7 @@ def _detectable(found: Array, effects: Array) -> float | None:
     return float(effects[at - 1] + part * (effects[at] - effects[at - 1]))
 
 
-def _lowest(block: Planned, counts: Counts, studies: int) -> Iterator[Curve]:
+def _lowest_curves(block: Planned, counts: Counts, studies: int) -> Iterator[Curve]:
     if (block.id, "lowest") not in counts:
         return
     shares = counts[block.id, "lowest"] / studies
@@ -154,7 +154,7 @@ def _lowest(block: Planned, counts: Counts, studies: int) -> Iterator[Curve]:
                 yield Curve(block.id, "lowest delay", item.id, "", block.names[delay], power, None, None, None)
 
 
-def _equivalent(block: Planned, counts: Counts, studies: int) -> Iterator[Curve]:
+def _equivalence_curves(block: Planned, counts: Counts, studies: int) -> Iterator[Curve]:
     if (block.id, "equivalent") not in counts:
         return
     shares = counts[block.id, "equivalent"] / studies
@@ -206,10 +206,10 @@ _HEADS: Final[dict[Question, tuple[str, str]]] = {
 
 def power_csv(found: Powers) -> bytes:
     """Return a row for every test and size."""
-    return csv_bytes(COLUMNS, _rows(found))
+    return csv_bytes(COLUMNS, _csv_rows(found))
 
 
-def _rows(found: Powers) -> Iterator[dict[str, Any]]:
+def _csv_rows(found: Powers) -> Iterator[dict[str, Any]]:
     for curve in found.curves:
         for place, size in enumerate(found.sizes):
             low, high = interval(curve.power[place], found.studies)
@@ -246,10 +246,10 @@ def power_markdown(found: Powers) -> str:
             if curves:
                 lines += ["", f"## {block.title}: {head[:1].lower()}{head[1:]}", "", *_explained(question, found), ""]
                 shown = [*curves, *_truly_equal(curves)] if question == "equivalence" else curves
-                lines += _table(shown, found, first, lambda curve, at: f"{curve.power[at]:.0%}", needed=True)
+                lines += _markdown_table(shown, found, first, lambda curve, at: f"{curve.power[at]:.0%}", needed=True)
             if any(one.detectable for one in curves):
                 lines += ["", "The smallest difference of mean answers that 80 % of studies show, in points:", ""]
-                lines += _table([one for one in curves if one.detectable], found, first, _detectable_cell)
+                lines += _markdown_table([one for one in curves if one.detectable], found, first, _detectable_cell)
     return "\n".join(lines) + "\n"
 
 
@@ -313,7 +313,7 @@ def _explained(question: Question, found: Powers) -> list[str]:
             ]
 
 
-def _table(
+def _markdown_table(
     curves: list[Curve], found: Powers, first: str, cell: Callable[[Curve, int], str], *, needed: bool = False
 ) -> list[str]:
     """Return a table of a row a curve and a column a size; ``needed`` adds from which size on the power is 80 %."""
@@ -375,7 +375,7 @@ class _Row:
 
 
 @style.own_settings()
-def draw(found: Powers, block: Planned, fonts: Sequence[str]) -> Sheet:
+def draw_power(found: Powers, block: Planned, fonts: Sequence[str]) -> Sheet:
     """Draw the power of one block."""
     ruler = Sheet(style.PAGE_WIDTH_PT, 72, fonts)
     rows = _figure_rows(found, block)
@@ -430,7 +430,7 @@ def _draw_row(
         for number, line in enumerate(titles[place]):
             sheet.text(x, top + 6 + number * LINE_PT, line, size=7.5, weight="bold")
         axes = sheet.axes(x, top + title_pt + 2, width, POWER_PT)
-        _power(sheet, axes, found, curves, numbers=place == 0)
+        _power_plot(sheet, axes, found, curves, numbers=place == 0)
         if row.points and curves[0].detectable:
             below = sheet.axes(x, top + title_pt + 2 + POWER_PT + BETWEEN_PT, width, POINTS_PT)
             _draw_points(sheet, below, found, curves[0], 1.18 * highest)
@@ -439,7 +439,7 @@ def _draw_row(
             _sizes(sheet, axes, found, width)
 
 
-def _power(sheet: Sheet, axes: Axes, found: Powers, curves: Sequence[Curve], *, numbers: bool) -> None:
+def _power_plot(sheet: Sheet, axes: Axes, found: Powers, curves: Sequence[Curve], *, numbers: bool) -> None:
     sizes = np.array(found.sizes, dtype=float)
     axes.set_ylim(-2, 104)
     for share in (0, 50, 100):
@@ -448,7 +448,7 @@ def _power(sheet: Sheet, axes: Axes, found: Powers, curves: Sequence[Curve], *, 
     if numbers:
         axes.set_yticks((0, 50, 80, 100), ("0", "50", "80", "100 %"), fontproperties=sheet.font(6.5))
     if curves[0].setting is not None:
-        _delays(sheet, axes, sizes, curves)
+        _delays_plot(sheet, axes, sizes, curves)
         return
     (curve,) = curves
     power = np.array(curve.power)
@@ -461,7 +461,7 @@ def _power(sheet: Sheet, axes: Axes, found: Powers, curves: Sequence[Curve], *, 
         )
 
 
-def _delays(sheet: Sheet, axes: Axes, sizes: Array, curves: Sequence[Curve]) -> None:
+def _delays_plot(sheet: Sheet, axes: Axes, sizes: Array, curves: Sequence[Curve]) -> None:
     """Draw a line a delay, named at its right end, names kept apart."""
     light, dark = (np.array([int(shade[at : at + 2], 16) for at in (1, 3, 5)]) / 255 for shade in SHADES)
     ends = [100 * curve.power[-1] for curve in curves]
@@ -544,7 +544,7 @@ def _foot(found: Powers, rows: Sequence[_Row]) -> str:
     return f"{words}Equivalent: within ±{bound:g} points. Answers of a model, not of people." if bound else words
 
 
-def write(found: Powers, to: Path) -> tuple[Path, ...]:
+def write_power(found: Powers, to: Path) -> tuple[Path, ...]:
     """Write tables (CSV, Markdown) and a figure a block (PNG, SVG, PDF) into ``to``; return the files.
 
     Raises
@@ -556,6 +556,6 @@ def write(found: Powers, to: Path) -> tuple[Path, ...]:
     for block in found.plan.blocks:
         title = f"{found.plan.name}: power of {block.title}"
         for form in style.FORMATS:
-            drawn = draw(found, block, style.fonts_for(form)).figure
+            drawn = draw_power(found, block, style.fonts_for(form)).figure
             files[f"power-{block.id}.{form}"] = style.file_bytes(drawn, form, title)
     return write_files(Path(to), files)

@@ -75,14 +75,8 @@ def written(one: Commitment) -> str:
     return f"```json\n{json.dumps(asdict(one), indent=1)}\n```\n"
 
 
-def read(folder: Path) -> Commitment | None:
-    """Return what the preregistration in a study's folder commits to; None: there is none.
-
-    Raises
-    ------
-    AnalysisError
-        It cannot be read.
-    """
+def read_commitment(folder: Path) -> Commitment | None:
+    """Return what the preregistration in a study's folder commits to; None: there is none."""
     path = folder / FILE
     try:
         found = _BLOCK.findall(path.read_text(encoding="utf-8"))
@@ -366,14 +360,8 @@ class Deviations:
 
 
 def deviations(study: Study) -> Deviations | None:
-    """Return where a study left what was planned; None: nothing was preregistered, nor a number of people planned.
-
-    Raises
-    ------
-    AnalysisError
-        The preregistration cannot be read.
-    """
-    sites = {prefix.removesuffix(DASH): read(place) for prefix, place in folders_of(study.folder).items()}
+    """Return where a study left what was planned; None: nothing was preregistered, nor a number of people planned."""
+    sites = {prefix.removesuffix(DASH): read_commitment(place) for prefix, place in folders_of(study.folder).items()}
     committed = next(filter(None, sites.values()), None)
     planned = (study.protocol.get("analysis") or {}).get("participants")
     if committed is None:

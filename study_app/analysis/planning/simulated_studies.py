@@ -17,8 +17,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.analysis.data import blocks as decided
-from study_app.analysis.data.blocks import Decided, Item, Kind, spoken
+from study_app.analysis.data.blocks import Decided, Item, Kind, read_decided, spoken
 from study_app.analysis.data.measures import Array
 from study_app.analysis.statistics.equivalence import equivalent as shows_equivalence
 from study_app.analysis.statistics.equivalence import sizes
@@ -96,7 +95,7 @@ def plan(protocol: Protocol, felt: ConditionFeatures) -> Plan:
         text_in(protocol.study.title, language),
         protocol.study.version,
         tuple(_planned(protocol, block, felt, language) for block in asked),
-        decided.read([table]),
+        read_decided([table]),
     )
 
 

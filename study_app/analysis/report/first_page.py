@@ -25,16 +25,22 @@ STUDIES: Final = 2000
 CLAIMS: Final[dict[int, int]] = {5: 11, 12: 33, 24: 36}
 """Participants → in how many of so many empty studies the page claims something."""
 
+SHOWN: Final = 6
+"""So many limits are listed; the others are folded."""
 
-def empty_studies(participants: int) -> str:
-    """Return in how many of a hundred empty studies the page would say something; ``participants`` take part."""
-    n = min(CLAIMS, key=lambda size: abs(size - participants))
-    share, low, high = (100 * one for one in (CLAIMS[n] / STUDIES, *interval(CLAIMS[n] / STUDIES, STUDIES)))
-    return (
-        "In how many of a hundred empty studies would this page say something? Of simulated studies of three liquids "
-        f"and seven delays in which nothing differs, with {n} participants, it claims a difference or a noticed delay "
-        f"in {share:.1f} of a hundred ({CLAIMS[n]} of {STUDIES} studies, 95 % interval {low:.1f} to {high:.1f}; "
-        "liquid-study validate-report)."
+
+def first_page(results: Results, limits: Sequence[str], failures: Failures) -> Markup:
+    """Return the first page as HTML; a picture that fails is left out, and kept in ``failures``."""
+    found = {one.id: one for one in results.blocks}
+    found_answers = answers(results)
+    return render(
+        "first_page.html",
+        answers=[_shown(one, found[one.block], results, failures) for one in found_answers],
+        several=len({one.block for one in found_answers}) > 1,
+        without_findings=of_levels(results) or (none_found(results),),
+        limits=list(limits),
+        shown=SHOWN,
+        empty=empty_studies(max((one.n for one in results.blocks), default=0)) if found_answers else "",
     )
 
 
@@ -78,25 +84,6 @@ def questions(kind: Kind) -> tuple[type[Finding[Any]], ...]:
     return tuple(one for one in all_findings() if one.question and kind in one.kinds)
 
 
-SHOWN: Final = 6
-"""So many limits are listed; the others are folded."""
-
-
-def first_page(results: Results, limits: Sequence[str], failures: Failures) -> Markup:
-    """Return the first page as HTML; a picture that fails is left out, and kept in ``failures``."""
-    found = {one.id: one for one in results.blocks}
-    found_answers = answers(results)
-    return render(
-        "first_page.html",
-        answers=[_shown(one, found[one.block], results, failures) for one in found_answers],
-        several=len({one.block for one in found_answers}) > 1,
-        without_findings=of_levels(results) or (none_found(results),),
-        limits=list(limits),
-        shown=SHOWN,
-        empty=empty_studies(max((one.n for one in results.blocks), default=0)) if found_answers else "",
-    )
-
-
 def _shown(answer: Answer, found: BlockFound, results: Results, failures: Failures) -> dict[str, Any]:
     finding = next(one for one in questions(found.kind) if one.key == answer.question)(found, results)
     drawn = failures.attempt(
@@ -119,3 +106,15 @@ def _shown(answer: Answer, found: BlockFound, results: Results, failures: Failur
 def _kept_together(words: str) -> str:
     """Return a text in which no line ends between a number and its unit."""
     return words.replace(" ms", "\u00a0ms").replace(" %", "\u00a0%").replace(" points", "\u00a0points")
+
+
+def empty_studies(participants: int) -> str:
+    """Return in how many of a hundred empty studies the page would say something; ``participants`` take part."""
+    n = min(CLAIMS, key=lambda size: abs(size - participants))
+    share, low, high = (100 * one for one in (CLAIMS[n] / STUDIES, *interval(CLAIMS[n] / STUDIES, STUDIES)))
+    return (
+        "In how many of a hundred empty studies would this page say something? Of simulated studies of three liquids "
+        f"and seven delays in which nothing differs, with {n} participants, it claims a difference or a noticed delay "
+        f"in {share:.1f} of a hundred ({CLAIMS[n]} of {STUDIES} studies, 95 % interval {low:.1f} to {high:.1f}; "
+        "liquid-study validate-report)."
+    )

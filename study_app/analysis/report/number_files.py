@@ -12,7 +12,7 @@ from typing import Any, Final
 from study_app import __version__
 from study_app.analysis.data.blocks import LevelBlock, Setting
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.export.table_files import credit_lines, head
+from study_app.analysis.export.table_files import credit_lines, study_head
 from study_app.analysis.findings import all_findings
 from study_app.analysis.levels.results import ExponentFound, LevelsFound, SensitivityFound, SettingFound, ThresholdFound
 from study_app.analysis.planning.preregistration import FILE as PREREGISTRATION
@@ -36,13 +36,7 @@ OF_FORMAT_2: Final = {
 
 
 def plain(value: Any) -> Any:
-    """Return a result as JSON's objects, arrays, texts, numbers, true, false and null.
-
-    Raises
-    ------
-    AnalysisError
-        A number is NaN or infinite, which no result may be.
-    """
+    """Return a result as JSON's objects, arrays, texts, numbers, true, false and null."""
     if isinstance(value, BlockFound):
         return {name: plain(entry) for name, entry in _entries(value)}
     if is_dataclass(value) and not isinstance(value, type):
@@ -126,10 +120,14 @@ def document(study: Study, results: Results, texts: Mapping[str, Any], failures:
     """Return everything as JSON; ``texts`` are the findings in words. A part that fails is null."""
     parts: dict[str, Callable[[], Any]] = {
         "versions": versions,
-        "study": lambda: {**head(study), "blinded": not study.revealed, "key_opened": list(reveals_of(study.folder))},
+        "study": lambda: {
+            **study_head(study),
+            "blinded": not study.revealed,
+            "key_opened": list(reveals_of(study.folder)),
+        },
         "sessions": lambda: sessions(study),
         "exclusions": lambda: [asdict(one) for one in study.exclusions],
-        "doubts": lambda: [{"file": _within(study, doubt.path), "what": doubt.what} for doubt in study.doubts],
+        "doubts": lambda: [{"file": _path_in_study(study, doubt.path), "what": doubt.what} for doubt in study.doubts],
         "files": lambda: files(study),
         **{what: partial(plain, text) for what, text in texts.items()},
         "results": lambda: plain(results),
@@ -170,10 +168,10 @@ def files(study: Study) -> dict[str, str]:
         for session in place.sessions():
             tables = [session.table(study.name, name) for name in ("responses", "trials")]
             found += [session.receipt, session.journal, session.checksums, *tables]
-    return {_within(study, path): sha256(path) for path in found if path.is_file()}
+    return {_path_in_study(study, path): sha256(path) for path in found if path.is_file()}
 
 
-def _within(study: Study, path: Any) -> str:
+def _path_in_study(study: Study, path: Any) -> str:
     return str(path.relative_to(study.folder).as_posix())
 
 
@@ -307,31 +305,31 @@ def _level_calls(block: LevelBlock, found: LevelsFound) -> Iterator[tuple[str, i
     """Yield each call and how many numbers it compares."""
     for one in found.sensitivities:
         if one.participant is not None and one.level is None and one.d_prime is not None:
-            yield _sensitivity(found, one, one.d_prime)
+            yield _sensitivity_call(found, one, one.d_prime)
     log = "TRUE" if found.spacing == "log" else "FALSE"
-    yield from _settings(block, found, log)
+    yield from _setting_calls(block, found, log)
     for mean in (one for one in found.thresholds if one.participant is None):
         own = [one for one in found.own_thresholds if one.standard == mean.standard]
         for each in own:
             if isinstance(block.method, UpDown) and block.stimulus is not None and each.reversal_mean is not None:
                 low, high = block.stimulus.levels
-                which = f"{r_text(found.block)}, {r_text(str(each.participant))}, {_number(each.standard)}"
+                which = f"{r_text(found.block)}, {r_text(str(each.participant))}, {_r_value(each.standard)}"
                 yield (
                     f"reversals({r_text(_what(found, each))}, at_standard(tracks, {which}), {r_number(low)}, "
                     f"{r_number(high)}, {block.method.average}, {log}, {r_number(each.reversal_mean)})",
                     1,
                 )
         yield _hartung_knapp(found, mean, own, log)
-    yield from _exponents(found)
+    yield from _exponent_calls(found)
 
 
-def _settings(block: LevelBlock, found: LevelsFound, log: str) -> Iterator[tuple[str, int]]:
+def _setting_calls(block: LevelBlock, found: LevelsFound, log: str) -> Iterator[tuple[str, int]]:
     """Yield the calls about levels that participants set: of each participant, and of all at a standard."""
     if block.stimulus is None:
         return
     middle = sum(block.stimulus.domain) / 2
     for one in found.settings:
-        ends = _ends(one)
+        ends = _r_ends(one)
         numbers = 1 if one.low is None else 3
         if one.participant is None:
             own = [each.pse for each in found.own_settings if each.standard == one.standard]
@@ -341,27 +339,27 @@ def _settings(block: LevelBlock, found: LevelsFound, log: str) -> Iterator[tuple
                 numbers,
             )
             continue
-        which = f"{r_text(found.block)}, {r_text(one.participant)}, {_number(one.standard)}"
+        which = f"{r_text(found.block)}, {r_text(one.participant)}, {_r_value(one.standard)}"
         others = (one.jnd, one.constant_error, one.hysteresis)
         yield (
             f"settings({r_text(_what(found, one))}, at_standard(judged, {which}), {log}, {r_number(middle)}, "
-            f"{r_number(one.pse)}, {ends}, {', '.join(map(_number, others))})",
+            f"{r_number(one.pse)}, {ends}, {', '.join(map(_r_value, others))})",
             numbers + sum(value is not None for value in others),
         )
 
 
-def _ends(one: ExponentFound | SettingFound | ThresholdFound) -> str:
+def _r_ends(one: ExponentFound | SettingFound | ThresholdFound) -> str:
     return "c()" if one.low is None or one.high is None else f"c({r_number(one.low)}, {r_number(one.high)})"
 
 
-def _sensitivity(found: LevelsFound, one: SensitivityFound, d_prime: float) -> tuple[str, int]:
-    rows, where = "at_standard", _number(one.standard)
+def _sensitivity_call(found: LevelsFound, one: SensitivityFound, d_prime: float) -> tuple[str, int]:
+    rows, where = "at_standard", _r_value(one.standard)
     if one.comparison is not None:
         rows, where = "of_condition", r_text(one.comparison)
     which = f"{rows}(judged, {r_text(found.block)}, {r_text(str(one.participant))}, {where})"
     return (
         f"sensitivity({r_text(_what(found, one))}, {which}, {r_text(found.design)}, {r_text(one.model or '')}, "
-        f"{r_number(d_prime)}, {_number(one.criterion)})",
+        f"{r_number(d_prime)}, {_r_value(one.criterion)})",
         1 if one.criterion is None else 2,
     )
 
@@ -371,7 +369,7 @@ def _hartung_knapp(
 ) -> tuple[str, int]:
     thresholds = ", ".join(r_number(one.threshold) for one in own)
     variances = ", ".join(r_number(one.variance or 0.0) for one in own)
-    ends = _ends(mean)
+    ends = _r_ends(mean)
     return (
         f"hartung_knapp({r_text(_what(found, mean))}, c({thresholds}), c({variances}), {log}, "
         f"{r_number(mean.threshold)}, {ends})",
@@ -379,7 +377,7 @@ def _hartung_knapp(
     )
 
 
-def _exponents(found: LevelsFound) -> Iterator[tuple[str, int]]:
+def _exponent_calls(found: LevelsFound) -> Iterator[tuple[str, int]]:
     """Yield the group's call, in which those of the participants are arguments."""
     group = next((one for one in found.exponents if one.participant is None), None)
     if group is None:
@@ -395,12 +393,12 @@ def _exponents(found: LevelsFound) -> Iterator[tuple[str, int]]:
             continue
         own = [each for each in found.own_thresholds if each.participant == one.participant]
         own = [each for each in own if (each.standard or 0.0) > 0 and each.threshold > 0]
-        standards = ", ".join(_number(each.standard) for each in own)
+        standards = ", ".join(_r_value(each.standard) for each in own)
         levels = ", ".join(r_number(each.threshold) for each in own)
         jnds = f"c({levels})" + (f" * c({standards})" if found.level_kind == "weber" else "")
         what = r_text(f"{found.block}, {one.participant}")
         slopes.append(f"  exponent({what}, c({standards}), {jnds}, {r_number(one.exponent)})")
-    ends = _ends(group)
+    ends = _r_ends(group)
     lines = ",\n".join(slopes)
     yield (
         f"exponents({r_text(f'{found.block}, group')}, {r_text(found.exponent_name)}, c(\n{lines}), "
@@ -416,7 +414,7 @@ def _what(found: LevelsFound, one: ThresholdFound | SensitivityFound | SettingFo
     return f"{found.block}, {one.participant or 'group'}{where}"
 
 
-def _number(value: float | None) -> str:
+def _r_value(value: float | None) -> str:
     return "NA" if value is None else r_number(value)
 
 
@@ -559,7 +557,7 @@ if (differing == 0) cat("every number that R computes is the report's\\n") else 
 def r_script(study: Study, results: Results) -> str:
     """Return the script."""
     table = f"study-{study.name}_description-responses_data.csv"
-    calls = [line for found in results.blocks if found.n for line in _calls(found, results)]
+    calls = [line for found in results.blocks if found.n for line in _block_calls(found, results)]
     of_levels, compared = level_lines(study, results.levels)
     start = START.format(table=table, exact=EXACT_UP_TO, numeric=TEXTS if study.protocol_format > 1 else NUMBERS)
     of_sites = list(_site_calls(results))
@@ -570,11 +568,11 @@ def r_script(study: Study, results: Results) -> str:
         + start
         + "\n".join([*calls, *of_levels, *of_sites])
         + "\n"
-        + END.format(numbers=_numbers(results) + compared)
+        + END.format(numbers=_count_of_numbers(results) + compared)
     )
 
 
-def _numbers(results: Results) -> int:
+def _count_of_numbers(results: Results) -> int:
     """Return how many statistics, p and ends of intervals the report's tests have."""
     return sum(row[name] is not None for row in tests(results) for name in ("statistic", "p", "low", "high"))
 
@@ -589,7 +587,7 @@ def _site_calls(results: Results) -> Iterator[str]:
             yield f"threshold_sites({r_text(what)}, {values}, {ends})"
 
 
-def _calls(found: BlockFound, results: Results) -> Iterator[str]:
+def _block_calls(found: BlockFound, results: Results) -> Iterator[str]:
     codes = r_vector([setting.code for setting in found.settings])
     if found.replicated_ms:
         by_delay = {setting.delay_ms: setting.code for setting in found.settings}

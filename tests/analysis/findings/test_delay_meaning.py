@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import pytest
 
-from study_app.analysis.data.blocks import NOTHING, Direction, Item, Setting
+from study_app.analysis.data.blocks import NOTHING_DECIDED, Direction, Item, Setting
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.findings.delay_answers import by_delay, meaning, tempting_ms
 from study_app.analysis.findings.delays import ContrastsWithControl, ContrastWithControl, Lowest, LowestDelay
@@ -53,7 +53,7 @@ def delays(
 
 
 def found(block: BlockFound) -> Found:
-    return Found(NOTHING, (), (block,), (), {}, None, 1)
+    return Found(NOTHING_DECIDED, (), (block,), (), {}, None, 1)
 
 
 def claim(block: BlockFound) -> str:

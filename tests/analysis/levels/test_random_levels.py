@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from study_app import figure_style
-from study_app.analysis.data.blocks import LevelBlock
+from study_app.analysis.data.blocks import LevelBlock, OwnDynamics, PublishedValue
 from study_app.analysis.figures.level_figures import level_pictures
 from study_app.analysis.levels.results import (
     CatchAnswers,
@@ -19,8 +19,6 @@ from study_app.analysis.levels.results import (
     LevelConduct,
     LevelsFound,
     LevelTimes,
-    OwnDynamics,
-    PublishedValue,
     SensitivityFound,
     SettingFound,
     ThresholdFound,

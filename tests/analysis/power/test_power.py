@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.planning.power_curves import Curve, Powers, interval, power_csv, power_markdown, powers, write
+from study_app.analysis.planning.power_curves import (
+    Curve,
+    Powers,
+    interval,
+    power_csv,
+    power_markdown,
+    powers,
+    write_power,
+)
 from study_app.analysis.planning.simulated_studies import BATCH, FULL, Counts, Plan, count, people, plan, sweep
 from study_app.analysis.statistics.trend import step_down
 from study_app.cli import commands
@@ -189,7 +197,7 @@ def test_a_study_of_two_liquids_without_decisions_can_be_study_plantoo(tmp_path:
     found = powers(study_plan, SIZES, studies, studies, 1, counts)
     assert not [one for one in found.curves if one.over == "all statements at once"]
     assert "knows nothing of smooth, warm" in power_markdown(found)
-    assert write(found, tmp_path / "power")
+    assert write_power(found, tmp_path / "power")
 
 
 def test_a_block_of_some_groups_counts_their_participants() -> None:

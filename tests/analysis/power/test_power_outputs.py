@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from study_app.analysis.planning.power_curves import powers, write
+from study_app.analysis.planning.power_curves import powers, write_power
 from study_app.analysis.planning.simulated_studies import count, plan
 from study_app.analysis.planning.threshold_studies import threshold_csv, threshold_markdown
 from study_app.protocol.load import load, parse
@@ -35,7 +35,7 @@ def test_power_of_small_plans(
     rng = np.random.default_rng(5)
     drawn = {what: one if what[1] == "means" else rng.integers(0, 4, one.shape) for what, one in counts.items()}
     for given, asked in ((counts, 3), (drawn, 40)):
-        for path in sorted(write(powers(planned, (3, 7), 3, asked, 1, given), tmp_path)):
+        for path in sorted(write_power(powers(planned, (3, 7), 3, asked, 1, given), tmp_path)):
             if path.suffix not in (".svg", ".pdf"):
                 content = path.read_bytes()
                 lines.append(f"##### {path.name}, {asked} asked")

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.planning.preregistration import FILE, commitment, preregistration, read
+from study_app.analysis.planning.preregistration import FILE, commitment, preregistration, read_commitment
 from study_app.cli import commands
 from study_app.protocol.load import load, protocol_hash, shipped, source_bytes
 from tests.protocol.trials.level_studies import FIVE_POINTS, study
@@ -40,9 +40,10 @@ def test_every_shipped_study_has_all_sections_and_its_hash(name: str, tmp_path: 
     assert len(questions) >= 1
     assert all(line.startswith("- ") for line in questions)
     (tmp_path / FILE).write_text(text, encoding="utf-8")
-    assert read(tmp_path) == commitment(load(name), digest)
-    assert read is not None
-    assert (read.study, read.protocol_hash) == (load(name).study.name, digest)
+    committed = read_commitment(tmp_path)
+    assert committed == commitment(load(name), digest)
+    assert committed is not None
+    assert (committed.study, committed.protocol_hash) == (load(name).study.name, digest)
 
 
 @pytest.mark.slow

@@ -11,9 +11,9 @@ import pytest
 from numpy.typing import NDArray
 
 from study_app.analysis.data import blocks
+from study_app.analysis.data.blocks import OwnDynamics
 from study_app.analysis.data.motion import Targets, path_length_m, performance, reaches
 from study_app.analysis.data.study_tables import load_study, pooled
-from study_app.analysis.levels.results import OwnDynamics
 from study_app.errors import AnalysisError
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
@@ -86,19 +86,19 @@ TABLE: dict[str, Any] = {
 
 
 def test_a_table_binds_and_its_absence_or_change_does_not() -> None:
-    one = blocks.read([TABLE, TABLE])
+    one = blocks.read_decided([TABLE, TABLE])
     assert (one.binding, one.alpha, one.equivalence_bound) == (True, 0.01, 0.5)
     assert [one.is_primary(item) for item in "ab"] == [True, False]
     assert [one.direction(item) for item in "abc"] == ["increasing", "decreasing", None]
-    assert blocks.read([{**TABLE, "primary": []}]).is_primary("b")
+    assert blocks.read_decided([{**TABLE, "primary": []}]).is_primary("b")
     for tables in ([None], [None, TABLE], [TABLE, None], [TABLE, {**TABLE, "alpha": 0.05}]):
-        assert not blocks.read(tables).binding
-        assert not blocks.read(tables).is_primary("a")
+        assert not blocks.read_decided(tables).binding
+        assert not blocks.read_decided(tables).is_primary("a")
 
 
 def test_a_receipt_that_does_not_say_it_is_refused() -> None:
     with pytest.raises(AnalysisError, match="a receipt does not say what was decided"):
-        blocks.read([{"alpha": 0.05}])
+        blocks.read_decided([{"alpha": 0.05}])
 
 
 @pytest.mark.slow
