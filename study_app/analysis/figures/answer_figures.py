@@ -25,7 +25,7 @@ from study_app.analysis.data.measures import COUNT_COLUMNS, NEUTRAL, QUARTILES, 
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures import delay_figures
 from study_app.analysis.figures.delay_figures import line_words
-from study_app.analysis.figures.page_layout import MARGIN_PT, Mark, Sheet
+from study_app.analysis.figures.page_layout import MARGIN_PT, Mark, Sheet, study_marks
 from study_app.errors import AnalysisError
 
 REASONS: Final = 5
@@ -471,7 +471,7 @@ def liquids(study: Study, block: Block | None = None, *, fonts: Sequence[str] | 
         [item.short for item in block.items],
         block.labels,
         title=title(block),
-        marks=marks(study),
+        marks=study_marks(study),
         counts=counts(study, block),
         fonts=fonts or style.screen_fonts(),
     ).figure
@@ -502,7 +502,7 @@ def delays(
         block.codes,
         block.delays_ms if block.revealed else None,
         title=title(block),
-        marks=marks(study),
+        marks=study_marks(study),
         counts=counts(study, block),
         foot=foot(block),
         fonts=fonts or style.screen_fonts(),
@@ -538,18 +538,6 @@ def _require_answers(study: Study, block: Block) -> None:
             f"{study.folder}: no completed session with answers in {block.id!r} yet ({states}): figures are drawn from "
             "completed sessions; export writes what there is"
         )
-
-
-def marks(study: Study) -> list[Mark]:
-    """Return what must not be overlooked in a figure of a study."""
-    found = []
-    if study.simulated:
-        found.append(Mark("SIMULATED participants", style.WARN, style.WARN_GROUND))
-    if study.pilot:
-        found.append(Mark("PILOT", style.WARN, style.WARN_GROUND))
-    if not study.revealed:
-        found.append(Mark("Blinded: by code", style.SEALED, style.SEALED_GROUND))
-    return found
 
 
 CELL_PT: Final = (52.0, 26.0)

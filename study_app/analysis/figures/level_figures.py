@@ -10,9 +10,15 @@ from matplotlib.axes import Axes
 
 from study_app import figure_style as style
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.figures import answer_figures
-from study_app.analysis.figures.page_layout import MARGIN_PT, Sheet
-from study_app.analysis.figures.picture import Picture, attempted, files_of, sample_words
+from study_app.analysis.figures.page_layout import (
+    MARGIN_PT,
+    Picture,
+    Sheet,
+    attempted,
+    files_of,
+    sample_words,
+    study_marks,
+)
 from study_app.analysis.levels.results import LevelAnswers, LevelsFound, SettingFound, ThresholdFound
 from study_app.analysis.levels.thresholds import Flags, TrackCourse, courses, psychometric_bands, tracks
 from study_app.analysis.results import Failures, counted
@@ -36,7 +42,7 @@ def sheet_of_panels(
     rows = math.ceil(panels / COLUMNS)
     height = HEAD_PT + rows * PANEL_PT + (rows - 1) * ROW_GAP_PT + foot_pt + 14
     sheet = Sheet(style.PAGE_WIDTH_PT, height, fonts)
-    sheet.heading(title, answer_figures.marks(study), (counted(study.n, "participant"),))
+    sheet.heading(title, study_marks(study), (counted(study.n, "participant"),))
     sheet.text(MARGIN_PT, 28, above, size=7, colour=style.TEXT_SOFT)
     return sheet
 
@@ -576,7 +582,7 @@ def weber_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: 
 @style.own_settings()
 def _draw_fractions(study: Study, found: LevelsFound, fonts: Sequence[str]) -> Sheet:
     sheet = Sheet(style.PAGE_WIDTH_PT / 2, HEIGHT_PT, fonts)
-    sheet.heading(found.title, answer_figures.marks(study), (counted(study.n, "participant"), f"n = {study.n}"))
+    sheet.heading(found.title, study_marks(study), (counted(study.n, "participant"), f"n = {study.n}"))
     sheet.text(MARGIN_PT, 28, f"Weber fraction{_at(found)}", size=7, colour=style.TEXT_SOFT)
     axes = sheet.axes(
         WEBER_LEFT_PT, TOP_PT, sheet.width_pt - WEBER_LEFT_PT - RIGHT_PT, sheet.height_pt - TOP_PT - WEBER_FOOT_PT

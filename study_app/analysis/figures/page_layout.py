@@ -1,7 +1,8 @@
-"""A figure laid out like a page: every place in points from the upper left corner, every text measured."""
+"""A figure laid out like a page, what it is drawn from, and its bytes in each form."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -14,6 +15,9 @@ from matplotlib.text import Text
 from matplotlib.transforms import Affine2D
 
 from study_app import figure_style as style
+from study_app.analysis.data.blocks import Block
+from study_app.analysis.data.study_tables import Study
+from study_app.analysis.results import BlockFound, Failure, Failures, Results, counted
 
 MARGIN_PT = 4.0
 
@@ -125,3 +129,71 @@ class Sheet:
         fitting = [words for words in counts if x + 10 + self.text_width(words, 7.5) <= right]
         words = fitting[0] if fitting else counts[-1]
         self.text(right, baseline, words, size=7.5, colour=style.TEXT_SOFT, ha="right")
+
+
+def study_marks(study: Study) -> list[Mark]:
+    """Return what must not be overlooked in a figure of a study."""
+    found = []
+    if study.simulated:
+        found.append(Mark("SIMULATED participants", style.WARN, style.WARN_GROUND))
+    if study.pilot:
+        found.append(Mark("PILOT", style.WARN, style.WARN_GROUND))
+    if not study.revealed:
+        found.append(Mark("Blinded: by code", style.SEALED, style.SEALED_GROUND))
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """One figure: the block it is of, its name as a file, its caption, and its bytes by form (png, svg, pdf)."""
+
+    block: str
+    name: str
+    caption: str
+    files: dict[str, bytes]
+
+
+def attempted(
+    pictures: Iterable[tuple[str, str, Callable[[str], Picture]]], failures: Failures | None
+) -> Iterator[Picture]:
+    """Yield figures from block, name and what draws it by that name; one that fails is kept in ``failures`` instead."""
+    held = Failures() if failures is None else failures
+    for block, name, draw in pictures:
+        drawn = held.attempt(f"figure {name}", partial(draw, name), block=block)
+        if not isinstance(drawn, Failure):
+            yield drawn
+
+
+def files_of(draw: Callable[[Sequence[str]], Sheet], forms: Sequence[str], title: str) -> dict[str, bytes]:
+    """Return the bytes of a figure in each of its forms; ``draw`` takes the fonts."""
+    return {form: style.file_bytes(draw(style.fonts_for(form)).figure, form, title) for form in forms}
+
+
+def sample_words(study: Study, n: int) -> str:
+    """Return what a caption ends with: who took part."""
+    return f"{'SIMULATED participants, no people; ' if study.simulated else ''}{counted(n, 'participant')}."
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """What a figure of a block is drawn from, its name as a file, and its forms."""
+
+    study: Study
+    block: Block
+    found: BlockFound
+    results: Results
+    name: str
+    forms: Sequence[str]
+
+    @property
+    def simulated(self) -> str:
+        """What a caption says of simulated participants."""
+        return "SIMULATED participants, no people; " if self.study.simulated else ""
+
+    def picture(self, title: str, caption: str, draw: Callable[..., Figure]) -> Picture:
+        """Return the figure that ``draw`` draws with ``title``, the study's ``marks`` and each form's ``fonts``."""
+        files = {}
+        for form in self.forms:
+            figure = draw(title=title, marks=study_marks(self.study), fonts=style.fonts_for(form))
+            files[form] = style.file_bytes(figure, form, f"{self.study.name}: {title}")
+        return Picture(self.block.id, self.name, caption, files)

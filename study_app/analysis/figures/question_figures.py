@@ -12,9 +12,16 @@ from matplotlib.colors import LinearSegmentedColormap, to_hex
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import AskedQuestion
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.figures import answer_figures
-from study_app.analysis.figures.page_layout import MARGIN_PT, Mark, Sheet
-from study_app.analysis.figures.picture import Picture, attempted, files_of, sample_words
+from study_app.analysis.figures.page_layout import (
+    MARGIN_PT,
+    Mark,
+    Picture,
+    Sheet,
+    attempted,
+    files_of,
+    sample_words,
+    study_marks,
+)
 from study_app.analysis.levels.results import QuestionFound
 from study_app.analysis.results import Failures, counted
 
@@ -220,7 +227,7 @@ def question_pictures(
 def _picture(study: Study, asked: AskedQuestion, found: QuestionFound, forms: Sequence[str], name: str) -> Picture:
     figure = FIGURES[found.figure or ""]
     title = found.short if found.short == found.title else f"{found.title}: {found.short}"
-    look = partial(Look, title, answer_figures.marks(study), (counted(study.n, "participant"),))
+    look = partial(Look, title, study_marks(study), (counted(study.n, "participant"),))
     files = files_of(lambda fonts: figure.draw(asked, found, look(fonts)), forms, f"{study.name}: {title}")
     caption = f"{found.title}: “{found.text}” {figure.caption} {sample_words(study, study.n)}"
     return Picture(found.where, name, caption, files)

@@ -13,7 +13,7 @@ from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.answer_figures import render
 from study_app.analysis.figures.level_figures import level_pictures
-from study_app.analysis.figures.picture import Drawing, Picture
+from study_app.analysis.figures.page_layout import Drawing, Picture
 from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.delays import LowestDelay

@@ -7,7 +7,7 @@ from typing import Any
 from study_app.analysis.data.blocks import Block, Direction
 from study_app.analysis.data.motion import OF_REACHES
 from study_app.analysis.figures import delay_figures
-from study_app.analysis.figures.picture import Drawing, Picture
+from study_app.analysis.figures.page_layout import Drawing, Picture
 from study_app.analysis.findings.block_tests import HOLM, MANY, Asked
 from study_app.analysis.findings.finding import FOUND, Absent, Finding, Row
 from study_app.analysis.findings.statement_tests import ONE_DELAY, DelayTrend

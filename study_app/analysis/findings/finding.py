@@ -9,8 +9,7 @@ from typing import Any, ClassVar, Final, Generic, Literal, TypeAlias, TypeVar, c
 
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import KINDS, Kind
-from study_app.analysis.figures.page_layout import Sheet
-from study_app.analysis.figures.picture import Drawing, Picture
+from study_app.analysis.figures.page_layout import Drawing, Picture, Sheet
 from study_app.analysis.findings.block_tests import Asked
 from study_app.analysis.report.html_page import drawn
 from study_app.analysis.results import BlockFound, NotTested, Results

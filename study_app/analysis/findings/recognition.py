@@ -11,8 +11,7 @@ from matplotlib.axes import Axes
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import Decided
 from study_app.analysis.figures import answer_figures
-from study_app.analysis.figures.page_layout import Sheet
-from study_app.analysis.figures.picture import Drawing, Picture
+from study_app.analysis.figures.page_layout import Drawing, Picture, Sheet
 from study_app.analysis.findings.block_tests import Asked, verdict
 from study_app.analysis.findings.finding import (
     FOOT_PT,

@@ -11,7 +11,7 @@ from fontTools.subset import Options, Subsetter, load_font, save_font
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from study_app.analysis.figures.picture import Picture
+from study_app.analysis.figures.page_layout import Picture
 
 LONG = 32
 """Cells of more letters are broken into lines."""

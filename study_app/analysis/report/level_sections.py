@@ -6,7 +6,7 @@ from itertools import takewhile
 from typing import Any, Final
 
 from study_app.analysis.figures.level_figures import level_words, mean_words, summary_words, with_unit
-from study_app.analysis.figures.picture import Picture
+from study_app.analysis.figures.page_layout import Picture
 from study_app.analysis.levels.results import LevelAnswers, LevelsFound, SensitivityFound, SettingFound, ThresholdFound
 from study_app.analysis.report.html_page import drawn, heading, paragraph, table
 from study_app.analysis.report.sentences import FAMILIES

@@ -8,7 +8,7 @@ from typing import Final
 from study_app.analysis.data.motion import OF_REACHES, OF_TRIALS, REACH_DEFINITIONS, TRIAL_DEFINITIONS, Performance
 from study_app.analysis.data.questions import MEASURES
 from study_app.analysis.data.study_tables import By, Study, group_counts, group_means
-from study_app.analysis.figures.picture import Picture
+from study_app.analysis.figures.page_layout import Picture
 from study_app.analysis.findings import all_findings
 from study_app.analysis.levels.results import QuestionFound, ScoreFound
 from study_app.analysis.report import level_sections

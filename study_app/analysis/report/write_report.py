@@ -13,7 +13,7 @@ from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.table_files import credit_lines, table_files
 from study_app.analysis.export.tables import deliver
 from study_app.analysis.figures.level_figures import level_pictures
-from study_app.analysis.figures.picture import Picture
+from study_app.analysis.figures.page_layout import Picture
 from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.figures.study_figures import pictures
 from study_app.analysis.planning.preregistration import deviations_section as preregistration_section

@@ -10,7 +10,7 @@ import pytest
 
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.figures.level_figures import level_pictures
-from study_app.analysis.figures.picture import Picture
+from study_app.analysis.figures.page_layout import Picture
 from study_app.analysis.levels.results import LevelsFound
 from study_app.analysis.levels.summaries import levels_found
 from study_app.analysis.levels.thresholds import TRACK, answers_of, tracks

@@ -7,8 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.stats import binomtest
 
-from study_app.analysis.figures.page_layout import Sheet
-from study_app.analysis.figures.picture import Drawing, Picture
+from study_app.analysis.figures.page_layout import Drawing, Picture, Sheet
 from study_app.analysis.findings.block_tests import Asked, alone
 from study_app.analysis.findings.finding import Absent, Answer, Finding
 from study_app.analysis.findings.statement_tests import table_of_tests
