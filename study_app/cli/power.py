@@ -133,7 +133,7 @@ def _of_statements(
     """Yield the power of the tests of statements, from ever more studies."""
     from study_app.analysis.planning.power_curves import powers
     from study_app.analysis.planning.simulated_studies import plan, sweep
-    from study_app.session.simulated.trial_features import condition_features
+    from study_app.session.simulated.rehearsal import condition_features
 
     show("simulating every condition")
     planned = plan(study, condition_features(study, seed=seed, progress=show))

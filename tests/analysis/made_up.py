@@ -9,7 +9,6 @@ import pandas as pd
 
 from study_app.analysis.data.blocks import NOTHING_DECIDED, Block, Decided, Item, Setting
 from study_app.analysis.data.study_tables import Study
-from study_app.store.tables.column import Column
 from study_app.store.tables.columns import RESPONSES, TRIALS
 from study_app.store.tables.csv_files import Column
 

@@ -11,23 +11,18 @@ from typing import Any, Final, Literal, TypeAlias, get_args
 from study_app.errors import AnalysisError
 from study_app.protocol.analysis_plan import Published
 from study_app.protocol.blocks import Compared, Phase
-from study_app.protocol.forms.kinds import question_of
-from study_app.protocol.forms.scale import Scale
-from study_app.protocol.instruments.scores import Score
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import every_step_of
-from study_app.protocol.questions.question import Context, Question
-from study_app.protocol.questions.statement import Statement
-from study_app.protocol.texts import text_in
-from study_app.protocol.trials.designs import Design
-from study_app.protocol.trials.kinds import DESIGN_KINDS, default_design
-from study_app.protocol.trials.method import Method
+from study_app.protocol.questionnaires import Score
+from study_app.protocol.questions import Context, Question, Scale, Statement, question_of
+from study_app.protocol.table import text_in
+from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
+from study_app.protocol.trials.designs import Design, default_design
+from study_app.protocol.trials.methods import Method
 from study_app.protocol.trials.presentation import link_words
-from study_app.protocol.trials.psychometric import Assumed, assumed_for, rises
-from study_app.protocol.trials.stimuli import OF_LINK, Stimulus
+from study_app.protocol.trials.stimuli import OF_LINK, Assumed, Stimulus, assumed_for, rises
 from study_app.protocol.trials.tracks import design_of, has_correct_answer, method_of, stimulus_of, success_name
-from study_app.store.blinded.blinding import Key
-from study_app.store.blinded.whole_protocol import whole_protocol
+from study_app.store.blinded.blinding import Key, whole_protocol
 
 Kind: TypeAlias = Compared
 

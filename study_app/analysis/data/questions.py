@@ -12,8 +12,7 @@ from study_app.analysis.data.measures import quartiles_or_none
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.levels.results import GroupAnswers, QuestionFound, ScoreFound
 from study_app.analysis.results import number
-from study_app.protocol.instruments.instrument import instrument, instruments
-from study_app.protocol.instruments.scores import score
+from study_app.protocol.questionnaires import instrument, instruments, score
 
 Numbers: TypeAlias = Mapping[str, Any]
 

@@ -21,15 +21,13 @@ from study_app.analysis.data.blocks import (
     spoken,
 )
 from study_app.errors import AnalysisError
-from study_app.protocol.texts import text_in
-from study_app.store.atomic import read_regular
+from study_app.protocol.table import text_in
+from study_app.store.atomic import parse_json, read_regular
 from study_app.store.blinded.blinding import Key
 from study_app.store.exclusions import Exclusion, named
-from study_app.store.folders import SessionFolder, StudyFolder
-from study_app.store.journals.parsing import check_study_name, parse_json
-from study_app.store.tables.column import MISSING, Column, header
-from study_app.store.tables.columns import LATER, columns_held, tables_of
-from study_app.store.tables.csv_files import cells
+from study_app.store.folders import SessionFolder, StudyFolder, check_study_name
+from study_app.store.tables.columns import tables_of
+from study_app.store.tables.csv_files import MISSING, Column, cells, header
 
 DTYPES: Final[dict[str, Any]] = {
     "text": "string",
@@ -72,7 +70,7 @@ def _texts(path: Path, columns: tuple[Column, ...]) -> tuple[Mapping[str, Sequen
         raise unreadable(path, error, _again(path)) from error
     except ValueError as error:
         raise AnalysisError(f"{path} {error}: it was cut off or changed; {_again(path)}") from error
-    held = columns_held(names, columns, LATER | {column.name for column in columns if column.sealed})
+    held = tuple(column for column in columns if column.name in names or not (column.later or column.sealed))
     if tuple(names) != header(held):
         raise AnalysisError(
             f"{path} does not begin with the columns of this table: it was changed, or written by another version of "

@@ -8,8 +8,7 @@ from study_app.analysis.export import psychds_dataset, spss
 from study_app.analysis.export.table_files import NOTHING_ELSE, Extra, file_name, table_bytes, table_files
 from study_app.analysis.export.tables import deliver, wide
 from study_app.analysis.results import Failure, Progress, silent
-from study_app.store.output_files import FileCopy
-from study_app.store.withdrawals.output_log import write_output
+from study_app.store.output_files import FileCopy, write_output
 
 
 def export(

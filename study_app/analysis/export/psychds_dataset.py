@@ -12,14 +12,13 @@ from study_app.analysis.data.blocks import spoken
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export.table_files import codebook_bytes, credit_lines, stated_credits
 from study_app.errors import ProtocolError
-from study_app.protocol.source.files import at_hand, find, protocol_hash, source_bytes
-from study_app.protocol.source.liquid_files import bundled, file_hash, unbundled
-from study_app.protocol.texts import text_in
+from study_app.protocol.source.files import at_hand, bundled, file_hash, find, protocol_hash, source_bytes, unbundled
+from study_app.protocol.table import text_in
 from study_app.store.atomic import cause, open_regular
 from study_app.store.blinded.blinding import revealed_key
 from study_app.store.output_files import FileCopy
 from study_app.store.sites.merged import read_merged
-from study_app.store.tables.column import Column
+from study_app.store.tables.csv_files import Column
 
 
 class Materials(NamedTuple):

@@ -19,9 +19,18 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.levels.results import ExponentFound, LevelsFound, SettingFound
 from study_app.analysis.levels.summaries import levels_found
 from study_app.analysis.levels.thresholds import OF_INTERVALS, tracks
-from study_app.store.tables.column import Column, Kind, header, optional, unsealed
-from study_app.store.tables.columns import INTERVALS, PARTICIPANTS, RESPONSES, TRIALS_2, tables_of
-from study_app.store.tables.level_columns import EXPONENTS, OF_TRACKS, SETTINGS, THRESHOLDS
+from study_app.store.tables.columns import (
+    EXPONENTS,
+    INTERVALS,
+    OF_TRACKS,
+    PARTICIPANTS,
+    RESPONSES,
+    SETTINGS,
+    THRESHOLDS,
+    TRIALS_2,
+    tables_of,
+)
+from study_app.store.tables.csv_files import Column, Kind, header, optional, unsealed
 
 _STATUS: Final = next(column for column in PARTICIPANTS if column.name == "status")
 

@@ -20,7 +20,7 @@ from study_app.analysis.findings.delays import LowestDelay
 from study_app.analysis.levels.summaries import levels_found
 from study_app.analysis.results import Failure, Failures, Results
 from study_app.errors import AnalysisError
-from study_app.store.withdrawals.output_log import write_output
+from study_app.store.output_files import write_output
 
 
 def pictures(

@@ -27,10 +27,9 @@ from study_app.analysis.results import SiteThresholds
 from study_app.analysis.statistics.outcome import Array, student_interval
 from study_app.analysis.statistics.rank_tests import groups_differ
 from study_app.analysis.statistics.thresholds import band, drift, fitted, group_mean, narrowing, p_of_fit
-from study_app.protocol.trials.method import Answer, TrackSetting
+from study_app.protocol.trials.methods import Answer, TrackSetting
 from study_app.protocol.trials.presentation import arrangement_of
-from study_app.protocol.trials.psychometric import analysis_grid
-from study_app.protocol.trials.stimuli import DELAY, FORCE_DELAY, Stimulus
+from study_app.protocol.trials.stimuli import DELAY, FORCE_DELAY, Stimulus, analysis_grid
 from study_app.psychophysics.families import CLIP, level_at, success
 from study_app.psychophysics.grid import Grid
 

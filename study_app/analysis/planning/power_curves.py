@@ -21,8 +21,7 @@ from study_app.analysis.figures.page_layout import MARGIN_PT, Mark, Sheet
 from study_app.analysis.planning.simulated_studies import EFFECTS, FULL, PLANNED_DRAWS, Counts, Plan, Planned
 from study_app.analysis.results import enough
 from study_app.store.output_files import write_files
-from study_app.store.tables.column import Column, optional
-from study_app.store.tables.csv_files import csv_bytes
+from study_app.store.tables.csv_files import Column, csv_bytes, optional
 
 Question: TypeAlias = Literal["settings differ", "trend", "lowest delay", "equivalence"]
 

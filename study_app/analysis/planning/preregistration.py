@@ -20,12 +20,12 @@ from study_app.protocol.checks.expected_precision import expected_of, precision_
 from study_app.protocol.describe import describe, limit_rows
 from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity, quantity_words
-from study_app.protocol.texts import text_in
-from study_app.protocol.trials.psychometric import Family, family_of
+from study_app.protocol.table import text_in
+from study_app.protocol.trials.stimuli import Family, family_of
 from study_app.protocol.trials.tracks import design_of, method_of, standards_of, stimulus_of
 from study_app.psychophysics.precision import BETWEEN_PEOPLE
+from study_app.store.atomic import parse_json
 from study_app.store.exclusions import named
-from study_app.store.journals.parsing import parse_json
 from study_app.store.sites.merged import DASH, folders_of
 
 FILE: Final = "preregistration.md"

@@ -23,12 +23,11 @@ from study_app.analysis.statistics.equivalence import equivalent as shows_equiva
 from study_app.analysis.statistics.equivalence import sizes
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block
-from study_app.protocol.forms.scale import POINTS
-from study_app.protocol.forms.simulated_observer import OPINIONS, Rater, TrialFeatures, opinions, rater
-from study_app.protocol.groups.session_steps import groups_with
+from study_app.protocol.groups import groups_with
 from study_app.protocol.model import Protocol
-from study_app.protocol.questions.question import Question
-from study_app.protocol.texts import text_in
+from study_app.protocol.questions import POINTS, Question
+from study_app.protocol.simulated_observer import OPINIONS, Rater, TrialFeatures, opinions, rater
+from study_app.protocol.table import text_in
 
 ConditionFeatures: TypeAlias = Mapping[tuple[str, str], Sequence[TrialFeatures]]
 """(Block, condition) → what was felt there in rehearsed trials."""

@@ -21,13 +21,17 @@ from study_app.analysis.planning.power_curves import interval
 from study_app.analysis.statistics.outcome import student_interval
 from study_app.analysis.statistics.thresholds import FEWEST, group_mean
 from study_app.errors import AnalysisError
-from study_app.protocol.checks.expected_means import MeanPlan, RatingPlan, SensitivityPlan
-from study_app.protocol.checks.expected_precision import ThresholdPlan, precision_plan
+from study_app.protocol.checks.expected_precision import (
+    MeanPlan,
+    RatingPlan,
+    SensitivityPlan,
+    ThresholdPlan,
+    precision_plan,
+)
 from study_app.protocol.model import Protocol
-from study_app.protocol.texts import text_in
+from study_app.protocol.table import text_in
 from study_app.psychophysics.precision import BETWEEN_PEOPLE, ESTIMATE_NOISE
-from study_app.store.tables.column import Column, optional
-from study_app.store.tables.csv_files import csv_bytes
+from study_app.store.tables.csv_files import Column, csv_bytes, optional
 
 BATCH: Final = 10
 """Studies of one case; which studies these are does not depend on how many are asked for."""

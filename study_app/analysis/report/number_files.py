@@ -21,7 +21,8 @@ from study_app.analysis.report.test_rows import TESTS, r_number, r_text, r_vecto
 from study_app.analysis.results import BlockFound, Failure, Failures, Results, name
 from study_app.analysis.statistics.trend import EXACT_UP_TO
 from study_app.errors import AnalysisError
-from study_app.protocol.trials.methods.updown import UpDown
+from study_app.protocol.trials.methods import UpDown
+from study_app.store.blinded.unblinding import reveals_of
 from study_app.store.checksums import sha256
 from study_app.store.folders import StudyFolder
 from study_app.store.sites.merged import MANIFEST, folders_of

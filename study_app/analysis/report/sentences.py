@@ -27,7 +27,7 @@ from study_app.analysis.results import (
 )
 from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.statistics.thresholds import FEWEST, SETS
-from study_app.protocol.trials.psychometric import ANALYSIS_LAPSES
+from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES
 
 SHIFT: Final = 0.1
 """A prior that shifts a threshold by a larger share of it is named."""

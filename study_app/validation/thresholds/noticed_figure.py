@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from study_app import figure_style as style
 from study_app.analysis.figures.page_layout import MARGIN_PT, Mark, Sheet
 from study_app.analysis.statistics.psychometrics import Curve, share
-from study_app.protocol.trials.psychometric import LINEAR_OBSERVER
+from study_app.protocol.trials.stimuli import LINEAR_OBSERVER
 from study_app.psychophysics.families import success
 from study_app.store.output_files import write_files
 from study_app.validation.thresholds.noticed_delays import (

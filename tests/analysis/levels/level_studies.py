@@ -7,9 +7,8 @@ import numpy as np
 import pandas as pd
 
 from study_app.analysis.data.blocks import LevelBlock, Setting
-from study_app.protocol.trials.designs import Design
-from study_app.protocol.trials.kinds import default_design
-from study_app.protocol.trials.methods.constant import Constant
+from study_app.protocol.trials.designs import Design, default_design
+from study_app.protocol.trials.methods import Constant
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.families import success
 from tests.protocol.trials import matching

@@ -5,8 +5,8 @@ import pytest
 
 from study_app.analysis.levels.thresholds import counts_of, courses, thresholds
 from study_app.analysis.statistics.thresholds import fitted, narrowing
-from study_app.protocol.trials.kinds import default_design
-from study_app.protocol.trials.psychometric import analysis_grid, assumed_for
+from study_app.protocol.trials.designs import default_design
+from study_app.protocol.trials.stimuli import analysis_grid, assumed_for
 from tests.analysis.levels.level_studies import STIMULUS, block, rows
 
 

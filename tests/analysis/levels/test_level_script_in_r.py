@@ -14,7 +14,7 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.levels.results import LevelsFound
 from study_app.analysis.levels.summaries import sensitivities
 from study_app.analysis.report.number_files import START, level_lines
-from study_app.protocol.trials.kinds import default_design
+from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.presentation import arrangement_text
 from tests.analysis.levels.level_studies import ONE, ROVING, block
 from tests.analysis.report.read_report import numbers, run_in_r

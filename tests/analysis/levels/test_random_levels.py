@@ -28,11 +28,8 @@ from study_app.analysis.report import level_sections
 from study_app.analysis.report.number_files import level_lines
 from study_app.analysis.report.sentences import level_findings, level_limits, level_methods
 from study_app.analysis.results import Failures
-from study_app.protocol.trials.designs import Rated
-from study_app.protocol.trials.kinds import default_design
-from study_app.protocol.trials.methods.constant import Constant
-from study_app.protocol.trials.methods.questplus import QuestPlus
-from study_app.protocol.trials.methods.updown import UpDown
+from study_app.protocol.trials.designs import Rated, default_design
+from study_app.protocol.trials.methods import Constant, QuestPlus, UpDown
 from study_app.protocol.trials.stimuli import Stimulus
 from tests.analysis.made_up import delays, everybody, study
 from tests.analysis.outputs import GOLDEN

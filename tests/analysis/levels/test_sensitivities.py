@@ -10,8 +10,7 @@ from scipy.stats import norm
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.levels.results import SensitivityFound
 from study_app.analysis.levels.summaries import sensitivities
-from study_app.protocol.trials.designs import Rated
-from study_app.protocol.trials.kinds import default_design
+from study_app.protocol.trials.designs import Rated, default_design
 from study_app.protocol.trials.presentation import arrangement_text
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.detection import different_rate, proportion_correct

@@ -7,9 +7,7 @@ import pytest
 
 from study_app.analysis.data.blocks import AskedIn, AskedQuestion
 from study_app.analysis.data.questions import MEASURES
-from study_app.protocol.forms.show_if import Value
-from study_app.protocol.questions.choice import Choice, Option
-from study_app.protocol.questions.question import Context, ItemView, Question, ValueType
+from study_app.protocol.questions import Choice, Context, ItemView, Option, Question, Value, ValueType
 
 OPTIONS = tuple(Option(id=name, text=name.capitalize()) for name in ("thin", "middle", "thick"))
 RESPONSES = ["thick middle thin", "thick thin middle", "thin thick middle", None]

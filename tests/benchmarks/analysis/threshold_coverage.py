@@ -13,9 +13,8 @@ from statistics import NormalDist
 import numpy as np
 
 from study_app.analysis.statistics.thresholds import fitted
-from study_app.protocol.trials.kinds import default_design
-from study_app.protocol.trials.psychometric import LAPSES, analysis_grid, assumed_for, running_grid
-from study_app.protocol.trials.stimuli import Stimulus
+from study_app.protocol.trials.designs import default_design
+from study_app.protocol.trials.stimuli import LAPSES, Stimulus, analysis_grid, assumed_for, running_grid
 from study_app.psychophysics.questplus import search_of
 
 TRIALS = (40, 80, 160)

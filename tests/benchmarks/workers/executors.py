@@ -18,7 +18,6 @@ from typing import NamedTuple
 import psutil
 
 from study_app.analysis.planning.simulated_studies import BATCH, Plan, count, plan
-from study_app.protocol.forms.simulated_observer import TrialFeatures
 from study_app.protocol.load import load
 from study_app.protocol.simulated_observer import TrialFeatures
 from study_app.workers.environment import environment

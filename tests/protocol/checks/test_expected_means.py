@@ -9,7 +9,7 @@ from scipy.stats import norm
 
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.levels.summaries import sensitivities
-from study_app.protocol.checks.expected_means import (
+from study_app.protocol.checks.expected_precision import (
     EstimationPlan,
     MeanPlan,
     RatingPlan,

@@ -9,7 +9,6 @@ from study_app.analysis.findings.other_assumptions import SameWithOtherAssumptio
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer
 from study_app.analysis.planning.simulated_studies import plan
-from study_app.protocol.forms.simulated_observer import TrialFeatures
 from study_app.protocol.load import load
 from study_app.protocol.simulated_observer import TrialFeatures
 from study_app.validation.report_rates import known_effects as studies

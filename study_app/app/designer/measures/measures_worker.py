@@ -17,7 +17,7 @@ from study_app.workers.server import Send, Stop
 
 if TYPE_CHECKING:
     from study_app.analysis.planning import threshold_studies
-    from study_app.session.simulated.trial_features import ConditionFeatures
+    from study_app.session.simulated.rehearsal import ConditionFeatures
 
 SEED: Final = 1
 """That of ``power`` where none is given."""

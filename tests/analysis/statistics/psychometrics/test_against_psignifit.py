@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 from study_app.analysis.statistics.thresholds import fitted
-from study_app.protocol.trials.kinds import default_design
-from study_app.protocol.trials.psychometric import Family, analysis_grid, assumed_for
-from study_app.protocol.trials.stimuli import Stimulus
+from study_app.protocol.trials.designs import default_design
+from study_app.protocol.trials.stimuli import Family, Stimulus, analysis_grid, assumed_for
 from study_app.psychophysics.families import success
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
