@@ -13,7 +13,7 @@ from study_app.devices.falcon.boot import BootFailure
 from study_app.devices.falcon.failures import FalconFailure, FalconLost, FalconNotFound, ProgramMissing, UsbFailure
 from study_app.devices.falcon.homing import NotHomed
 from study_app.errors import Problem, ProtocolError, StudyError
-from study_app.workers.messages import Stopped
+from study_app.workers.server import Stopped
 
 PLAIN = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, StudyError)]
 PROTOCOL = ProtocolError(

@@ -33,7 +33,7 @@ from study_app.store.blinded.unblinding import all_opened, reveals_of, unblind_f
 from study_app.store.exclusions import exclude, include
 from study_app.store.sites.merged import all_exclusions, folders_of, own_place, sessions_in
 from study_app.store.tables.study_files import participants_of, study_folders
-from study_app.workers.messages import Stopped
+from study_app.workers.server import Stopped
 
 if TYPE_CHECKING:
     from study_app.analysis.data.blocks import Block

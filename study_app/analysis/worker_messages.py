@@ -98,7 +98,7 @@ class StudiesFound:
 
 @dataclass(frozen=True, slots=True)
 class SessionsFound:
-    """The sessions of a study as rows of ``store.tables.participants``, exclusions, and how the key was last opened."""
+    """The sessions of a study as rows of ``store.tables.study_files``, exclusions, and how the key was last opened."""
 
     folder: Path
     rows: tuple[dict[str, Any], ...]

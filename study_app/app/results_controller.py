@@ -37,7 +37,7 @@ from study_app.gui.application import open_here
 from study_app.gui.results.view import ResultsPlace
 from study_app.viewmodels.results import FigureShown, Going, ResultsView, StudyChoice, Trouble
 from study_app.viewmodels.sessions import session_facts
-from study_app.workers.messages import Crashed, Refused
+from study_app.workers.server import Crashed, Refused
 
 LISTEN_MS: Final = 40
 PATIENCE_S: Final = 0.3

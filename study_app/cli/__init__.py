@@ -14,9 +14,9 @@ import sys
 import click
 
 from study_app import __version__
-from study_app.cli import data, identify, listing, model, outlets, power, screenshots, study, validate
-from study_app.cli.devices import devices, emulate_falcon
-from study_app.cli.evidence import accuracy, cfd, soak, stability, thresholds, timing
+from study_app.cli import data, model, power, study
+from study_app.cli.devices import devices, emulate_falcon, outlets
+from study_app.cli.evidence import accuracy, stability, timing, validation
 from study_app.cli.options import EXIT_USER_ERROR, GroupedCommands
 from study_app.errors import StudyError, naming_the_extra
 
@@ -43,30 +43,12 @@ def commands(context: click.Context) -> None:
         context.exit(app.home())
 
 
-MODULES = (
-    study,
-    listing,
-    data,
-    validate,
-    power,
-    model,
-    accuracy,
-    stability,
-    identify,
-    cfd,
-    soak,
-    timing,
-    thresholds,
-    screenshots,
-    outlets,
-)
-
-for module in MODULES:
+for module in (study, data, power, model, accuracy, stability, timing, validation):
     for command in vars(module).values():
         if isinstance(command, click.Command):
             commands.add_command(command)
-commands.add_command(devices)  # with commands of its own
-commands.add_command(emulate_falcon)
+for command in (devices, emulate_falcon, outlets):  # what else their module holds belongs to the group devices
+    commands.add_command(command)
 
 
 def _shortened(message: str) -> str:

@@ -6,8 +6,17 @@ from pathlib import Path
 
 import click
 
-from study_app.cli.options import BY, EXIT_FOUND, PARTICIPANT, REASON, SESSION, Target, takes_session, takes_study
-from study_app.cli.progress import progress
+from study_app.cli.options import (
+    BY,
+    EXIT_FOUND,
+    PARTICIPANT,
+    REASON,
+    SESSION,
+    Target,
+    progress,
+    takes_session,
+    takes_study,
+)
 
 
 @click.command()

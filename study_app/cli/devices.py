@@ -14,12 +14,11 @@ from math import degrees
 from pathlib import Path
 from random import Random
 from textwrap import fill
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from study_app.cli.device_options import TakesDeviceOptions, given
-from study_app.cli.options import EXIT_FOUND
+from study_app.cli.options import EXIT_FOUND, TakesDeviceOptions, given
 from study_app.errors import DeviceError
 
 if TYPE_CHECKING:
@@ -34,6 +33,7 @@ _WIDTH = 100
 _PREPARING = "Preparing …"
 FIRMWARE = click.option("--firmware", type=click.Path(path_type=Path), metavar="PATH", help="Firmware file.")
 DEVICE = click.option("--device", "name", default="falcon", show_default=True, metavar="NAME", help="The device.")
+OFF = "off"
 
 
 @click.group(invoke_without_command=True)
@@ -355,3 +355,34 @@ def state_of(emulator: Emulator) -> str:
     if not emulator.running:
         return f"no program yet, {emulator.loaded} bytes of it"
     return f"lights {lights} | arms homed {emulator.homed.bit_count()} of 3 | torques {torques}"
+
+
+@click.command()
+@click.option("--markers", type=click.Choice((OFF, "on")), help="Markers of events over the Lab Streaming Layer (LSL).")
+@click.option(
+    "--samples",
+    type=click.Choice((OFF, "single-blind", "always")),
+    help="Samples over LSL; single-blind: not in double-blind studies.",
+)
+@click.option("--triggers", metavar="PORT", help="Trigger codes on a port, such as serial:/dev/ttyUSB0; off: none.")
+def outlets(markers: str | None, samples: str | None, triggers: str | None) -> None:
+    """Print what sessions on this machine send to other programs; with options, change it."""
+    from study_app.errors import OutletError
+    from study_app.outlets.session_outlets import is_port, port_examples
+    from study_app.store import workstation
+
+    settings = workstation.load()
+    changes: dict[str, Any] = {} if markers is None else {"lsl_markers": markers == "on"}
+    if samples is not None:
+        changes["lsl_samples"] = samples
+    if triggers is not None:
+        changes["triggers"] = "" if triggers == OFF else triggers
+        if triggers != OFF and not is_port(triggers):
+            examples = " or ".join(port_examples())
+            raise OutletError(f"--triggers '{triggers}' is not the address of a port: use one like {examples}, or off")
+    if changes:
+        settings = type(settings).model_validate(settings.model_dump() | changes)
+        workstation.save(settings)
+    click.echo(f"markers over LSL: {'on' if settings.lsl_markers else OFF}")
+    click.echo(f"samples over LSL: {settings.lsl_samples}")
+    click.echo(f"triggers: {settings.triggers or OFF}")

@@ -1,11 +1,22 @@
-"""The commands about the force model alone."""
+"""The commands about the force model: its forces, and its parameters from measurements."""
 
+from __future__ import annotations
+
+import time
 from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
 import click
 
-from study_app.cli.options import SCENE_FILE, Target
+from study_app.cli.options import EXIT_FOUND, SCENE_FILE, Target, progress
+from study_app.errors import StudyError
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, MOST_DELAY
+
+if TYPE_CHECKING:
+    from study_app.lab.estimation.estimator import Estimate
+
+POLL_S: Final = 0.03
+SHOWN_S: Final = 1.0
 
 
 @click.command()
@@ -70,3 +81,152 @@ def figures(to: Path) -> None:
 
     for written in draw(to):
         click.echo(written)
+
+
+@click.command()
+@SCENE_FILE
+@click.option(
+    "--measured",
+    required=True,
+    type=click.Path(path_type=Path),
+    metavar="CSV",
+    help="Motion and force, or a flow curve.",
+)
+@click.option("--liquid", required=True, metavar="NAME", help="Id of the liquid in that file.")
+@click.option("--fit", "names", required=True, metavar="NAMES", help="Parameters, such as drag_coefficient,length.")
+@click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Initial value, or a fixed parameter.")
+@click.option(
+    "--velocity",
+    type=click.Choice(["centred", "scene"]),
+    default="centred",
+    show_default=True,
+    help="If the CSV has no velocities: estimate them without lag (centred), or with the scene's filter (scene).",
+)
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for preset, residuals and figure.")
+def identify(
+    measured: Path, scene: str, liquid: str, names: str, changes: tuple[str, ...], velocity: str, to: Path | None
+) -> None:
+    """Fit a liquid's parameters to measured motion and force, or to a flow curve, with intervals and warnings.
+
+    CSV has columns t_s, x_m, y_m, z_m, fx_n, fy_n, fz_n (scene frame; the liquid's force on the ball), and vx_mps,
+    vy_mps, vz_mps where they are known; or t_s, velocity_mps, force_n for a motion along one line; or, from a
+    rheometer, shear_rate_per_s, shear_stress_pa.
+    """
+    from study_app.evaluation.identify import measured_force as measurements
+    from study_app.evaluation.identify import preset as identified
+    from study_app.evaluation.identify.fit import Fit, fit
+    from study_app.evaluation.identify.flow_curve import CurveFit, fit_curve
+    from study_app.haptics.model.overrides import override_all
+    from study_app.protocol.load import load_scene
+
+    chosen = override_all(load_scene(scene, liquid), dict(assignment(change) for change in changes))
+    read = measurements.read(measured)
+    fitted = [name.strip() for name in names.split(",")]
+    found: Fit | CurveFit
+    with progress() as show:
+        show(f"fitting {names}")
+        if isinstance(read, measurements.FlowCurve):
+            found = fit_curve(chosen, liquid, fitted, read)
+        else:
+            motion = measurements.centred(read.motion) if velocity == "centred" else read.motion
+            found = fit(chosen, liquid, fitted, motion, read.force_n)
+    click.echo(identified.text(found))
+    for written in identified.write(found, to, measured) if to is not None else ():
+        click.echo(written)
+
+
+@click.command()
+@SCENE_FILE
+@click.option(
+    "--measured", type=click.Path(path_type=Path), metavar="CSV", help="Motion and force; the file may still grow."
+)
+@click.option("--lsl", "stream", metavar="NAME", help="A stream of the Lab Streaming Layer instead.")
+@click.option("--liquid", required=True, metavar="NAME", help="Id of the liquid in that file.")
+@click.option(
+    "--fit",
+    "names",
+    default="drag_coefficient",
+    show_default=True,
+    metavar="NAMES",
+    help="Parameters: drag_coefficient, optionally with length, scaling or both, separated by commas.",
+)
+@click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Initial value, or a fixed parameter.")
+@click.option(
+    "--memory",
+    "memory_s",
+    type=click.FloatRange(1, 600),
+    default=10.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="Age at which the weight of a row has decayed to 1/e.",
+)
+@click.option(
+    "--idle",
+    "idle_s",
+    type=click.FloatRange(0),
+    default=5.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="End after this time without new data.",
+)
+def estimate(
+    scene: str,
+    measured: Path | None,
+    stream: str | None,
+    liquid: str,
+    names: str,
+    changes: tuple[str, ...],
+    memory_s: float,
+    idle_s: float,
+) -> None:
+    """Estimate drag and wake of a liquid while force is measured, once per second.
+
+    CSV has columns t_s, x_m, y_m, z_m, fx_n, fy_n, fz_n (scene frame; the liquid's force on the ball), and vx_mps,
+    vy_mps, vz_mps where they are known; the channels of a stream have these labels. Ends with 3 if the motion did not
+    identify the parameters.
+    """
+    from study_app.haptics.model.overrides import override_all
+    from study_app.lab.estimation.estimator import OnlineEstimator
+    from study_app.lab.estimation.growing_csv import GrowingCsv
+    from study_app.lab.estimation.liquid_model import prepare
+    from study_app.lab.estimation.lsl_stream import LslForce
+    from study_app.protocol.load import load_scene
+
+    if (measured is None) == (stream is None):
+        raise StudyError("name either a file (--measured CSV) or a stream (--lsl NAME)")
+    chosen = override_all(load_scene(scene, liquid), dict(assignment(change) for change in changes))
+    fitted = tuple(name.strip() for name in names.split(","))
+    estimator = OnlineEstimator(chosen, fitted, memory_s=memory_s)
+    source = LslForce(stream or "") if measured is None else GrowingCsv(measured)
+    prepare()
+    rows, computing_s, shown_s, came_s = 0, 0.0, None, time.monotonic()
+    while True:
+        found = source.poll()
+        if len(found) == 0:
+            if time.monotonic() - came_s > (idle_s if rows else max(idle_s, SHOWN_S)):
+                break
+            time.sleep(POLL_S)
+            continue
+        began_s = time.process_time()
+        estimator.take(found)
+        computing_s += time.process_time() - began_s
+        rows, came_s = rows + len(found), time.monotonic()
+        if shown_s is None or found.t_s[-1] - shown_s >= SHOWN_S:
+            shown_s = float(found.t_s[-1])
+            click.echo(_line(estimator.estimate))
+    if rows == 0:
+        raise StudyError(f"nothing came for {max(idle_s, SHOWN_S):g} s from {measured or stream}")
+    last = estimator.estimate
+    click.echo(f"at the end:\n{_line(last)}\n{rows} rows, {1e6 * computing_s / rows:.1f} µs of computing per row")
+    if not last.identified:
+        click.get_current_context().exit(EXIT_FOUND)
+
+
+def _line(found: Estimate) -> str:
+    """Return an estimate as one line."""
+    from study_app.lab.estimation.estimator import value_words
+
+    if not found.identified:
+        return f"{found.seconds:7.1f} s  {found.reason}"
+    values = ", ".join(f"{name} {' '.join(value_words(found, name))}" for name in found.values)
+    return f"{found.seconds:7.1f} s  {values}; residual {found.rms_n:.3f} N"

@@ -1,15 +1,22 @@
-"""The arguments, options, groups and exit codes that commands share."""
+"""The arguments, options, groups and exit codes that commands share, their executor, and progress on the terminal."""
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 
 import click
+from click.core import ParameterSource
+
+from study_app.workers.executors import Workers, open_executor
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
 
 EXIT_USER_ERROR = 2
 EXIT_FOUND = 3
-
 GROUPS: Final = {
     "Study": "new edit check design power preregister run resume rehearse studies sessions workspace",
     "Data": "export plot report unblind exclude include withdraw merge verify rebuild reproduce replay",
@@ -17,11 +24,16 @@ GROUPS: Final = {
     "Evidence": "accuracy stability timing soak cfd validate validate-report delay-thresholds screenshots",
     "Devices": "devices outlets emulate-falcon",
 }
-
 LONGEST: Final = 150
 """Characters of a command's first sentence in ``--help``, which wraps it."""
-
 Command = TypeVar("Command", bound=Callable[..., Any])
+FILE = click.argument("protocol", metavar="FILE")
+SCENE_FILE = click.argument("scene", metavar="FILE")
+BY = click.option("--by", required=True, metavar="NAME", help="Name or initials of the person, or a rule.")
+PARTICIPANT = click.option("--participant", required=True, metavar="ID", help="Participant, such as P007.")
+SESSION = click.option("--session", type=click.IntRange(1, 99), default=1, show_default=True, help="Session number.")
+REASON = click.option("--reason", required=True, metavar="TEXT", help="Reason; recorded with the time.")
+EXIT_CANCELLED: Final = 130
 
 
 class GroupedCommands(click.Group):
@@ -51,12 +63,6 @@ class Target(click.Path):
         return super().convert(value, param, ctx)
 
 
-FILE = click.argument("protocol", metavar="FILE")
-SCENE_FILE = click.argument("scene", metavar="FILE")
-BY = click.option("--by", required=True, metavar="NAME", help="Name or initials of the person, or a rule.")
-PARTICIPANT = click.option("--participant", required=True, metavar="ID", help="Participant, such as P007.")
-SESSION = click.option("--session", type=click.IntRange(1, 99), default=1, show_default=True, help="Session number.")
-REASON = click.option("--reason", required=True, metavar="TEXT", help="Reason; recorded with the time.")
 RESULTS = click.option(
     "--results", type=Target(), metavar="DIR", help="Study folder; default: results/<study> of the workspace."
 )
@@ -134,3 +140,148 @@ def keep_offered_workspace() -> None:
         offered = offered_workspace()
         keep_workspace(offered)
         click.echo(f"workspace of this machine: {offered.folder} (liquid-study workspace DIR changes it)", err=True)
+
+
+class ShowProgress(Protocol):
+    """Shows what is being done, and which share of all is done (0 to 1), if that is known."""
+
+    def __call__(self, what: str, share: float | None = None) -> None: ...  # noqa: D102
+
+
+@contextmanager
+def progress(otherwise: Callable[[str], object] | None = None) -> Iterator[ShowProgress]:
+    """Show progress below what is printed, on standard error, and remove it at the end of the block.
+
+    Print nothing on standard output inside the block.
+    """
+    if not sys.stderr.isatty():
+
+        def plainly(what: str, share: float | None = None) -> None:
+            if otherwise is not None:
+                otherwise(what)
+
+        yield plainly
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (BarColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True, redirect_stdout=False) as shown:
+        task = shown.add_task("", total=None)
+
+        def show(what: str, share: float | None = None) -> None:
+            shown.update(task, description=what, total=None if share is None else 1.0, completed=share or 0.0)
+
+        yield show
+
+
+def takes_workers(function: Command) -> Command:
+    """Give a command ``--workers`` and ``--cluster``; the function gets ``workers``."""
+
+    @click.option(
+        "--workers",
+        "--jobs",
+        "count",
+        type=click.IntRange(-1),
+        default=-1,
+        metavar="N",
+        callback=_not_zero,
+        help="Worker processes on this computer; default: one per core.",
+    )
+    @click.option(
+        "--cluster",
+        metavar="ADDRESS",
+        envvar="DASK_SCHEDULER_ADDRESS",
+        show_envvar=True,
+        help="Scheduler of a Dask cluster that computes instead, such as tcp://HOST:8786.",
+    )
+    @wraps(function)
+    def run(*words: Any, count: int, cluster: str | None, **options: Any) -> Any:
+        of_count, of_cluster = (click.get_current_context().get_parameter_source(it) for it in ("count", "cluster"))
+        if of_count == of_cluster == ParameterSource.COMMANDLINE:
+            raise click.UsageError("--workers and --cluster exclude each other: a cluster has its own workers")
+        here = cluster is None or of_count == ParameterSource.COMMANDLINE
+        workers = Workers(None if count < 0 else count) if here else Workers(cluster=cluster)
+        return function(*words, workers=workers, **options)
+
+    return run  # type: ignore[return-value]
+
+
+def _not_zero(_context: click.Context, _option: click.Parameter, value: int) -> int:
+    if value == 0:
+        raise click.BadParameter("0 workers cannot compute: give 1 or more, or -1 for one per core")
+    return value
+
+
+@contextmanager
+def executor_for(workers: Workers) -> "Iterator[Executor]":
+    """Open the executor of a command, which keeps finished cases until all are; Ctrl+C says how many are kept."""
+    from study_app.workers.cases import KeptCases
+
+    computing = open_executor(workers)
+    if computing.workers == 0:
+        click.echo(f"{workers.cluster} has no worker yet: the computation begins when one joins", err=True)
+    kept = KeptCases(computing)
+    try:
+        with kept:
+            yield kept
+    except BaseException:
+        if kept.stored:
+            click.echo(f"finished cases kept: {kept.stored}; the same command continues with them", err=True)
+        raise
+    if kept.reused:
+        click.echo(f"cases finished by an earlier start: {kept.reused}", err=True)
+
+
+class DeviceName(click.Option):
+    """``--device``, whose help names the devices; ``only_moving`` names those that move by themselves."""
+
+    def __init__(self, *declarations: Any, only_moving: bool = False, **attributes: Any) -> None:
+        super().__init__(*declarations, metavar="NAME", **attributes)
+        self._only_moving = only_moving
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        """Return the names, and what the option says else."""
+        from study_app.devices.registry import discover
+
+        names = []
+        for device in discover().devices:
+            if device.moves_by_itself or not self._only_moving:
+                bare = [] if device.argument_required else [device.name]
+                names += [*bare, f"{device.name}:{device.argument}"] if device.argument else bare
+        *first, last = names
+        listed = f"{', '.join(first)} or {last}" if first else last
+        known = self.help
+        self.help = f"{listed}; see devices." if not known else f"{known} {listed}; see devices."
+        try:
+            return super().get_help_record(ctx)
+        finally:
+            self.help = known
+
+
+class TakesDeviceOptions(click.Command):
+    """A command that also takes the options of all devices; the function gets them as keywords."""
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        """Return the command's own options, then those of the devices whose names are free."""
+        from study_app.devices.registry import discover
+
+        own = super().get_params(ctx)
+        taken = {parameter.name for parameter in own}
+        options = {option.name: option for device in discover().devices for option in device.options}
+        added = [
+            click.Option(
+                [f"--{option.name}", keyword],
+                type=click.Path(path_type=Path) if option.file_filter else str,
+                metavar="PATH" if option.file_filter else "TEXT",
+                help=option.help,
+            )
+            for option in options.values()
+            if (keyword := option.name.replace("-", "_")) not in taken
+        ]
+        return [*own[:-1], *added, *own[-1:]]  # --help stays the last
+
+
+def given(options: Mapping[str, str | Path | None]) -> dict[str, str | Path]:
+    """Return the device options that were given, by their own names."""
+    return {name.replace("_", "-"): value for name, value in options.items() if value is not None}

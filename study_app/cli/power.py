@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from study_app.cli.options import FILE, Target
-from study_app.cli.parallel import EXIT_CANCELLED, executor_for, takes_workers
-from study_app.cli.progress import ShowProgress, progress
+from study_app.cli.options import EXIT_CANCELLED, FILE, ShowProgress, Target, executor_for, progress, takes_workers
 from study_app.workers.executors import Workers
 
 if TYPE_CHECKING:

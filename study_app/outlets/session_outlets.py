@@ -6,15 +6,12 @@ An outlet that cannot be opened or fails later is in `Outlets.lost` with the rea
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, Literal, Protocol, TypeAlias
 
-from study_app.discovery import modules_of
 from study_app.errors import OutletError
-from study_app.outlets import sinks
-from study_app.outlets.marker import Marker
-from study_app.outlets.sample_stream import SampleStream
-from study_app.outlets.sink import Sink, SinkKind, SinkThread
+from study_app.outlets.markers import Marker, Sink, SinkKind, SinkThread
+from study_app.outlets.sinks import SINKS
+from study_app.outlets.streams import SampleStream
 
 SampleChoice: TypeAlias = Literal["off", "single-blind", "always"]
 """The studies in which samples are streamed: none, those that are not double-blind, all."""
@@ -45,11 +42,9 @@ class OutletStatus:
     shows_force: bool = False
 
 
-@cache
 def sink_kinds() -> Mapping[str, SinkKind]:
     """Return the kinds of sinks by name."""
-    kinds = [module.SINK for module in modules_of(sinks)]
-    return {kind.name: kind for kind in kinds}
+    return {kind.name: kind for kind in SINKS}
 
 
 def is_port(address: str) -> bool:

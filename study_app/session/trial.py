@@ -23,8 +23,7 @@ from study_app.session.ports import RecorderPort, ServoPort
 from study_app.session.tasks import Outcome, TargetReached, TaskView, track
 from study_app.session.transitions.events import StartTrial
 from study_app.store.delivered import JUDGED, delivered_error, judged
-from study_app.video.frames import VideoFrame, VideoSource
-from study_app.video.statistics import VideoStatistics
+from study_app.video.frames import VideoFrame, VideoSource, VideoStatistics
 
 LEAD_S = 0.6  # longer than the slowest fade
 _TIMES = np.dtype([(name, SAMPLE[name]) for name in ("tick", "time_ns", "lateness_ns")])

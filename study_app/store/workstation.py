@@ -94,7 +94,7 @@ class MachineSettings(_Strict):
     of a device's program, ``workspace`` the folder of protocols and results (None: not chosen: `study_app.workspace`);
     ``recent`` are the protocol files outside it that were opened last, newest first; ``operator`` are the initials that
     were given last; ``photodiode`` is whether the tank has a corner that a photodiode looks at; ``camera`` is the one
-    that conditions show (see `video.camera`), "" for the usual one of the system; ``benches`` are the latest
+    that conditions show (see `video.sources`), "" for the usual one of the system; ``benches`` are the latest
     measurements of devices. ``lsl_markers``, ``lsl_samples`` and ``triggers`` (the address of a port, "": none)
     are what sessions send to other programs. Whether ``device`` is known is for those to say who open it.
     """

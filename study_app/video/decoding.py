@@ -34,13 +34,7 @@ def installed() -> bool:
 
 
 def open_video(source: str, *, kind: str | None = None, timeout: Any = None, **options: str) -> Any:
-    """Return an open container of PyAV with a video in it; ``kind`` is a name of FFmpeg's for a device or format.
-
-    Raises
-    ------
-    VideoError
-        It cannot be opened, or PyAV is not installed; the reason alone.
-    """
+    """Return an open container of PyAV with a video in it; ``kind`` is a name of FFmpeg's for a device or format."""
     try:
         import av  # noqa: PLC0415 - an optional extra
         from av.error import FFmpegError  # noqa: PLC0415

@@ -6,9 +6,7 @@ from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
 from typing import Final, Generic, TypeVar
 
-from study_app.workers.messages import Crashed, Refused
-from study_app.workers.server import serve
-from study_app.workers.spawning import CONTEXT
+from study_app.workers.server import CONTEXT, Crashed, Refused, serve
 
 PATIENCE_S: Final = 3.0
 """Time after which a process that was asked to end is killed."""

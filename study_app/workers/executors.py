@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from study_app.workers.processes import CancellingExecutor
+    from study_app.workers.cases import CancellingExecutor
 
 # multiprocessing is loaded where processes are needed: every command imports this module.
 
@@ -33,9 +33,9 @@ def open_executor(workers: Workers = Workers()) -> CancellingExecutor:
         No cluster is at this address. A case of an executor raises it where processes are lost again and again.
     """
     if workers.cluster is not None:
-        from study_app.workers.cluster import ClusterExecutor  # noqa: PLC0415
+        from study_app.workers.cases import ClusterExecutor  # noqa: PLC0415
 
         return ClusterExecutor(workers.cluster)
-    from study_app.workers.processes import ProcessExecutor  # noqa: PLC0415
+    from study_app.workers.cases import ProcessExecutor  # noqa: PLC0415
 
     return ProcessExecutor(workers.count or os.cpu_count() or 1)

@@ -1,10 +1,19 @@
-"""The worker process: it carries out orders in sequence, by one function, until its client has ended."""
+"""The worker process: it carries out orders in sequence, by one function, until its client has ended.
 
+Processes are started by spawn and ignore Ctrl+C, which the terminal sends to all processes of a program. `Refused`,
+`Crashed` and `Stopped` answer any order, besides the values of its task.
+"""
+
+import os
+import signal
+import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import partial
 from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnContext, SpawnProcess
 from pkgutil import resolve_name
 from queue import SimpleQueue
 from typing import Any, Final, TypeAlias
@@ -12,32 +21,82 @@ from typing import Any, Final, TypeAlias
 import psutil
 
 from study_app.errors import StudyError, naming_the_extra
-from study_app.workers.messages import Refused, Stopped
-from study_app.workers.spawning import compute_in_one_thread, ignore_interrupts
 
 Send: TypeAlias = Callable[[Any], object]
 """Sends an answer before the last one."""
-
 Stop: TypeAlias = Callable[[], bool]
 """Whether to stop early: by request, because another order waits, or because the client has ended."""
-
 Task: TypeAlias = Callable[[Any, Send, Stop], object]
 """Carries out an order; what it returns is its last answer. A `StudyError` is answered by `Refused`."""
-
 _STOP: Final = None
 _END: Final = object()
 
 
-def serve(orders: Connection, answers: Connection, task: str, *, background: bool) -> None:
-    """Carry out orders (number, order) until the client has ended; answers are (number, answer, last).
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """An order could not be carried out, with the reason and without partial effects. ``stopped``: by request."""
 
-    Parameters
-    ----------
-    task : str
-        The function that carries out an order (see `Task`), as "package.module:function". It is imported here.
-    background : bool
-        Whether this process gets the lowest priority and computes in one thread, before it imports the task.
+    sentence: str
+    stopped: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Crashed:
+    """The process ended before it had carried out the order.
+
+    ``exit_code`` is negative where a signal ended it, 1 where the terminal shows an exception.
     """
+
+    exit_code: int | None
+
+    @property
+    def sentence(self) -> str:
+        """The description of the event for the user."""
+        if self.exit_code is not None and self.exit_code < 0:
+            return f"the process was ended by signal {-self.exit_code}"
+        return f"the process ended with exit code {self.exit_code}; the terminal may show why"
+
+
+class Stopped(StudyError):
+    """An order stopped early, by request or because of another order."""
+
+
+class _WorkerProcess(SpawnProcess):
+    """A process that begins with SIGINT blocked, so that it prints no traceback before it can ignore it."""
+
+    def start(self) -> None:
+        if sys.platform == "win32":
+            super().start()
+        else:
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            try:
+                super().start()
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+class _WorkerContext(SpawnContext):
+    """Spawns `_WorkerProcess`."""
+
+    Process = _WorkerProcess
+
+
+CONTEXT: Final = _WorkerContext()
+
+
+def ignore_interrupts() -> None:
+    """Ignore Ctrl+C: the program that started this process ends its workers."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def compute_in_one_thread() -> None:
+    """Limit the linear algebra of this process to one thread; numpy must not be imported yet."""
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+
+
+def serve(orders: Connection, answers: Connection, task: str, *, background: bool) -> None:
+    """Carry out orders (number, order) until the client has ended; answers are (number, answer, last)."""
     ignore_interrupts()
     if background:
         psutil.Process().nice(getattr(psutil, "IDLE_PRIORITY_CLASS", 19))

@@ -39,7 +39,7 @@ from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
 from study_app.store.sites.merge import merge
 from study_app.viewmodels.sessions import session_facts
-from study_app.workers.messages import Refused, Stopped
+from study_app.workers.server import Refused, Stopped
 from tests.studies import made_up, rehearsed
 
 pytestmark = pytest.mark.slow

@@ -21,7 +21,7 @@ from study_app.gui.widgets.main_view import Place
 from study_app.store.blinded.blinding import reveals
 from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
-from study_app.workers.messages import Crashed, Refused
+from study_app.workers.server import Crashed, Refused
 from tests.studies import rehearsed
 
 pytestmark = pytest.mark.slow

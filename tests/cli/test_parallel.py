@@ -20,7 +20,7 @@ CASES = 40
 FINISHED = 20
 COMMAND = f"""
     import signal, sys
-    from study_app.cli.parallel import executor_for
+    from study_app.cli.options import executor_for
     from study_app.workers.executors import Workers
     from tests.workers.worker_cases import draw_or_wait
     if __name__ == "__main__":

@@ -11,7 +11,7 @@ import pytest
 PROGRAM = textwrap.dedent(
     """
     import sys
-    from study_app.cli.progress import progress
+    from study_app.cli.options import progress
     with progress(*([print] if "plainly" in sys.argv else [])) as show:
         show("counting [1]")
         show("counting [2]", 0.5)

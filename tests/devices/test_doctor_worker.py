@@ -7,7 +7,7 @@ import pytest
 
 from study_app.devices.doctor_report import Report
 from study_app.devices.doctor_worker import start_examination
-from study_app.workers.messages import Crashed, Refused
+from study_app.workers.server import Crashed, Refused
 from tests.compiled import needs_servo
 
 pytestmark = [pytest.mark.slow, needs_servo]

@@ -28,7 +28,7 @@ from study_app.viewmodels.computer_check import computer_checks
 from study_app.viewmodels.devices.bench import BenchShown
 from study_app.viewmodels.devices.list_view import devices_shown
 from study_app.viewmodels.home import Interrupted
-from study_app.workers.messages import Refused
+from study_app.workers.server import Refused
 from tests.gui import windows
 from tests.gui.home.home_window import open_home
 from tests.gui.lab.states import LAB

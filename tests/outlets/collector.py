@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from study_app.outlets.marker import Marker
+from study_app.outlets.markers import Marker
 from study_app.session.simulated import rehearsal
 
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from study_app.errors import OutletError
-from study_app.outlets.marker import Marker, marker_of
+from study_app.outlets.markers import Marker, marker_of
 
 
 def marker(trial: int = 1, event: str = "trial_started", time_s: float = 1.0) -> Marker:

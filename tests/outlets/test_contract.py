@@ -13,12 +13,10 @@ from typing import Any
 import pytest
 
 from study_app.errors import OutletError
-from study_app.outlets.marker import CODES
+from study_app.outlets import sinks
+from study_app.outlets.markers import CODES, HIGH_S, LOW_S, SinkThread, TriggerSink
 from study_app.outlets.session_outlets import open_sink, sink_kinds
-from study_app.outlets.sink import SinkThread
-from study_app.outlets.sinks import parallel_port
-from study_app.outlets.sinks.parallel_port import PPCLAIM, PPEXCL, PPRELEASE, PPWCONTROL, PPWDATA, ParallelPort
-from study_app.outlets.trigger_pulse import HIGH_S, LOW_S, TriggerSink
+from study_app.outlets.sinks import PPCLAIM, PPEXCL, PPRELEASE, PPWCONTROL, PPWDATA, ParallelPort
 from tests.outlets.sinks import Recorder, marker
 
 EVENTS = ("trial_started", "interval_started", "responses", "trial_ended")
@@ -227,7 +225,7 @@ def test_the_requests_are_those_of_the_kernel_header() -> None:
     text = " ".join(header.read_text(encoding="utf-8").split())
     for name, number in (("PPCLAIM", 0x8B), ("PPRELEASE", 0x8C), ("PPEXCL", 0x8F)):
         assert f"#define {name} _IO(PP_IOCTL, {number:#x})" in text
-        assert getattr(parallel_port, name) == 0x7000 | number
+        assert getattr(sinks, name) == 0x7000 | number
     for name, number in (("PPWDATA", 0x86), ("PPWCONTROL", 0x84)):
         assert f"#define {name} _IOW(PP_IOCTL, {number:#x}, unsigned char)" in text
-        assert getattr(parallel_port, name) == 0x40017000 | number
+        assert getattr(sinks, name) == 0x40017000 | number

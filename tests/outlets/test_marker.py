@@ -7,10 +7,9 @@ from collections.abc import Callable
 
 import pytest
 
-from study_app.outlets import sink as module
-from study_app.outlets.clock_mapping import ClockMapping
-from study_app.outlets.marker import CODES, marker_of
-from study_app.outlets.sink import HANGS_S, SinkThread
+from study_app.outlets import markers as module
+from study_app.outlets.markers import CODES, HANGS_S, SinkThread, marker_of
+from study_app.outlets.streams import ClockMapping
 from study_app.store.journals.journal_events import EVENT_NAMES
 from tests.haptics.running import wait_until
 from tests.outlets.sinks import Sink, marker
@@ -211,7 +210,7 @@ def test_it_is_measured_again_when_it_is_due(monkeypatch: pytest.MonkeyPatch) ->
     clocks.offset_s = 3.0
     mapping.measure_if_due()
     assert mapping.offset_s == pytest.approx(2.0, abs=1e-5)
-    monkeypatch.setattr("study_app.outlets.clock_mapping.time.monotonic", lambda: float("inf"))
+    monkeypatch.setattr("study_app.outlets.streams.time.monotonic", lambda: float("inf"))
     mapping.measure_if_due()
     assert mapping.offset_s == pytest.approx(3.0, abs=mapping.uncertainty_s)
     assert mapping.uncertainty_s < 2e-6

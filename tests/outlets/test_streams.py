@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_SLEW, SAMPLE
-from study_app.outlets.sample_stream import CHANNELS, SampleStream, channels_of
+from study_app.outlets.markers import SinkKind, SinkThread
 from study_app.outlets.session_outlets import Outlets, open_sink
-from study_app.outlets.sink import SinkKind, SinkThread
+from study_app.outlets.streams import CHANNELS, SampleStream, channels_of
 from tests.outlets.sinks import Recorder, marker
 
 pylsl = pytest.importorskip("pylsl", reason="pylsl is not installed: pip install 'liquid-study[lsl]'")

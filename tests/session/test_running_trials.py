@@ -11,8 +11,7 @@ from study_app.protocol.trials.tasks import Explore, Follow
 from study_app.session.tasks import TaskView
 from study_app.session.transitions.events import StartTrial
 from study_app.session.trial import SETTLED_S, Recording, RunningTrial
-from study_app.video.frames import VideoFrame
-from study_app.video.statistics import VideoStatistics
+from study_app.video.frames import VideoFrame, VideoStatistics
 from tests.session.fakes import FakeServo
 
 SWING = Follow(kind="follow")

@@ -16,7 +16,7 @@ from study_app.errors import VideoError
 
 pytest.importorskip("av", reason="the optional extra video is not installed")
 
-from study_app.video.camera import Camera, _Numbers
+from study_app.video.sources import Camera, _Numbers
 from tests.video.clips import number_in
 from tests.video.test_footage import pixels_of
 

@@ -14,7 +14,7 @@ pytest.importorskip("av", reason="the optional extra video is not installed")
 
 from study_app.video import decoding
 from study_app.video.decoding import Scaler
-from study_app.video.footage import Footage
+from study_app.video.sources import Footage
 from tests.video.clips import number_in, write_clip
 
 FRAMES, RATE_HZ = 12, 30
@@ -101,7 +101,7 @@ def test_a_file_that_fails_later_stops_without_its_name(clip: Path, monkeypatch:
         opened.append(source)
         return decoding.open_video(source)
 
-    monkeypatch.setattr("study_app.video.footage.open_video", once)
+    monkeypatch.setattr("study_app.video.sources.open_video", once)
     footage = Footage(clip)
     footage.thread.join(10)
     with pytest.raises(VideoError, match=r"a video of the study stopped \(it is gone\)") as refused:

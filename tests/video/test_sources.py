@@ -17,10 +17,8 @@ from study_app.session.transitions.events import Broke, broken
 from study_app.store import workstation
 from study_app.store.workstation import MachineSettings
 from study_app.video import sources
-from study_app.video.camera import NOT_SHOWN, without_login
-from study_app.video.frames import VideoFrame, stopped
-from study_app.video.sources import Videos
-from study_app.video.statistics import VideoStatistics
+from study_app.video.frames import VideoFrame, VideoStatistics, stopped
+from study_app.video.sources import NOT_SHOWN, Videos, without_login
 from tests.video.clips import write_clip
 
 

@@ -19,8 +19,7 @@ import pytest
 from study_app.errors import StudyError
 from study_app.workers import client as clients
 from study_app.workers.client import WorkerClient
-from study_app.workers.messages import Crashed, Refused, Stopped
-from study_app.workers.server import Send, Stop
+from study_app.workers.server import Crashed, Refused, Send, Stop, Stopped
 
 SOON_S = 60.0
 

@@ -12,9 +12,9 @@ import pytest
 
 from study_app.cli import main
 from study_app.errors import StudyError, WorkerError
-from study_app.workers import cluster as clusters
-from study_app.workers import environment as environments
-from study_app.workers.environment import environment
+from study_app.workers import cases as clusters
+from study_app.workers import cases as environments
+from study_app.workers.cases import environment
 from study_app.workers.executors import Workers, open_executor
 from tests.workers.local_cluster import INSTALLED, MISSING, local_cluster
 from tests.workers.worker_cases import draw, killed_once, refuse

@@ -18,11 +18,10 @@ import psutil
 import pytest
 
 from study_app.errors import Problem, ProtocolError, StudyError, WorkerError
-from study_app.workers import kept_cases
+from study_app.workers import cases
+from study_app.workers.cases import OLD_S, CancellingExecutor, KeptCases
 from study_app.workers.executors import Workers, open_executor
-from study_app.workers.kept_cases import OLD_S, KeptCases
-from study_app.workers.processes import CancellingExecutor
-from study_app.workers.spawning import CONTEXT
+from study_app.workers.server import CONTEXT
 from tests.workers.worker_cases import counted_draw, die, draw, killed_once, loaded, refuse, refuse_file
 
 pytestmark = pytest.mark.slow
@@ -243,7 +242,7 @@ def test_another_program_or_library_has_other_cases(
     store: Path, computed: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     compute(store, computed, range(10), stop_after=4)
-    monkeypatch.setattr(kept_cases, "environment_digest", lambda: "another")
+    monkeypatch.setattr(cases, "environment_digest", lambda: "another")
     assert compute(store, computed, range(10)).reused == 0
     assert len(files(store)) == 1
 
@@ -251,7 +250,7 @@ def test_another_program_or_library_has_other_cases(
 def test_a_case_is_the_same_with_other_hashes() -> None:
     """A protocol holds sets of names, whose order differs from one start to the next."""
     program = (
-        "from study_app.protocol.load import load; from study_app.workers.kept_cases import _key_of;"
+        "from study_app.protocol.load import load; from study_app.workers.cases import _key_of;"
         "print(_key_of((load('viscosityjnd'), frozenset('abc'))).hex(), list(set('abcdefgh')))"
     )
     keys, orders = zip(
@@ -285,6 +284,6 @@ def test_without_a_folder_that_can_be_written_the_cases_are_computed(
     store: Path, computed: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     store.write_text("a file")
-    with caplog.at_level(logging.CRITICAL, "study_app.workers.kept_cases"):
+    with caplog.at_level(logging.CRITICAL, "study_app.workers.cases"):
         assert compute(store, computed, range(4)).stored == 0
     assert times(computed) == dict.fromkeys(range(4), 1)

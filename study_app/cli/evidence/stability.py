@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from study_app.cli.options import EXIT_FOUND, Target, exclude_each_other
-from study_app.cli.parallel import executor_for, takes_workers
-from study_app.cli.progress import progress
+from study_app.cli.options import EXIT_FOUND, Target, exclude_each_other, executor_for, progress, takes_workers
 from study_app.errors import StudyError
 from study_app.workers.executors import Workers
 

@@ -20,7 +20,7 @@ from study_app.gui.widgets.cards import Card, Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.store.support import NAME, write_support
-from study_app.workers.messages import Crashed, Refused
+from study_app.workers.server import Crashed, Refused
 
 LOOK_MS = 100
 PREPARING = "Preparing … The first time the driver is compiled, which takes about a minute."

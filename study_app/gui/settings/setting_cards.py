@@ -15,7 +15,7 @@ from study_app.gui.widgets.cards import Card, Rule
 from study_app.gui.widgets.controls import ActionButton, Choice, Radio, Toggle
 from study_app.gui.widgets.labels import Elided, label
 from study_app.store.workstation import CAMERA_LENGTH, DISTANCE_MM, LEAST_X_HEIGHT_DEG, WIDTH_MM, MachineSettings
-from study_app.video.camera import USUAL
+from study_app.video.sources import USUAL
 
 SAMPLE = "I think this feels like interacting with a liquid."
 MOST_SAMPLE = 2.4

@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import Any
 
 from study_app.errors import StoreError
-from study_app.outlets.marker import Marker, marker_of
+from study_app.outlets.markers import Marker, marker_of
 from study_app.outlets.session_outlets import Outlets
 from study_app.protocol.model import Protocol
 from study_app.store import receipt

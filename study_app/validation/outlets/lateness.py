@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from study_app.outlets.markers import SinkThread
 from study_app.outlets.session_outlets import open_sink
-from study_app.outlets.sink import SinkThread
 from study_app.validation.outlets.listening import MeasuredStream, listening
 from study_app.validation.outlets.streams import MARKER_EVERY_S, numbered
 from study_app.validation.timing.loops import PERIOD_NS, ServoLoop, granted

@@ -15,8 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.haptics.runtime.clocks.clock import SystemClock
-from study_app.outlets.clock_mapping import ClockMapping
-from study_app.outlets.streaming import MARKERS, SAMPLES, library
+from study_app.outlets.streams import MARKERS, SAMPLES, ClockMapping, library
 
 FOUND_WITHIN_S: Final = 30.0
 LOOK_S: Final = 0.002

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.errors import WorkerError
-from study_app.outlets.sample_stream import SampleStream
+from study_app.outlets.streams import SampleStream
 
 PATIENCE_S: Final = 60.0
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.outlets.trigger_pulse import HIGH_S
+from study_app.outlets.markers import HIGH_S
 from study_app.validation.outlets.lateness import MOST_RATIO, Ratio
 from study_app.validation.outlets.streams import MOST_ERROR_MS, Streamed
 from study_app.validation.outlets.trigger_delays import TriggerDelays

@@ -9,9 +9,8 @@ from typing import Final
 import numpy as np
 
 from study_app.haptics.runtime.servo import Servo
-from study_app.outlets.marker import Marker, marker_of
+from study_app.outlets.markers import Marker, SinkThread, marker_of
 from study_app.outlets.session_outlets import open_sink
-from study_app.outlets.sink import SinkThread
 from study_app.validation.outlets.listening import MeasuredStream, Received, listening
 from study_app.validation.outlets.pacing import paced
 from study_app.validation.timing.timed_scene import FULL, PlayedHand

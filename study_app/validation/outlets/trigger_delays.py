@@ -17,10 +17,8 @@ from numpy.typing import NDArray
 
 from study_app.errors import OutletError, StudyError, WorkerError
 from study_app.haptics.runtime.clocks.clock import SystemClock
-from study_app.outlets.marker import CODES, marker_of
+from study_app.outlets.markers import CODES, SinkThread, TriggerSink, marker_of
 from study_app.outlets.session_outlets import open_sink
-from study_app.outlets.sink import SinkThread
-from study_app.outlets.trigger_pulse import TriggerSink
 from study_app.validation.outlets.pacing import paced
 
 VIRTUAL: Final = "virtual"

@@ -27,8 +27,8 @@ from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load_scene
 from study_app.protocol.wording.languages import words
 from study_app.session.trial import SETTLED_S
-from study_app.video.footage import Footage
-from study_app.video.statistics import VideoStatistics
+from study_app.video.frames import VideoStatistics
+from study_app.video.sources import Footage
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 

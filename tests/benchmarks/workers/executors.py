@@ -19,10 +19,8 @@ import psutil
 
 from study_app.analysis.planning.simulated_studies import BATCH, Plan, count, plan
 from study_app.protocol.load import load
-from study_app.protocol.simulated_observer import TrialFeatures
-from study_app.workers.environment import environment
+from study_app.workers.cases import KeptCases, environment
 from study_app.workers.executors import Workers, open_executor
-from study_app.workers.kept_cases import KeptCases
 from tests.workers.local_cluster import INSTALLED, local_cluster
 
 ROUNDS = 20

@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner
 from scipy.integrate import quad
 
-from study_app.cli.evidence.cfd import cfd
-from study_app.cli.parallel import executor_for
+from study_app.cli.evidence.accuracy import cfd
+from study_app.cli.options import executor_for
 from study_app.errors import StudyError
 from study_app.protocol.load import load_scene
 from study_app.validation.cfd import cases, flow, model_comparison, solver, stored_flows

@@ -12,8 +12,7 @@ from study_app.authoring.measures.planned import ENOUGH, Detectable, Finding, Gr
 from study_app.protocol.checks.expected_precision import ThresholdPlan, imprecise
 from study_app.protocol.model import Protocol
 from study_app.workers.client import WorkerClient
-from study_app.workers.messages import Stopped
-from study_app.workers.server import Send, Stop
+from study_app.workers.server import Send, Stop, Stopped
 
 if TYPE_CHECKING:
     from study_app.analysis.planning import threshold_studies

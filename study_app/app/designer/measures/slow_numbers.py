@@ -16,7 +16,7 @@ from study_app.app.designer.measures.measures_worker import (
     Wanted,
     start_measure_worker,
 )
-from study_app.workers.messages import Crashed, Refused
+from study_app.workers.server import Crashed, Refused
 
 log = logging.getLogger(__name__)
 

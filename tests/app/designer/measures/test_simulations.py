@@ -35,7 +35,7 @@ from study_app.protocol.wording.languages import words
 from study_app.viewmodels.designer.measures.measures_view import Controls, focus_of
 from study_app.viewmodels.designer.measures.number_cards import ANEW, FAILED, UNKNOWN
 from study_app.viewmodels.designer.requests import RetypeFile
-from study_app.workers.messages import Crashed, Stopped
+from study_app.workers.server import Crashed, Stopped
 from tests.app.designer.measures.conftest import Worker, jnd, shown
 
 

@@ -185,7 +185,7 @@ def test_a_source_that_fails_in_a_trial_ends_in_zero_force(
         bridge.leave_now()
 
     monkeypatch.setattr(SessionBridge, "fail", failed)
-    monkeypatch.setattr("study_app.video.footage.Footage.frame_at", _lost)
+    monkeypatch.setattr("study_app.video.sources.Footage.frame_at", _lost)
     with pytest.raises(Exception, match="the session was stopped: the file is gone"):
         run()
     assert forces[0] is False

@@ -1,0 +1,180 @@
+"""The commands that validate the analysis by simulated studies, and the one that takes pictures of every window."""
+
+import os
+import time
+from pathlib import Path
+
+import click
+
+from study_app.cli.options import EXIT_FOUND, Target, executor_for, progress, takes_workers
+from study_app.workers.executors import Workers
+
+EXIT_UNDECIDED = 4
+
+
+@click.command("validate-report")
+@click.option(
+    "--studies",
+    type=click.IntRange(1, 1_000_000),
+    default=1000,
+    show_default=True,
+    help="Initial number of studies per cell.",
+)
+@takes_workers
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the simulation.")
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for rates.md and rates.csv.")
+def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) -> None:
+    """Measure how often the report's verdicts are wrong, on studies simulated with no, some or all effects.
+
+    Studies of rek2024 with 5, 12 and 24 participants, by the rehearsals' answer model and by an ordinal probit model
+    with random effects, are analysed by the report's own tests. Every rate is printed with its Wilson interval, and
+    whether it meets its limit: "at most 5 %" is met if the interval reaches down to 5 % and ends below 7.5 %. A cell
+    with an undecided rate is continued with further studies, up to four times as many. Ctrl+C ends the command with
+    the results so far. Ends with exit code 3 if a rate exceeds its limit by its 99.9 % interval, otherwise with 4 if
+    there are too few studies to decide about a rate.
+    """
+    from study_app.analysis.power.plan import plan
+    from study_app.protocol.load import load
+    from study_app.session.simulated.rehearsal import condition_features
+    from study_app.store.output_files import make_folder, write_files
+    from study_app.validation.report_rates.known_effects import simulated
+    from study_app.validation.report_rates.rates import Rate, markdown, table
+    from study_app.validation.report_rates.simulation import validate
+
+    if to is not None:
+        make_folder(to)
+    rates: tuple[Rate, ...] = ()
+    begun, done = time.monotonic(), 0
+
+    def say(text: str) -> None:
+        click.echo(f"{time.monotonic() - begun:.0f} s: {text}", err=True)
+
+    try:
+        with progress() as show, executor_for(workers) as executor:
+            show("rehearsing every condition")
+            protocol = load("rek2024")
+            studied = simulated(protocol, plan(protocol, condition_features(protocol, seed=seed)))
+            begun = time.monotonic()
+            for done, so_far in validate(studied, studies, executor, seed=seed, progress=say):
+                rates = so_far
+                show(f"{done} studies")
+    except KeyboardInterrupt:
+        click.echo("ended early", err=True)
+    words = f"{done} studies in {time.monotonic() - begun:.0f} s\n\n{markdown(rates)}"
+    click.echo(words, nl=False)
+    if to is not None:
+        for path in write_files(to, {"rates.md": words.encode(), "rates.csv": table(rates)}):
+            click.echo(path)
+    beyond, undecided = (sum(one.holds == verdict for one in rates) for verdict in ("no", "too few studies"))
+    limited = sum(one.holds != "counted" for one in rates)
+    click.echo(_summary(beyond, undecided, limited))
+    if beyond:
+        click.get_current_context().exit(EXIT_FOUND)
+    if undecided or not limited:
+        click.get_current_context().exit(EXIT_UNDECIDED)
+
+
+def _summary(beyond: int, undecided: int, limited: int) -> str:
+    """Return how many of the rates that have a limit are beyond it, or may be."""
+    if not limited:
+        return "no rate was counted"
+    if beyond:
+        return f"{beyond} of {limited} rates exceed their limits, {undecided} undecided"
+    if undecided:
+        return f"{undecided} of {limited} rates undecided: simulate more studies"
+    return "every rate is within its limit"
+
+
+@click.command()
+@click.argument("files", metavar="[FILE]...", nargs=-1)
+@click.option(
+    "--studies",
+    type=click.IntRange(10, 1_000_000),
+    default=200,
+    show_default=True,
+    help="Studies of ten participants, of each protocol.",
+)
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the simulation.")
+@takes_workers
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for thresholds.md and thresholds.csv.")
+def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, to: Path | None) -> None:
+    """Recover the known thresholds of simulated observers, with methods and analysis alone and with the whole program.
+
+    For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay) many studies of ten
+    identical observers are simulated and analysed; in magnitude estimation the exponent is known. Then three
+    participants are rehearsed with servo, files, unblinding and analysis. Every value is printed with its limit. Ends
+    with exit code 3 if a value exceeds its limit.
+    """
+    from study_app.protocol.load import load, source_bytes
+    from study_app.store.output_files import make_folder, write_files
+    from study_app.validation.thresholds.many_studies import NAMES, methods_alone, plant
+    from study_app.validation.thresholds.verdicts import Verdict, markdown, table
+    from study_app.validation.thresholds.whole_pipeline import PEOPLE, judged, rehearsed
+
+    try:
+        chosen = [(source_bytes(name), plant(Path(name).stem, load(name))) for name in files or NAMES]
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
+    if to is not None:
+        make_folder(to)
+    begun = time.monotonic()
+    judgements: list[Verdict] = []
+    with progress() as show, executor_for(workers) as executor:
+        rehearsals = [executor.submit(rehearsed, one, source, seed) for source, one in chosen]
+        for (_, one), rehearsal in zip(chosen, rehearsals, strict=True):
+
+            def counted(done: int, name: str = one.name) -> None:
+                show(f"{name}: {done} of {studies} studies", done / studies)
+
+            of_methods, spread = methods_alone(one, studies, seed, executor, counted)
+            show(f"{one.name}: rehearsing {PEOPLE} participants")
+            judgements += [*of_methods, *judged(one, rehearsal.result(), spread)]
+    used_s = sum(os.times()[:4])  # with the workers', which have ended
+    took = f"{time.monotonic() - begun:.0f} s, {used_s:.0f} s of processor time"
+    words = f"{studies} studies of each protocol, seed {seed}, in {took}\n\n{markdown(judgements)}"
+    click.echo(words, nl=False)
+    if to is not None:
+        for path in write_files(to, {"thresholds.md": words.encode(), "thresholds.csv": table(judgements)}):
+            click.echo(path)
+    beyond = sum(not one.holds for one in judgements)
+    click.echo(
+        f"{beyond} of {len(judgements)} values exceed their limits" if beyond else "every value is within its limit"
+    )
+    if beyond:
+        click.get_current_context().exit(EXIT_FOUND)
+
+
+@click.command("delay-thresholds")
+@click.option("--people", type=click.IntRange(5, 1000), default=40, show_default=True, help="Simulated people.")
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the simulation.")
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for the table and the figure.")
+def delay_thresholds(people: int, seed: int, to: Path | None) -> None:
+    """Compare the delay that simulated people rate as different (rek2024) with the one they detect (delaydetect).
+
+    The forced choice does not depend on a person's criterion; the rating does.
+    """
+    from study_app.validation.thresholds.noticed_delays import compare, markdown
+    from study_app.validation.thresholds.noticed_figure import write
+
+    with progress() as show:
+        show("simulating people")
+        found = compare(people, seed)
+    click.echo(markdown(found), nl=False)
+    if to is not None:
+        for path in write(found, to):
+            click.echo(path)
+
+
+@click.command()
+@click.option("--to", type=Target(), required=True, metavar="DIR", help="Folder for the pictures.")
+@click.option(
+    "--only", type=click.Choice(("places", "designer", "session", "single-blind")), help="Only these; default: all."
+)
+def screenshots(to: Path, only: str | None) -> None:
+    """Take pictures of every window of the program in both themes; takes some minutes and needs no display."""
+    os.environ["QT_QPA_PLATFORM"] = "offscreen"  # the same pictures on every machine
+    from study_app.app.screenshots import screenshots as take
+    from study_app.store.output_files import make_folder
+
+    make_folder(to)
+    take(to, only=only, progress=click.echo)

@@ -1,0 +1,309 @@
+"""Markers: events of the journal for other programs, as text and as a trigger code, and the threads that send them.
+
+A marker contains only codes and counts from a list of permitted fields: no condition, answer, measure or entered text,
+and nothing that the journal seals. A session queues a marker and continues at once. A sink that fails or hangs delays
+neither the session nor the servo: it gets no more markers, and `SinkThread.lost` gives the reason. On a port a trigger
+code is the byte of an event, then 0; two simultaneous events are sent as two successive pulses.
+"""
+
+import json
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from time import monotonic
+from typing import Any, Final, Protocol
+
+from study_app.errors import OutletError
+
+CODES: Final[Mapping[str, int]] = {
+    "session_started": 1,
+    "session_resumed": 2,
+    "session_ended": 3,
+    "trial_started": 10,
+    "trial_ended": 11,
+    "interval_started": 20,
+    "interval_ended": 21,
+    "choice": 30,
+    "responses": 31,
+    "form_answered": 32,
+    "force_stopped": 40,
+    "force_restored": 41,
+    "paused": 42,
+    "resumed": 43,
+    "broke": 44,
+}
+"""The trigger code of each event that has one: a byte; 0 is the idle state of a port."""
+_UNCODED: Final = frozenset(
+    (
+        "page_shown",
+        "page_left",
+        "feedback_shown",
+        "stepped",
+        "target_reached",
+        "form_shown",
+        "item_shown",
+        "answer_removed",
+        "note",
+        "repeat",
+        "device_reconnected",
+    )
+)
+"""Events that are markers without a trigger code."""
+_SAID: Final = ("trial", "attempt", "interval", "block", "phase", "code", "item", "form", "page", "target", "by")
+"""The fields of an event that a marker contains; ``code`` is the blinded one, such as L2."""
+ROOM: Final = 1000
+"""Greatest number of waiting markers."""
+HANGS_S: Final = 5.0
+"""A sink that takes longer over one marker counts as lost at the next. [choice]"""
+ADVICE: Final = "no more are sent; check the connection, then end and resume the session"
+PATIENCE_S: Final = 1.0
+HIGH_S: Final = 0.010
+LOW_S: Final = 0.004
+"""Least time at 0 between two codes, so that an amplifier at 500 Hz samples it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Marker:
+    """An event for other programs.
+
+    ``time_ns`` is when it happened on the servo's clock, ``t_s`` the same on the session's, which the journal has.
+    ``byte`` is its trigger code, None of an event without one.
+    """
+
+    event: str
+    time_ns: int
+    t_s: float
+    said: tuple[tuple[str, Any], ...] = ()
+
+    @property
+    def byte(self) -> int | None:
+        """The trigger code; None of an event without one."""
+        return CODES.get(self.event)
+
+    @property
+    def text(self) -> str:
+        """Return the marker as one line of JSON."""
+        line = {"event": self.event, **dict(self.said), "t_s": round(self.t_s, 6)}
+        if self.byte is not None:
+            line["trigger"] = self.byte
+        return json.dumps(line, ensure_ascii=False, separators=(",", ":"))
+
+
+def marker_of(event: str, t_s: float, origin_ns: int, fields: Mapping[str, Any]) -> Marker | None:
+    """Return the marker of an event of the journal, None if the event has no marker.
+
+    Parameters
+    ----------
+    t_s : float
+        When it happened on the session's clock [s].
+    origin_ns : int
+        The servo's clock at the origin of the session's [ns].
+    fields : mapping
+        The other fields of the journal's line.
+    """
+    if event not in CODES and event not in _UNCODED:
+        return None
+    said = tuple((name, fields[name]) for name in _SAID if fields.get(name) is not None)
+    return Marker(event, origin_ns + round(t_s * 1e9), t_s, said)
+
+
+class Sink(Protocol):
+    """A sink of markers. One thread calls `send` and `close`, which may block; others read the properties."""
+
+    @property
+    def title(self) -> str:
+        """Its name for the operator."""
+        ...
+
+    @property
+    def described(self) -> Mapping[str, Any]:
+        """Its record in the receipt."""
+        ...
+
+    @property
+    def listens(self) -> bool | None:
+        """Whether a program receives the markers; None if unknown."""
+        ...
+
+    def send(self, marker: Marker) -> None:
+        """Send a marker.
+
+        Raises
+        ------
+        OutletError
+            Neither this marker nor later ones are sent.
+        """
+        ...
+
+    def close(self) -> None:
+        """Close it."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class SinkKind:
+    """The descriptor of a kind of sink.
+
+    ``name`` is the part of an address before the colon, ``example`` an address; ``open`` receives the part after the
+    colon and the servo's clock [ns].
+    """
+
+    name: str
+    title: str
+    example: str
+    open: Callable[[str, Callable[[], int]], Sink]
+
+
+class SinkThread:
+    """Sends markers to a sink in a separate thread.
+
+    Attributes
+    ----------
+    lost : str
+        Why the sink gets no more markers; empty while it works.
+    """
+
+    def __init__(self, sink: Sink) -> None:
+        self.sink = sink
+        self.lost = ""
+        self._waiting: deque[Marker] = deque()
+        self._changed = threading.Condition()
+        self._closing = False
+        self._since_s: float | None = None  # of the marker that is being sent
+        self._thread = threading.Thread(target=self._work, name=f"outlet {sink.title}", daemon=True)
+        self._thread.start()
+
+    def mark(self, marker: Marker) -> None:
+        """Queue a marker; returns at once."""
+        with self._changed:
+            if self.lost or self._closing:
+                return
+            since_s = self._since_s  # read once: the thread clears it at any time
+            taken_s = 0.0 if since_s is None else monotonic() - since_s
+            if taken_s > HANGS_S:
+                self._give_up(f"a marker was not sent in {taken_s:.1f} s (limit {HANGS_S:g} s): {ADVICE}")
+            elif len(self._waiting) >= ROOM:
+                self._give_up(f"{ROOM:,} markers wait to be sent (limit): {ADVICE}")
+            else:
+                self._waiting.append(marker)
+                self._changed.notify_all()
+
+    def close(self, patience_s: float = PATIENCE_S) -> None:
+        """Send waiting markers within the time limit, and close the sink; a hanging one is left to its thread."""
+        with self._changed:
+            self._closing = True
+            self._changed.notify_all()
+        self._thread.join(patience_s)
+
+    def _work(self) -> None:
+        try:
+            while (marker := self._next()) is not None:
+                self.sink.send(marker)
+                self._since_s = None
+        except OutletError as error:
+            with self._changed:
+                self._give_up(str(error))
+        except Exception as error:  # noqa: BLE001 - any error of a driver: the session goes on without it
+            with self._changed:
+                self._give_up(f"{type(error).__name__}: {error}")
+        try:
+            self.sink.close()
+        except Exception as error:  # noqa: BLE001
+            self.lost = self.lost or f"it was not closed: {error}"
+
+    def _give_up(self, reason: str) -> None:
+        self.lost = self.lost or reason
+        self._waiting.clear()
+        self._changed.notify_all()
+
+    def _next(self) -> Marker | None:
+        with self._changed:
+            self._changed.wait_for(lambda: self._waiting or self._closing or self.lost)
+            if not self._waiting:
+                return None
+            self._since_s = monotonic()
+            return self._waiting.popleft()
+
+
+class TriggerPort(Protocol):
+    """A port of eight lines that are written together."""
+
+    @property
+    def title(self) -> str:
+        """Its name for the operator."""
+        ...
+
+    @property
+    def address(self) -> str:
+        """Its address, such as ``serial:/dev/ttyUSB0``."""
+        ...
+
+    def write(self, byte: int) -> None:
+        """Write a byte to the lines; returns when the port has it (OutletError: it does not accept it)."""
+        ...
+
+    def close(self) -> None:
+        """Close the port."""
+        ...
+
+
+class TriggerSink:
+    """Sends the codes of events to a port.
+
+    Parameters
+    ----------
+    port : TriggerPort
+        An open port; it is set to 0.
+    now_ns : callable
+        The servo's clock [ns].
+
+    Raises
+    ------
+    OutletError
+        The port does not accept a byte; it is closed then.
+
+    Attributes
+    ----------
+    delays_ns : list of int
+        Time from each event to the writing of its byte [ns].
+    """
+
+    listens = None
+
+    def __init__(self, port: TriggerPort, now_ns: Callable[[], int]) -> None:
+        self._port = port
+        self._now_ns = now_ns
+        self.delays_ns: list[int] = []
+        self._clear = 0.0
+        try:
+            port.write(0)
+        except OutletError:
+            port.close()
+            raise
+
+    @property
+    def title(self) -> str:
+        """What the operator calls it."""
+        return self._port.title
+
+    @property
+    def described(self) -> Mapping[str, Any]:
+        """Its record in the receipt."""
+        return {"address": self._port.address, "high_ms": 1e3 * HIGH_S, "codes": dict(CODES)}
+
+    def send(self, marker: Marker) -> None:
+        """Send the code of an event, and 0 after `HIGH_S`; an event without a code sends nothing."""
+        if marker.byte is None:
+            return
+        time.sleep(max(0.0, self._clear - time.monotonic()))
+        self._port.write(marker.byte)
+        self.delays_ns.append(self._now_ns() - marker.time_ns)
+        time.sleep(HIGH_S)
+        self._port.write(0)
+        self._clear = time.monotonic() + LOW_S
+
+    def close(self) -> None:
+        """Let go of the port."""
+        self._port.close()

@@ -1,0 +1,173 @@
+"""Sinks of markers: a stream of the Lab Streaming Layer, and trigger codes on a parallel or serial port.
+
+The parallel port is one of Linux, by the ioctl calls of ``ppdev``: eight data lines and a strobe. The code is written
+to the data lines before the strobe is pulsed, so that a receiver that latches on the strobe reads settled lines; one
+that polls the lines reads them while the code is held. The serial port (pyserial, extra ``triggers``) gets one byte,
+8N1, without flow control.
+"""
+
+import os
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from study_app.errors import OutletError
+from study_app.outlets.markers import CODES, Marker, SinkKind, TriggerPort, TriggerSink
+from study_app.outlets.streams import MARKERS, ClockMapping, close_outlet, library, stream_info
+
+# linux/ppdev.h
+PPCLAIM: Final = 0x708B
+PPRELEASE: Final = 0x708C
+PPEXCL: Final = 0x708F
+PPWDATA: Final = 0x40017086
+PPWCONTROL: Final = 0x40017084
+STROBE: Final = 0x01  # of linux/parport.h; the connector's line is inverted: low while it is set
+Ioctl = Callable[..., Any]
+BAUD: Final = 115_200
+TIMEOUT_S: Final = 0.5
+
+
+class MarkerStream:
+    """An outlet of markers, timed by the servo's clock."""
+
+    title = "LSL markers"
+
+    def __init__(self, now_ns: Callable[[], int]) -> None:
+        lsl = library()
+        info = stream_info(lsl, MARKERS, "Markers", ("marker",), 0.0, "string")
+        codes = info.desc().append_child("triggers")
+        for event, byte in CODES.items():
+            codes.append_child_value(event, str(byte))
+        self.mapping = ClockMapping(now_ns, lsl.local_clock)
+        self._outlet: Any = lsl.StreamOutlet(info)
+
+    @property
+    def described(self) -> Mapping[str, Any]:
+        """Its record in the receipt."""
+        return {"stream": MARKERS, "clock_uncertainty_us": round(1e6 * self.mapping.uncertainty_s, 3)}
+
+    @property
+    def listens(self) -> bool:
+        """Whether a program receives the stream."""
+        outlet = self._outlet  # its thread may release it meanwhile
+        return bool(outlet is not None and outlet.have_consumers())
+
+    def send(self, marker: Marker) -> None:
+        """Send a marker with the time of its event."""
+        self.mapping.measure_if_due()
+        self._outlet.push_sample([marker.text], 1e-9 * marker.time_ns + self.mapping.offset_s)
+
+    def close(self) -> None:
+        """End the stream."""
+        outlet, self._outlet = self._outlet, None
+        close_outlet(outlet)
+
+
+class ParallelPort:
+    """An open parallel port."""
+
+    title = "Parallel port"
+
+    def __init__(self, place: str, ioctl: Ioctl | None = None) -> None:
+        self.address = f"parallel:{place}"
+        self._ioctl = _system_ioctl() if ioctl is None else ioctl
+        try:
+            self._file = os.open(place, os.O_RDWR)
+        except OSError as error:
+            raise OutletError(f"{self.address} cannot be opened: {error.strerror}") from error
+        try:
+            self._call(PPEXCL)
+            self._call(PPCLAIM)
+        except OutletError:
+            os.close(self._file)
+            raise
+
+    def write(self, byte: int) -> None:
+        """Put a byte on the data lines; a code other than 0 is followed by a pulse of the strobe.
+
+        Raises
+        ------
+        OutletError
+            The port does not accept it.
+        """
+        self._call(PPWDATA, bytes((byte,)))
+        if byte:
+            self._call(PPWCONTROL, bytes((STROBE,)))
+            self._call(PPWCONTROL, bytes((0,)))
+
+    def close(self) -> None:
+        """Release the port and close it."""
+        try:
+            self._call(PPRELEASE)
+        finally:
+            os.close(self._file)
+
+    def _call(self, request: int, *value: bytes) -> None:
+        try:
+            self._ioctl(self._file, request, *value)
+        except OSError as error:
+            raise OutletError(f"{self.address} failed: {error.strerror}; is another program using it?") from error
+
+
+def _system_ioctl() -> Ioctl:
+    try:
+        import fcntl  # noqa: PLC0415 - not on Windows
+    except ImportError as error:
+        raise OutletError("parallel ports are supported on Linux only: use a serial port") from error
+    return fcntl.ioctl
+
+
+class SerialPort:
+    """An open serial port."""
+
+    title = "Serial port"
+
+    def __init__(self, place: str) -> None:
+        try:
+            import serial  # noqa: PLC0415 - an extra
+        except ImportError as error:
+            raise OutletError("triggers need pyserial: pip install 'liquid-study[triggers]'") from error
+        name, _, baud = place.partition("@")
+        if not name or not (baud or str(BAUD)).isdecimal():
+            raise OutletError(f"serial:{place} is not a serial port: write serial:NAME or serial:NAME@BAUD")
+        self.address = f"serial:{place}"
+        self._failures: tuple[type[Exception], ...] = (serial.SerialException, OSError)
+        try:
+            self._port: Any = serial.Serial(name, int(baud or BAUD), write_timeout=TIMEOUT_S)
+        except (*self._failures, ValueError) as error:
+            raise OutletError(f"{self.address} cannot be opened: {_cause(error)}") from error
+
+    def write(self, byte: int) -> None:
+        """Send a byte; returns when the driver has sent it.
+
+        Raises
+        ------
+        OutletError
+            The port does not accept it: an adapter was unplugged.
+        """
+        try:
+            self._port.write(bytes((byte,)))
+            self._port.flush()
+        except self._failures as error:
+            raise OutletError(f"{self.address} failed: {_cause(error)}") from error
+
+    def close(self) -> None:
+        """Close the port."""
+        self._port.close()
+
+
+def _cause(error: Exception) -> str:
+    """Return the system's message for an error with a number, else its own message."""
+    number = getattr(error, "errno", None)
+    return os.strerror(number) if isinstance(number, int) else str(error)
+
+
+def _port(kind: Callable[[str], TriggerPort]) -> Callable[[str, Callable[[], int]], TriggerSink]:
+    return lambda place, now_ns: TriggerSink(kind(place), now_ns)
+
+
+SINKS: Final = (
+    SinkKind("lsl", MarkerStream.title, "lsl", lambda _place, now_ns: MarkerStream(now_ns)),
+    SinkKind("parallel", ParallelPort.title, "parallel:/dev/parport0", _port(ParallelPort)),
+    SinkKind("serial", SerialPort.title, "serial:/dev/ttyUSB0", _port(SerialPort)),
+)
+"""The kinds of sinks."""

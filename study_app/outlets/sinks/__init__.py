@@ -1,1 +1,0 @@
-"""The kinds of sinks for markers: one module each, with its descriptor `SINK`."""

@@ -1,0 +1,210 @@
+"""Streams of the Lab Streaming Layer (extra ``lsl``), and the servo's samples as one of them, at the servo's rate.
+
+A separate thread reads the telemetry like the recorder's readers, so the servo's thread never calls the library, and
+neither a window nor the disk delays the stream. It runs from before the first page to the end of the session, with or
+without recordings. Every sample has the time at which the device was read, by a mapping of the servo's clock to that of
+the library, measured at the start and while it runs.
+"""
+
+import platform
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import study_app
+from study_app.errors import OutletError
+
+MARKERS: Final = "liquid-study markers"
+SAMPLES: Final = "liquid-study samples"
+DELIVERY_S: Final = 0.2
+"""Time for which a stream with receivers stays open after its last sample, to deliver it."""
+MEASURE_EVERY_S: Final = 5.0
+READINGS: Final = 8
+SEND_EVERY_S: Final = 0.01
+PATIENCE_S: Final = 1.0
+CHANNELS: Final = (
+    *(f"position_{axis} m" for axis in "xyz"),
+    *(f"velocity_{axis} m/s" for axis in "xyz"),
+    *(f"force_{axis} N" for axis in "xyz"),
+    "limiters",
+)
+
+
+def library() -> Any:
+    """Return the module ``pylsl``.
+
+    Raises
+    ------
+    OutletError
+        It, or the library that it loads, is not installed.
+    """
+    try:
+        import pylsl  # noqa: PLC0415 - an extra
+    except (ImportError, RuntimeError) as error:
+        raise OutletError("the Lab Streaming Layer needs pylsl: pip install 'liquid-study[lsl]'") from error
+    return pylsl
+
+
+def stream_info(lsl: Any, name: str, kind: str, labels: Sequence[str], rate_hz: float, form: str) -> Any:
+    """Return the description of a stream: its name, its channels and the sender; no data of a session.
+
+    ``labels`` are those of the channels, followed by a blank and the unit if there is one.
+    """
+    source = f"{name} of {platform.node()}"
+    info = lsl.StreamInfo(name, kind, len(labels), rate_hz, form, source)
+    about = info.desc()
+    about.append_child_value("manufacturer", "liquid-study")
+    about.append_child_value("version", study_app.__version__)
+    channels = about.append_child("channels")
+    for label in labels:
+        words, _, unit = label.partition(" ")
+        channel = channels.append_child("channel")
+        channel.append_child_value("label", words)
+        if unit:
+            channel.append_child_value("unit", unit)
+    return info
+
+
+def close_outlet(outlet: Any) -> None:
+    """Wait for delivery of the last samples if a program receives them; the outlet ends with its last reference."""
+    if outlet is not None and outlet.have_consumers():
+        time.sleep(DELIVERY_S)
+
+
+class ClockMapping:
+    """The offset between two clocks, as an interval that certainly contains it.
+
+    A reading of the other clock between two of the servo's bounds the offset. Bounds of later readings are intersected
+    with earlier ones; if the intersection is empty, the clocks have drifted and the newest bounds count. Use it from
+    one thread.
+    """
+
+    def __init__(self, now_ns: Callable[[], int], other_s: Callable[[], float]) -> None:
+        self._now_ns = now_ns
+        self._other_s = other_s
+        self._low_s, self._high_s = float("-inf"), float("inf")
+        self._due_s = 0.0
+        self.measure()
+
+    def measure(self) -> None:
+        """Measure the offset again."""
+        for _ in range(READINGS):
+            before_ns = self._now_ns()
+            other_s = self._other_s()
+            after_ns = self._now_ns()
+            low_s, high_s = other_s - 1e-9 * after_ns, other_s - 1e-9 * before_ns
+            if low_s > self._high_s or high_s < self._low_s:
+                self._low_s, self._high_s = low_s, high_s
+            else:
+                self._low_s, self._high_s = max(low_s, self._low_s), min(high_s, self._high_s)
+        self._due_s = time.monotonic() + MEASURE_EVERY_S
+
+    def measure_if_due(self) -> None:
+        """Measure it again if the last measurement is older than `MEASURE_EVERY_S`."""
+        if time.monotonic() >= self._due_s:
+            self.measure()
+
+    @property
+    def offset_s(self) -> float:
+        """The other clock's time minus the servo's time [s]."""
+        return 0.5 * (self._low_s + self._high_s)
+
+    @property
+    def uncertainty_s(self) -> float:
+        """The greatest error of the offset [s]."""
+        return 0.5 * (self._high_s - self._low_s)
+
+
+def channels_of(samples: Any) -> NDArray[np.float32]:
+    """Return the channels of the stream for samples (array of ``layout.SAMPLE``)."""
+    out = np.empty((len(samples), len(CHANNELS)), np.float32)
+    out[:, 0:3] = samples["position_m"]
+    out[:, 3:6] = samples["velocity_mps"]
+    out[:, 6:9] = samples["device_force_n"]
+    out[:, 9] = samples["limiters"]
+    return out
+
+
+class SampleStream:
+    """An outlet of samples, and the thread that feeds it.
+
+    Parameters
+    ----------
+    telemetry : Telemetry
+        The servo's (``haptics.runtime.telemetry``).
+    rate_hz : float
+        Its nominal rate.
+    now_ns : callable
+        Its clock [ns].
+
+    Attributes
+    ----------
+    sent : int
+        Samples that were sent so far.
+    lost : str
+        Why samples are missing; empty while none are.
+
+    Raises
+    ------
+    OutletError
+        The library is not installed.
+    """
+
+    title = "LSL samples"
+
+    def __init__(self, telemetry: Any, rate_hz: float, now_ns: Callable[[], int]) -> None:
+        lsl = library()
+        self.mapping = ClockMapping(now_ns, lsl.local_clock)
+        self._outlet: Any = lsl.StreamOutlet(stream_info(lsl, SAMPLES, "Haptics", CHANNELS, rate_hz, "float32"))
+        self._reader = telemetry.reader()
+        self.sent = 0
+        self.lost = ""
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._work, name="outlet LSL samples", daemon=True)
+        self._thread.start()
+
+    @property
+    def described(self) -> Mapping[str, Any]:
+        """The record of the stream in the receipt."""
+        return {"stream": SAMPLES, "clock_uncertainty_us": round(1e6 * self.mapping.uncertainty_s, 3)}
+
+    @property
+    def listens(self) -> bool:
+        """Whether a program receives the stream."""
+        outlet = self._outlet  # its thread may release it meanwhile
+        return bool(outlet is not None and outlet.have_consumers())
+
+    def close(self) -> None:
+        """Send the remaining samples, and end the stream."""
+        self._ending.set()
+        self._thread.join(PATIENCE_S)
+
+    def _work(self) -> None:
+        try:
+            while not self._ending.wait(SEND_EVERY_S):
+                self.send_new()
+            self.send_new()
+            close_outlet(self._outlet)
+        except Exception as error:  # noqa: BLE001 - any error of the library: the session goes on without it
+            self.lost = f"{type(error).__name__}: {error}"
+        self._outlet = None
+
+    def send_new(self) -> None:
+        """Send the samples since the last time; called in the stream's thread."""
+        samples = self._reader.read()
+        if self._reader.dropped:
+            self.lost = f"{self._reader.dropped} samples were not sent in time: this computer is too busy"
+        if len(samples) == 0:
+            return
+        self.mapping.measure_if_due()
+        times_s = 1e-9 * samples["time_ns"] + self.mapping.offset_s
+        self.push(channels_of(samples), times_s)
+        self.sent += len(samples)
+
+    def push(self, channels: NDArray[np.float32], times_s: NDArray[np.float64]) -> None:
+        """Push samples (n, 10), with their times on the clock of the Lab Streaming Layer [s]."""
+        self._outlet.push_chunk(channels, times_s.tolist())
