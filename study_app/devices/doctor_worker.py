@@ -40,13 +40,7 @@ def start_examination(
 
 
 def carry_out(examination: Examination, send: Send, _stop: Stop) -> Report:
-    """Examine a device, and return the report.
-
-    Raises
-    ------
-    DeviceError
-        It cannot be examined.
-    """
+    """Examine a device, and return the report."""
     signal.signal(signal.SIGTERM, _leave)
     name, options, faults = examination.name, examination.options, examination.faults
     return doctor_of(name).examine(name, options=options, faults=faults, progress=send)

@@ -144,13 +144,6 @@ def boot(
     firmware : the bytes of its file
     attempts : their greatest number
     progress : receives a line about each failed attempt
-
-    Raises
-    ------
-    BootFailure
-        None of the attempts succeeded.
-    FalconFailure
-        The bytes are no firmware, or the bridge failed.
     """
     found = check(firmware)
     for attempt in range(1, attempts + 1):

@@ -54,13 +54,7 @@ class Firmware:
 
 
 def check(data: bytes) -> Firmware:
-    """Return what ``data`` holds.
-
-    Raises
-    ------
-    ProgramMissing
-        It is no firmware, or not whole; the message says what it is instead.
-    """
+    """Return what ``data`` holds."""
     _refuse_other_files(data)
     _refuse_wrong_header(data)
     high, low = struct.unpack_from("<HH", data, _HEADER_BYTES - 4)

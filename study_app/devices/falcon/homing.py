@@ -51,11 +51,6 @@ def home(
     falcon : record of ``exchange.FALCON``
     tick : runs one tick of it, and waits a millisecond now_s : the time [s] progress : is given what to do, a line at a
     time
-
-    Raises
-    ------
-    NotHomed
-        It did not happen within ``patience_s``.
     """
     began_s = now_s()
     advised_s = began_s

@@ -33,11 +33,6 @@ def examine(
     faults : of an emulated one: words of ``emulated.FAULTS``
     progress : is given what to do, a line at a time
     seconds : how long it is run
-
-    Raises
-    ------
-    DeviceError
-        It cannot have faults.
     """
     device = _device(name, options or {}, faults)
     return examine_by_table(device, FAILURES, _words, running="error", progress=progress, seconds=seconds)

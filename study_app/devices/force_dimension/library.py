@@ -85,11 +85,6 @@ class Library:
     Parameters
     ----------
     path : of the library; None: as the environment variable states, else the usual names
-
-    Raises
-    ------
-    DeviceFailure
-        It is not there, or lacks functions.
     """
 
     def __init__(self, path: str | Path | None = None) -> None:
@@ -282,13 +277,7 @@ class Library:
 
 
 def end_force(path: str, serial: str) -> None:
-    """Open the device with this serial number ("": the first one), and end its force: what a guard does.
-
-    Raises
-    ------
-    DeviceFailure
-        There is no such library or device, another program still uses it, or it accepts no end of the force.
-    """
+    """Open the device with this serial number ("": the first one), and end its force: what a guard does."""
     library = Library(path or None)
     if not library.abandon(library.open(int(serial) if serial else None)):
         raise FAILURES.failure("error")

@@ -174,13 +174,7 @@ class Inverse3Device(Device):
 
 
 def address(where: str) -> tuple[str, int, str]:
-    """Return host, port and device id of what follows the device's name: "", "ID", "HOST:PORT" or "HOST:PORT:ID".
-
-    Raises
-    ------
-    DeviceError
-        It is none of these.
-    """
+    """Return host, port and device id of what follows the device's name: "", "ID", "HOST:PORT" or "HOST:PORT:ID"."""
     parts = where.split(":")
     if len(parts) == 1:
         return HOST, PORT, parts[0]

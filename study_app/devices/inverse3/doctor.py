@@ -33,11 +33,6 @@ def examine(
     faults : of an emulated one: words of ``emulator.faults.FAULTS``
     progress : is given what to do, a line at a time
     seconds : how long it is run
-
-    Raises
-    ------
-    DeviceError
-        It cannot have faults.
     """
     device = _device(name, faults, progress)
     return examine_by_table(device, FAILURES, _words, running="no-reply", progress=progress, seconds=seconds)

@@ -51,13 +51,7 @@ class Link(Protocol):
 
 
 class SocketLink:
-    """A TCP connection to ``host:port``, without Nagle's algorithm.
-
-    Raises
-    ------
-    DeviceFailure
-        Nothing listens there.
-    """
+    """A TCP connection to ``host:port``, without Nagle's algorithm."""
 
     emulated = False
 

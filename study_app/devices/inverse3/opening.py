@@ -51,13 +51,7 @@ class Messages:
         self._header = np.zeros(2, np.int64)
 
     def upgrade(self, host: str) -> None:
-        """Make a WebSocket of the link (RFC 6455 §4.1).
-
-        Raises
-        ------
-        DeviceFailure
-            The answer is not that of a WebSocket.
-        """
+        """Make a WebSocket of the link (RFC 6455 §4.1)."""
         key = base64.b64encode(secrets.token_bytes(16))
         self._link.send(
             b"GET / HTTP/1.1\r\nHost: %b\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
@@ -87,13 +81,7 @@ class Messages:
         self._link.send(out[:size].tobytes())
 
     def receive(self) -> dict[str, Any]:
-        """Return the next message.
-
-        Raises
-        ------
-        DeviceFailure
-            None comes, or it is not a JSON object.
-        """
+        """Return the next message."""
         while True:
             data = np.frombuffer(self._came, np.uint8)
             size = parse_header(data, 0, data.size, self._header)
@@ -140,11 +128,6 @@ def open_session(messages: Messages, link: Link, wanted_id: str = "") -> Session
     Parameters
     ----------
     wanted_id : of the device; "": the first that the service lists
-
-    Raises
-    ------
-    DeviceFailure
-        There is no such device, it cannot be used, or its settings are not neutral.
     """
     entry = find_device(messages.receive(), wanted_id)
     device_id, config = entry["device_id"], entry["config"]
@@ -175,15 +158,7 @@ def open_session(messages: Messages, link: Link, wanted_id: str = "") -> Session
 
 
 def find_device(message: Mapping[str, Any], wanted_id: str = "", *, inventory: bool = True) -> dict[str, Any]:
-    """Return what a message says of the device with this id, or of the first one.
-
-    Raises
-    ------
-    DeviceFailure
-        The message is of an older version, or lists no such device.
-    DeviceError
-        The id of the device does not fit into a command.
-    """
+    """Return what a message says of the device with this id, or of the first one."""
     listed = message.get("inverse3", [])
     if not isinstance(listed, list):
         raise FAILURES.failure("version", "format 3.0")

@@ -45,11 +45,6 @@ def check_force_scale(answer: Any) -> float:
 
     The shape of the answer is not documented: a bare number, or an object with the number as ``value`` or under the
     key, are understood.
-
-    Raises
-    ------
-    DeviceFailure
-        It is not 1 or not known, so that forces are or may be other than commanded.
     """
     scale = answer.get("value", answer.get("devices/force_scale")) if isinstance(answer, dict) else answer
     if type(scale) not in {int, float}:  # a bool is none

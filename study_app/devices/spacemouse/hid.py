@@ -30,13 +30,7 @@ _NO_MOTION_INTERFACE: Final = (
 
 
 def load_hid() -> Any:
-    """Return hidapi's module: on Linux the one that leaves the kernel's driver in place.
-
-    Raises
-    ------
-    DeviceError
-        It cannot be loaded.
-    """
+    """Return hidapi's module: on Linux the one that leaves the kernel's driver in place."""
     names = ("hidraw", "hid") if sys.platform.startswith("linux") else ("hid",)
     reason = ""
     for name in names:
@@ -55,15 +49,7 @@ def find_space_mice(hid: Any) -> list[tuple[Model, dict[str, Any]]]:
 
 
 def choose(found: list[tuple[Model, dict[str, Any]]]) -> tuple[Model, bytes]:
-    """Return the first interface that reports motion; one that does not tell what it reports may be one.
-
-    Raises
-    ------
-    DeviceNotFound
-        There is none.
-    DeviceError
-        None of them reports motion.
-    """
+    """Return the first interface that reports motion; one that does not tell what it reports may be one."""
     if not found:
         raise DeviceNotFound(
             "no SpaceMouse is connected: connect it, or turn it on; known models are "

@@ -73,11 +73,6 @@ def damping_limits(period_s: float, delay_ticks: int, velocity: Velocity | Devic
     also has the limit of the raw difference. A given velocity has no estimator; it is taken as the thesis' own, "ewma".
     The velocity that a device measures has the limits of a line of the same lag (`DeviceVelocity.window`). The entries
     of "kalman" also hold if the delay is one tick longer or shorter than assumed, and while EWMA replaces it.
-
-    Raises
-    ------
-    StudyError
-        A loop slower or more delayed than any entry.
     """
     if isinstance(velocity, DeviceVelocity):
         velocity = velocity.window(period_s)

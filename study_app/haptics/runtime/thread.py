@@ -214,13 +214,7 @@ class LoopThread:
         )
 
     def _new_safety(self) -> Any:
-        """Return the safety record of a loop that begins, for the delay that the device measured.
-
-        Raises
-        ------
-        DeviceError
-            The device's delay is so long that no force is stable.
-        """
+        """Return the safety record of a loop that begins, for the delay that the device measured."""
         driver = self._driver
         delay_ticks = driver.dynamics.delay_ticks(self._rate_hz)
         if delay_ticks > MOST_DELAY:

@@ -73,11 +73,6 @@ def examine(
     progress : receives instructions, one line at a time
     seconds : duration of the run
     emulator : the emulated one; None: a new one
-
-    Raises
-    ------
-    DeviceError
-        It cannot have faults.
     """
     device = _device(name, firmware, faults, progress, emulator)
     facts = _looked_for() if name.partition(":")[0] == "falcon" else Facts()

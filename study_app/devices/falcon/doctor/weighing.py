@@ -128,13 +128,7 @@ class Grip:
         return answer
 
     def come(self, place_m: Any) -> None:
-        """Move it slowly to a place, and wait until it rests there, possibly displaced by its load.
-
-        Raises
-        ------
-        DeviceError
-            It does not come to rest.
-        """
+        """Move it slowly to a place, and wait until it rests there, possibly displaced by its load."""
         way = np.asarray(place_m) - self._target_m
         ticks = max(int(np.linalg.norm(way) / (_PACE_MPS * _TICK_S)), 1)
         began = self._target_m.copy()

@@ -154,13 +154,7 @@ def save(serial: str, calibration: Calibration) -> Path:
 
 
 def load(serial: str) -> Calibration | None:
-    """Return the calibration of the Falcon with this serial number; None where it has none.
-
-    Raises
-    ------
-    DeviceError
-        There is one, and it is invalid.
-    """
+    """Return the calibration of the Falcon with this serial number; None where it has none."""
     file = calibration_file(serial)
     try:
         found = Calibration(**json.loads(file.read_text(encoding="utf-8")))

@@ -74,11 +74,6 @@ class FtdiTransport:
     ----------
     library : D2XX as ctypes loads it; None: it is loaded by name
     serial : number of the Falcon that is meant; None: the first
-
-    Raises
-    ------
-    UsbFailure
-        The library cannot be loaded, or there is no Falcon, or it cannot be opened.
     """
 
     def __init__(self, library: Any = None, *, serial: str | None = None) -> None:

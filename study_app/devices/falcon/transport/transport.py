@@ -76,13 +76,7 @@ class Transport(Protocol):
 
 
 def open_transport(name: str) -> Transport:
-    """Return the bridge called ``name``, open: "falcon", "falcon:SERIAL" or "falcon-socket:PATH".
-
-    Raises
-    ------
-    UsbFailure
-        It is not there, or cannot be opened.
-    """
+    """Return the bridge called ``name``, open: "falcon", "falcon:SERIAL" or "falcon-socket:PATH"."""
     kind, _, argument = name.partition(":")
     if kind == "falcon-socket" and argument:
         from study_app.devices.falcon.transport.unix_socket import SocketTransport  # noqa: PLC0415 - not needed by most
@@ -121,13 +115,7 @@ def quiet(transport: Transport) -> int:
 
 
 def end_torque(name: str) -> None:
-    """Open the bridge called ``name`` and send packets of zero torque: what a guard does.
-
-    Raises
-    ------
-    DeviceError
-        It cannot be opened, or takes no packet.
-    """
+    """Open the bridge called ``name`` and send packets of zero torque: what a guard does."""
     transport = open_transport(name)
     try:
         if not quiet(transport):

@@ -29,13 +29,7 @@ _SERVO_S: Final = 2  # the same for the servo, whose time-outs are a few millise
 
 
 class SocketTransport:
-    """The bridge that a server offers at the Unix socket ``path``.
-
-    Raises
-    ------
-    UsbFailure
-        Nobody serves there, somebody else has it, or it is no Falcon.
-    """
+    """The bridge that a server offers at the Unix socket ``path``."""
 
     def __init__(self, path: str) -> None:
         self._path = path

@@ -44,11 +44,6 @@ class PyUsbTransport:
         ``pause(seconds)``, ``c_calls(handle) -> BulkCalls`` with the handle that its ``open_device`` gave.
     index : which Falcon, of several
     serial : its serial number; then ``index`` does not count
-
-    Raises
-    ------
-    UsbFailure
-        There is none, or it cannot be opened and claimed.
     """
 
     def __init__(self, backend: Any = None, *, index: int = 0, serial: str | None = None) -> None:

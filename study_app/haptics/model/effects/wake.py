@@ -82,13 +82,7 @@ W = TypeVar("W", bound=Tail)
 
 
 def within_scaling(wake: W) -> W:
-    """Return a wake.
-
-    Raises
-    ------
-    ValueError
-        It is longer than its scaling.
-    """
+    """Return a wake."""
     if wake.length > wake.scaling:
         raise ValueError(
             f"length {wake.length} exceeds scaling {wake.scaling:g}: the wake would outrun the body; "

@@ -73,13 +73,7 @@ def drag_n(
     diameter_m: float,
     drag_coefficient: float,
 ) -> float:
-    """Return the size of the drag [N] on a sphere at a relative speed, by a law; ``constant`` takes the coefficient.
-
-    Raises
-    ------
-    ValueError
-        A law of the Reynolds number for a liquid without viscosity, or the linear law, which is not that of a sphere.
-    """
+    """Return the size of the drag [N] on a sphere at a relative speed, by a law; ``constant`` takes the coefficient."""
     if law == "constant":
         return 0.5 * density_kg_m3 * drag_coefficient * math.pi / 4 * diameter_m**2 * speed_mps**2
     if viscosity_pa_s is None or law not in LAWS:

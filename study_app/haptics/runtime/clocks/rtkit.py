@@ -30,11 +30,6 @@ def make_real_time(thread: int, address: str | None = None) -> int:
         The system's id of the thread.
     address : str, optional
         Path of the bus' socket; by default the system bus.
-
-    Raises
-    ------
-    OSError
-        There is no bus or no such service here, or it refuses.
     """
     import resource  # noqa: PLC0415 - of POSIX; this file is read on every system
 
