@@ -7,9 +7,8 @@ from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.app.workstation_controller import WorkstationController
-from study_app.devices.backends import backends
 from study_app.devices.descriptor import Backend
-from study_app.devices.registry import descriptor_of
+from study_app.devices.registry import backends, descriptor_of
 from study_app.gui.application import open_here
 from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
 from study_app.gui.devices.view import DevicesPlace

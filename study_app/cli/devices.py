@@ -47,8 +47,7 @@ def devices(context: click.Context) -> None:
 @devices.command("list")
 def list_devices() -> None:
     """List every device: whether it is connected, what it can do, and why it cannot be used."""
-    from study_app.devices.backends import backends
-    from study_app.devices.registry import discover
+    from study_app.devices.registry import backends, discover
 
     of = {
         device.name: f"; {device.kind}, {device.degrees_of_freedom} degrees of freedom" for device in discover().devices
@@ -156,8 +155,7 @@ def bench(name: str, to: Path | None, **device_options: str | Path | None) -> No
             f"device '{name}' has no force to measure: see 'liquid-study devices list' for those that have"
         )
     click.echo(_PREPARING)
-    from study_app.devices.bench.procedure import run_bench
-    from study_app.devices.bench.simulated_operator import asks_hand
+    from study_app.devices.bench.procedure import asks_hand, run_bench
     from study_app.devices.registry import open_device
     from study_app.haptics.runtime.clocks.clock import SystemClock, VirtualClock
 
@@ -181,7 +179,7 @@ def _ask_operator(terminal: Terminal) -> AskOperator:
 
 def _keep_bench(found: Found, folder: Path, *, simulated: bool) -> None:
     """Write the report, and keep the numbers in this machine's settings where the device is a real one."""
-    from study_app.devices.bench.report import as_json, as_markdown, kept
+    from study_app.devices.bench.procedure import as_json, as_markdown, kept
     from study_app.store import workstation
     from study_app.store.atomic import write_file
 

@@ -1,6 +1,6 @@
-"""The devices by name: found in the folder ``descriptors`` and at entry points, described, and opened.
+"""The devices by name: found in the folder ``descriptors`` and at entry points, described, probed, and opened.
 
-Naming the devices loads neither compiler nor driver.
+Naming and probing the devices loads no compiler, and drivers only as far as probing needs them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any, Final
 
 from study_app.devices import descriptors as folder
-from study_app.devices.descriptor import DeviceDescriptor, Doctor, OpenRequest
+from study_app.devices.descriptor import NOT_AVAILABLE, Backend, DeviceDescriptor, Doctor, OpenRequest
 from study_app.devices.names import DEFAULT_DEVICE
 from study_app.errors import DeviceError, DeviceNotFound
 
@@ -165,3 +165,28 @@ def check_options(name: str, options: Iterable[str]) -> None:
             takers = [device.title for device in discover().devices if option in {one.name for one in device.options}]
             only = f"; only these do: {', '.join(takers)}" if takers else ""
             raise DeviceError(f"device '{name}' takes no {option}{only}: leave --{option} out")
+
+
+def backends() -> list[Backend]:
+    """Return the results of all devices' probes, the default device first, then those that could not be loaded."""
+    discovery = discover()
+    found = [backend for device in discovery.devices for backend in _probed(device)]
+    return found + [
+        Backend(
+            f"{one.name} ({one.package})",
+            "entry point",
+            NOT_AVAILABLE,
+            f"a device of the package {one.package}",
+            f"its entry point of the group {ENTRY_POINTS} cannot be loaded ({one.reason}): update or uninstall the "
+            f"package {one.package}",
+        )
+        for one in discovery.broken
+    ]
+
+
+def _probed(device: DeviceDescriptor) -> list[Backend]:
+    try:
+        return list(device.probe())
+    except Exception as error:  # noqa: BLE001 - shown: one device must not hide the others
+        reason = " ".join(str(error).split()) or type(error).__name__
+        return [Backend(device.usage, device.title, NOT_AVAILABLE, "", f"it cannot be looked for: {reason}")]

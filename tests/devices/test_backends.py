@@ -5,13 +5,12 @@ from types import SimpleNamespace
 import numba
 import pytest
 
-from study_app.devices.backends import backends
 from study_app.devices.descriptor import DRIVER_READY, NONE, NOT_AVAILABLE, READY
 from study_app.devices.falcon.failures import UsbFailure
 from study_app.devices.falcon.probe import probe as probe_falcon
 from study_app.devices.falcon.probe import probe_ftdi
-from study_app.devices.registry import list_devices
-from study_app.devices.spacemouse.probe import probe as probe_spacemouse
+from study_app.devices.registry import backends, list_devices
+from study_app.devices.spacemouse.hid import probe as probe_spacemouse
 from study_app.devices.spacemouse.reports import MODELS
 
 
@@ -97,7 +96,7 @@ def test_a_hidapi_that_does_not_load_is_told(monkeypatch):
 @pytest.mark.slow
 def test_this_machine_can_be_asked_and_no_compiler_is_loaded():
     program = (
-        "import sys; from study_app.devices.backends import backends; print(len(backends())); "
+        "import sys; from study_app.devices.registry import backends; print(len(backends())); "
         "sys.exit('numba' in sys.modules)"
     )
     finished = subprocess.run([sys.executable, "-c", program], check=False, capture_output=True, text=True)

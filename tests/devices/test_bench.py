@@ -13,7 +13,7 @@ from study_app.cli import commands
 from study_app.devices.bench import measurements, procedure
 from study_app.devices.bench.kept import dynamics_of
 from study_app.devices.bench.measurements import gain_of
-from study_app.devices.bench.report import as_json, as_markdown, kept
+from study_app.devices.bench.procedure import as_json, as_markdown, kept
 from study_app.devices.registry import descriptor_of, open_device
 from study_app.errors import DeviceError, DeviceLost
 from study_app.haptics.model.device_dynamics import Dynamics
@@ -26,8 +26,7 @@ pytestmark = [needs_servo, pytest.mark.slow]
 
 
 def bench(device, ask=None, durations=QUICK):
-    from study_app.devices.bench.procedure import run_bench
-    from study_app.devices.bench.simulated_operator import asks_hand
+    from study_app.devices.bench.procedure import asks_hand, run_bench
     from study_app.haptics.runtime.clocks.clock import VirtualClock
 
     said = []
@@ -235,7 +234,7 @@ def test_force_of_an_excitation_never_exceeds_its_limit():
 
 def test_handle_that_is_held_is_reported_and_not_kept(tmp_path, monkeypatch):
     from study_app.cli.devices import bench as command
-    from study_app.devices.bench import simulated_operator
+    from study_app.devices.bench import procedure
 
     def never_lets_go(device, _tell):
         device.hold(0.0, 0.0, 0.0)
@@ -243,7 +242,7 @@ def test_handle_that_is_held_is_reported_and_not_kept(tmp_path, monkeypatch):
         return lambda kind, _words: lambda: {"damping": None, "scale": "no"}.get(kind, "")
 
     monkeypatch.setattr(procedure, "Durations", lambda: QUICK)
-    monkeypatch.setattr(simulated_operator, "asks_hand", never_lets_go)
+    monkeypatch.setattr(procedure, "asks_hand", never_lets_go)
     real = replace(descriptor_of("scripted"), kind="felt")
     monkeypatch.setattr("study_app.devices.registry.descriptor_of", lambda _name: real)
     done = CliRunner().invoke(command, ["scripted", "--to", str(tmp_path / "report")])

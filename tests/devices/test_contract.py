@@ -203,7 +203,7 @@ STREAM = [
 
 def words_of(made: Callable[..., Subject], mode: str) -> tuple[str, str]:
     """Return cause and cure of a mode of failure."""
-    from study_app.devices.falcon.failure_modes import BY_ID
+    from study_app.devices.falcon.failures import BY_ID
 
     if made is falcon:
         return BY_ID[mode].cause, BY_ID[mode].cure(sys.platform)
@@ -249,7 +249,7 @@ def test_a_fault_in_a_stroke_ends_in_its_message_zero_force_and_silence(
 def refused(made: Callable[..., Subject], fault: str, request: pytest.FixtureRequest) -> DeviceError:
     """Open a device with a fault; return how it is refused, without any force and with nothing left open."""
     if made is inverse3:
-        from study_app.devices.inverse3.emulated import EmulatedInverse3
+        from study_app.devices.inverse3.doctor import EmulatedInverse3
         from study_app.devices.inverse3.emulator.service import Service
 
         service = Service()
@@ -308,7 +308,7 @@ def test_a_fault_of_opening_is_refused_with_cause_and_cure_and_without_force(
 
 def test_the_tables_of_faults_are_complete() -> None:
     from study_app.devices.force_dimension.emulated import FAULTS as EMULATED
-    from study_app.devices.inverse3.emulator.faults import FAULTS as SERVICE
+    from study_app.devices.inverse3.emulator.documents import FAULTS as SERVICE
     from tests.devices.force_dimension.standin import FAULTS as STANDIN
 
     tried = {made: {fault for one, fault, _ in (*STREAM, *OPENING) if one is made} for made in MOVING}

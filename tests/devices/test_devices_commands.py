@@ -17,7 +17,7 @@ if numba.config.DISABLE_JIT:
 from study_app.cli import commands
 from study_app.cli.devices import Terminal
 from study_app.devices.falcon.emulator.emulator import Emulator
-from study_app.devices.falcon.failure_modes import MODES, UDEV_RULE
+from study_app.devices.falcon.failures import MODES, UDEV_RULE
 from study_app.devices.falcon.mechanics.calibration import calibration_file, load
 from study_app.devices.registry import list_devices
 

@@ -9,8 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
-from study_app.devices.backends import backends
-from study_app.devices.registry import discover, list_devices, open_device
+from study_app.devices.registry import backends, discover, list_devices, open_device
 from study_app.errors import DeviceError
 from study_app.gui.devices.view import DevicesPlace
 from study_app.gui.home.new_session_dialog import NewSessionDialog

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study_app.devices.backends import backends
-from study_app.devices.registry import open_device
+from study_app.devices.registry import backends, open_device
 from study_app.haptics.model import layout
 from tests.compiled import needs_servo
 from tests.devices.packages import TEMPLATE

@@ -14,8 +14,15 @@ import pytest
 
 from study_app.devices.doctor_report import Report, lines
 from study_app.devices.falcon.doctor.failure_report import findings_of
-from study_app.devices.falcon.facts import OPEN, Facts
-from study_app.devices.falcon.failure_modes import LARGEST_STEP_N, LEAST_HZ, LONGEST_ROUND_TRIP_S, MOST_BROKEN, sentence
+from study_app.devices.falcon.failures import (
+    LARGEST_STEP_N,
+    LEAST_HZ,
+    LONGEST_ROUND_TRIP_S,
+    MOST_BROKEN,
+    OPEN,
+    Facts,
+    sentence,
+)
 from study_app.devices.registry import discover
 from tests.compiled import needs_servo
 from tests.devices.subjects import Subject, falcon, force_dimension, inverse3, mouse, over, scripted

@@ -14,8 +14,8 @@ from study_app.app.computer_check import ComputerCheck
 from study_app.devices.descriptor import Backend
 from study_app.devices.doctor_report import Report
 from study_app.devices.falcon.doctor.failure_report import findings_of
-from study_app.devices.falcon.facts import OPEN
-from study_app.devices.falcon.facts import Facts as FalconFacts
+from study_app.devices.falcon.failures import OPEN
+from study_app.devices.falcon.failures import Facts as FalconFacts
 from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
 from study_app.gui.home.new_session_dialog import NewSessionDialog
 from study_app.gui.home.startup_window import OpeningWindow

@@ -17,7 +17,7 @@ def _open(request: OpenRequest) -> Device:
 
 
 def _open_emulated(request: OpenRequest) -> Device:
-    from study_app.devices.inverse3.emulated import EmulatedInverse3  # noqa: PLC0415 - the compiler
+    from study_app.devices.inverse3.doctor import EmulatedInverse3  # noqa: PLC0415 - the compiler
 
     return opened(EmulatedInverse3(request.random, progress=request.progress, **request.limits))
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def _open(request: OpenRequest) -> Device:
-    from study_app.devices.mouse import MouseDevice  # noqa: PLC0415 - the compiler
+    from study_app.devices.simulated.simulated_device import MouseDevice  # noqa: PLC0415 - the compiler
 
     return opened(MouseDevice(**request.limits))
 

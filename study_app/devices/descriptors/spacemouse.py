@@ -17,7 +17,7 @@ def _open(request: OpenRequest) -> Device:
 
 
 def _probe() -> list[Backend]:
-    from study_app.devices.spacemouse.probe import probe  # noqa: PLC0415 - numpy
+    from study_app.devices.spacemouse.hid import probe  # noqa: PLC0415 - numpy
 
     return probe()
 

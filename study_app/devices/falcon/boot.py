@@ -10,9 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from study_app.devices.falcon.facts import OPEN, Facts
-from study_app.devices.falcon.failure_modes import BY_ID
-from study_app.devices.falcon.failures import FalconFailure, UsbFailure
+from study_app.devices.falcon.failures import BY_ID, OPEN, Facts, FalconFailure, UsbFailure
 from study_app.devices.falcon.firmware import Firmware, check
 from study_app.devices.falcon.transport.transport import Transport
 from study_app.devices.falcon.wire import constants

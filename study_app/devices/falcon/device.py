@@ -18,9 +18,7 @@ from study_app.devices.falcon.exchange import (
     exchange_functions,
     new_exchange,
 )
-from study_app.devices.falcon.facts import OPEN, Facts
-from study_app.devices.falcon.failure_modes import BY_ID, sentence
-from study_app.devices.falcon.failures import ProgramMissing, usb_failure
+from study_app.devices.falcon.failures import BY_ID, OPEN, Facts, ProgramMissing, sentence, usb_failure
 from study_app.devices.falcon.firmware import check
 from study_app.devices.falcon.homing import PATIENCE_S, home
 from study_app.devices.falcon.mechanics import calibration

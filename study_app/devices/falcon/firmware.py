@@ -11,8 +11,7 @@ import struct
 from dataclasses import dataclass
 from typing import Final
 
-from study_app.devices.falcon.facts import Facts
-from study_app.devices.falcon.failures import ProgramMissing
+from study_app.devices.falcon.failures import Facts, ProgramMissing
 from study_app.devices.falcon.wire.constants import BOOT_KEY
 
 _RESERVED_WORDS: Final = 8

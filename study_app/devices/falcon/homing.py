@@ -7,9 +7,7 @@ following out-stroke confirms the positions, and that the hand is at the require
 from collections.abc import Callable
 from typing import Any, Final
 
-from study_app.devices.falcon.facts import OPEN, Facts
-from study_app.devices.falcon.failure_modes import sentence
-from study_app.devices.falcon.failures import FalconFailure
+from study_app.devices.falcon.failures import OPEN, Facts, FalconFailure, sentence
 from study_app.devices.falcon.wire.replies import ALL_HOMED
 
 PATIENCE_S: Final = 120.0

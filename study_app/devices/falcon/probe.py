@@ -5,8 +5,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from study_app.devices.descriptor import DRIVER_READY, NONE, NOT_AVAILABLE, Backend
-from study_app.devices.falcon.failure_modes import BY_ID
-from study_app.devices.falcon.failures import UsbFailure
+from study_app.devices.falcon.failures import BY_ID, UsbFailure
 
 
 def probe(usb: Any = None, platform: str = sys.platform) -> Backend:

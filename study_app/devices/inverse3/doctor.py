@@ -1,20 +1,106 @@
 """An Inverse3 looked over: its service and device found, opened with neutral settings, run at 1 kHz, and let go of.
 
-Everything is done by the driver that a session uses, so what fails there fails here; `failures` has cause and cure.
+Everything is done by the driver that a session uses, so what fails there fails here; `failures` has cause and cure. The
+driver can stand in front of an emulated Inverse Service, whose handle a simulated hand holds: all of the driver is the
+real one, down to the bytes of the WebSocket; in place of the socket's functions it calls those of the emulator. Once it
+is open, the emulator's time is that of the servo's ticks.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from random import Random
+from typing import Any
+
+import numpy as np
 
 from study_app.devices.doctor_report import Report
 from study_app.devices.doctor_run import SECONDS, examine_by_table
-from study_app.devices.inverse3.device import Inverse3Device
-from study_app.devices.inverse3.emulated import EmulatedInverse3
-from study_app.devices.inverse3.emulator.service import Service
+from study_app.devices.inverse3.device import FORCE_LIMIT_N, WORKSPACE_M, Inverse3Device
+from study_app.devices.inverse3.emulator.service import Service, service_calls
 from study_app.devices.inverse3.failures import FAILURES
+from study_app.devices.inverse3.link import Link, TransferCalls
 from study_app.errors import DeviceError
 
 _FAULT_AFTER = 1000  # commands
+
+
+class EmulatedLink:
+    """The byte stream to an emulated service: nothing waits, since each command is carried out at once."""
+
+    emulated = True
+
+    def __init__(self, service: Service) -> None:
+        self._service = service
+        service.connected()
+
+    def calls(self) -> TransferCalls:
+        """Return it as compiled code sees it."""
+        return TransferCalls(*service_calls(self._service))
+
+    def send(self, data: bytes) -> None:
+        """Send all of it."""
+        self._service.take_bytes(data)
+
+    def receive(self, timeout_s: float) -> bytes:
+        """Return what came."""
+        return self._service.give_bytes() or self._nothing(timeout_s)
+
+    def now_s(self) -> float:
+        """Return the emulated time [s]."""
+        return 1e-9 * float(self._service.state.now_ns)
+
+    def close(self) -> None:
+        """Let the service see the end of the stream."""
+        self._service.disconnected()
+
+    def _nothing(self, timeout_s: float) -> bytes:
+        if self._service.state.ended:
+            raise FAILURES.failure("closed", "while it was opened")
+        raise FAILURES.failure("no-reply", f"nothing within {timeout_s:g} s")
+
+
+class EmulatedInverse3(Inverse3Device):
+    """An Inverse3 of numbers; ``hand`` takes the orders of whoever simulates a participant.
+
+    Parameters
+    ----------
+    random : where the hand's tremor is drawn from; None: always the same one
+    workspace_m : half extents of where the handle shall reach, and can be sent [m]
+    force_limit_n : the greatest force it may be asked for [N]
+    progress : is given what to do while it is opened
+    service : another than a new one
+    """
+
+    name = "inverse3-emulated"
+
+    def __init__(
+        self,
+        random: Random | None = None,
+        *,
+        workspace_m: tuple[float, float, float] = WORKSPACE_M,
+        force_limit_n: float = FORCE_LIMIT_N,
+        progress: Callable[[str], object] | None = None,
+        service: Service | None = None,
+    ) -> None:
+        super().__init__(workspace_m=workspace_m, force_limit_n=force_limit_n, progress=progress)
+        self.hand = service if service is not None else Service(random, workspace_m=workspace_m)
+
+    def open(self) -> None:
+        """Open the session; from then on the emulator's time is that of the ticks."""
+        super().open()
+        self.exchange.now_ns = np.int64(self.hand.state.now_ns)
+        self.hand.follow_clock(self.context)  # INVERSE3 begins with the time of the tick
+
+    def close(self) -> None:
+        """Send zero force and a close frame, and close the connection; a second call does nothing."""
+        super().close()
+        self.hand.follow_clock(0)
+
+    def _connect(self) -> Link:
+        return EmulatedLink(self.hand)
+
+    def _force_scale(self) -> Any:
+        return self.hand.force_scale
 
 
 def examine(

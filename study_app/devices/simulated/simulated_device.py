@@ -1,7 +1,10 @@
-"""A device made of ``haptics.kernels.plant`` and a hand: the common part of mouse and scripted device.
+"""Devices made of ``haptics.kernels.plant`` and a hand: the mouse, and the common part of it and the scripted device.
 
-Its read advances hand and handle to the given time, inside the servo's loop; its write stores the force for the next
-step.
+The read of such a device advances hand and handle to the given time, inside the servo's loop; its write stores the
+force for the next step. With the mouse the liquid is seen instead of felt: a spring and a damper connect a simulated
+handle to the pointer, and the liquid's force acts on that handle: it lags behind the pointer by force / stiffness, and
+continues after the pointer has stopped, as the liquid moves it. In free space it follows smoothly, 20 ms behind (two
+low-passes of 10 ms, which smooth the pointer's steps).
 """
 
 from functools import cache
@@ -10,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from study_app.devices.base import Device
-from study_app.devices.simulated.hand import HAND, move_held_handle
+from study_app.devices.simulated.hand import HAND, POINT, move_held_handle
 from study_app.devices.simulated.hand_commands import HandOrders
 from study_app.haptics.kernels.c_functions import (
     READ,
@@ -21,7 +24,7 @@ from study_app.haptics.kernels.c_functions import (
     c_function,
     record_at,
 )
-from study_app.haptics.kernels.plant import HANDLE, let_go, measure, push
+from study_app.haptics.kernels.plant import HANDLE, let_go, measure, new_handle, push
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import COMMAND, MEASURED_VELOCITY, READING, records
 
@@ -37,10 +40,13 @@ SIMULATED = np.dtype(
     ],
     align=True,
 )
-
 _simulated_at = record_at(SIMULATED)
 _reading_at = record_at(READING)
 _command_at = record_at(COMMAND)
+MASS_KG = 0.2
+STIFFNESS_NPM = 400.0  # 8 N hold the handle back by 20 mm, a fifth of the workspace
+DAMPING_NSPM = 27.0  # 1.5 times critical
+LAG_S = 0.010
 
 
 class SimulatedDevice(HandOrders, Device):
@@ -137,3 +143,30 @@ def _write(context: int, command: int) -> int:
     device, force_n = _simulated_at(context), _command_at(command).force_n
     push(device.handle, force_n[0], force_n[1], force_n[2])
     return READ_LOST if device.unplugged != 0 else 0
+
+
+class PointedDevice(SimulatedDevice):
+    """A handle connected to a pointer; the subclass moves the pointer.
+
+    Parameters
+    ----------
+    workspace_m : half extents of the handle's workspace [m]
+    force_limit_n : the greatest force that may be commanded [N]
+    """
+
+    def __init__(
+        self, workspace_m: tuple[float, float, float] = (0.05, 0.05, 0.05), force_limit_n: float = 8.0
+    ) -> None:
+        handle = new_handle(mass_kg=MASS_KG, stiffness_npm=STIFFNESS_NPM, damping_nspm=DAMPING_NSPM)
+        super().__init__(handle, workspace_m, force_limit_n)
+        self.state.hand.lag_s = LAG_S
+
+    def point_to(self, x_m: float, y_m: float, z_m: float) -> None:
+        """Set the pointer's place [m, hand frame]; a place outside the workspace counts as its border."""
+        self._post(POINT, target_m=self._inside(x_m, y_m, z_m))
+
+
+class MouseDevice(PointedDevice):
+    """The built-in default: a pointer and its buttons without hardware; a window sets the pointer."""
+
+    name = "mouse"

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-from study_app.devices.mouse import PointedDevice
+from study_app.devices.simulated.simulated_device import PointedDevice
 from study_app.devices.spacemouse.hid import choose, find_space_mice, load_hid, opened
 from study_app.devices.spacemouse.reports import (
     DEAD_DEFLECTION,

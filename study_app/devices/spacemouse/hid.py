@@ -7,8 +7,10 @@ of which one reports motion. Loads no compiler, and hidapi only when asked to.
 
 import sys
 from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Final
 
+from study_app.devices.descriptor import NONE, NOT_AVAILABLE, Backend
 from study_app.devices.spacemouse.reports import MODELS, USAGE, Model
 from study_app.errors import DeviceError, DeviceNotFound
 
@@ -72,3 +74,29 @@ def opened(hid: Any, model: Model, path: bytes) -> Any:
         cure = CANNOT_OPEN.get(sys.platform, CANNOT_OPEN["win32"])
         raise DeviceError(f"the {model.name} cannot be opened: {cure}") from error
     return device
+
+
+def probe(hid: Any = None) -> list[Backend]:
+    """Return what hidapi finds.
+
+    Parameters
+    ----------
+    hid : hidapi's module; None: it is loaded
+    """
+    can = "visual only, no force: pushing the cap further moves the ball faster"
+    by = f"hidapi {_version()}"
+    try:
+        found = find_space_mice(load_hid() if hid is None else hid)
+    except (DeviceError, OSError) as error:
+        return [Backend("spacemouse", by, NOT_AVAILABLE, can, str(error))]
+    if not found:
+        return [Backend("spacemouse", by, NONE, can, "connect a 3Dconnexion SpaceMouse, or turn it on")]
+    names = sorted({model.name for model, _ in found})
+    return [Backend("spacemouse", by, "connected: " + ", ".join(names), can)]
+
+
+def _version() -> str:
+    try:
+        return version("hidapi")
+    except PackageNotFoundError:
+        return "(not installed)"

@@ -17,7 +17,7 @@ import numpy as np
 from numba import types
 
 from study_app.devices.inverse3.device import Inverse3Device
-from study_app.devices.inverse3.emulated import EmulatedInverse3
+from study_app.devices.inverse3.doctor import EmulatedInverse3
 from study_app.devices.inverse3.emulator.server import ServiceServer
 from study_app.devices.inverse3.emulator.service import Service
 from study_app.devices.inverse3.exchange import INVERSE3

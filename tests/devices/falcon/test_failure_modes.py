@@ -12,8 +12,7 @@ from study_app.devices.falcon.doctor.examine import examine, ftdi_sees
 from study_app.devices.falcon.emulated import EmulatedFalcon
 from study_app.devices.falcon.emulator.emulator import Emulator
 from study_app.devices.falcon.emulator.faults import CHANCES, SWITCHES
-from study_app.devices.falcon.failure_modes import BY_ID, diagnose
-from study_app.devices.falcon.failures import FalconFailure
+from study_app.devices.falcon.failures import BY_ID, FalconFailure, diagnose
 from study_app.devices.falcon.homing import PULL_OUT
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo

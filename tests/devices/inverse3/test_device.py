@@ -10,7 +10,7 @@ import pytest
 
 from study_app.devices.inverse3 import service_settings
 from study_app.devices.inverse3.device import Inverse3Device, address
-from study_app.devices.inverse3.emulated import EmulatedInverse3, EmulatedLink
+from study_app.devices.inverse3.doctor import EmulatedInverse3, EmulatedLink
 from study_app.devices.inverse3.emulator.service import Service
 from study_app.devices.inverse3.exchange import MOST_UNANSWERED, MOST_WEAKER
 from study_app.devices.inverse3.opening import find_device

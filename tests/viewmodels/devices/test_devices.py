@@ -5,9 +5,8 @@ from typing import Any
 
 import pytest
 
-from study_app.devices.backends import backends
 from study_app.devices.descriptor import DRIVER_READY, NONE, NOT_AVAILABLE, READY, Backend
-from study_app.devices.registry import list_devices
+from study_app.devices.registry import backends, list_devices
 from study_app.store.workstation import DEFAULTS, DeviceBench
 from study_app.viewmodels.devices.bench import benches_shown
 from study_app.viewmodels.devices.list_view import device_named, devices_shown, looking

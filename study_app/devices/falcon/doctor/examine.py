@@ -18,8 +18,7 @@ from study_app.devices.falcon.device import FalconDevice
 from study_app.devices.falcon.doctor.failure_report import findings_of
 from study_app.devices.falcon.emulated import EmulatedFalcon, new_emulator
 from study_app.devices.falcon.emulator.emulator import Emulator
-from study_app.devices.falcon.facts import ALL_HOMED, OPEN, Facts
-from study_app.devices.falcon.failures import FalconFailure, UsbFailure
+from study_app.devices.falcon.failures import ALL_HOMED, OPEN, Facts, FalconFailure, UsbFailure
 from study_app.devices.falcon.mechanics.geometry import WORKSPACE_M
 from study_app.devices.falcon.transport.ftdi import FtdiTransport, load_d2xx
 from study_app.devices.falcon.transport.usb import find_falcons

@@ -6,8 +6,7 @@ Loads neither the compiler nor a driver, and can be passed between processes.
 from typing import Final
 
 from study_app.devices.doctor_report import Finding
-from study_app.devices.falcon.facts import Facts, Mode
-from study_app.devices.falcon.failure_modes import MODES
+from study_app.devices.falcon.failures import MODES, Facts, Mode
 
 _NOTHING_SEEN: Final = Facts()
 

@@ -16,13 +16,14 @@ import numpy as np
 
 from study_app.devices.inverse3.emulator.documents import (
     DEVICE_ID,
+    FAULTS,
     LEGACY_STATE,
     STATUS,
     config,
+    faulty_bytes,
     state_message,
     template,
 )
-from study_app.devices.inverse3.emulator.faults import FAULTS, faulty_bytes
 from study_app.devices.inverse3.emulator.stream import (
     SERVICE,
     act,
