@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.laws.rheology import stress_pa
 from study_app.haptics.model.scene import Scene
-from study_app.haptics.model.steady_state import steady
+from study_app.haptics.model.slope_limits import steady
 
 Floats: TypeAlias = NDArray[np.float64]
 

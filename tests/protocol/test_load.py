@@ -11,7 +11,7 @@ from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.gate import describe_gate, resolve
 from study_app.haptics.model.overrides import override, value_of
 from study_app.haptics.model.scene import Ewma, Kalman, Line, Liquid, Scene
-from study_app.haptics.model.steady_state import steady
+from study_app.haptics.model.slope_limits import steady
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, load_scene, parse, protocol_hash, source_bytes
 from study_app.protocol.orders.schedule import build_schedule

@@ -1,6 +1,6 @@
 """The force of each liquid against a hand."""
 
-from study_app.haptics.model.steady_state import HAND_MPS, Steady, steady
+from study_app.haptics.model.slope_limits import HAND_MPS, Steady, steady
 from study_app.protocol.model import Protocol
 
 

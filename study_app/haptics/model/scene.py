@@ -6,7 +6,7 @@ hand from here, too.
 """
 
 import math
-from typing import Annotated, Literal, Self, TypeAlias
+from typing import Annotated, Final, Literal, Self, TypeAlias
 
 from pydantic import Field, model_validator
 
@@ -17,7 +17,6 @@ from study_app.haptics.model.estimators.kalman import Kalman
 from study_app.haptics.model.estimators.lead import Lead
 from study_app.haptics.model.estimators.line import MAX_WINDOW, Line
 from study_app.haptics.model.estimators.raw import Raw
-from study_app.haptics.model.force_link import PROMPT, ForceLink, too_long
 from study_app.haptics.model.liquid import MAX_LIQUIDS, Box, Cylinder, Effect, Everywhere, Liquid, Region
 from study_app.haptics.model.ranges import (
     Coordinate,
@@ -31,6 +30,11 @@ from study_app.haptics.model.ranges import (
     within,
 )
 
+MOST_DELAY_MS: Final = 200
+MOST_JITTER_MS: Final = 50
+MOST_LOSS: Final = 0.5
+STORED_FORCES: Final = 1024
+"""Number of stored forces: delay and jitter together are shorter [ticks]."""
 __all__ = [
     "MAX_LIQUIDS",
     "MAX_WINDOW",
@@ -56,14 +60,66 @@ __all__ = [
     "Scene",
     "Velocity",
 ]
-
 RateHz: TypeAlias = Annotated[float, within(50, 5000, "below, no servo is stable; above, no tick fits")]
 SceneScale: TypeAlias = Annotated[float, within(0.01, 100, "a stroke of 60 mm is then 0.6 mm to 6 m in the scene")]
-
 FADE_S = 0.05
 HAND_SPEED_MPS = 0.3
 HAND_ACCELERATION_MPS2 = 3.0  # 0.3 m/s at 1.6 Hz
 HAND_REACH_M = 0.04
+Estimator: TypeAlias = Annotated[Ewma | Line | Foaw | Kalman | Lead | Raw, Field(discriminator="kind")]
+Velocity: TypeAlias = Annotated[Ewma | Line | Foaw | Kalman | Lead | Raw | Given, Field(discriminator="kind")]
+
+
+class ForceLink(Frozen):
+    """A link that sends the force of the effects late, with jitter and loss.
+
+    Parameters
+    ----------
+    delay_s : float
+        Delay of every force [s].
+    jitter_s : float
+        A force is later by up to this, drawn again at every tick from a uniform distribution [s].
+    loss : float
+        Share of ticks whose force is lost: the last one is held.
+    seed : int
+        Of jitter and loss, below 2³².
+    """
+
+    delay_s: Annotated[float, within(0, MOST_DELAY_MS / 1000, "beyond, a liquid pushes instead of resisting")] = 0.0
+    jitter_s: Annotated[float, within(0, MOST_JITTER_MS / 1000, "networks deviate less")] = 0.0
+    loss: Annotated[float, within(0, MOST_LOSS, "beyond, most forces are held ones")] = 0.0
+    seed: Annotated[int, within(0, 2**32 - 1, "32 bits")] = 0
+
+    @property
+    def acts(self) -> bool:
+        """Whether it changes the force."""
+        return self.delay_s > 0 or self.jitter_s > 0 or self.loss > 0
+
+    def ticks(self, rate_hz: float) -> tuple[int, int]:
+        """Return delay and jitter in whole ticks."""
+        return round(self.delay_s * rate_hz), round(self.jitter_s * rate_hz)
+
+    def mean_delay_s(self, rate_hz: float) -> float:
+        """Return the approximate mean delay of a force [s].
+
+        A force older than the last one is skipped, so a uniform jitter of J ticks adds about √(πJ/2) ticks.
+        """
+        return self.delay_s + math.sqrt(math.pi / 2 * self.ticks(rate_hz)[1]) / rate_hz
+
+    def fits(self, rate_hz: float) -> bool:
+        """Return whether enough forces are stored for the delay."""
+        return sum(self.ticks(rate_hz)) < STORED_FORCES
+
+
+def too_long_delay(rate_hz: float) -> str:
+    """Return the error message of a link that does not fit."""
+    return (
+        f"delay and jitter of the force must be below {1000 * STORED_FORCES / rate_hz:g} ms together at {rate_hz:g} Hz"
+    )
+
+
+PROMPT_LINK: Final = ForceLink()
+"""No link, the default: the force of a tick is sent in that tick."""
 
 
 class Body(Frozen):
@@ -77,10 +133,6 @@ class Body(Frozen):
     def volume_m3(self) -> float:
         """The volume of the ball."""
         return math.pi / 6 * self.diameter_m**3
-
-
-Estimator: TypeAlias = Annotated[Ewma | Line | Foaw | Kalman | Lead | Raw, Field(discriminator="kind")]
-Velocity: TypeAlias = Annotated[Ewma | Line | Foaw | Kalman | Lead | Raw | Given, Field(discriminator="kind")]
 
 
 class Knee(Frozen):
@@ -158,7 +210,7 @@ class Scene(Frozen):
     accuracy: Accuracy = Accuracy()
     motion: MotionBox = MotionBox()
     format: Literal[1, 2] = 1
-    link: ForceLink = PROMPT
+    link: ForceLink = PROMPT_LINK
 
     @model_validator(mode="after")
     def _liquids_are_told_apart(self) -> Self:
@@ -170,7 +222,7 @@ class Scene(Frozen):
     @model_validator(mode="after")
     def _link_reaches_back(self) -> Self:
         if not self.link.fits(self.rate_hz):
-            raise ValueError(too_long(self.rate_hz))
+            raise ValueError(too_long_delay(self.rate_hz))
         return self
 
     def motion_in(self, liquid: Liquid) -> MotionBox:

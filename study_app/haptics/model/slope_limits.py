@@ -1,28 +1,31 @@
-"""The maximum stable damping of a sampled loop: the table of slope limits, without compiled code.
+"""The maximum stable damping of a sampled loop, and the force that the servo sends in uniform motion.
 
-The table is ``slope_limits.csv`` in this folder, measured by ``validation.stability`` on the servo's own
-tick; how its numbers follow from the measurement is said there.
+Neither needs compiled code. The table of slope limits is ``slope_limits.csv`` in this folder, measured by
+``validation.stability`` on the servo's own tick; how its numbers follow from the measurement is said there.
 """
 
 import csv
+import math
 from functools import cache, lru_cache
 from importlib import resources
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 from study_app.errors import StudyError
+from study_app.haptics.model.bounds import met_mps
 from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.effects.drag import resistance_n
+from study_app.haptics.model.effects.non_newtonian import VISCOUS_SHARE, steady_n
+from study_app.haptics.model.effects.unsteady_drag import LATE_SHARE, even_n
 from study_app.haptics.model.estimators import NAMED
 from study_app.haptics.model.estimators.device import DeviceVelocity
 from study_app.haptics.model.force_rules import CURRENT, ForceRules
-from study_app.haptics.model.scene import Ewma, Foaw, Given, Kalman, Velocity
+from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.scene import Ewma, Foaw, Given, Kalman, Scene, Velocity
 
 SLOWEST_HZ: Final = 500.0
 """Slower servos are for trials only: participants would feel the limits rather than the liquids."""
-
-
 INERTIA_SHARE: Final = 0.3
 """Share of the drag limit for added mass and history if they need not be exact."""
-
 MEASURED_KG: Final = 0.1
 """Mass of the free handle in the measurement of the table."""
 LIGHTER: Final = 2.0
@@ -34,9 +37,10 @@ KALMAN_SLEW: Final = 0.8
 """Its share with "kalman": at 1, a released handle oscillated in tar if the delay was one tick longer than assumed."""
 SLEW_S: Final = 1e-3
 NOMINAL_S: Final = 1e-3
-
 _THESIS: Final = Ewma()
 _SAME: Final = 1e-9  # tolerance for periods that differ only by rounding
+HAND_MPS: Final = 0.1
+"""Hand speed while exploring a liquid [m/s]."""
 
 
 class DampingLimits(NamedTuple):
@@ -169,3 +173,39 @@ def refuses(rate_hz: float) -> str | None:
         f"the servo runs at {rate_hz:g} Hz, and below {SLOWEST_HZ:g} Hz the stability limits are felt instead of the "
         "liquids: set device.rate_hz to 1000"
     )
+
+
+class Steady(NamedTuple):
+    """The sent force [N], the drag before the safety layer, and the limit that reduced it, if any."""
+
+    force_n: float
+    drag_n: float
+    limit: Literal["slope", "norm"] | None
+
+
+def steady(scene: Scene, hand_mps: float = HAND_MPS) -> Steady:
+    """Return the force on a hand in uniform motion at ``hand_mps`` through the scene's liquid at rest.
+
+    Only drag, after the safety layer: without wake, acceleration and buoyancy. The scene has one liquid; the loop one
+    tick of delay.
+    """
+    (liquid,) = resolve(scene).liquids
+    if not {"drag", "unsteady_drag", "non_newtonian"} & set(liquid.effects):
+        return Steady(0.0, 0.0, None)
+    speed_mps = met_mps(scene, liquid, scene.scale * hand_mps)
+    slope_n = slope_limit(1 / scene.rate_hz, 1, scene.velocity) * speed_mps / scene.scale
+    if "drag" in liquid.effects:
+        drag_n = resistance_n(scene, liquid, speed_mps, liquid.drag.law)
+        stable_n = min(drag_n, slope_n)
+    elif "non_newtonian" in liquid.effects:
+        drag_n = sum(steady_n(scene, liquid, speed_mps))
+        held_n, viscous_n = steady_n(scene, liquid, speed_mps, slope_n / speed_mps if speed_mps > 0 else math.inf)
+        stable_n = held_n + min(viscous_n, slope_n * (VISCOUS_SHARE if held_n > 0 else 1.0))
+    else:
+        drag_n, stokes_n = even_n(scene, liquid, speed_mps)
+        most_late_n = LATE_SHARE * math.sqrt(2) * max(slope_n - stokes_n, 0.0)  # ball and wake have the same speed
+        stable_n = drag_n if drag_n - stokes_n <= most_late_n else min(stokes_n, slope_n) + most_late_n
+    force_n = min(stable_n, scene.force_limit_n)
+    if force_n == drag_n:
+        return Steady(force_n, drag_n, None)
+    return Steady(force_n, drag_n, "norm" if force_n == scene.force_limit_n else "slope")

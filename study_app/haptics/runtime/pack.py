@@ -1,36 +1,96 @@
-"""Packs a scene into the memory that compiled code reads, which is allocated once and refilled in place."""
+"""Packs a scene into the memory that compiled code reads, which is allocated once and refilled in place.
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+Each liquid is converted into the record that its effects read, and into the rows of the effects' arrays.
+"""
+
+from collections import namedtuple
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
 from study_app.errors import StudyError
 from study_app.haptics.model import layout
 from study_app.haptics.model.device_dynamics import MOST_DELAY, UNKNOWN, Dynamics
-from study_app.haptics.model.effect import GRAVITY_MPS2
+from study_app.haptics.model.effect import GRAVITY_MPS2, Rows
 from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.estimators import NAMED as ESTIMATORS
 from study_app.haptics.model.estimators.device import MOST_LAG_TICKS, DeviceVelocity
-from study_app.haptics.model.force_link import FORCES
 from study_app.haptics.model.force_rules import CURRENT, ForceRules
 from study_app.haptics.model.gate import resolve
-from study_app.haptics.model.scene import MAX_LIQUIDS, MAX_WINDOW, Ewma, Given, Kalman, Scene
+from study_app.haptics.model.liquid import Box, Cylinder, Liquid, Region
+from study_app.haptics.model.scene import MAX_LIQUIDS, MAX_WINDOW, STORED_FORCES, Ewma, Given, Kalman, Scene
 from study_app.haptics.model.slope_limits import DampingLimits, handle_limits, slew_limit_n
-from study_app.haptics.runtime.scene_records import (
-    KINDS,
-    EffectRows,
-    count_open_ended,
-    fill,
-    most_rows,
-    no_rows,
-    rows_after,
-    rows_needed,
-)
 
+KINDS: Final[tuple[Rows, ...]] = tuple(rows for effect in EFFECTS for rows in effect.rows)
+_ARRAYS: Final = tuple(name for kind in KINDS for name in kind.arrays)
+EffectRows: Final[Any] = namedtuple("EffectRows", _ARRAYS)  # type: ignore[misc]
+EffectRows.__doc__ = "The arrays of a model that effects own, by name."
+Counts: TypeAlias = Mapping[str, int]
+"""A number of rows for each of these arrays."""
 RESOLUTION = 1e-6
 """Of the factor of smoothing rates."""
 _KNEES = {"none": layout.KNEE_NONE, "sqrt": layout.KNEE_SQRT, "square": layout.KNEE_SQUARE}
+
+
+def rows_needed(scene: Scene) -> Counts:
+    """Return the rows that the effects of a scene's liquids own."""
+    rows = no_rows()
+    for liquid in scene.liquids:
+        rows = rows_after(rows, liquid, scene.rate_hz)
+    return rows
+
+
+def no_rows() -> Counts:
+    """Return none."""
+    return dict.fromkeys(_ARRAYS, 0)
+
+
+def rows_after(rows: Counts, liquid: Liquid, rate_hz: float) -> Counts:
+    """Return the rows plus those that a liquid's effects own."""
+    added = {
+        name: kind.needed(liquid, rate_hz)
+        for effect in EFFECTS
+        if effect.name in liquid.effects
+        for kind in effect.rows
+        for name in kind.arrays
+    }
+    return {name: count + added.get(name, 0) for name, count in rows.items()}
+
+
+def most_rows(liquids: int, capacity: int, rate_hz: float) -> Counts:
+    """Return the rows for any ``liquids``; ``capacity`` where only the caller knows their number."""
+    return {
+        name: capacity if kind.most is None else liquids * kind.most(rate_hz) for kind in KINDS for name in kind.arrays
+    }
+
+
+def count_open_ended(rows: Counts) -> int:
+    """Return the greatest number of the rows that only the caller that packs scenes knows."""
+    return max((rows[name] for kind in KINDS if kind.most is None for name in kind.arrays), default=0)
+
+
+def fill(record: layout.Record, liquid: Liquid, scene: Scene, first: Counts) -> None:
+    """Write only the parameters of a liquid's effects, for rows from ``first`` on."""
+    _fill_region(record.region, liquid.region)
+    for effect in EFFECTS:
+        if effect.name in liquid.effects:
+            record.effects |= effect.bit
+            if effect.parameters is not None:
+                effect.fill(record[effect.name], liquid, scene, first)
+
+
+def _fill_region(record: layout.Record, region: Region) -> None:
+    if isinstance(region, Box):
+        record.kind = layout.REGION_BOX
+        record.centre_m[:] = region.centre_m
+        record.half_m[:] = [size / 2 for size in region.size_m]
+    elif isinstance(region, Cylinder):
+        record.kind = layout.REGION_CYLINDER
+        record.centre_m[:] = region.centre_m
+        record.half_m[:] = region.radius_m, region.height_m / 2, region.radius_m
+    else:
+        record.kind = layout.REGION_EVERYWHERE
 
 
 class Model(NamedTuple):
@@ -41,7 +101,7 @@ class Model(NamedTuple):
     state: Any  # (1,) STATE
     liquid_states: Any  # (n,) LIQUID_STATE
     window: Any  # (rows,) WINDOW, the newest samples, of estimators with a window
-    forces_n: Any  # (FORCES, 3) the newest forces [N], if the scene's link delays them; else (0, 3)
+    forces_n: Any  # (STORED_FORCES, 3) the newest forces [N], if the scene's link delays them; else (0, 3)
     rows: Any  # `EffectRows`: arrays of the effects, with contiguous rows per liquid
 
     @property
@@ -86,7 +146,7 @@ def pack(
         state=layout.records(layout.STATE, 1),
         liquid_states=layout.records(layout.LIQUID_STATE, liquids),
         window=layout.records(layout.WINDOW, window_needed(scene) if capacity is None else MAX_WINDOW),
-        forces_n=np.zeros((FORCES if capacity is not None or scene.link.acts else 0, 3)),
+        forces_n=np.zeros((STORED_FORCES if capacity is not None or scene.link.acts else 0, 3)),
         rows=EffectRows(
             **{
                 name: layout.records(layout.record_type(fields), rows[name])

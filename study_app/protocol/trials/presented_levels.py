@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final, Literal
 from study_app.errors import StudyError
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.scene import Scene
-from study_app.haptics.model.steady_state import steady
+from study_app.haptics.model.slope_limits import steady
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulus

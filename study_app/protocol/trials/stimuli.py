@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, Self, Typ
 from pydantic import Field, model_validator
 from pydantic.json_schema import SkipJsonSchema
 
-from study_app.haptics.model import force_link
-from study_app.haptics.model.force_link import ForceLink
+from study_app.haptics.model import scene
 from study_app.haptics.model.ranges import within
-from study_app.protocol.table import ExtendedTable, Id, Table, invalid
-from study_app.protocol.trials.designs import Design
+from study_app.haptics.model.scene import ForceLink
+from study_app.protocol.table import ExtendedTable, Table
+from study_app.protocol.texts import Id
 
 if TYPE_CHECKING:
     from study_app.psychophysics.families import Floats
@@ -32,9 +32,9 @@ FORCE_DELAY: Final = "force_delay_ms"
 DELAYS: Final = (DELAY, FORCE_DELAY)
 MOST_DELAY_MS: Final = 1000
 OF_LINK: Final = {
-    FORCE_DELAY: force_link.MOST_DELAY_MS,
-    "force_jitter_ms": force_link.MOST_JITTER_MS,
-    "force_loss": force_link.MOST_LOSS,
+    FORCE_DELAY: scene.MOST_DELAY_MS,
+    "force_jitter_ms": scene.MOST_JITTER_MS,
+    "force_loss": scene.MOST_LOSS,
 }
 OF_CONDITION: Final = {DELAY: MOST_DELAY_MS, **OF_LINK}
 """The varied numbers that belong to the condition, not to its liquid, and the most that each may be."""
@@ -60,13 +60,13 @@ class Condition(ExtendedTable):
     ball: Literal["shown", "hidden"] = Field(
         default="shown", description="shown: the ball is always drawn; hidden: it is drawn only during a task's lead."
     )
-    force_delay_ms: Annotated[float, within(0, force_link.MOST_DELAY_MS, "a later force pushes the hand")] = Field(
+    force_delay_ms: Annotated[float, within(0, scene.MOST_DELAY_MS, "a later force pushes the hand")] = Field(
         default=0, description="Delay of the force [ms]; what is drawn is not delayed by it."
     )
-    force_jitter_ms: Annotated[float, within(0, force_link.MOST_JITTER_MS, "networks deviate less")] = Field(
+    force_jitter_ms: Annotated[float, within(0, scene.MOST_JITTER_MS, "networks deviate less")] = Field(
         default=0, description="Largest additional delay of the force, drawn at random at every tick [ms]."
     )
-    force_loss: Annotated[float, within(0, force_link.MOST_LOSS, "beyond, most forces are held ones")] = Field(
+    force_loss: Annotated[float, within(0, scene.MOST_LOSS, "beyond, most forces are held ones")] = Field(
         default=0, description="Share of ticks whose force is lost; the last one is held."
     )
     view: str = Field(

@@ -11,8 +11,15 @@ from study_app.errors import StudyError
 from study_app.haptics.model.effects.drag import DAMPING_NSPM, Drag
 from study_app.haptics.model.estimators import ESTIMATORS as KINDS
 from study_app.haptics.model.estimators.device import MOST_LAG_TICKS
-from study_app.haptics.model.force_link import MOST_DELAY_MS, MOST_JITTER_MS, MOST_LOSS, ForceLink, too_long
-from study_app.haptics.model.scene import Liquid, Scene
+from study_app.haptics.model.scene import (
+    MOST_DELAY_MS,
+    MOST_JITTER_MS,
+    MOST_LOSS,
+    ForceLink,
+    Liquid,
+    Scene,
+    too_long_delay,
+)
 from study_app.protocol.load import load
 from study_app.protocol.source.files import shipped, shipped_file
 
@@ -219,7 +226,7 @@ def parse(line: str) -> Case:
         if getattr(case, name) not in permitted:
             raise StudyError(f"{name}={getattr(case, name)} is none of {', '.join(permitted)}")
     if not _link_of(case).fits(case.rate_hz):
-        raise StudyError(too_long(case.rate_hz))
+        raise StudyError(too_long_delay(case.rate_hz))
     return case
 
 

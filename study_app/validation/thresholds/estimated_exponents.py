@@ -15,7 +15,7 @@ import numpy as np
 from study_app.analysis.levels.thresholds import estimate_slope
 from study_app.analysis.statistics.outcome import student_interval
 from study_app.haptics.model.overrides import override
-from study_app.haptics.model.steady_state import steady
+from study_app.haptics.model.slope_limits import steady
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key

@@ -8,11 +8,10 @@ from study_app.errors import StudyError
 from study_app.haptics.kernels.force_link import delay_force, uniform
 from study_app.haptics.kernels.safety import begin_scene
 from study_app.haptics.model.effects.drag import Drag
-from study_app.haptics.model.force_link import FORCES, PROMPT, ForceLink
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_STOP
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.overrides import number_names, override
-from study_app.haptics.model.scene import Box, Liquid, Scene
+from study_app.haptics.model.scene import PROMPT_LINK, STORED_FORCES, Box, ForceLink, Liquid, Scene
 from study_app.haptics.runtime.offline import samples_along
 from study_app.haptics.runtime.pack import built_alike, pack, pack_into
 from study_app.protocol.scene_file import scene_text
@@ -111,7 +110,7 @@ def test_a_stop_is_zero_at_once_and_the_force_returns_with_a_fade():
 def test_the_first_force_that_arrives_fades_in():
     """A force that stood at its full value after the fade of the scene would be a knock."""
     felt = scene(liquid(4000, effects=("buoyancy",)), link=ForceLink(delay_s=0.15))
-    prompt, late = Hand(felt.model_copy(update={"link": PROMPT}), faded_in=False), Hand(felt, faded_in=False)
+    prompt, late = Hand(felt.model_copy(update={"link": PROMPT_LINK}), faded_in=False), Hand(felt, faded_in=False)
     forces = np.array([[hand.tick((0.0, 0.0, 0.0)).device_force_n[1] for _ in range(900)] for hand in (prompt, late)])
     assert forces[0, -1] > 1
     assert not forces[1, :150].any()
@@ -137,7 +136,7 @@ def test_a_body_that_bobs_through_a_surface_gets_no_energy_from_late_buoyancy():
         forces = np.array([hand.tick(place).device_force_n for place in place_m])
         return float(np.einsum("ij,ij->", forces[1000:-1], np.diff(place_m[1000:], axis=0))) / 21
 
-    assert per_cycle_j(PROMPT) < 0.2e-3  # its force is held for a tick
+    assert per_cycle_j(PROMPT_LINK) < 0.2e-3  # its force is held for a tick
     assert per_cycle_j(ForceLink(delay_s=0.08)) < 0.5e-3  # 16 mJ where the observer left late buoyancy out
 
 
@@ -198,4 +197,4 @@ def test_delay_and_jitter_beyond_the_kept_forces_are_refused():
         Scene.model_validate(damper(delay_s=0.2, jitter_s=0.05).model_copy(update={"rate_hz": 5000.0}).model_dump())
     with pytest.raises(StudyError, match="pack it with a capacity"):
         pack_into(pack(damper()), damper(delay_s=0.001))
-    assert len(pack(damper(loss=0.1)).forces_n) == FORCES
+    assert len(pack(damper(loss=0.1)).forces_n) == STORED_FORCES

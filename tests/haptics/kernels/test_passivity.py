@@ -7,12 +7,11 @@ from hypothesis import strategies as st
 
 from study_app.haptics.kernels.safety import begin_scene
 from study_app.haptics.model import paths
-from study_app.haptics.model.force_link import ForceLink
 from study_app.haptics.model.force_rules import VERSIONS
 from study_app.haptics.model.laws import drag_laws as laws
 from study_app.haptics.model.layout import LIMITER_ENERGY
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Body
+from study_app.haptics.model.scene import Body, ForceLink
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import COMPILED, HONEY, THESIS, WATER, Hand, examples, liquid, scene
 

@@ -7,7 +7,7 @@ from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.layout import LIMITER_NORM, LIMITER_SLOPE
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Knee, Liquid, Scene
-from study_app.haptics.model.steady_state import steady
+from study_app.haptics.model.slope_limits import steady
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import COMPILED, vectors
 

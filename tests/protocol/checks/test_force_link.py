@@ -2,9 +2,9 @@
 
 import pytest
 
-from study_app.haptics.model.force_link import PROMPT, ForceLink
-from study_app.protocol.checks.delayed_force import STIRRED, delay_warnings
-from study_app.protocol.checks.force_limits import longest_ms, returned_j
+from study_app.haptics.model.scene import PROMPT_LINK, ForceLink
+from study_app.protocol.checks.delay_warnings import STIRRED, delay_warnings
+from study_app.protocol.checks.returned_energy import longest_ms, returned_j
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
@@ -39,7 +39,7 @@ def test_an_interval_presents_its_link() -> None:
     assert delays_force(one)
     assert not delays_force(load("rek2024"))
     assert scene_of(one, Stimulated("water"), 7).link == ForceLink(delay_s=0.01, seed=7)
-    assert scene_of(one, Stimulated("damper"), 7).link == PROMPT
+    assert scene_of(one, Stimulated("damper"), 7).link == PROMPT_LINK
     varied = scene_of(one, Stimulated("damper", "force_delay_ms", 80.0), 7)
     assert varied.link == ForceLink(delay_s=0.08, seed=7)
     assert varied.liquids == one.scene_for("damper").liquids

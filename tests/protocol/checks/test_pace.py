@@ -7,7 +7,7 @@ import pytest
 
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Ewma, Foaw, Given, Kalman, Line, Raw, Scene
-from study_app.haptics.model.steady_state import steady
+from study_app.haptics.model.slope_limits import steady
 from study_app.haptics.runtime.offline import simulate
 from study_app.protocol.checks.force_limits import fastest_hz, passed_share
 from study_app.protocol.load import parse

@@ -8,7 +8,7 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Row
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.outline import title_of
-from study_app.haptics.model.steady_state import HAND_MPS, steady
+from study_app.haptics.model.slope_limits import HAND_MPS, steady
 from study_app.protocol.source.document import Path
 from study_app.viewmodels.designer.form.row_facts import RowFacts
 from study_app.viewmodels.designer.measures.number_cards import UNKNOWN

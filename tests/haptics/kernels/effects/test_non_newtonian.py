@@ -8,7 +8,7 @@ from study_app.haptics.model.effects.non_newtonian import steady_n
 from study_app.haptics.model.laws import rheology
 from study_app.haptics.model.laws.rheology import Carreau, HerschelBulkley, Maxwell, ShearThickening
 from study_app.haptics.model.layout import LIMITER_SLOPE
-from study_app.haptics.model.steady_state import steady
+from study_app.haptics.model.slope_limits import steady
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.materials import PRESETS, creep_mps, tank
 from tests.haptics.scenes import COMPILED, UNBENT, Hand, moving, scene, vectors

@@ -9,7 +9,7 @@ from study_app.haptics.kernels.effects.unsteady_drag import RATES_PER_S, WEIGHTS
 from study_app.haptics.model.laws.drag_laws import finite_reynolds
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Box, Kalman, MotionBox
-from study_app.haptics.model.steady_state import steady
+from study_app.haptics.model.slope_limits import steady
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack
 from study_app.validation.cfd import fits, stored_flows

@@ -11,7 +11,7 @@ from study_app.haptics.model.laws import rheology
 from study_app.haptics.model.laws.rheology import Carreau, HerschelBulkley, Maxwell, ShearThickening
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.scene import Kalman, Liquid, Scene
-from study_app.haptics.model.steady_state import steady
+from study_app.haptics.model.slope_limits import steady
 from tests.haptics.materials import PRESETS, tank
 
 D = 0.068
