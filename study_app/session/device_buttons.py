@@ -51,7 +51,9 @@ class DeviceButtons:
                 yield Submitted(now_s)
             return
         self._next_ns.clear()
-        if continues and _reads(where()[0]):
+        state = where()[0]
+        # a page to read is left, but a squeeze gives no consent
+        if continues and state.phase is Phase.READING and state.plan.protocol.pages[state.page_id].kind != "consent":
             yield Continue(now_s)
         yield from _answers(where()[0], pressed, now_s)
 
@@ -73,11 +75,6 @@ class DeviceButtons:
             if not self._down & bit:
                 self._next_ns.pop(bit, None)
         return steps
-
-
-def _reads(state: SessionState) -> bool:
-    """Return whether a button goes on from the page: from one to read, but a squeeze gives no consent."""
-    return state.phase is Phase.READING and state.plan.protocol.pages[state.page_id].kind != "consent"
 
 
 def _answers(state: SessionState, pressed: Any, now_s: float) -> Iterator[Event]:

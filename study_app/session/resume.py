@@ -61,7 +61,13 @@ def resume_at(
     step = reached = _next_step(protocol, schedule, progress)
     heard = () if key is None else heard_in(protocol, opened(lines, key))
     if protocol.study.resume == "block" and not exactly:
-        step = _block_start(schedule, step)
+        within = _within(schedule.steps, step)
+        if within is not None:  # to the first trial of its block
+            step = next(
+                index
+                for index, other in enumerate(schedule.steps)
+                if isinstance(other, Trial) and other.block == within.block
+            )
         before = {trial.number for trial in schedule.steps[:step] if isinstance(trial, Trial)}
         heard = tuple(one for one in heard if one.trial in before)
     return Start(step, progress.presented, heard, progress.invalid if step == progress.step == reached else 0)
@@ -118,16 +124,10 @@ def find_protocol(
         if protocol_hash(source) == start["protocol_hash"]:
             return name
     for name, source in sources.items():
-        if _study_name(name, source) == start["study"]:
-            return name
+        with contextlib.suppress(ProtocolError):
+            if parse(source, name).study.name == start["study"]:
+                return name
     raise SessionError(f"no known protocol belongs to the study {start['study']!r}: name its file with --protocol FILE")
-
-
-def _study_name(name: str, source: bytes) -> str | None:
-    try:
-        return parse(source, name).study.name
-    except ProtocolError:
-        return None
 
 
 def _next_step(protocol: Protocol, schedule: Schedule, progress: Progress) -> int:
@@ -146,14 +146,6 @@ def _next_step(protocol: Protocol, schedule: Schedule, progress: Progress) -> in
     return progress.step + 1 if number is not None and progress.task_done and not asks else progress.step
 
 
-def _block_start(schedule: Schedule, step: int) -> int:
-    """Return the step of the first trial of the block that ``step`` is within."""
-    trial = _within(schedule.steps, step)
-    if trial is None:
-        return step
-    return next(index for index, other in enumerate(schedule.steps) if _of_block(other, trial.block))
-
-
 def _within(steps: tuple[Step, ...], step: int) -> Trial | None:
     """Return a trial of the block that ``step`` is within: a trial of it, or a break between two; None elsewhere."""
     here, before, after = (steps[at] if 0 <= at < len(steps) else None for at in (step, step - 1, step + 1))
@@ -162,7 +154,3 @@ def _within(steps: tuple[Step, ...], step: int) -> Trial | None:
     if isinstance(before, Trial) and isinstance(after, Trial) and before.block == after.block:
         return after
     return None
-
-
-def _of_block(step: Step, block: str) -> bool:
-    return isinstance(step, Trial) and step.block == block

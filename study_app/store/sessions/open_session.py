@@ -46,7 +46,7 @@ class SessionStore:
     ``journal`` receives events, ``opening`` locks the folder until it is released; ``key`` translates codes while the
     session runs; ``clock`` gives the journal's times; ``recorder`` records the trials' samples and frames, or is None
     in a session without recordings; ``behind`` is why the tables on disk are older than the journal, or None;
-    ``fingerprint`` is empty until the session has ended. Made by `begin`; by ``resume.reopen`` from ``lines`` written
+    ``fingerprint`` is empty until the session has ended. Made by `begin`; by ``recovery.reopen`` from ``lines`` written
     before.
     """
 
