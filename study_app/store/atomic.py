@@ -292,6 +292,16 @@ def read_regular(path: Path) -> bytes:
         return file.read()
 
 
+def read_if_there(path: Path) -> bytes | None:
+    """Return the content of a file, None where there is none; StoreError where it cannot be read."""
+    try:
+        return read_regular(path)
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as error:
+        raise cannot_read(path, error) from error
+
+
 def read_own(path: Path, root: Path) -> bytes:
     """Return the content of a file that must lie under ``root``, wherever links lead."""
     try:

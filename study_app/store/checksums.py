@@ -20,8 +20,8 @@ from study_app.store.atomic import (
     cannot_read,
     open_regular,
     paths_in,
+    read_if_there,
     read_own,
-    read_regular,
     study_root,
     write_file,
 )
@@ -185,12 +185,7 @@ def read_copy(path: Path) -> tuple[tuple[str, str], ...]:
 
 
 def _matches(path: Path) -> Iterator[tuple[int, re.Match[str] | None]]:
-    try:
-        text = read_regular(path).decode("utf-8-sig", "replace")
-    except FileNotFoundError:
-        return
-    except OSError as error:
-        raise cannot_read(path, error) from error
+    text = (read_if_there(path) or b"").decode("utf-8-sig", "replace")
     for number, line in enumerate(text.splitlines(), start=1):
         if line.strip():
             yield number, _FINGERPRINT.fullmatch(line.lower() if line.isupper() else line)

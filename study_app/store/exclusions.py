@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 
 from study_app.errors import StoreError
-from study_app.store.atomic import append_line, cannot_read, parse_json, read_regular, write_file
+from study_app.store.atomic import append_line, parse_json, read_if_there, write_file
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.progress import progress_of
@@ -137,13 +137,12 @@ def exclusions(folder: Path) -> tuple[Exclusion, ...]:
         The list cannot be read, or a row of it is invalid.
     """
     path = StudyFolder(folder).exclusions
-    try:
-        text = without_mark(read_regular(path)).decode("utf-8")
-        names, *rows = list(csv.reader(io.StringIO(text, newline=""))) or [[]]
-    except FileNotFoundError:
+    content = read_if_there(path)
+    if content is None:
         return ()
-    except OSError as error:
-        raise cannot_read(path, error) from error
+    try:
+        text = without_mark(content).decode("utf-8")
+        names, *rows = list(csv.reader(io.StringIO(text, newline=""))) or [[]]
     except UnicodeDecodeError as error:
         raise StoreError(f"{path} is not UTF-8: save it as CSV in UTF-8") from error
     except csv.Error as error:
@@ -156,12 +155,7 @@ def exclusions(folder: Path) -> tuple[Exclusion, ...]:
 def reversals(folder: Path) -> tuple[Exclusion, ...]:
     """Return the reversed exclusions of the study in ``folder``, in the order of the reversals."""
     path = StudyFolder(folder).reversed_exclusions
-    try:
-        lines = read_regular(path).split(b"\n")  # a reason may contain other line endings
-    except FileNotFoundError:
-        return ()
-    except OSError as error:
-        raise cannot_read(path, error) from error
+    lines = (read_if_there(path) or b"").split(b"\n")  # a reason may contain other line endings
     return tuple(_reversed(path, number, line) for number, line in enumerate(lines, start=1) if line.strip())
 
 

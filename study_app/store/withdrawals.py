@@ -19,12 +19,12 @@ from typing import Any, Final
 from study_app.errors import StoreError
 from study_app.store.atomic import (
     append_line,
-    cannot_read,
     cannot_write,
     is_there,
     open_regular,
     parse_json,
     paths_in,
+    read_if_there,
     read_regular,
     sync_folder,
     write_file,
@@ -125,18 +125,14 @@ def withdraw(
     study = StudyFolder(folder)
     copies, shared = _found(study, also)
     at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="seconds")
-    opening = open_alone(folder)
-    try:
+    with open_alone(folder):
         tombstone = _tombstone(study, participant, at, by.strip(), reason.strip())
         erased = [study.path] if _erase(study, tombstone) else []
         outputs, elsewhere = _outputs(study.path)
-    finally:
-        opening.release()
     left = [*_names(study, participant)]
     reached = [study.path]
     for copy in copies:
-        opening = open_alone(copy.path)
-        try:
+        with open_alone(copy.path):
             if others := _others(copy, tombstone):
                 left += [
                     f"{other} is not a copy of an erased session: {copy.path} was not changed; if it is of the same "
@@ -147,8 +143,6 @@ def withdraw(
                 erased.append(copy.path)
                 left += _names(copy, participant)
             reached += [copy.path] if _is_buried(copy, tombstone) else []
-        finally:
-            opening.release()
     for merged in dict.fromkeys(filter(None, map(merged_above, reached))):
         of_merged, merged_elsewhere = _outputs(merged)
         outputs, elsewhere = (*outputs, *of_merged), (*elsewhere, *merged_elsewhere)
@@ -168,12 +162,7 @@ def tombstones(study: StudyFolder) -> dict[str, Tombstone]:
     StoreError
         The list cannot be read, or a line of it is not a withdrawal.
     """
-    try:
-        content = read_regular(study.withdrawals)
-    except (FileNotFoundError, NotADirectoryError):
-        return {}
-    except OSError as error:
-        raise cannot_read(study.withdrawals, error) from error
+    content = read_if_there(study.withdrawals) or b""
     found: dict[str, Tombstone] = {}
     for number, line in enumerate(content.splitlines(), start=1):
         if line.strip():
@@ -305,12 +294,7 @@ def _erase(study: StudyFolder, tombstone: Tombstone) -> bool:
 
 def _keep_lines(path: Path, keeps: Callable[[bytes], bool]) -> bool:
     """Rewrite a list without the lines that it does not keep; return whether there were any."""
-    try:
-        lines = read_regular(path).splitlines(keepends=True)
-    except FileNotFoundError:
-        return False
-    except OSError as error:
-        raise cannot_read(path, error) from error
+    lines = (read_if_there(path) or b"").splitlines(keepends=True)
     kept = [line for line in lines if keeps(line)]
     if kept != lines:
         write_file(path, b"".join(kept))
