@@ -186,7 +186,7 @@ def describe_session(session: SessionFolder) -> ErasedSession:
     return ErasedSession(session.number, begun, checksums, proof)
 
 
-def bury(study: StudyFolder, tombstone: Tombstone) -> None:
+def add_tombstone(study: StudyFolder, tombstone: Tombstone) -> None:
     """Add a tombstone to the study's list."""
     append_line(study.withdrawals, json.dumps(asdict(tombstone), ensure_ascii=False).encode() + b"\n")
 
@@ -270,7 +270,7 @@ def _erase(study: StudyFolder, tombstone: Tombstone) -> bool:
     for session in sessions:
         refuse_if_open(session.path)
     if sessions and participant not in tombstones(study):
-        bury(study, replace(tombstone, sessions=tuple(map(describe_session, sessions))))
+        add_tombstone(study, replace(tombstone, sessions=tuple(map(describe_session, sessions))))
     ignored = study.withdrawals.name.encode()  # by a Psych-DS validator, also in folders of earlier versions
     if is_there(study.ignore) and ignored not in read_regular(study.ignore).splitlines():
         append_line(study.ignore, ignored + b"\n")

@@ -159,7 +159,7 @@ class SessionRows:
                 "restore it from a copy"
             )
         trial["intervals"] += 1
-        self.intervals.append(interval_row(trial, self._started[which], line, earlier))
+        self.intervals.append(_interval_row(trial, self._started[which], line, earlier))
 
     def _interval_of(self, line: Line) -> Row:
         if (place := self._intervals.get((line["trial"], line["attempt"], line["interval"]))) is None:
@@ -173,7 +173,7 @@ class SessionRows:
         if not is_of_intervals(self._started[which]):
             return {name: line.get(name) for name in self._measured_names}
         intervals = (self.intervals[at] for key, at in self._intervals.items() if key[:2] == which)
-        return combined(intervals, self._measured_names)
+        return _measures_of(intervals, self._measured_names)
 
     def _last(self) -> Row:
         self.changed = min(self.changed, len(self.trials) - 1)
@@ -335,7 +335,7 @@ def response_text(value: Any) -> str | None:
     return None if value is None else str(value)
 
 
-def interval_row(trial: Row, started: Mapping[str, Any], line: Mapping[str, Any], before: Row | None) -> Row:
+def _interval_row(trial: Row, started: Mapping[str, Any], line: Mapping[str, Any], before: Row | None) -> Row:
     """Return the row of an interval that begins."""
     row: Row = {name: trial.get(name) for name in header(INTERVALS)} | dict.fromkeys(_OF_THE_END)
     number = line["interval"]
@@ -352,7 +352,7 @@ def interval_row(trial: Row, started: Mapping[str, Any], line: Mapping[str, Any]
     }
 
 
-def combined(intervals: Iterable[Row], names: Sequence[str]) -> Row:
+def _measures_of(intervals: Iterable[Row], names: Sequence[str]) -> Row:
     """Return the measures of a trial from all its intervals; None for those measured in none."""
     rows = list(intervals)
     return {name: _combined(name, [row[name] for row in rows if row.get(name) is not None]) for name in names}

@@ -29,9 +29,24 @@ from study_app.store.tables.csv_files import Column, Row, header
 
 COARSE_S = 2.0  # modification times closer than this may be in the wrong order
 NONE: Final[Mapping[Path, csv_files.Row]] = MappingProxyType({})
-
 _Stamp: TypeAlias = tuple[int, int] | None  # when a journal was last changed [ns since 1970], and its size; None: gone
 _Seen: TypeAlias = dict[Path, tuple[_Stamp, list[csv_files.Row]]]
+# What a study folder holds besides tables; patterns as in .gitignore.
+IGNORED = b"""\
+.psychds-ignore
+.*.tmp
+.open-*.json
+journal.jsonl
+receipt.json
+checksums.sha256
+recordings/
+blinding/
+exclusions.csv
+exclusions_reversed.jsonl
+fingerprints.txt
+withdrawals.jsonl
+rebuilt.txt
+"""
 
 
 def participants(folder: StudyFolder) -> list[csv_files.Row]:
@@ -167,24 +182,6 @@ def columns_of(folder: StudyFolder, rows: Iterable[csv_files.Row]) -> tuple[Colu
     """Return the columns of the table with these rows."""
     second = any("group" in row for row in rows)
     return PARTICIPANTS_2 if second and reveals(folder.path) else PARTICIPANTS
-
-
-# What a study folder holds besides tables; patterns as in .gitignore.
-IGNORED = b"""\
-.psychds-ignore
-.*.tmp
-.open-*.json
-journal.jsonl
-receipt.json
-checksums.sha256
-recordings/
-blinding/
-exclusions.csv
-exclusions_reversed.jsonl
-fingerprints.txt
-withdrawals.jsonl
-rebuilt.txt
-"""
 
 
 def description_bytes(study: StudyHead, *, sealed: bool, protocol_format: int = 1, intervals: bool = False) -> bytes:

@@ -21,7 +21,7 @@ from study_app.store.checksums import listed
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.recovery import check_can_go_on, rebuild
 from study_app.store.verification.verify_study import verify
-from study_app.store.withdrawals import Tombstone, bury, describe_session
+from study_app.store.withdrawals import Tombstone, add_tombstone, describe_session
 from tests.store.conftest import SOURCE, Attend, Start
 from tests.store.forging import Lines, cover_up, forge
 
@@ -210,7 +210,7 @@ def test_a_deleted_participant_who_is_said_to_have_withdrawn_is_named(study: Pat
     erased = tuple(map(describe_session, folder.sessions()[:1]))
     forget_a_participant(study)
     cover_up(study)
-    bury(folder, Tombstone("P007", "2026-03-02T09:30:00+01:00", "AB", "asked", erased))
+    add_tombstone(folder, Tombstone("P007", "2026-03-02T09:30:00+01:00", "AB", "asked", erased))
     found = verify(study, tmp_path / "kept.txt")
     assert found.errors == ()
     assert "participant P007 withdrew at 2026-03-02T09:30:00+01:00 (recorded by AB)" in "\n".join(
