@@ -5,7 +5,7 @@ name mean the same in every table.
 """
 
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.store.tables.csv_files import Column, optional
@@ -102,128 +102,23 @@ EXCLUSIONS: tuple[Column, ...] = (
     Column("reason", "text", "Reason for the exclusion."),
     Column("excluded_at", "time", "Time of the decision."),
 )
-SETTINGS: Final[tuple[Column, ...]] = (
-    Column("block", "text", "Id of the block."),
-    optional("standard", "number", "The standard, in the unit of the varied number; n/a where there is none."),
-    Column("n", "integer", "Settings that count.", minimum=0),
-    Column("pse", "number", "Point of subjective equality, a level: the mean of the settings in u."),
-    optional("low", "number", "Lower end of the 95 % interval of the PSE (Student's t)."),
-    optional("high", "number", "Upper end of the 95 % interval of the PSE (Student's t)."),
-    optional(
-        "jnd",
-        "number",
-        "Just-noticeable difference: the standard deviation of the settings, in u (decades where levels are spaced by "
-        "their logarithm, else in the unit of the levels).",
-        minimum=0,
-    ),
-    optional("constant_error", "number", "PSE minus standard, in u; n/a where no standard was presented."),
-    optional(
-        "hysteresis", "number", "Mean of the settings that started high minus mean of those that started low, in u."
-    ),
-)
-"""Of one row per participant and standard of a block whose levels participants set."""
-EXPONENTS: Final[tuple[Column, ...]] = (
-    Column("block", "text", "Id of the block."),
-    Column("levels", "integer", "Levels with answers that count.", minimum=2),
-    Column(
-        "exponent",
-        "number",
-        "Exponent of the power law: the slope of the mean ln answer at each level on ln level, at delivered levels.",
-    ),
-)
-"""Of one row per participant of a block of magnitude estimation."""
-THRESHOLDS: Final[tuple[Column, ...]] = (
-    Column("block", "text", "Id of the block."),
-    optional("standard", "number", "The standard, in the unit of the varied number; n/a where there is none."),
-    optional("condition", "text", "The condition that was compared; n/a in a block of levels."),
-    Column("n", "integer", "Answers that count.", minimum=0),
-    optional(
-        "threshold",
-        "number",
-        "Level at which the psychometric function is half-way between guesses and lapses: posterior median, in the "
-        "unit of the stimulus' levels; n/a where the answers enter no such function.",
-    ),
-    optional("low", "number", "Lower end of the threshold's equal-tailed 95 % interval."),
-    optional("high", "number", "Upper end of the threshold's equal-tailed 95 % interval."),
-    optional(
-        "beyond",
-        "text",
-        "Whether the threshold lies beyond the levels that were presented; n/a: between them.",
-        levels=(("above", "above the highest"), ("below", "below the lowest")),
-    ),
-    optional(
-        "width",
-        "number",
-        "Posterior median of the function's width, from 5 to 95 % of its rise: in decades where levels are spaced by "
-        "their logarithm, else in the unit of the levels.",
-        minimum=0,
-    ),
-    optional("lapse", "number", "Posterior median of the lapse rate.", minimum=0, maximum=1),
-    optional(
-        "weber_exponent",
-        "number",
-        "Slope of ln JND on ln standard over the participant's standards: the same in each of these rows; n/a with "
-        "fewer than two standards.",
-    ),
-    optional("flat_width_threshold", "number", "The threshold under a flat prior on the width."),
-    optional(
-        "reversal_mean",
-        "number",
-        "Mean of the last reversals of the up–down tracks; n/a for other methods and with too few.",
-    ),
-    optional(
-        "target_percent",
-        "number",
-        "Percentage of successes to which the rule of the up–down tracks converges.",
-        "%",
-        minimum=0,
-        maximum=100,
-    ),
-    optional("d_prime", "number", "Sensitivity over all levels presented; n/a where no answer is correct."),
-    optional(
-        "d_prime_model",
-        "text",
-        "The model of d_prime, where the design has two.",
-        levels=(
-            ("differencing", "intervals are compared with each other"),
-            ("independent", "each interval is compared with known alternatives"),
-        ),
-    ),
-    optional("d_prime_other", "number", "Sensitivity under the other model."),
-    optional(
-        "criterion",
-        "number",
-        "c of yes–no and of two-interval forced choice, k of the differencing model of same–different.",
-    ),
-    optional(
-        "share_first", "number", "Share of the first of the answers, such as “first” or “yes”.", minimum=0, maximum=1
-    ),
-    optional(
-        "fit_p",
-        "number",
-        "p of the function's deviance among simulated sets of answers; below 0.05 the function does not fit.",
-        minimum=0,
-        maximum=1,
-    ),
-    optional("drift", "number", "Correlation of trial number and deviance residual.", minimum=-1, maximum=1),
-)
-"""Of one row per participant and standard, or compared condition."""
 
 
-def _measure(name: str, description: str, unit: str = "", *, sealed: bool = False, later: bool = False) -> Column:
-    return optional(name, "number", description, unit, minimum=0, sealed=sealed, later=later)
+def _measure(name: str, description: str, unit: str = "", **more: Any) -> Column:
+    return optional(name, "number", description, unit, minimum=0, **more)
 
 
-def _signed(name: str, description: str, unit: str = "") -> Column:
-    return optional(name, "number", description, unit, sealed=True, later=True)
+def _signed(name: str, description: str, unit: str = "", **more: Any) -> Column:
+    return optional(name, "number", description, unit, sealed=True, later=True, **more)
 
 
-def _count(name: str, description: str, *, sealed: bool = False, later: bool = False) -> Column:
-    return optional(name, "integer", description, minimum=0, sealed=sealed, later=later)
+def _count(name: str, description: str, **more: Any) -> Column:
+    return optional(name, "integer", description, minimum=0, **more)
 
 
-def _delay_error(name: str, which: str) -> Column:
-    return optional(name, "number", f"Visual delay, achieved minus requested: {which}.", "ms", sealed=True)
+def _delay_error(name: str, which: str, of_trial: str) -> Column:
+    description = f"Visual delay, achieved minus requested: {which}."
+    return optional(name, "number", description, "ms", sealed=True, of_trial=of_trial)
 
 
 RESPONSES: tuple[Column, ...] = (
@@ -296,20 +191,21 @@ TRIALS: tuple[Column, ...] = (
     _count("targets_reached", "Number of targets reached.", sealed=True),
     _count("targets", "Number of targets to reach; n/a if the task has none or no fixed number."),
     _count("ticks", "Ticks of the servo during the trial.", sealed=True),
-    _measure("tick_rate_hz", "Achieved rate of the servo.", "Hz"),
-    _measure("lateness_p99_ms", "Lateness of the servo's ticks, 99th percentile.", "ms"),
-    _measure("worst_gap_ms", "Longest time between two ticks of the servo.", "ms"),
+    _measure("tick_rate_hz", "Achieved rate of the servo.", "Hz", of_trial="mean"),
+    _measure("lateness_p99_ms", "Lateness of the servo's ticks, 99th percentile.", "ms", of_trial="max"),
+    _measure("worst_gap_ms", "Longest time between two ticks of the servo.", "ms", of_trial="max"),
     _count("overruns", "Deadlines of the servo that were skipped because a tick took too long."),
     _count("samples_dropped", "Telemetry samples that were overwritten before they were read."),
     _measure("path_length_m", "Length of the hand's path.", "m", sealed=True),
-    _measure("mean_speed_mps", "Mean speed of the hand.", "m/s", sealed=True),
-    _measure("force_mean_n", "Mean magnitude of the force sent to the device.", "N", sealed=True),
-    _measure("force_peak_n", "Largest magnitude of the force sent to the device.", "N", sealed=True),
+    _measure("mean_speed_mps", "Mean speed of the hand.", "m/s", sealed=True, of_trial="mean"),
+    _measure("force_mean_n", "Mean magnitude of the force sent to the device.", "N", sealed=True, of_trial="mean"),
+    _measure("force_peak_n", "Largest magnitude of the force sent to the device.", "N", sealed=True, of_trial="max"),
     _measure(
         "withheld_share",
         "Share of the force that limits, passivity controller and device withheld during the task; 0.05 is 5 %.",
         sealed=True,
         later=True,
+        of_trial="mean",
     ),
     _measure(
         "delivered_error",
@@ -317,11 +213,13 @@ TRIALS: tuple[Column, ...] = (
         "and later; 0.05 is 5 %; n/a if the participant set the force, the study delays it, or it is below 0.05 N.",
         sealed=True,
         later=True,
+        of_trial="mean",
     ),
     _count(
         "loop_delay_ticks",
         "Ticks from a command of the servo until its force acts; maximum during the task.",
         later=True,
+        of_trial="max",
     ),
     _count("loop_delay_changes", "How often that delay changed during the task.", later=True),
     *(
@@ -335,19 +233,21 @@ TRIALS: tuple[Column, ...] = (
     ),
     _count("frames", "Frames shown to the participant.", sealed=True),
     _count("frames_late", "Frames whose delay exceeded the requested delay by more than the limit.", sealed=True),
-    _delay_error("delay_error_mean_ms", "mean"),
-    _delay_error("delay_error_p95_ms", "95th percentile"),
-    _delay_error("delay_error_max_ms", "largest"),
+    _delay_error("delay_error_mean_ms", "mean", "mean"),
+    _delay_error("delay_error_p95_ms", "95th percentile", "max"),
+    _delay_error("delay_error_max_ms", "largest", "max"),
     _measure(
         "first_frame_gap_ms",
         "Time from the start of the trial to its first painted frame, when force and task begin.",
         "ms",
         later=True,
+        of_trial="max",
     ),
     _measure(
         "worst_frame_gap_ms",
         ("Longest time between two frames, or between the last frame and the end of the task."),
         "ms",
+        of_trial="max",
     ),
     optional(
         "valid",
@@ -416,12 +316,13 @@ VIDEO: tuple[Column, ...] = (
         sealed=True,
         later=True,
     ),
-    _signed("video_delay_error_max_ms", "Delay of the video, achieved minus requested: largest.", "ms"),
+    _signed("video_delay_error_max_ms", "Delay of the video, achieved minus requested: largest.", "ms", of_trial="max"),
     _signed(
         "video_age_mean_ms",
         "Mean age of the camera's pictures when they were ready, by the source's time stamps, in addition to the "
         "delay; n/a if the source does not state it; 0 for a file.",
         "ms",
+        of_trial="mean",
     ),
 )
 """What was seen of a video."""
@@ -534,3 +435,110 @@ OF_TRACKS: Final[tuple[Column, ...]] = (
     replace(_BY_NAME["setting"], description="The level that the participant set, from level_asked on."),
 )
 """What a row of tracks has in addition to the trial it is about."""
+
+SETTINGS: Final[tuple[Column, ...]] = (
+    Column("block", "text", "Id of the block."),
+    optional("standard", "number", "The standard, in the unit of the varied number; n/a where there is none."),
+    Column("n", "integer", "Settings that count.", minimum=0),
+    Column("pse", "number", "Point of subjective equality, a level: the mean of the settings in u."),
+    optional("low", "number", "Lower end of the 95 % interval of the PSE (Student's t)."),
+    optional("high", "number", "Upper end of the 95 % interval of the PSE (Student's t)."),
+    optional(
+        "jnd",
+        "number",
+        "Just-noticeable difference: the standard deviation of the settings, in u (decades where levels are spaced by "
+        "their logarithm, else in the unit of the levels).",
+        minimum=0,
+    ),
+    optional("constant_error", "number", "PSE minus standard, in u; n/a where no standard was presented."),
+    optional(
+        "hysteresis", "number", "Mean of the settings that started high minus mean of those that started low, in u."
+    ),
+)
+"""Of one row per participant and standard of a block whose levels participants set."""
+EXPONENTS: Final[tuple[Column, ...]] = (
+    Column("block", "text", "Id of the block."),
+    Column("levels", "integer", "Levels with answers that count.", minimum=2),
+    Column(
+        "exponent",
+        "number",
+        "Exponent of the power law: the slope of the mean ln answer at each level on ln level, at delivered levels.",
+    ),
+)
+"""Of one row per participant of a block of magnitude estimation."""
+THRESHOLDS: Final[tuple[Column, ...]] = (
+    Column("block", "text", "Id of the block."),
+    optional("standard", "number", "The standard, in the unit of the varied number; n/a where there is none."),
+    optional("condition", "text", "The condition that was compared; n/a in a block of levels."),
+    Column("n", "integer", "Answers that count.", minimum=0),
+    optional(
+        "threshold",
+        "number",
+        "Level at which the psychometric function is half-way between guesses and lapses: posterior median, in the "
+        "unit of the stimulus' levels; n/a where the answers enter no such function.",
+    ),
+    optional("low", "number", "Lower end of the threshold's equal-tailed 95 % interval."),
+    optional("high", "number", "Upper end of the threshold's equal-tailed 95 % interval."),
+    optional(
+        "beyond",
+        "text",
+        "Whether the threshold lies beyond the levels that were presented; n/a: between them.",
+        levels=(("above", "above the highest"), ("below", "below the lowest")),
+    ),
+    optional(
+        "width",
+        "number",
+        "Posterior median of the function's width, from 5 to 95 % of its rise: in decades where levels are spaced by "
+        "their logarithm, else in the unit of the levels.",
+        minimum=0,
+    ),
+    optional("lapse", "number", "Posterior median of the lapse rate.", minimum=0, maximum=1),
+    optional(
+        "weber_exponent",
+        "number",
+        "Slope of ln JND on ln standard over the participant's standards: the same in each of these rows; n/a with "
+        "fewer than two standards.",
+    ),
+    optional("flat_width_threshold", "number", "The threshold under a flat prior on the width."),
+    optional(
+        "reversal_mean",
+        "number",
+        "Mean of the last reversals of the up–down tracks; n/a for other methods and with too few.",
+    ),
+    optional(
+        "target_percent",
+        "number",
+        "Percentage of successes to which the rule of the up–down tracks converges.",
+        "%",
+        minimum=0,
+        maximum=100,
+    ),
+    optional("d_prime", "number", "Sensitivity over all levels presented; n/a where no answer is correct."),
+    optional(
+        "d_prime_model",
+        "text",
+        "The model of d_prime, where the design has two.",
+        levels=(
+            ("differencing", "intervals are compared with each other"),
+            ("independent", "each interval is compared with known alternatives"),
+        ),
+    ),
+    optional("d_prime_other", "number", "Sensitivity under the other model."),
+    optional(
+        "criterion",
+        "number",
+        "c of yes–no and of two-interval forced choice, k of the differencing model of same–different.",
+    ),
+    optional(
+        "share_first", "number", "Share of the first of the answers, such as “first” or “yes”.", minimum=0, maximum=1
+    ),
+    optional(
+        "fit_p",
+        "number",
+        "p of the function's deviance among simulated sets of answers; below 0.05 the function does not fit.",
+        minimum=0,
+        maximum=1,
+    ),
+    optional("drift", "number", "Correlation of trial number and deviance residual.", minimum=-1, maximum=1),
+)
+"""Of one row per participant and standard, or compared condition."""

@@ -66,7 +66,8 @@ class Column:
     ``kind``: flags are ``true`` or ``false``, times ISO 8601 with zone. ``levels`` are all permitted values where
     these are few, each with its meaning. Where ``may_miss``, a cell can be ``n/a``. A ``sealed`` column can tell the
     condition: no table has it before the study's key was opened. Earlier versions did not write a ``later`` column:
-    a table without them is read as if they held ``n/a``.
+    a table without it is read as if it held ``n/a``. A trial of intervals has the sum, maximum or mean of theirs,
+    ``of_trial``.
     """
 
     name: str
@@ -79,6 +80,7 @@ class Column:
     may_miss: bool = False
     sealed: bool = False
     later: bool = False
+    of_trial: Literal["sum", "max", "mean"] = "sum"
 
     def value(self, cell: str) -> Any:
         """Return what a cell holds, None where it is missing.

@@ -22,32 +22,7 @@ from study_app.store.tables.columns import DELIVERED, INTERVALS, TRIALS, VIDEO, 
 from study_app.store.tables.csv_files import Column, Row, header, header_bytes, records, unsealed
 
 _PRESENTED: Final = {"S": "standard", "C": "comparison"}
-_LONGEST: Final = frozenset(
-    {
-        "lateness_p99_ms",
-        "worst_gap_ms",
-        "force_peak_n",
-        "loop_delay_ticks",
-        "delay_error_p95_ms",
-        "delay_error_max_ms",
-        "first_frame_gap_ms",
-        "worst_frame_gap_ms",
-        "video_delay_error_max_ms",
-    }
-)
-"""Columns in which a trial has the maximum of its intervals."""
-_MEANS: Final = frozenset(
-    {
-        "tick_rate_hz",
-        "mean_speed_mps",
-        "force_mean_n",
-        "withheld_share",
-        "delivered_error",
-        "delay_error_mean_ms",
-        "video_age_mean_ms",
-    }
-)
-"""Of these a trial has the mean of its intervals; of what is left the sum."""
+_OF_TRIAL: Final = {column.name: column.of_trial for column in (*TRIALS, *VIDEO)}
 _OF_THE_END = header(INTERVALS[[column.name for column in INTERVALS].index("invalid_reasons") :])
 _SESSION_COLUMNS = ("study", "participant", "session", "simulated", "pilot")
 _TRIAL_COLUMNS = ("trial", "attempt", "block", "phase", "part", "index", "code")
@@ -361,10 +336,10 @@ def _measures_of(intervals: Iterable[Row], names: Sequence[str]) -> Row:
 def _combined(name: str, values: list[Any]) -> Any:
     if not values:
         return None
-    if name in _LONGEST:
+    if _OF_TRIAL[name] == "max":
         return max(values)
     total = sum(values)
-    found = total / len(values) if name in _MEANS else total
+    found = total / len(values) if _OF_TRIAL[name] == "mean" else total
     return round(found, 6) if isinstance(found, float) else found
 
 
