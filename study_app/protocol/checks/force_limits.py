@@ -38,32 +38,67 @@ from study_app.protocol.trials.stimuli import OF_LINK, Stimulated, Stimulus
 from study_app.protocol.trials.tasks import Stroke
 from study_app.protocol.trials.tracks import condition_of, standards_of, stimulus_of
 
-
-def passed_share(velocity: Velocity, rate_hz: float, frequency_hz: float) -> float:
-    """Return Re V/(jωX), the estimated velocity over the true one in a swing of ``frequency_hz``, sampled evenly.
-
-    Of "ewma" and "lead" from the recursion, of windows from the weights of their least-squares slope at full length, of
-    "kalman" from its lag.
-    """
-    return NAMED[velocity.kind].passed_share(velocity, 1 / rate_hz, 2 * math.pi * frequency_hz)
-
-
-def fastest_hz(velocity: Velocity, rate_hz: float, share: float) -> float:
-    """Return the highest frequency [Hz] up to which an estimator passes this share, to 1 mHz; at most 20 Hz."""
-    low_hz, high_hz = 0.0, 20.0
-    while high_hz - low_hz > 1e-3:
-        middle_hz = (low_hz + high_hz) / 2
-        low_hz, high_hz = (
-            (middle_hz, high_hz) if passed_share(velocity, rate_hz, middle_hz) >= share else (low_hz, middle_hz)
-        )
-    return low_hz
-
-
+LEAST_SHARE: Final = 0.99
+"""Of a damper, that the velocity estimator must pass."""
+LIMIT_J: Final = 0.5e-3
+"""A force that returns no more is delivered; measured in docs/late-force.md."""
 MOST_NAMED: Final = 4
 """Of more clipped levels the first and the last of each row are named."""
 PACED: Final = 'choose a task of kind "follow"'
 _GIVES: Final = ("gives", "give")
 _IS: Final = ("is", "are")
+
+
+def paced(protocol: Protocol, delay_ticks: int = BELIEVED_TICKS) -> Iterator[Fault]:
+    """Yield what is wrong with tasks of kind "follow", and with balls that are hidden where a hand must aim.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The study, sound but for this.
+    delay_ticks : int
+        How many ticks late a force acts.
+    """
+    yield from _hidden(protocol)
+    yield from _lagging(protocol)
+    for blocks in by_stimulus(protocol):
+        yield from clipped(protocol, blocks, delay_ticks)
+    for block in protocol.blocks.values():
+        task = protocol.tasks[block.task]
+        if block.stimulus is None and isinstance(task, Follow):
+            for index, name in enumerate(block.conditions):
+                for message, hint in clipped_at_pace(protocol.scene_for(name), task, f'"{name}" is'):
+                    yield Fault(("blocks", block.id, "conditions", index), message, hint)
+
+
+def _hidden(protocol: Protocol) -> Iterator[Fault]:
+    for block in protocol.blocks.values():
+        if not isinstance(protocol.tasks[block.task], Reach):
+            continue
+        for name in protocol.conditions_in(block.id):
+            if protocol.conditions[name].ball == "hidden":
+                message = f'is hidden, but block "{block.id}" has a reaching task: it cannot be aimed'
+                yield Fault(("conditions", name, "ball"), message, 'a task of kind "follow" or "explore"')
+
+
+def _lagging(protocol: Protocol) -> Iterator[Fault]:
+    """Check that the velocity estimator passes a damper at the frequency of each target."""
+    velocity, rate_hz = protocol.scene.velocity, protocol.device.rate_hz
+    felt: dict[str, list[Scene]] = {}
+    for block in protocol.blocks.values():
+        felt.setdefault(block.task, []).extend(protocol.scene_for(name) for name in protocol.conditions_in(block.id))
+    for name, scenes in felt.items():
+        task = protocol.tasks[name]
+        laws = {liquid.drag.law for scene in scenes for liquid in scene.liquids}
+        if not isinstance(task, Follow) or "linear" not in laws:
+            continue
+        if (share := passed_share(velocity, rate_hz, task.frequency_hz)) < LEAST_SHARE:
+            most_hz = floored(fastest_hz(velocity, rate_hz, LEAST_SHARE), 1)
+            yield Fault(
+                ("tasks", name, "frequency_hz"),
+                f"at {task.frequency_hz:g} Hz the velocity estimator passes {100 * share:.1f} % of a damper's force",
+                f"at most {most_hz:g} Hz, where it passes {100 * LEAST_SHARE:g} %",
+            )
 
 
 def by_stimulus(protocol: Protocol) -> list[list[Block]]:
@@ -262,83 +297,24 @@ def _number(level: float) -> str:
     return f"{float(f'{level:.3g}'):g}"
 
 
-LEAST_SHARE: Final = 0.99
-"""Of a damper, that the velocity estimator must pass."""
+def passed_share(velocity: Velocity, rate_hz: float, frequency_hz: float) -> float:
+    """Return Re V/(jωX), the estimated velocity over the true one in a swing of ``frequency_hz``, sampled evenly.
 
-
-def paced(protocol: Protocol, delay_ticks: int = BELIEVED_TICKS) -> Iterator[Fault]:
-    """Yield what is wrong with tasks of kind "follow", and with balls that are hidden where a hand must aim.
-
-    Parameters
-    ----------
-    protocol : Protocol
-        The study, sound but for this.
-    delay_ticks : int
-        How many ticks late a force acts.
+    Of "ewma" and "lead" from the recursion, of windows from the weights of their least-squares slope at full length, of
+    "kalman" from its lag.
     """
-    yield from _hidden(protocol)
-    yield from _lagging(protocol)
-    for blocks in by_stimulus(protocol):
-        yield from clipped(protocol, blocks, delay_ticks)
-    for block in protocol.blocks.values():
-        task = protocol.tasks[block.task]
-        if block.stimulus is None and isinstance(task, Follow):
-            for index, name in enumerate(block.conditions):
-                for message, hint in clipped_at_pace(protocol.scene_for(name), task, f'"{name}" is'):
-                    yield Fault(("blocks", block.id, "conditions", index), message, hint)
+    return NAMED[velocity.kind].passed_share(velocity, 1 / rate_hz, 2 * math.pi * frequency_hz)
 
 
-def _hidden(protocol: Protocol) -> Iterator[Fault]:
-    for block in protocol.blocks.values():
-        if not isinstance(protocol.tasks[block.task], Reach):
-            continue
-        for name in protocol.conditions_in(block.id):
-            if protocol.conditions[name].ball == "hidden":
-                message = f'is hidden, but block "{block.id}" has a reaching task: it cannot be aimed'
-                yield Fault(("conditions", name, "ball"), message, 'a task of kind "follow" or "explore"')
-
-
-def _lagging(protocol: Protocol) -> Iterator[Fault]:
-    """Check that the velocity estimator passes a damper at the frequency of each target."""
-    velocity, rate_hz = protocol.scene.velocity, protocol.device.rate_hz
-    felt: dict[str, list[Scene]] = {}
-    for block in protocol.blocks.values():
-        felt.setdefault(block.task, []).extend(protocol.scene_for(name) for name in protocol.conditions_in(block.id))
-    for name, scenes in felt.items():
-        task = protocol.tasks[name]
-        laws = {liquid.drag.law for scene in scenes for liquid in scene.liquids}
-        if not isinstance(task, Follow) or "linear" not in laws:
-            continue
-        if (share := passed_share(velocity, rate_hz, task.frequency_hz)) < LEAST_SHARE:
-            most_hz = floored(fastest_hz(velocity, rate_hz, LEAST_SHARE), 1)
-            yield Fault(
-                ("tasks", name, "frequency_hz"),
-                f"at {task.frequency_hz:g} Hz the velocity estimator passes {100 * share:.1f} % of a damper's force",
-                f"at most {most_hz:g} Hz, where it passes {100 * LEAST_SHARE:g} %",
-            )
-
-
-LIMIT_J: Final = 0.5e-3
-"""A force that returns no more is delivered; measured in docs/late-force.md."""
-
-
-def damping_nspm(scene: Scene, stroke: Stroke) -> float:
-    """Return the damping of a scene's liquid at the greatest speed of a stroke, at the hand [N·s/m]."""
-    return steady(scene, stroke.speed_mps).drag_n / stroke.speed_mps
-
-
-def returned_j(damping: float, stroke: Stroke, delay_s: float) -> float:
-    """Return what a damper [N·s/m] that is late returns to the hand at each reversal of a stroke [J]."""
-    omega = 2 * math.pi * stroke.frequency_hz
-    angle = omega * delay_s
-    return damping * stroke.speed_mps**2 / (2 * omega) * (math.sin(angle) - angle * math.cos(angle))
-
-
-def longest_ms(damping: float, stroke: Stroke) -> float:
-    """Return the longest delay at which a damper [N·s/m] returns no more than the limit [whole ms]."""
-    delays_ms = range(MOST_DELAY_MS + 1)
-    beyond = (one for one in delays_ms if returned_j(damping, stroke, one / 1000) > LIMIT_J)
-    return next(beyond, MOST_DELAY_MS + 1) - 1
+def fastest_hz(velocity: Velocity, rate_hz: float, share: float) -> float:
+    """Return the highest frequency [Hz] up to which an estimator passes this share, to 1 mHz; at most 20 Hz."""
+    low_hz, high_hz = 0.0, 20.0
+    while high_hz - low_hz > 1e-3:
+        middle_hz = (low_hz + high_hz) / 2
+        low_hz, high_hz = (
+            (middle_hz, high_hz) if passed_share(velocity, rate_hz, middle_hz) >= share else (low_hz, middle_hz)
+        )
+    return low_hz
 
 
 def returned(protocol: Protocol) -> Iterator[Fault]:
@@ -374,3 +350,22 @@ def _returned(protocol: Protocol, block: Block, stroke: Stroke) -> Fault | None:
         "the passivity controller removes it",
         f"at most {longest_ms(damping, stroke)} ms, which return {1000 * LIMIT_J:g} mJ",
     )
+
+
+def damping_nspm(scene: Scene, stroke: Stroke) -> float:
+    """Return the damping of a scene's liquid at the greatest speed of a stroke, at the hand [N·s/m]."""
+    return steady(scene, stroke.speed_mps).drag_n / stroke.speed_mps
+
+
+def returned_j(damping: float, stroke: Stroke, delay_s: float) -> float:
+    """Return what a damper [N·s/m] that is late returns to the hand at each reversal of a stroke [J]."""
+    omega = 2 * math.pi * stroke.frequency_hz
+    angle = omega * delay_s
+    return damping * stroke.speed_mps**2 / (2 * omega) * (math.sin(angle) - angle * math.cos(angle))
+
+
+def longest_ms(damping: float, stroke: Stroke) -> float:
+    """Return the longest delay at which a damper [N·s/m] returns no more than the limit [whole ms]."""
+    delays_ms = range(MOST_DELAY_MS + 1)
+    beyond = (one for one in delays_ms if returned_j(damping, stroke, one / 1000) > LIMIT_J)
+    return next(beyond, MOST_DELAY_MS + 1) - 1

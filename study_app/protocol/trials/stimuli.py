@@ -266,7 +266,13 @@ class Assumed:
 
 def assumed_for(stimulus: Stimulus, design: Design) -> Assumed:
     """Return what is assumed where the method states nothing else."""
-    return Assumed(family_of(stimulus, design), widths_of(stimulus), width_prior_of(stimulus))
+    low, high = stimulus.domain
+    log, span = stimulus.spacing == "log", high - low
+    return Assumed(
+        family=family_of(stimulus, design),
+        widths=WIDTHS if log else (span / 8, 2 * span),
+        width_prior=LINEAR_OBSERVER if log and is_distance(stimulus) else (span / 2, 2.0),
+    )
 
 
 def is_distance(stimulus: Stimulus) -> bool:
@@ -296,21 +302,6 @@ def guesses_of(stimulus: Stimulus, design: Design) -> tuple[float, ...] | None:
     if design.has_standard and not is_distance(stimulus):
         return None
     return FREE_GUESSES if design.guess_rate is None else (design.guess_rate,)
-
-
-def widths_of(stimulus: Stimulus) -> tuple[float, float]:
-    """Return the smallest and the largest width, in u."""
-    if stimulus.spacing == "log":
-        return WIDTHS
-    span = stimulus.domain[1] - stimulus.domain[0]
-    return span / 8, 2 * span
-
-
-def width_prior_of(stimulus: Stimulus) -> tuple[float, float]:
-    """Return median and factor of the prior on the width, in u."""
-    if stimulus.spacing == "log" and is_distance(stimulus):
-        return LINEAR_OBSERVER
-    return (stimulus.domain[1] - stimulus.domain[0]) / 2, 2.0
 
 
 def running_grid(stimulus: Stimulus, design: Design, assumed: Assumed, lapses: tuple[float, ...]) -> Grid:

@@ -1,1 +1,0 @@
-"""Standard questionnaires: their items and scoring, one TOML file each."""
