@@ -80,7 +80,7 @@ class Expected:
         Number of standards in the group's mean.
     half : float
         Half the 95 % interval of one participant, in u; infinite if nothing is measured.
-        spread : float
+    spread : float
         Standard deviation of the estimate's error, in u; infinite if nothing is measured.
     threshold : float
         Approximate threshold, as a level; or the assumed d′, d_a or exponent.
