@@ -86,8 +86,12 @@ class Analysis(ExtendedTable):
     def described(self, named_by: Sequence[str]) -> Iterator[tuple[str, str]]:
         """Yield a row in words for each decision; ``named_by`` says which item names each condition."""
         bound = self.equivalence_bound
+        points = "point" if bound == 1 else "points"
         yield "Significant", f"p of at most {self.alpha:g}"
-        yield "Equivalent", "not tested" if bound is None else f"answers as without delay, to within {_points(bound)}"
+        yield (
+            "Equivalent",
+            "not tested" if bound is None else f"answers as without delay, to within {bound:g} {points} of the scale",
+        )
         yield "Primary", ", ".join(self.primary) or "all statements"
         yield "Names", ", ".join(self.names) or "none"
         if named_by:
@@ -101,10 +105,6 @@ class Analysis(ExtendedTable):
             yield "Precision", f"group mean ±{100 * self.precision:g} % (half its 95 % interval)"
         for one in self.published:
             yield "Published", one.described()
-
-
-def _points(points: float) -> str:
-    return f"{points:g} point of the scale" if points == 1 else f"{points:g} points of the scale"
 
 
 def decisions(document: Mapping[str, Any]) -> Iterator[Fault]:

@@ -91,22 +91,22 @@ def newer_keys(document: Mapping[str, Any]) -> Iterator[Fault]:
 def completed(document: Mapping[str, Any]) -> dict[str, Any]:
     """Return a file of format 2 with what it leaves out; what is broken stays as it is."""
     found = dict(document)
-    head = _table(found, "study")
+    head = found.get("study", {})
     if isinstance(head, dict):
         found["study"] = {"version": "1", "languages": ("en",), **head}
         if isinstance(head.get("name"), str):
             found["study"].setdefault("title", dict.fromkeys(_languages(found), head["name"]))
-    found["device"] = _with(_table(found, "device"), workspace_mm=WORKSPACE_MM)
+    found["device"] = _with(found.get("device", {}), workspace_mm=WORKSPACE_MM)
     if any(
         "stimulus" in block or "design" in block
         for _, block in entries(found, "blocks.*")
         if isinstance(block, Mapping)
     ):
-        found["limits"] = _with(_table(found, "limits"), **LEVEL_LIMITS)
+        found["limits"] = _with(found.get("limits", {}), **LEVEL_LIMITS)
     found = with_scene_defaults(found)
-    if isinstance(liquids := _table(found, "liquids"), dict):
+    if isinstance(liquids := found.get("liquids", {}), dict):
         found.setdefault("conditions", {name: {"liquid": name} for name in liquids})
-    if isinstance(blocks := _table(found, "blocks"), dict) and blocks:
+    if isinstance(blocks := found.get("blocks", {}), dict) and blocks:
         found["blocks"] = _with_numbers(blocks, names(found, "tasks"), _languages(found))
         if "sequences" not in found and not _own_sequences(found):
             found.setdefault("sequence", tuple(blocks))
@@ -116,8 +116,8 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
 def with_scene_defaults(document: Mapping[str, Any]) -> dict[str, Any]:
     """Return a file of format 2 with the estimator and the densities of dampers that it leaves out."""
     found = dict(document)
-    found["scene"] = _with(_table(found, "scene"), velocity={"kind": ESTIMATOR})
-    if isinstance(liquids := _table(found, "liquids"), dict):
+    found["scene"] = _with(found.get("scene", {}), velocity={"kind": ESTIMATOR})
+    if isinstance(liquids := found.get("liquids", {}), dict):
         found["liquids"] = {name: _with_density(table) for name, table in liquids.items()}
     return found
 
@@ -161,10 +161,6 @@ def relax(schema: dict[str, Any]) -> None:
     questions = schema["$defs"]["Questionnaire"]
     questions["if"] = {"not": {"required": ["instrument"]}}
     questions["then"] = {"required": questions.pop("required")}
-
-
-def _table(document: Mapping[str, Any], key: str) -> Any:
-    return document.get(key, {})
 
 
 def _with(table: Any, **defaults: Any) -> Any:

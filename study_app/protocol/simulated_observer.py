@@ -111,7 +111,7 @@ def judgements(items: Iterable[str], felt: TrialFeatures, person: Rater, draw: D
 def opinions(items: Iterable[str], felt: TrialFeatures, person: Rater) -> list[float]:
     """Return what a person thinks of each item, from 1 to 7, before leaning and noise make an answer of it."""
     impression = _impression(felt, person)
-    return [OPINIONS.get(item, _no_opinion)(impression) for item in items]
+    return [OPINIONS[item](impression) if item in OPINIONS else NO_OPINION for item in items]
 
 
 def _normal(draw: Draw) -> float:
@@ -142,9 +142,7 @@ def _impression(felt: TrialFeatures, person: Rater) -> _Impression:
     )
 
 
-def _no_opinion(_: _Impression) -> float:
-    return 4.0
-
+NO_OPINION = 4.0
 
 OPINIONS: dict[str, Callable[[_Impression], float]] = {
     # what was felt

@@ -75,7 +75,7 @@ def proportion_correct(task: str, d_prime: float) -> float:
     return PROPORTIONS[task](d_prime)
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=4096)  # 50 ms for oddity
 def d_prime_at(task: str, proportion: float) -> float:
     """Return d′ at a P(correct), by bisection to 1e-10; 0 at or below chance."""
     return _inverse(PROPORTIONS[task], proportion)
@@ -202,10 +202,6 @@ def _cdf(x: Floats) -> Floats:
     return np.asarray(0.5 * _erfc(-x / math.sqrt(2.0)), float)
 
 
-def _two(d_prime: float) -> float:
-    return NORMAL.cdf(d_prime / math.sqrt(2.0))
-
-
 def _abx(d_prime: float, divisor: float) -> float:
     """Return P(correct): both comparisons have the correct sign, or both the wrong sign."""
     first, second = NORMAL.cdf(d_prime / math.sqrt(2.0)), NORMAL.cdf(d_prime / divisor)
@@ -228,19 +224,15 @@ def _same_different_differencing(d_prime: float) -> float:
     return 0.5 * (1.0 + different_rate(d_prime, low) - different_rate(0.0, low))
 
 
-def _same_different(d_prime: float) -> float:
-    return 0.5 * (1.0 + (2.0 * NORMAL.cdf(d_prime / 2.0) - 1.0) ** 2)
-
-
 PROPORTIONS: Final[Mapping[str, Callable[[float], float]]] = {
-    "2ifc": _two,
+    "2ifc": lambda d_prime: NORMAL.cdf(d_prime / math.sqrt(2.0)),
     "3ifc": partial(forced_choice, intervals=3),
     "4ifc": partial(forced_choice, intervals=4),
     "abx differencing": partial(_abx, divisor=math.sqrt(6.0)),
     "abx independent": partial(_abx, divisor=2.0),
     "oddity": _oddity,
     "samedifferent differencing": _same_different_differencing,
-    "samedifferent independent": _same_different,
+    "samedifferent independent": lambda d_prime: 0.5 * (1.0 + (2.0 * NORMAL.cdf(d_prime / 2.0) - 1.0) ** 2),
     "yesno": lambda d_prime: NORMAL.cdf(d_prime / 2.0),
 }
 """P(correct) from d′, by design and model."""

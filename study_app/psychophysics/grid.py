@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -121,13 +121,11 @@ def quantile(centres: ArrayLike, weights: ArrayLike, share: float) -> float:
     return float(np.interp(share, np.concatenate(([0.0], np.cumsum(weights))), edges))
 
 
-@lru_cache(maxsize=64)
 def evenly(low: float, high: float, count: int) -> Values:
     """Return ``count`` evenly spaced numbers from ``low`` to ``high``."""
     return tuple(np.linspace(low, high, count).tolist())
 
 
-@lru_cache(maxsize=64)
 def geometric(low: float, high: float, count: int) -> Values:
     """Return ``count`` numbers from ``low`` to ``high``, evenly spaced in their logarithm."""
     return tuple(np.geomspace(low, high, count).tolist())

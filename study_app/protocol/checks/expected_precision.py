@@ -112,16 +112,9 @@ class SensitivityPlan:
 
 @dataclass(frozen=True)
 class EstimationPlan:
-    """What decides how precise the exponent of magnitude estimation is.
+    """What decides how precise the exponent of magnitude estimation is; ``value`` is that of simulated participants.
 
-    Attributes
-    ----------
-    levels : tuple of float
-        That are presented, all above zero.
-    repetitions : int
-        Of each level.
-    value : float
-        The exponent of simulated participants.
+    The levels are above zero, each is presented ``repetitions`` times.
     """
 
     levels: tuple[float, ...]

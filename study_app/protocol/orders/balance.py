@@ -47,12 +47,12 @@ class Evenness:
     @property
     def positions_even(self) -> bool:
         """Whether each code came in each position equally often."""
-        return _even(count for line in self.positions for count in line)
+        return len({count for line in self.positions for count in line}) <= 1
 
     @property
     def follows_even(self) -> bool:
         """Whether each code followed each other one equally often."""
-        return _even(self.after_another)
+        return len({*self.after_another}) <= 1
 
     @property
     def balanced(self) -> bool:
@@ -179,10 +179,6 @@ def _block_balance(study: str, block: BlockOrder, title: str, participants: Sequ
         evenness=evenness(block.codes, drawn),
         unnumbered=tuple(participant for participant in participants if enrolment(participant) is None),
     )
-
-
-def _even(counts: Iterable[int]) -> bool:
-    return len(set(counts)) <= 1
 
 
 def describe_balance(judged: Balance) -> str:

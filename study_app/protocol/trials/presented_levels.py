@@ -60,14 +60,9 @@ class Level:
 
 @dataclass(frozen=True, slots=True)
 class LevelLimits:
-    """Up to which values of the varied number the force is presented in full; None: beyond what is looked at.
+    """The highest values of the varied number that two limits leave in full; None: beyond what is looked at.
 
-    Attributes
-    ----------
-    force, loop : float or None
-        The highest value that the force limit, and the slope limit of the loop, leave as it is asked.
-    hand_mps : float
-        The speed of the hand that both are for [m/s].
+    ``force`` is of the force limit, ``loop`` of the slope limit, both for a hand at ``hand_mps`` [m/s].
     """
 
     force: float | None

@@ -71,13 +71,7 @@ def standards_of(protocol: Protocol, block: Block) -> tuple[float | None, ...]:
 
 
 def present_value(protocol: Protocol, stimulus: Stimulus) -> float:
-    """Return the value that the varied number has in the protocol.
-
-    Raises
-    ------
-    StudyError
-        The condition has no such number.
-    """
+    """Return the value that the varied number has in the protocol (StudyError if the condition has none)."""
     name = condition_of(protocol, stimulus)
     condition = protocol.conditions[name]
     if stimulus.vary in OF_CONDITION:
