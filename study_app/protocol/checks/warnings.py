@@ -141,58 +141,34 @@ def _of_different_sizes(protocol: Protocol) -> Iterator[str]:
 
 def level_warnings(protocol: Protocol, *, simulates: bool = True) -> Iterator[str]:
     """Yield what to think over of the blocks with a design; ``simulates``: also what takes simulated observers."""
-    yielded: set[str] = set()
-    for block in protocol.blocks_in_order:
-        if block.design is not None:
-            for sentence in (
-                *_unbalanced(protocol, block),
-                *_converging(protocol, block),
-                *_without_catch(protocol, block),
-                *_seen(protocol, block),
-                *_unpaced(protocol, block),
-                *(imprecise(protocol, block) if simulates else ()),
-            ):
-                if sentence not in yielded:
-                    yielded.add(sentence)
-                    yield sentence
+    blocks = (block for block in protocol.blocks_in_order if block.design is not None)
+    yield from dict.fromkeys(one for block in blocks for one in _of_block(protocol, block, simulates))
 
 
-def _unbalanced(protocol: Protocol, block: Block) -> Iterator[str]:
-    """Yield that the trials of a track cannot present every arrangement equally often."""
-    count = len(design_of(protocol, block).arrangements)
-    track = tracks_of(protocol, block)[0]
-    trials = track.slots - len(track.catch)
-    if not design_of(protocol, block).has_noise and trials % count:
+def _of_block(protocol: Protocol, block: Block, simulates: bool) -> Iterator[str]:
+    design, track = design_of(protocol, block), tracks_of(protocol, block)[0]
+    count, trials = len(design.arrangements), track.slots - len(track.catch)
+    if not design.has_noise and trials % count:  # not every arrangement comes equally often
         place = f"blocks.{block.id}.repetitions" if block.stimulus is None else f"methods.{block.method}"
         wanted = "an even number" if count == 2 else f"a multiple of {count}"
         yield f"{place}: {trials} trials cannot balance {count} arrangements: choose {wanted}"
-
-
-def _converging(protocol: Protocol, block: Block) -> Iterator[str]:
-    """Yield what a block's method has to say of itself."""
     if block.stimulus is not None:
         for key, sentence in method_of(protocol, block).warnings():
             yield f"methods.{block.method}.{key}: {sentence}"
-
-
-def _without_catch(protocol: Protocol, block: Block) -> Iterator[str]:
-    """Yield that a track is too short for the share of catch trials."""
-    track = tracks_of(protocol, block)[0]
     if block.catch is not None and not track.catch:
         share = math.ceil(100 / track.slots) / 100
         yield (
             f"blocks.{block.id}.catch.share: {block.catch.share:g} of {track.slots} trials gives no catch trial: "
             f"choose {share:g}"
         )
-
-
-def _seen(protocol: Protocol, block: Block) -> Iterator[str]:
-    """Yield that a double-blind study shows its operator which answers were correct."""
-    if design_of(protocol, block).feedback == "always" and protocol.study.blinding == "double":
+    if design.feedback == "always" and protocol.study.blinding == "double":
         yield (
             f'designs.{block.design}.feedback: "always" in a double-blind study: anyone who sees the participant\'s '
             'screen sees which answers were correct: choose feedback = "practice"'
         )
+    yield from _unpaced(protocol, block)
+    if simulates:
+        yield from imprecise(protocol, block)
 
 
 def _unpaced(protocol: Protocol, block: Block) -> Iterator[str]:
