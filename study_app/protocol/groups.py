@@ -74,16 +74,7 @@ def session_count(protocol: HasSteps, group: str | None) -> int | None:
 
 
 def steps_of(protocol: HasSteps, group: str | None, session: int) -> Steps:
-    """Return the steps of a session.
-
-    Parameters
-    ----------
-    protocol : HasSteps
-        The study.
-    group : str or None
-        The participant's group; None in a study without groups.
-    session : int
-        The session's number, from 1.
+    """Return the steps of a session (from 1) of a participant of a group; None in a study without groups.
 
     Raises
     ------

@@ -90,14 +90,9 @@ class Conditional(Protocol):
 
 
 def shown(items: Iterable[Conditional], answers: Mapping[str, Value]) -> tuple[str, ...]:
-    """Return the ids of the items that are shown, in their order.
+    """Return the ids of the items that are shown, in their order; ``answers`` are those given so far.
 
-    Parameters
-    ----------
-    items : iterable of Conditional
-        The items of a form, in order.
-    answers : mapping of str to Value
-        The answers given so far; those to items that are not shown count for nothing.
+    Answers to items that are not shown count for nothing.
     """
     found: list[str] = []
     for item in items:

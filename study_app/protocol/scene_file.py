@@ -17,16 +17,10 @@ _COMMENT_LETTERS: Final = 110
 
 
 def scene_text(scene: Scene, *, said: Sequence[str] = (), notes: Mapping[Place, str] | None = None) -> str:
-    """Return a scene as a scene file.
+    """Return a scene as a scene file, which cannot say that velocities are given.
 
-    Parameters
-    ----------
-    scene : Scene
-        A given velocity is left out, which a file cannot say.
-    said : sequence of str
-        Paragraphs that stand above it as comments.
-    notes : mapping of Place to str, optional
-        Comments of single keys, by their place: ``("liquids", "water", "density_kg_m3")``.
+    Paragraphs ``said`` stand above it as comments; ``notes`` are comments of single keys by their place, such as
+    ``("liquids", "water", "density_kg_m3")``.
     """
     comments = [f"# {line}" for it in said for line in textwrap.wrap(it, _COMMENT_LETTERS)]
     head = [*comments, *([""] if comments else []), f"format = {needed_by(scene)}"]

@@ -84,16 +84,10 @@ def keyed_stream(secret: bytes, name: str) -> random.Random:
 
 
 def group_of(shares: Mapping[str, int], secret: bytes, entry: int) -> str:
-    """Return the group of the participant with an entry.
+    """Return the group of participant ``entry`` of the folder, from 1.
 
-    Parameters
-    ----------
-    shares : mapping of str to int
-        Group → how often it comes in each permuted block; the order of the groups does not matter.
-    secret : bytes
-        The nonce of the sealed key.
-    entry : int
-        Which participant of the folder it is, from 1.
+    ``shares`` say how often each group comes in a permuted block, in any order; ``secret`` is the nonce of the sealed
+    key.
     """
     groups = [name for name in sorted(shares) for _ in range(shares[name])]
     block, place = divmod(entry - 1, len(groups))

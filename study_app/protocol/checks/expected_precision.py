@@ -85,15 +85,7 @@ class SensitivityPlan:
         return replace(self, trials=trials)
 
     def estimates(self, truth: Floats, random: Generator) -> Floats:
-        """Return d′ as the report estimates it, of unbiased observers.
-
-        Parameters
-        ----------
-        truth : (observers,) array
-            Their d′.
-        random : random.Generator
-            Where answers are drawn from.
-        """
+        """Return d′ as the report estimates it, of unbiased observers with a true d′ each, both (observers,) arrays."""
         import numpy as np  # noqa: PLC0415
 
         design, count = self.design, len(self.design.arrangements)
@@ -137,15 +129,7 @@ class EstimationPlan:
         return replace(self, repetitions=max(1, round(trials / len(self.levels))))
 
     def estimates(self, truth: Floats, random: Generator) -> Floats:
-        """Return exponents as the report estimates them: least-squares slopes of mean ln answers on ln level.
-
-        Parameters
-        ----------
-        truth : (observers,) array
-            Their exponents.
-        random : random.Generator
-            Where answers are drawn from.
-        """
+        """Return exponents as the report estimates them: least-squares slopes of mean ln answers on ln level."""
         import numpy as np  # noqa: PLC0415
 
         from study_app.psychophysics.precision import ESTIMATE_NOISE  # noqa: PLC0415
@@ -188,13 +172,6 @@ class RatingPlan:
 
         A rating is the number of criteria that a normal observation exceeds. The criteria divide a normal distribution
         with the mean and the standard deviation of both levels' observations at `value` into equal shares.
-
-        Parameters
-        ----------
-        truth : (observers,) array
-            Their d_a.
-        random : random.Generator
-            Where answers are drawn from.
         """
         import numpy as np  # noqa: PLC0415
 
@@ -422,15 +399,7 @@ class ThresholdPlan:
         return estimated(analysis_grid(stimulus, design, assumed), places, counts[0], counts[1])
 
     def simulate(self, thresholds: Floats, random: Generator) -> Estimates | None:
-        """Return what the analysis estimates of observers with these thresholds [u]; None: tracks are not simulated.
-
-        Parameters
-        ----------
-        thresholds : (observers,) array
-            In u.
-        random : random.Generator
-            Where answers are drawn from.
-        """
+        """Return what the analysis estimates of observers with these thresholds [u]; None: tracks are not simulated."""
         found = self.answered(thresholds, random)
         return None if found is None else self.estimates(found)
 

@@ -52,12 +52,7 @@ _IS: Final = ("is", "are")
 def paced(protocol: Protocol, delay_ticks: int = BELIEVED_TICKS) -> Iterator[Fault]:
     """Yield what is wrong with tasks of kind "follow", and with balls that are hidden where a hand must aim.
 
-    Parameters
-    ----------
-    protocol : Protocol
-        The study, sound but for this.
-    delay_ticks : int
-        How many ticks late a force acts.
+    The study is sound but for this; a force acts ``delay_ticks`` ticks late.
     """
     yield from _hidden(protocol)
     yield from _lagging(protocol)
@@ -134,14 +129,8 @@ def beyond_slope_limit(protocol: Protocol, blocks: Sequence[Block], delay_ticks:
 def clipped(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> Iterator[Fault]:
     """Yield which levels each limit clips; a level that both clip counts as one of the slope limit.
 
-    Parameters
-    ----------
-    protocol : Protocol
-        The study.
-    blocks : sequence of Block
-        Blocks with one stimulus; in those whose task sets no pace, only damping has a limit (`clipped_unpaced`).
-    delay_ticks : int
-        How many ticks late a force acts.
+    The blocks have one stimulus; in those whose task sets no pace, only damping has a limit (`clipped_unpaced`).
+    A force acts ``delay_ticks`` ticks late.
     """
     beyond = beyond_slope_limit(protocol, blocks, delay_ticks)
     if beyond is not None:

@@ -26,12 +26,7 @@ need for reliable discrimination; the thesis' water and honey differ by 40 %."""
 def warnings(protocol: Protocol, *, simulates: bool = True) -> tuple[str, ...]:
     """Return what is permitted and may still be a mistake, a sentence each.
 
-    Parameters
-    ----------
-    protocol : Protocol
-        The study.
-    simulates : bool
-        Whether what takes simulated observers, up to a second a block, is among it.
+    ``simulates`` says whether what takes simulated observers, up to a second a block, is among it.
     """
     return (
         *liquid_warnings(protocol),

@@ -170,14 +170,9 @@ class Method(Table):
         return iter(())
 
     def target(self, guess: float | None, success: str) -> str | None:
-        """Return in words which share of successes its levels aim at; None: at none.
+        """Return in words which share of successes, such as "correct", its levels aim at; None: at none.
 
-        Parameters
-        ----------
-        guess : float or None
-            The share of successes by guessing, 0 where no answer is correct; None: it is free.
-        success : str
-            What is counted, such as "correct".
+        ``guess`` is the share of successes by guessing, 0 where no answer is correct; None: it is free.
         """
         return None
 

@@ -23,15 +23,7 @@ _PATTERNS: Final = tuple(
 def without_force(protocol: Protocol) -> Protocol:
     """Return a study whose pages, introductions and instructions do not speak of force.
 
-    Parameters
-    ----------
-    protocol : Protocol
-        The study as its file is.
-
-    Returns
-    -------
-    Protocol
-        The study to be shown, never the one to be kept or hashed.
+    It is to be shown, never to be kept or hashed.
     """
     reworded = {"pages": "body", "questionnaires": "intro", "tasks": "instruction"}
     tables = {
