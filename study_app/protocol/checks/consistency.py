@@ -139,11 +139,8 @@ def targets(parts: Draft) -> Iterator[Fault]:
     half = tuple(size / 2 for size in parts.device.workspace_mm)
     for name, task in parts.tasks.items():
         if isinstance(task, Follow) and task.amplitude_mm + task.radius_mm > half[0]:
-            yield Fault(
-                ("tasks", name, "amplitude_mm"),
-                f"{task.amplitude_mm:g} mm with radius {task.radius_mm:g} mm leaves the tank",
-                f"device.workspace_mm reaches to {half[0]:g} mm",
-            )
+            message = f"{task.amplitude_mm:g} mm with radius {task.radius_mm:g} mm leaves the tank"
+            yield Fault(("tasks", name, "amplitude_mm"), message, f"device.workspace_mm reaches to {half[0]:g} mm")
         if not isinstance(task, Reach):
             continue
         for index, target in enumerate(task.targets_mm):

@@ -74,11 +74,8 @@ def designs(protocol: Protocol) -> Iterator[Fault]:
 def _block(protocol: Protocol, block: Block) -> Iterator[Fault]:
     design, place = design_of(protocol, block), ("blocks", block.id)
     if block.questionnaire is not None:
-        yield Fault(
-            (*place, "questionnaire"),
-            "a block with a design asks the design's question",
-            "omit questionnaire; ask other questions in a form",
-        )
+        message = "a block with a design asks the design's question"
+        yield Fault((*place, "questionnaire"), message, "omit questionnaire; ask other questions in a form")
     correct = has_correct_answer(design, None if block.stimulus is None else protocol.stimuli[block.stimulus])
     for key in ("until", "catch"):
         if not correct and getattr(block, key) is not None:
@@ -103,25 +100,18 @@ def _block(protocol: Protocol, block: Block) -> Iterator[Fault]:
             )
         return
     if design.has_standard and standards_of(protocol, block) == (None,):
-        yield Fault(
-            (*place, "design"),
-            f'"{block.design}" presents a standard in noise trials, and a level that is a value has none',
-            'level = "weber" or "difference"',
-        )
+        message = f'"{block.design}" presents a standard in noise trials, and a level that is a value has none'
+        yield Fault((*place, "design"), message, 'level = "weber" or "difference"')
         return
     if not design.adaptive and method_of(protocol, block).adaptive:
-        yield Fault(
-            (*place, "method"),
-            f'"{block.design}" has no track: correct answers determine no level',
-            'method = "constant"',
-        )
+        message = f'"{block.design}" has no track: correct answers determine no level'
+        yield Fault((*place, "method"), message, 'method = "constant"')
     elif method_of(protocol, block).adaptive and not rises(protocol.stimuli[block.stimulus], design):
-        yield Fault(
-            (*place, "method"),
+        message = (
             f'"{block.design}" at levels of values is answered correctly above and below the standard: '
-            "there is no threshold",
-            'method = "constant", or level = "weber" or "difference"',
+            "there is no threshold"
         )
+        yield Fault((*place, "method"), message, 'method = "constant", or level = "weber" or "difference"')
     if unknown := [one for one in block.standards if one not in protocol.stimuli[block.stimulus].standards]:
         listed = ", ".join(f"{one:g}" for one in protocol.stimuli[block.stimulus].standards)
         yield Fault((*place, "standards"), f"the stimulus has no standard {unknown[0]:g}", f"these: {listed or 'none'}")
@@ -158,17 +148,11 @@ def _varied(protocol: Protocol, name: str, stimulus: Stimulus) -> Iterator[Fault
     if stimulus.vary in OF_CONDITION:
         return
     if len(liquids) > 1:
-        yield Fault(
-            (*place, "condition"),
-            f"has {len(liquids)} liquids: which one's number is varied?",
-            "a condition with one liquid",
-        )
+        message = f"has {len(liquids)} liquids: which one's number is varied?"
+        yield Fault((*place, "condition"), message, "a condition with one liquid")
     elif protocol.liquids[liquids[0]].effects == "auto":
-        yield Fault(
-            (*place, "vary"),
-            f'the effects of "{liquids[0]}" would be selected again at every level',
-            'name them: effects = ["drag"]',
-        )
+        message = f'the effects of "{liquids[0]}" would be selected again at every level'
+        yield Fault((*place, "vary"), message, 'name them: effects = ["drag"]')
     else:
         try:
             present_value(protocol, stimulus)
@@ -195,11 +179,8 @@ def _levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
     levels = sorted((*method.asked(stimulus), *([most] if block.catch else [])))
     if levels[0] < least * (1 - 1e-9) or levels[-1] > most * (1 + 1e-9):
         beyond = levels[0] if levels[0] < least * (1 - 1e-9) else levels[-1]
-        yield Fault(
-            ("methods", str(block.method), "levels"),
-            f"{beyond:g} is not within the stimulus' levels",
-            f"from {least:g} to {most:g}",
-        )
+        message = f"{beyond:g} is not within the stimulus' levels"
+        yield Fault(("methods", str(block.method), "levels"), message, f"from {least:g} to {most:g}")
         return
     for standard in standards_of(protocol, block):
         if standard is not None and (fault := _standard(protocol, block, stimulus, standard, least)) is not None:
@@ -262,11 +243,8 @@ def misfits(protocol: Protocol, block: Block) -> Iterator[Fault]:
     design, place = design_of(protocol, block), ("blocks", block.id)
     if block.stimulus is None:
         if design.adjusts:
-            yield Fault(
-                (*place, "design"),
-                "adjusts a number, and the block varies none",
-                'give stimulus = "…" instead of conditions',
-            )
+            message = "adjusts a number, and the block varies none"
+            yield Fault((*place, "design"), message, 'give stimulus = "…" instead of conditions')
     elif design.adjusts and not method_of(protocol, block).adjusts:
         yield Fault(
             (*place, "method"), f'levels of "{block.design}" are set by the participant', 'method = "adjustment"'

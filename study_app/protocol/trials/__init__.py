@@ -1,1 +1,1 @@
-"""Tasks of a trial."""
+"""Trials: their designs, stimuli, methods and tasks, and what their intervals present."""
