@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from study_app.haptics.model.scene import FADE_S, Scene
-from study_app.protocol.analysis_plan import Analysis
 from study_app.protocol.blocks import Block
+from study_app.protocol.model import Analysis
 from study_app.protocol.questions import POINTS
 from study_app.protocol.source.document import entries, names
 from study_app.protocol.source.problems import Fault

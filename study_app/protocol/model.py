@@ -4,7 +4,7 @@ Each class is one table of the file (blocks, tasks and questionnaires have modul
 can decide by itself is checked by its class; what needs two tables is in ``checks``.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias, TypeVar
 
@@ -23,13 +23,13 @@ from study_app.haptics.model.scene import (
     Scene,
     SceneScale,
 )
-from study_app.protocol.analysis_plan import Analysis
 from study_app.protocol.blocks import Block, Compared, Kind
 from study_app.protocol.groups import Group, Sequences, Steps, every_step
 from study_app.protocol.questionnaires import Questionnaire
 from study_app.protocol.questions import Scale
 from study_app.protocol.table import Body as PageBody
 from study_app.protocol.table import (
+    Brief,
     Description,
     ExtendedTable,
     Id,
@@ -261,6 +261,99 @@ class Limits(ExtendedTable):
     attempts: Annotated[int, Field(ge=1, le=100)] | None = Field(
         default=None, description="How often a trial of intervals is presented until it is delivered; default: 3."
     )
+
+
+Reported = Annotated[float, within(-1e9, 1e9, "no published value is larger")]
+
+
+class Published(Table):
+    """A value of another study, which figures show next to the study's own."""
+
+    block: Id = Field(description="The block whose results it is comparable with.")
+    measure: Literal["weber", "threshold", "exponent", "pse"] = Field(
+        description="weber: the Weber fraction; threshold: the threshold; exponent: the exponent of a power law; pse: "
+        "the point of subjective equality."
+    )
+    value: Reported = Field(description="The value; a threshold in the unit of the varied number.")
+    standard: Reported | None = Field(default=None, description="Its standard, in that unit; left out: of all.")
+    low: Reported | None = Field(default=None, description="Lower end of its interval or range.")
+    high: Reported | None = Field(default=None, description="Upper end of its interval or range.")
+    percent: Annotated[float, within(0, 100, "a share of answers")] | None = Field(
+        default=None, description="Percentage of correct answers at the value; left out: unknown."
+    )
+    n: Annotated[int, within(1, 1_000_000, "no study had more")] | None = Field(
+        default=None, description="Number of its participants."
+    )
+    source: Brief = Field(default="", description="Where it was published.")
+
+    def described(self) -> str:
+        """Return it in words."""
+        about = (
+            "" if self.standard is None else f", standard {self.standard:g}",
+            "" if self.percent is None else f", at {self.percent:g} % correct",
+            "" if self.n is None else f", n = {self.n}",
+            f", {self.source}" if self.source else "",
+        )
+        return f"{self.block}: {self.measure} {self.value:g}{''.join(about)}"
+
+
+class Analysis(ExtendedTable):
+    """Decisions about the analysis; without this table the report calls all its results exploratory."""
+
+    LATER: ClassVar[frozenset[str]] = frozenset({"participants", "precision", "published"})
+
+    alpha: Annotated[float, within(0.0001, 0.2, "no study of people shows less than 0.0001")] = Field(
+        default=0.05, description="Largest p that counts as significant."
+    )
+    equivalence_bound: Annotated[float, within(0.05, 6, "the scale has 6 steps, means differ by tenths")] | None = (
+        Field(
+            default=None,
+            description="Largest mean difference to no delay that would not matter, in points of the scale; left out: "
+            "equivalence is not tested.",
+        )
+    )
+    primary: tuple[Id, ...] = Field(
+        default=(), description="Items of the questions asked; the others are exploratory. Left out: all are primary."
+    )
+    names: tuple[Id, ...] = Field(
+        default=(),
+        description="Items that name a liquid; the participant named the one with the single highest answer.",
+    )
+    rising: tuple[Id, ...] = Field(default=(), description="Items whose answers are expected to rise with delay.")
+    falling: tuple[Id, ...] = Field(default=(), description="Items whose answers are expected to fall with delay.")
+    noticed: Id | None = Field(
+        default=None, description="Item for which agreement (5 to 7) means that a delay was noticed."
+    )
+    participants: Annotated[int, Field(ge=1, le=100_000)] | None = Field(
+        default=None, description="How many participants are planned."
+    )
+    precision: Annotated[float, within(0.001, 10, "a share of the group's mean")] | None = Field(
+        default=None, description="Half the 95 % interval of the group's mean that is planned, as a share of the mean."
+    )
+    published: tuple[Published, ...] = Field(default=(), description="Published values to compare with.")
+
+    def described(self, named_by: Sequence[str]) -> Iterator[tuple[str, str]]:
+        """Yield a row in words for each decision; ``named_by`` says which item names each condition."""
+        bound = self.equivalence_bound
+        points = "point" if bound == 1 else "points"
+        yield "Significant", f"p of at most {self.alpha:g}"
+        yield (
+            "Equivalent",
+            "not tested" if bound is None else f"answers as without delay, to within {bound:g} {points} of the scale",
+        )
+        yield "Primary", ", ".join(self.primary) or "all statements"
+        yield "Names", ", ".join(self.names) or "none"
+        if named_by:
+            yield "Recognised", ", ".join(named_by)
+        yield "Rise with delay", ", ".join(self.rising) or "none"
+        yield "Fall with delay", ", ".join(self.falling) or "none"
+        yield "Noticed", "not asked" if self.noticed is None else f"{self.noticed} from 5 on"
+        if self.participants is not None:
+            yield "Participants", f"{self.participants} planned"
+        if self.precision is not None:
+            yield "Precision", f"group mean ±{100 * self.precision:g} % (half its 95 % interval)"
+        for one in self.published:
+            yield "Published", one.described()
 
 
 T = TypeVar("T")

@@ -19,9 +19,9 @@ from study_app.haptics.model.bounds import Extremes
 from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.scene import MAX_LIQUIDS, Box, Everywhere, Liquid, MotionBox, Scene
-from study_app.protocol.analysis_plan import decisions
 from study_app.protocol.checks.cross_references import (
     alike,
+    decisions,
     groups,
     items,
     languages,

@@ -78,6 +78,7 @@ TEXTS = (
 )
 
 WITHOUT_REPEATS = ("study.languages", "conditions.*.liquids", "blocks.*.conditions")
+DECIDED_LISTS = ("primary", "names", "rising", "falling")
 
 Document = Mapping[str, Any]
 
@@ -236,6 +237,29 @@ def groups(document: Mapping[str, Any]) -> Iterator[Fault]:
     for block in names(document, "blocks"):
         if used and block not in used:
             yield Fault(("groups",), f'block "{block}" is in no group\'s sequence', "add it to one, or take it out")
+
+
+def decisions(document: Document) -> Iterator[Fault]:
+    """Check that what is decided is about statements there are, each once, and that liquids are named by such items."""
+    asked = (item for _, item in entries(document, "questionnaires.*.items.*") if isinstance(item, Mapping))
+    items = {item["id"] for item in asked if isinstance(item.get("id"), str) and "kind" not in item}
+    for key in DECIDED_LISTS:
+        found = list(entries(document, f"analysis.{key}.*"))
+        for path, name in found:
+            yield from _unknown(path, name, "item", items)
+        for place, (path, name) in enumerate(found):
+            if name in [earlier for _, earlier in found[:place]]:
+                yield Fault(path, f'"{name}" is listed twice', "remove one")
+    for path, name in entries(document, "analysis.noticed"):
+        yield from _unknown(path, name, "item", items)
+    falling = [name for _, name in entries(document, "analysis.falling.*")]
+    for path, name in entries(document, "analysis.rising.*"):
+        if name in falling:
+            yield Fault(path, f'"{name}" is expected to fall too', "an item rises, falls, or is in neither list")
+    named = [name for _, name in entries(document, "analysis.names.*")]
+    for path, name in entries(document, "conditions.*.label"):
+        if isinstance(name, str) and name not in named:
+            yield Fault(path, f'"{name}" is not among analysis.names', "add it there, or leave the label out")
 
 
 def questions(document: Document) -> Iterator[Fault]:

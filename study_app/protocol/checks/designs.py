@@ -11,9 +11,8 @@ from typing import Any, Final
 
 from study_app.errors import StudyError
 from study_app.haptics.model.overrides import number_names, override
-from study_app.protocol.analysis_plan import Published
 from study_app.protocol.blocks import Block
-from study_app.protocol.model import Protocol
+from study_app.protocol.model import Protocol, Published
 from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.quantities import can_vary
 from study_app.protocol.source.document import Path, entries, names

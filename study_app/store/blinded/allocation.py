@@ -3,7 +3,7 @@
 The participants of a folder have entries 1, 2 … in the order in which their first sessions began. An entry is claimed
 by creating ``blinding/allocated/NNN.json`` exclusively, so that two programs get different entries; it is never
 assigned again. The file has the entry, the participant, and, sealed, the group, which follows from entry and secret
-(`protocol.groups.allocation`).
+(`protocol.streams`).
 """
 
 import json
