@@ -1,4 +1,4 @@
-"""What is found by importing the modules of one folder: kinds of questions, their widgets, measures and figures."""
+"""What is found by importing the modules of one folder: widgets of questions, their measures and figures."""
 
 import importlib
 import pkgutil
