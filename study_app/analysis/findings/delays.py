@@ -11,7 +11,7 @@ from study_app.analysis.figures.page_layout import Drawing, Picture
 from study_app.analysis.findings.block_tests import HOLM, MANY, Asked
 from study_app.analysis.findings.finding import FOUND, Absent, Finding, Row
 from study_app.analysis.findings.statement_tests import ONE_DELAY, DelayTrend
-from study_app.analysis.report.html_page import heading, paragraph, table
+from study_app.analysis.report.html_page import heading, paragraph, table_of
 from study_app.analysis.report.test_rows import r_number, r_text, rows_alone, test_row
 from study_app.analysis.results import (
     BlockFound,
@@ -43,12 +43,6 @@ from study_app.analysis.statistics.equivalence import Verdict as Nearness
 from study_app.analysis.statistics.outcome import holm
 from study_app.analysis.statistics.psychometrics import Threshold, noticed
 from study_app.analysis.statistics.trend import StepDown, step_down
-
-AGAINST = (
-    *("Statement", "Delay", "n", "difference", "interval", "people beyond the bound", "p equivalent"),
-    "p without normality",
-    *("p different, adjusted", "n for 80 %", "Verdict"),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,24 +233,19 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
             return
         control = ms(self.value[0].control_ms)
         yield heading(3, f"Each delay against {control}")
-        yield table(
-            AGAINST,
-            [
-                [
-                    short(self.found, one.item),
-                    ms(one.delay_ms),
-                    str(one.found.n),
-                    number(one.found.effect),
-                    interval(one.found.interval),
-                    beyond(one.found),
-                    p_value(one.found.p),
-                    p_value(_without_normality(one.found)),
-                    _p_different(one),
-                    _needed(one),
-                    one.verdict + (" *" if one.found.checks_agree is False else ""),
-                ]
-                for one in self.value
-            ],
+        yield table_of(
+            self.value,
+            ("Statement", lambda one: short(self.found, one.item)),
+            ("Delay", lambda one: ms(one.delay_ms)),
+            ("n", lambda one: str(one.found.n)),
+            ("difference", lambda one: number(one.found.effect)),
+            ("interval", lambda one: interval(one.found.interval)),
+            ("people beyond the bound", lambda one: beyond(one.found)),
+            ("p equivalent", lambda one: p_value(one.found.p)),
+            ("p without normality", lambda one: p_value(_without_normality(one.found))),
+            ("p different, adjusted", _p_different),
+            ("n for 80 %", _needed),
+            ("Verdict", lambda one: one.verdict + (" *" if one.found.checks_agree is False else "")),
             words=2,
             last=1,
         )
@@ -331,6 +320,10 @@ def _at_most(delay_ms: float | None) -> str:
     return "–" if delay_ms is None else f"≤ {ms(delay_ms)}"
 
 
+def _steps(one: Lowest) -> str:
+    return "; ".join(f"{ms(step.longest_ms)} {p_value(step.page.p)}" for step in one.steps.steps)
+
+
 class LowestDelay(Finding[tuple[Lowest, ...]]):
     """The lowest delay at which a trend shows, stepping down from the longest."""
 
@@ -372,17 +365,12 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
         if not self.value:
             return
         yield heading(3, "The lowest delay that shows")
-        yield table(
-            ("Statement", "lowest", "uncorrected", "steps down: longest delay, p"),
-            [
-                [
-                    short(self.found, one.item),
-                    _at_most(one.over_all_ms),
-                    _at_most(one.steps.lowest_ms),
-                    "; ".join(f"{ms(step.longest_ms)} {p_value(step.page.p)}" for step in one.steps.steps),
-                ]
-                for one in self.value
-            ],
+        yield table_of(
+            self.value,
+            ("Statement", lambda one: short(self.found, one.item)),
+            ("lowest", lambda one: _at_most(one.over_all_ms)),
+            ("uncorrected", lambda one: _at_most(one.steps.lowest_ms)),
+            ("steps down: longest delay, p", _steps),
             words=4,
         )
         members = self.value[0].members

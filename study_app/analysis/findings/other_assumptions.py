@@ -9,7 +9,7 @@ import numpy as np
 from study_app.analysis.data.measures import Array
 from study_app.analysis.findings.block_tests import MANY, Asked, alone
 from study_app.analysis.findings.finding import Absent, Finding, Row
-from study_app.analysis.report.html_page import heading, paragraph, table
+from study_app.analysis.report.html_page import heading, paragraph, table_of
 from study_app.analysis.report.test_rows import judged_row
 from study_app.analysis.results import BlockFound, NotTested, Tested, interval, number, p_value, short, statistic
 from study_app.analysis.statistics.mixed_model import Ordinal, ordinal
@@ -123,20 +123,16 @@ class SameWithOtherAssumptions(Finding[OtherAssumptions]):
         if not again:
             return
         yield heading(3, "The same asked with other assumptions")
-        yield table(
-            ("Statement", "Test", "n", "statistic", "p", "effect", "interval", "note"),
-            [
-                [
-                    short(self.found, one.item),
-                    one.outcome.test,
-                    str(one.outcome.n),
-                    statistic(one.outcome),
-                    p_value(one.outcome.p),
-                    *_effects(self.found, one),
-                    one.outcome.note,
-                ]
-                for one in again
-            ],
+        yield table_of(
+            again,
+            ("Statement", lambda one: short(self.found, one.item)),
+            ("Test", lambda one: one.outcome.test),
+            ("n", lambda one: str(one.outcome.n)),
+            ("statistic", lambda one: statistic(one.outcome)),
+            ("p", lambda one: p_value(one.outcome.p)),
+            ("effect", lambda one: _effects(self.found, one)[0]),
+            ("interval", lambda one: _effects(self.found, one)[1]),
+            ("note", lambda one: one.outcome.note),
             words=2,
             last=1,
         )

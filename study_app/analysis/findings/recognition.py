@@ -26,7 +26,7 @@ from study_app.analysis.findings.finding import (
     foot,
 )
 from study_app.analysis.findings.statement_tests import Pairs, SettingsDiffer, smallest_of_pairs
-from study_app.analysis.report.html_page import heading, paragraph, table
+from study_app.analysis.report.html_page import heading, paragraph, table_of
 from study_app.analysis.report.test_rows import r_number, r_text, r_vector, rows_alone, test_row
 from study_app.analysis.results import (
     BlockFound,
@@ -100,20 +100,13 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
             return
         yield heading(3, "Were the liquids recognised?")
         yield from self.drawn()
-        rates = {rate.setting: rate for rate in named.found.rates}
-        yield table(
-            ("Liquid", "right", "of", "share", "95 % interval"),
-            [
-                [
-                    name,
-                    str(rates[place].hits),
-                    str(rates[place].n),
-                    number(rates[place].rate),
-                    interval(rates[place].interval),
-                ]
-                for place, name in enumerate(self.found.names)
-                if place in rates
-            ],
+        yield table_of(
+            sorted(named.found.rates, key=lambda rate: rate.setting),
+            ("Liquid", lambda rate: self.found.names[rate.setting]),
+            ("right", lambda rate: str(rate.hits)),
+            ("of", lambda rate: str(rate.n)),
+            ("share", lambda rate: number(rate.rate)),
+            ("95 % interval", lambda rate: interval(rate.interval)),
         )
         outcome = named.found
         why = "" if outcome.interval else f" ({outcome.no_interval})"

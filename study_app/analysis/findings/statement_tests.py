@@ -17,7 +17,7 @@ from study_app.analysis.data.blocks import KINDS
 from study_app.analysis.data.measures import medians
 from study_app.analysis.findings.block_tests import FDR, HOLM, SEALED, Asked, each_statement, in_family, judged
 from study_app.analysis.findings.finding import Absent, Finding, Row
-from study_app.analysis.report.html_page import heading, paragraph, table
+from study_app.analysis.report.html_page import heading, paragraph, table_of
 from study_app.analysis.report.test_rows import judged_row, r_number, r_text, r_vector, rows_alone, test_row
 from study_app.analysis.results import (
     BlockFound,
@@ -51,7 +51,6 @@ from study_app.analysis.statistics.rank_tests import (
 from study_app.analysis.statistics.trend import Page, page
 
 ONE_DELAY: Final = "the block has one delay: there is nothing to compare it with"
-HEAD: Final = ("Statement", "n", "Statistic", "p", "adjusted p", "smallest p", "Effect", "Interval", "Verdict")
 
 
 def table_of_tests(
@@ -70,20 +69,17 @@ def table_of_tests(
     two = isinstance(first.outcome, Paired) and len(compared) == 2
     above = f", above 0 where {compared[0]} was rated higher than {compared[1]}" if two else ""
     yield heading(3, title)
-    yield table(
-        HEAD,
-        [
-            [
-                short(found, one.item),
-                f"{one.outcome.n}" + (f" (−{one.outcome.dropped})" if one.outcome.dropped else ""),
-                statistic(one.outcome),
-                *(p_value(p) for p in (one.outcome.p, one.p_adjusted, one.outcome.smallest_p)),
-                number(one.outcome.effect),
-                interval(one.outcome.interval),
-                one.verdict + (f" ({one.outcome.note})" if one.verdict == "not tested" and one.outcome.note else ""),
-            ]
-            for one in tests
-        ],
+    yield table_of(
+        tests,
+        ("Statement", lambda one: short(found, one.item)),
+        ("n", lambda one: f"{one.outcome.n}" + (f" (−{one.outcome.dropped})" if one.outcome.dropped else "")),
+        ("Statistic", lambda one: statistic(one.outcome)),
+        ("p", lambda one: p_value(one.outcome.p)),
+        ("adjusted p", lambda one: p_value(one.p_adjusted)),
+        ("smallest p", lambda one: p_value(one.outcome.smallest_p)),
+        ("Effect", lambda one: number(one.outcome.effect)),
+        ("Interval", lambda one: interval(one.outcome.interval)),
+        ("Verdict", _verdict),
         last=1,
     )
     yield paragraph(
@@ -94,6 +90,10 @@ def table_of_tests(
     )
     if reasons and not intervals:
         yield paragraph(f"Intervals: {'; '.join(reasons)}.", "soft")
+
+
+def _verdict(one: Tested) -> str:
+    return one.verdict + (f" ({one.outcome.note})" if one.verdict == "not tested" and one.outcome.note else "")
 
 
 def tests_in_words(found: BlockFound, tests: Sequence[Tested], showing: str, nothing: str) -> Iterator[str]:
@@ -566,9 +566,18 @@ class Pairs(Finding[tuple[Pair, ...]]):
         if not (pairs := self.value):
             return
         yield heading(3, "Which of them differ?")
-        yield table(
-            ("Statement", "Pair", "n", "V", "p", "adjusted p", "smallest p", "rank-biserial", "Interval", "Verdict"),
-            [self._row(one) for one in pairs],
+        yield table_of(
+            pairs,
+            ("Statement", lambda one: short(self.found, one.tested.item)),
+            ("Pair", lambda one: f"{name(self.found, one.first)} – {name(self.found, one.second)}"),
+            ("n", lambda one: f"{one.tested.outcome.n} ({_differing(one)} differ)"),
+            ("V", lambda one: number(one.tested.outcome.statistic, 1)),
+            ("p", lambda one: p_value(one.tested.outcome.p)),
+            ("adjusted p", lambda one: p_value(one.tested.p_adjusted)),
+            ("smallest p", lambda one: p_value(one.tested.outcome.smallest_p)),
+            ("rank-biserial", lambda one: number(one.tested.outcome.effect)),
+            ("Interval", _pair_interval),
+            ("Verdict", lambda one: one.tested.verdict),
             words=2,
             last=1,
         )
@@ -582,21 +591,6 @@ class Pairs(Finding[tuple[Pair, ...]]):
             "soft",
         )
 
-    def _row(self, pair: Pair) -> list[str]:
-        outcome = pair.tested.outcome
-        differ = outcome.n - (outcome.zeros if isinstance(outcome, Paired) else 0)
-        one_way = outcome.effect is not None and abs(outcome.effect) == 1.0
-        return [
-            short(self.found, pair.tested.item),
-            f"{name(self.found, pair.first)} – {name(self.found, pair.second)}",
-            f"{outcome.n} ({differ} differ)",
-            number(outcome.statistic, 1),
-            *(p_value(p) for p in (outcome.p, pair.tested.p_adjusted, outcome.smallest_p)),
-            number(outcome.effect),
-            f"– (all {differ} one way)" if one_way else interval(outcome.interval),
-            pair.tested.verdict,
-        ]
-
     def methods(self) -> Iterator[str]:
         if self.value:
             yield (
@@ -608,3 +602,16 @@ class Pairs(Finding[tuple[Pair, ...]]):
     def calls(self, codes: str) -> Iterator[str]:
         for pair in self.value:
             yield from _pair_calls(self.found, codes, pair.first, pair.second, pair.tested)
+
+
+def _differing(pair: Pair) -> int:
+    """Return how many participants answered the two differently, who alone are tested."""
+    outcome = pair.tested.outcome
+    return outcome.n - (outcome.zeros if isinstance(outcome, Paired) else 0)
+
+
+def _pair_interval(pair: Pair) -> str:
+    """Return the interval of the effect, or in its place how many went one way, where all did."""
+    outcome = pair.tested.outcome
+    one_way = outcome.effect is not None and abs(outcome.effect) == 1.0
+    return f"– (all {_differing(pair)} one way)" if one_way else interval(outcome.interval)

@@ -2,16 +2,18 @@
 
 import base64
 import io
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from importlib import resources
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from fontTools.subset import Options, Subsetter, load_font, save_font
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from study_app.analysis.figures.page_layout import Picture
+
+T = TypeVar("T")
 
 LONG = 32
 """Cells of more letters are broken into lines."""
@@ -69,6 +71,15 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], *, words: int = 1,
     kinds = ["" if place < words or place >= len(head) - last else "n" for place in range(len(head))]
     cells = [[(kind or _width(cell), cell) for kind, cell in zip(kinds, row, strict=True)] for row in rows]
     return _part("table", list(zip(kinds, head, strict=True)), cells)
+
+
+def table_of(
+    rows: Iterable[T], *columns: tuple[str, Callable[[T], str]] | None, words: int = 1, last: int = 0
+) -> Markup:
+    """Return a table of ``rows``; a column is its heading and what makes a cell of a row, None one that is left out."""
+    shown = [column for column in columns if column is not None]
+    cells = [[cell(row) for _, cell in shown] for row in rows]
+    return table([head for head, _ in shown], cells, words=words, last=last)
 
 
 def _width(words: str) -> str:

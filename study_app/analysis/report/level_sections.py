@@ -1,14 +1,23 @@
 """The section of a block of levels: times to answer and, once the key is open, all that was found."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from itertools import takewhile
-from typing import Any, Final
+from typing import Final, Protocol
 
 from study_app.analysis.figures.level_figures import level_words, mean_words, summary_words, with_unit
 from study_app.analysis.figures.page_layout import Picture
-from study_app.analysis.levels.results import LevelAnswers, LevelsFound, SensitivityFound, SettingFound, ThresholdFound
-from study_app.analysis.report.html_page import drawn, heading, paragraph, table
+from study_app.analysis.levels.results import (
+    LevelAnswers,
+    LevelsFound,
+    LevelTimes,
+    SensitivityFound,
+    SettingFound,
+    ThresholdFound,
+    WithheldForce,
+)
+from study_app.analysis.report.html_page import drawn, heading, paragraph, table, table_of
 from study_app.analysis.report.sentences import FAMILIES
 from study_app.analysis.results import counted, listed, number
 from study_app.analysis.statistics.thresholds import SETS
@@ -54,15 +63,32 @@ EXPLAINED = (
 OWN_UNITS = " The interval leaves out that each participant chose a unit: ln answers less the participant's mean."
 
 
+class _OfPeople(Protocol):
+    @property
+    def participant(self) -> str | None: ...
+    @property
+    def n(self) -> int: ...
+
+
+_OF_WHOM: Final[tuple[tuple[str, Callable[[_OfPeople], str]], ...]] = (
+    ("Participant", lambda one: one.participant or f"group of {one.n}"),
+    ("n", lambda one: "–" if one.participant is None else str(one.n)),
+)
+"""The columns that say of whom a row is."""
+
+
 def level_section(found: LevelsFound, pictures: Sequence[Picture], estimator: str | None) -> Iterator[str]:
     """Yield what a block's section says in addition to the counts of its answers.
 
     ``estimator`` is the name of the servo's velocity estimator, None where the receipt has none.
     """
     yield heading(3, "Time to answer")
-    yield table(
-        ("Setting" if found.revealed else "Code", "n", "median [s]", "quartiles [s]"),
-        [[one.name, *_time_cells(one.numbers)] for one in found.times],
+    yield table_of(
+        found.times,
+        ("Setting" if found.revealed else "Code", lambda one: one.name),
+        ("n", lambda one: str(one.numbers["n"])),
+        ("median [s]", lambda one: number(one.numbers["median"])),
+        ("quartiles [s]", lambda one: _between(one.numbers["q1"], one.numbers["q3"], number)),
     )
     at_each = "Answers at each level" if found.vary is not None or not found.revealed else "Answers"
     if not found.settings:
@@ -117,59 +143,49 @@ def _thresholds(found: LevelsFound) -> str:
     standards = len({one.standard for one in found.thresholds}) > 1
     percent, compared = _target_percent(found), found.compared_percent
     with_device = any(found.with_device(one) is not None for one in found.thresholds)
-    return table(
-        (
-            *((f"Standard{_width_unit(found)}",) if standards else ()),
-            "Participant",
-            "n",
-            _threshold_name(found),
-            "95 % interval",
-            *((f"at {compared:g} %",) if compared is not None else ()),
-            *(("with device damping",) if with_device else ()),
-            f"width [{WIDTH_UNITS[found.spacing]}]",
-            "flat width prior",
-            *((f"mean of reversals ({percent:.1f} %)",) if percent is not None else ()),
-            "fit (p)",
-            "drift",
-        ),
-        [
-            [
-                *((_threshold_level(one.standard),) if standards else ()),
-                one.participant or f"group of {one.n}",
-                "–" if one.participant is None else str(one.n),
-                f"{BEYOND[one.beyond]}{one.threshold:.3g}",
-                "–" if one.low is None or one.high is None else f"{one.low:.3g} – {one.high:.3g}",
-                *((_threshold_level(one.compared, 3),) if compared is not None else ()),
-                *((_threshold_level(found.with_device(one), 3),) if with_device else ()),
-                "–" if one.width is None else f"{one.width:.2g}",
-                _threshold_level(one.flat_width, 3),
-                *((_threshold_level(one.reversal_mean, 3),) if percent is not None else ()),
-                _fit(one),
-                _drift(one),
-            ]
-            for one in found.thresholds
-        ],
+    weber = found.level_kind == "weber"
+    return table_of(
+        found.thresholds,
+        (f"Standard{_unit(found)}", lambda one: _digits(one.standard, 4)) if standards else None,
+        *_OF_WHOM,
+        ("threshold" + (" (Weber fraction)" if weber else _unit(found)), _threshold),
+        ("95 % interval", lambda one: _between(one.low, one.high, _digits)),
+        None if compared is None else (f"at {compared:g} %", lambda one: _digits(one.compared)),
+        ("with device damping", lambda one: _digits(found.with_device(one))) if with_device else None,
+        (f"width [{WIDTH_UNITS[found.spacing]}]", lambda one: _digits(one.width, 2)),
+        ("flat width prior", lambda one: _digits(one.flat_width)),
+        None if percent is None else (f"mean of reversals ({percent:.1f} %)", lambda one: _digits(one.reversal_mean)),
+        ("fit (p)", _fit),
+        ("drift", _drift),
         words=int(not standards),
     )
+
+
+def _threshold(one: ThresholdFound) -> str:
+    return f"{BEYOND[one.beyond]}{one.threshold:.3g}"
 
 
 def _target_percent(found: LevelsFound) -> float | None:
     return next((one.target_percent for one in found.own_thresholds), None)
 
 
-def _threshold_name(found: LevelsFound) -> str:
-    """Return what a threshold is, with its unit."""
-    if found.level_kind == "weber":
-        return "threshold (Weber fraction)"
-    return "threshold" + _width_unit(found)
-
-
-def _width_unit(found: LevelsFound) -> str:
+def _unit(found: LevelsFound) -> str:
     return f" [{found.unit}]" if found.unit else ""
 
 
-def _threshold_level(value: float | None, digits: int = 4) -> str:
+def _digits(value: float | None, digits: int = 3) -> str:
+    """Return a number with so many digits, a dash where there is none."""
     return "–" if value is None else f"{value:.{digits}g}"
+
+
+def _between(low: float | None, high: float | None, written: Callable[[float], str]) -> str:
+    """Return an interval, a dash where there is none."""
+    return "–" if low is None or high is None else f"{written(low)} – {written(high)}"
+
+
+def _levels(one: LevelTimes | WithheldForce) -> str:
+    """Return the levels that a row is about."""
+    return _digits(one.low) if one.low == one.high else _between(one.low, one.high, _digits)
 
 
 def _fit(one: ThresholdFound) -> str:
@@ -190,17 +206,12 @@ def _published(found: LevelsFound, *, exponents: bool) -> Iterator[str]:
 
 
 def _exponents(found: LevelsFound) -> str:
-    return table(
-        ("Participant", "standards" if found.thresholds else "levels", "exponent", "95 % interval"),
-        [
-            [
-                one.participant or f"group of {one.n}",
-                "–" if one.participant is None else str(one.n),
-                number(one.exponent),
-                "–" if one.low is None or one.high is None else f"{number(one.low)} – {number(one.high)}",
-            ]
-            for one in found.exponents
-        ],
+    return table_of(
+        found.exponents,
+        _OF_WHOM[0],
+        ("standards" if found.thresholds else "levels", _OF_WHOM[1][1]),
+        ("exponent", lambda one: number(one.exponent)),
+        ("95 % interval", lambda one: _between(one.low, one.high, number)),
     )
 
 
@@ -209,7 +220,7 @@ def _sensitivities(found: LevelsFound) -> str:
     ones = found.sensitivities
     wheres = len({_sensitivity_where(one) for one in ones}) > 1
     where = (
-        f"Standard{_width_unit(found)}"
+        f"Standard{_unit(found)}"
         if ones[0].standard is not None
         else "Level"
         if ones[0].level is not None
@@ -218,28 +229,22 @@ def _sensitivities(found: LevelsFound) -> str:
     measured = any(one.d_prime is not None for one in ones)
     biased = any(one.criterion is not None for one in ones)
     answers = tuple(ones[0].shares)
-    return table(
-        (
-            *((where,) if wheres else ()),
-            "Participant",
-            "n",
-            *(("d′", "95 % interval") if measured else ()),
-            *(("k" if found.design == "samedifferent" else "c",) if biased else ()),
-            *(f"“{answer.replace('_', ' ')}”" for answer in (answers[:1] if len(answers) == 2 else answers)),
-        ),
-        [
-            [
-                *((_sensitivity_where(one),) if wheres else ()),
-                one.participant or f"group of {one.n}",
-                "–" if one.participant is None else str(one.n),
-                *((number(one.d_prime), _share_interval(one)) if measured else ()),
-                *((number(one.criterion),) if biased else ()),
-                *(f"{100 * one.shares[answer]:.0f} %" for answer in (answers[:1] if len(answers) == 2 else answers)),
-            ]
-            for one in ones
-        ],
+    k_or_c = "k" if found.design == "samedifferent" else "c"
+    return table_of(
+        ones,
+        (where, _sensitivity_where) if wheres else None,
+        *_OF_WHOM,
+        ("d′", lambda one: number(one.d_prime)) if measured else None,
+        ("95 % interval", lambda one: _between(one.low, one.high, number)) if measured else None,
+        (k_or_c, lambda one: number(one.criterion)) if biased else None,
+        *map(_share, answers[:1] if len(answers) == 2 else answers),
         words=int(not wheres),
     )
+
+
+def _share(answer: str) -> tuple[str, Callable[[SensitivityFound], str]]:
+    """Return the column of an answer's share."""
+    return f"“{answer.replace('_', ' ')}”", lambda one: f"{100 * one.shares[answer]:.0f} %"
 
 
 def _sensitivity_where(one: SensitivityFound) -> str:
@@ -249,33 +254,17 @@ def _sensitivity_where(one: SensitivityFound) -> str:
     return "–" if value is None else f"{value:.4g}"
 
 
-def _share_interval(one: SensitivityFound) -> str:
-    return "–" if one.low is None or one.high is None else f"{number(one.low)} – {number(one.high)}"
-
-
 def _answer_times(found: LevelsFound) -> str:
     """Return a row per standard and level, with the median times of correct and of other answers."""
     standards = len({one.standard for one in found.level_times}) > 1
-    return table(
-        (
-            *((f"Standard{_width_unit(found)}",) if standards else ()),
-            level_words(found),
-            "n correct",
-            "median, correct [s]",
-            "n incorrect",
-            "median, incorrect [s]",
-        ),
-        [
-            [
-                *((_threshold_level(one.standard),) if standards else ()),
-                _threshold_level(one.low, 3) if one.low == one.high else f"{one.low:.3g} – {one.high:.3g}",
-                str(one.right_n),
-                number(one.right_s),
-                str(one.wrong_n),
-                number(one.wrong_s),
-            ]
-            for one in found.level_times
-        ],
+    return table_of(
+        found.level_times,
+        (f"Standard{_unit(found)}", lambda one: _digits(one.standard, 4)) if standards else None,
+        (level_words(found), _levels),
+        ("n correct", lambda one: str(one.right_n)),
+        ("median, correct [s]", lambda one: number(one.right_s)),
+        ("n incorrect", lambda one: str(one.wrong_n)),
+        ("median, incorrect [s]", lambda one: number(one.wrong_s)),
         words=0,
     )
 
@@ -334,19 +323,14 @@ def conduct_part(found: LevelsFound, estimator: str | None) -> Iterator[str]:
         yield paragraph(_conduct_words(found, estimator), "soft")
     if found.catches:
         yield heading(3, "Catch trials")
-        yield table(
-            ("Participant", "session", "n", "incorrect", "share", "rule"),
-            [
-                [
-                    one.participant,
-                    str(one.session),
-                    str(one.n),
-                    str(one.wrong),
-                    f"{100 * one.wrong / one.n:.0f} %",
-                    f"{'excluded: above' if one.excludes else 'kept: at most'} {100 * one.most:g} %",
-                ]
-                for one in found.catches
-            ],
+        yield table_of(
+            found.catches,
+            ("Participant", lambda one: one.participant),
+            ("session", lambda one: str(one.session)),
+            ("n", lambda one: str(one.n)),
+            ("incorrect", lambda one: str(one.wrong)),
+            ("share", lambda one: f"{100 * one.wrong / one.n:.0f} %"),
+            ("rule", lambda one: f"{'excluded: above' if one.excludes else 'kept: at most'} {100 * one.most:g} %"),
         )
         yield paragraph("Catch trials present the largest level; they enter the fit of the threshold.", "soft")
 
@@ -354,24 +338,18 @@ def conduct_part(found: LevelsFound, estimator: str | None) -> Iterator[str]:
 def _delivery(found: LevelsFound) -> str:
     """Return a row per standard."""
     standards = any(one.standard is not None for one in found.conduct)
-    unit = f" [{found.unit}]" if found.unit else ""
     digits = 4 if found.level_kind == "weber" else 3
-    level = f"level error{'' if found.level_kind == 'weber' else unit}"
-    return table(
-        (
-            *((f"Standard{unit}",) if standards else ()),
-            *("trials", "repeated attempts", "measured", f"{level}, mean", "largest"),
-            *("hand speed, RMS [m/s]", "apparent mass [kg]"),
-        ),
-        [
-            [
-                *(("–" if one.standard is None else f"{one.standard:.4g}",) if standards else ()),
-                *(str(one.trials), str(one.repeated), str(one.measured)),
-                *(number(one.error_mean, digits), number(one.error_largest, digits)),
-                *(number(one.pace_mps, 3), number(one.apparent_mass_kg, 3)),
-            ]
-            for one in found.conduct
-        ],
+    level = f"level error{'' if found.level_kind == 'weber' else _unit(found)}"
+    return table_of(
+        found.conduct,
+        (f"Standard{_unit(found)}", lambda one: _digits(one.standard, 4)) if standards else None,
+        ("trials", lambda one: str(one.trials)),
+        ("repeated attempts", lambda one: str(one.repeated)),
+        ("measured", lambda one: str(one.measured)),
+        (f"{level}, mean", lambda one: number(one.error_mean, digits)),
+        ("largest", lambda one: number(one.error_largest, digits)),
+        ("hand speed, RMS [m/s]", lambda one: number(one.pace_mps, 3)),
+        ("apparent mass [kg]", lambda one: number(one.apparent_mass_kg, 3)),
         words=0,
     )
 
@@ -400,20 +378,14 @@ def withheld(found: LevelsFound) -> Iterator[str]:
     if not found.withheld:
         return
     standards = len({one.standard for one in found.withheld}) > 1
-    unit = f" [{found.unit}]" if found.unit else ""
     yield heading(3, "Force withheld by safety")
-    yield table(
-        (*((f"Standard{unit}",) if standards else ()), f"Level{unit}", "intervals", "mean", "most"),
-        [
-            [
-                *(((f"{one.standard:.4g}" if one.standard is not None else "–"),) if standards else ()),
-                f"{one.low:.3g}" if one.low == one.high else f"{one.low:.3g} – {one.high:.3g}",
-                str(one.n),
-                f"{one.mean_percent:.1f} %",
-                f"{one.most_percent:.1f} %",
-            ]
-            for one in found.withheld
-        ],
+    yield table_of(
+        found.withheld,
+        (f"Standard{_unit(found)}", lambda one: _digits(one.standard, 4)) if standards else None,
+        (f"Level{_unit(found)}", _levels),
+        ("intervals", lambda one: str(one.n)),
+        ("mean", lambda one: f"{one.mean_percent:.1f} %"),
+        ("most", lambda one: f"{one.most_percent:.1f} %"),
         words=0,
     )
     yield paragraph(f"{' '.join(_withheld_words(found))} {WITHHELD_EXPLAINED}", "soft")
@@ -445,40 +417,21 @@ def _settings_table(found: LevelsFound) -> str:
     standards = len({one.standard for one in found.settings}) > 1
     compared = any(map(_has_error, found.settings))
     unit = "decades" if found.spacing == "log" else found.unit or "units of the level"
-    return table(
-        (
-            *((f"Standard [{found.unit}]" if found.unit else "Standard",) if standards else ()),
-            "Participant",
-            "n",
-            f"PSE [{found.unit}]" if found.unit else "PSE",
-            "95 % interval",
-            f"JND [{unit}]",
-            *((f"constant error [{unit}]",) if compared else ()),
-            f"hysteresis [{unit}]",
-        ),
-        [
-            [
-                *((_setting_number(one.standard, 4),) if standards else ()),
-                one.participant or f"group of {one.n}",
-                "–" if one.participant is None else str(one.n),
-                f"{one.pse:.3g}",
-                "–" if one.low is None or one.high is None else f"{one.low:.3g} – {one.high:.3g}",
-                _setting_number(one.jnd),
-                *((_signed(one.constant_error),) if compared else ()),
-                _signed(one.hysteresis),
-            ]
-            for one in found.settings
-        ],
+    return table_of(
+        found.settings,
+        (f"Standard{_unit(found)}", lambda one: _digits(one.standard, 4)) if standards else None,
+        *_OF_WHOM,
+        (f"PSE{_unit(found)}", lambda one: _digits(one.pse)),
+        ("95 % interval", lambda one: _between(one.low, one.high, _digits)),
+        (f"JND [{unit}]", lambda one: _digits(one.jnd)),
+        (f"constant error [{unit}]", lambda one: _signed(one.constant_error)) if compared else None,
+        (f"hysteresis [{unit}]", lambda one: _signed(one.hysteresis)),
         words=int(not standards),
     )
 
 
 def _has_error(one: SettingFound) -> bool:
     return one.constant_error is not None
-
-
-def _setting_number(value: float | None, digits: int = 3) -> str:
-    return "–" if value is None else f"{value:.{digits}g}"
 
 
 def _signed(value: float | None) -> str:
@@ -497,44 +450,35 @@ def _settings_words(found: LevelsFound) -> str:
 
 
 def _of_group(found: LevelsFound) -> str:
-    columns = list(_level_columns(found))
-    return table(
-        (*(name for name, _ in columns), "participants", "n", summary_words(found), "95 % interval"),
-        [
-            [
-                *(_plain(getattr(one, what)) for _, what in columns),
-                str(one.participants),
-                str(one.n),
-                _value(found, one.value),
-                _interval(found, one),
-            ]
-            for one in found.of_group
-        ],
+    return table_of(
+        found.of_group,
+        *((head, partial(_presented, what)) for head, what in _level_columns(found)),
+        ("participants", lambda one: str(one.participants)),
+        ("n", lambda one: str(one.n)),
+        (summary_words(found), lambda one: _value(found, one.value)),
+        ("95 % interval", lambda one: _between(one.low, one.high, partial(_value, found))),
         words=1 if found.vary is None else 0,
     )
 
 
+def _presented(what: str, one: LevelAnswers) -> str:
+    return _plain(getattr(one, what))
+
+
 def _level_columns(found: LevelsFound) -> Iterator[tuple[str, str]]:
     """Yield the columns that say what was presented: heading, and field of the answers."""
-    unit = f" [{found.unit}]" if found.unit else ""
     if any(one.standard is not None for one in found.of_group):
-        yield f"Standard{unit}", "standard"
+        yield f"Standard{_unit(found)}", "standard"
     if found.level_kind not in {None, "value"}:
         yield level_words(found), "level"
     if found.level_kind == "value" and not any(one.standard is not None for one in found.of_group):
         yield level_words(found), "comparison"
     else:
-        yield f"Comparison{unit}", "comparison"
+        yield f"Comparison{_unit(found)}", "comparison"
 
 
 def _value(found: LevelsFound, value: float) -> str:
     return f"{100 * value:.0f} %" if found.summary == "share" else f"{value:.3g}"
-
-
-def _interval(found: LevelsFound, one: LevelAnswers) -> str:
-    if one.low is None or one.high is None:
-        return "–"
-    return f"{_value(found, one.low)} – {_value(found, one.high)}"
 
 
 def _plain(value: float | str | None) -> str:
@@ -567,8 +511,3 @@ def _level_cell(found: LevelsFound, one: LevelAnswers | None) -> str:
     if one.count is not None:
         return f"{one.count}/{one.n}"
     return f"{_value(found, one.value)} ({one.n})"
-
-
-def _time_cells(numbers: Mapping[str, Any]) -> list[str]:
-    low, high = numbers["q1"], numbers["q3"]
-    return [str(numbers["n"]), number(numbers["median"]), "–" if low is None else f"{number(low)} – {number(high)}"]

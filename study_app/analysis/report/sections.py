@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 from study_app.analysis.data.motion import OF_REACHES, OF_TRIALS, REACH_DEFINITIONS, TRIAL_DEFINITIONS, Performance
 from study_app.analysis.data.questions import MEASURES
@@ -12,7 +12,7 @@ from study_app.analysis.figures.page_layout import Picture
 from study_app.analysis.findings import all_findings
 from study_app.analysis.levels.results import QuestionFound, ScoreFound
 from study_app.analysis.report import level_sections
-from study_app.analysis.report.html_page import bullets, drawn, heading, not_there, paragraph, picture, table
+from study_app.analysis.report.html_page import bullets, drawn, heading, not_there, paragraph, picture, table, table_of
 from study_app.analysis.results import (
     VERDICTS_MEAN,
     BlockFound,
@@ -106,23 +106,23 @@ def answers(results: Results) -> Iterator[str]:
 
 def _measures(found: BlockFound) -> str:
     levels = [str(level) for level in range(1, 8)]
-    return table(
-        ("Statement", settings_noun(found).capitalize(), *levels, "n", "missing", "median", "quartiles", "agree %"),
-        [
-            [
-                short(found, str(row["item"])),
-                name(found, str(row["code"])),
-                *(str(row[f"count_{level}"]) for level in levels),
-                str(row["n"]),
-                str(row["missing"] + row["cannot_judge"]),
-                number(row["median"], 1),
-                f"{number(row['q1'], 1)} – {number(row['q3'], 1)}" if row["q1"] is not None else "–",
-                number(row["agree_percent"], 0),
-            ]
-            for row in sorted(found.measures, key=lambda row: [item.id for item in found.items].index(str(row["item"])))
-        ],
+    order = [item.id for item in found.items]
+    return table_of(
+        sorted(found.measures, key=lambda row: order.index(str(row["item"]))),
+        ("Statement", lambda row: short(found, str(row["item"]))),
+        (settings_noun(found).capitalize(), lambda row: name(found, str(row["code"]))),
+        *((str(level), partial(_count_of, level)) for level in levels),
+        ("n", lambda row: str(row["n"])),
+        ("missing", lambda row: str(row["missing"] + row["cannot_judge"])),
+        ("median", lambda row: number(row["median"], 1)),
+        ("quartiles", lambda row: "–" if row["q1"] is None else f"{number(row['q1'], 1)} – {number(row['q3'], 1)}"),
+        ("agree %", lambda row: number(row["agree_percent"], 0)),
         words=2,
     )
+
+
+def _count_of(level: str, row: Mapping[str, Any]) -> str:
+    return str(row[f"count_{level}"])
 
 
 def places(results: Results) -> dict[str, str]:
