@@ -591,8 +591,6 @@ EXACT_GROUPS: Final = 50_000
 """So many allocations of participants to groups are gone through (two groups: of eight or nine); beyond, p is drawn."""
 
 AT_ONCE: Final = 500
-GROUPS_ROUNDING: Final = 1e-9
-"""Sums of the same numbers in another order differ by less than this, relatively."""
 
 NO_INTERVAL_OF_GROUPS: Final = "no interval for the share between groups: it cannot be negative"
 
@@ -671,7 +669,7 @@ def _impossible(groups: int, n: int, total: float) -> str:
         return "fewer than two groups have participants with all answers"
     if n == groups:
         return "each group has one participant"
-    return "" if total > GROUPS_ROUNDING else "no variation: all participants answered alike"
+    return "" if total > ROUNDING else "no variation: all participants answered alike"
 
 
 def _between(centred: Array, labels: NDArray[np.intp], groups: int) -> Array:
@@ -690,14 +688,14 @@ def _p_of_groups(
     """Return p, the smallest it could have been, and how it was found."""
     sizes = np.bincount(labels)
     log_ways = math.lgamma(len(labels) + 1) - sum(math.lgamma(size + 1) for size in sizes)
-    reached_by = found * (1 - GROUPS_ROUNDING)
+    reached_by = found * (1 - ROUNDING)
     if log_ways <= math.log(EXACT_GROUPS):
         every = np.array(list(_allocations(tuple(sizes.tolist()), len(labels))), dtype=np.intp)
         reached = np.concatenate(
             [_between(centred, every[at : at + AT_ONCE], len(sizes)) for at in range(0, len(every), AT_ONCE)]
         )
         p = float((reached >= reached_by).mean())
-        return p, float((reached >= reached.max() * (1 - GROUPS_ROUNDING)).mean()), "exact permutation of participants"
+        return p, float((reached >= reached.max() * (1 - ROUNDING)).mean()), "exact permutation of participants"
     rng = np.random.default_rng(seed)
     above = 0
     for done in range(0, draws, AT_ONCE):
