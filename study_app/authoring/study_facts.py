@@ -8,7 +8,7 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.measures.participant_texts import missing_texts, to_translate
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.haptics.model.slope_limits import HAND_MPS, steady
-from study_app.protocol.describe import warnings
+from study_app.protocol.checks.warnings import warnings
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s, step_duration_s
 

@@ -9,8 +9,7 @@ from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
 from study_app.haptics.model.gate import describe_gate, resolve
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.scene import Scene
-from study_app.haptics.model.slope_limits import slope_limit
-from study_app.haptics.model.steady_state import steady
+from study_app.haptics.model.slope_limits import slope_limit, steady
 from study_app.number_text import counted
 from study_app.protocol.checks.expected_precision import precision_rows
 from study_app.protocol.checks.warnings import warnings

@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, TypeAlias, get_args
 
 from study_app.errors import AnalysisError
-from study_app.protocol.analysis_plan import Published
 from study_app.protocol.blocks import Compared, Phase
-from study_app.protocol.model import Protocol
+from study_app.protocol.model import Protocol, Published
 from study_app.protocol.orders.block_orders import every_step_of
 from study_app.protocol.questionnaires import Score
 from study_app.protocol.questions import Context, Question, Scale, Statement, question_of

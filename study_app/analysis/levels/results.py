@@ -81,44 +81,6 @@ class LevelAnswers:
 
 
 @dataclass(frozen=True, slots=True)
-class PublishedValue:
-    """A value of another study that the protocol names: see `protocol.model.Published`."""
-
-    measure: str
-    value: float
-    standard: float | None
-    low: float | None
-    high: float | None
-    percent: float | None
-    n: int | None
-    source: str
-
-    def in_words(self) -> str:
-        """Return it with what is known of it."""
-        known = [
-            *([] if self.standard is None else [f"standard {self.standard:g}"]),
-            *([] if self.low is None or self.high is None else [f"{self.low:g} to {self.high:g}"]),
-            *([] if self.percent is None else [f"at {self.percent:g} % correct"]),
-            *([] if self.n is None else [f"n = {self.n}"]),
-        ]
-        source = f"{self.source}: " if self.source else ""
-        return f"{source}{self.measure} {self.value:g}" + (f" ({', '.join(known)})" if known else "")
-
-
-class _Published(Protocol):
-    @property
-    def measure(self) -> str: ...
-    @property
-    def percent(self) -> float | None: ...
-
-
-def compared_percent(published: Iterable[_Published]) -> float | None:
-    """Return the percentage of successes at which published thresholds were measured; None: unknown, or several."""
-    percents = {one.percent for one in published if one.measure in {"weber", "threshold"}}
-    return percents.pop() if len(percents) == 1 else None
-
-
-@dataclass(frozen=True, slots=True)
 class ThresholdFound:
     """A participant's threshold at one standard or, where ``participant`` is None, the group's.
 

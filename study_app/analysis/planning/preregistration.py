@@ -14,11 +14,10 @@ from study_app.analysis.planning.simulated_studies import compares_statements
 from study_app.analysis.report.html_page import bullets, heading, paragraph
 from study_app.analysis.results import counted, listed
 from study_app.errors import AnalysisError
-from study_app.protocol.analysis_plan import Analysis
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import expected_of, precision_plan, precision_rows, threshold_plan
 from study_app.protocol.describe import describe, limit_rows
-from study_app.protocol.model import Protocol
+from study_app.protocol.model import Analysis, Protocol
 from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.table import text_in
 from study_app.protocol.trials.stimuli import Family, family_of

@@ -33,7 +33,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     the results so far. Ends with exit code 3 if a rate exceeds its limit by its 99.9 % interval, otherwise with 4 if
     there are too few studies to decide about a rate.
     """
-    from study_app.analysis.power.plan import plan
+    from study_app.analysis.planning.simulated_studies import plan
     from study_app.protocol.load import load
     from study_app.session.simulated.rehearsal import condition_features
     from study_app.store.output_files import make_folder, write_files

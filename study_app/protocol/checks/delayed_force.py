@@ -13,7 +13,7 @@ from importlib import resources
 from operator import attrgetter
 from typing import Final, NamedTuple
 
-from study_app.haptics.model.steady_state import steady
+from study_app.haptics.model.slope_limits import steady
 from study_app.protocol.checks.consistency import numbers
 from study_app.protocol.checks.force_limits import LIMIT_J, damping_nspm, returned_j
 from study_app.protocol.checks.force_limits import longest_ms as longest_returned_ms

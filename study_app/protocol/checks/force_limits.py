@@ -15,9 +15,8 @@ from typing import Final
 
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
 from study_app.haptics.model.estimators import NAMED
-from study_app.haptics.model.force_link import MOST_DELAY_MS
 from study_app.haptics.model.overrides import override
-from study_app.haptics.model.scene import Scene
+from study_app.haptics.model.scene import MOST_DELAY_MS, Scene, Velocity
 from study_app.haptics.model.slope_limits import slope_limit, steady
 from study_app.number_text import counted
 from study_app.protocol.blocks import Block

@@ -15,8 +15,8 @@ from pydantic.json_schema import SkipJsonSchema
 from study_app.haptics.model import scene
 from study_app.haptics.model.ranges import within
 from study_app.haptics.model.scene import ForceLink
-from study_app.protocol.table import ExtendedTable, Table
-from study_app.protocol.texts import Id
+from study_app.protocol.table import ExtendedTable, Id, Table, invalid
+from study_app.protocol.trials.designs import Design
 
 if TYPE_CHECKING:
     from study_app.psychophysics.families import Floats

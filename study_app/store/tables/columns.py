@@ -5,7 +5,7 @@ name mean the same in every table.
 """
 
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.store.tables.csv_files import Column, optional
@@ -116,7 +116,7 @@ def _count(name: str, description: str, **more: Any) -> Column:
     return optional(name, "integer", description, minimum=0, **more)
 
 
-def _delay_error(name: str, which: str, of_trial: str) -> Column:
+def _delay_error(name: str, which: str, of_trial: Literal["sum", "max", "mean"]) -> Column:
     description = f"Visual delay, achieved minus requested: {which}."
     return optional(name, "number", description, "ms", sealed=True, of_trial=of_trial)
 

@@ -7,10 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study_app.analysis.designs.thresholds import counts_of, thresholds
-from study_app.analysis.statistics.psychometrics.goodness import p_of_fit
-from study_app.analysis.statistics.psychometrics.posterior import band, fitted
-from study_app.analysis.statistics.random_effects import group_mean
+from study_app.analysis.levels.thresholds import counts_of, thresholds
+from study_app.analysis.statistics.thresholds import band, fitted, group_mean, p_of_fit
 from study_app.protocol.model import Published
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.methods import Heard, QuestPlus, TrackSetting, UpDown

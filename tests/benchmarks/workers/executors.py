@@ -19,6 +19,7 @@ import psutil
 
 from study_app.analysis.planning.simulated_studies import BATCH, Plan, count, plan
 from study_app.protocol.load import load
+from study_app.protocol.simulated_observer import TrialFeatures
 from study_app.workers.cases import KeptCases, environment
 from study_app.workers.executors import Workers, open_executor
 from tests.workers.local_cluster import INSTALLED, local_cluster
