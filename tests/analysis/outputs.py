@@ -13,7 +13,9 @@ from study_app.analysis.figures.level_figures import level_pictures
 from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.figures.study_figures import pictures
 from study_app.analysis.report import write_report
-from tests.golden import figure_of, file_lines, stub_png
+from study_app.analysis.tables.study_tables import Study
+from tests.golden_figures import figure_of, stub_png
+from tests.golden_values import file_lines, table_lines
 
 GOLDEN = Path(__file__).parent / "golden"
 ELSEWHERE = frozenset({"codebook.json", "methods.txt"})
@@ -36,6 +38,18 @@ def figures_as_lines() -> Iterator[list[str]]:
         for draw in (pictures, level_pictures, question_pictures):
             patched.setattr(write_report, draw.__name__, partial(draw, forms=("png",)))
         yield drawn
+
+
+def sav_lines(path: Path) -> Iterator[str]:
+    """Yield the labels of the variables of a file of SPSS, and the cells."""
+    pyreadstat = pytest.importorskip("pyreadstat", reason="the extra spss is not installed")
+    frame, meta = pyreadstat.read_sav(str(path), user_missing=True)
+    for column in frame:
+        labels = meta.variable_value_labels.get(column, {})
+        missing = meta.missing_ranges.get(column, [])
+        kind = meta.variable_measure[column]
+        yield f"{column}: {meta.column_names_to_labels[column]} {kind} {labels} {missing}"
+    yield from table_lines(frame.to_csv(index=False))
 
 
 def report_lines(study: Study, without: frozenset[str] = ELSEWHERE) -> Iterator[str]:

@@ -1,6 +1,5 @@
 """The whole report and export of unusual results folders, compared with reviewed files."""
 
-import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,8 +14,9 @@ from study_app.store.blinded.unblinding import unblind, unblind_folder
 from study_app.store.sites.merge import merge
 from tests.analysis.conftest import CANNOT_JUDGE, SMALL, Results, make_results
 from tests.analysis.levels.level_studies import ADAPTIVE, matching_file
-from tests.analysis.outputs import ELSEWHERE, GOLDEN, figures_as_lines, report_lines
-from tests.golden import compare, file_lines
+from tests.analysis.outputs import ELSEWHERE, GOLDEN, figures_as_lines, report_lines, sav_lines
+from tests.golden import CHANGING, compare
+from tests.golden_values import file_lines
 from tests.protocol.forms.mixed import mixed_file
 from tests.protocol.groups.grouped import GROUPS, STUDY
 from tests.protocol.trials.level_studies import text_of_damper
@@ -48,18 +48,6 @@ def excluded(folder: Path) -> Path:
     results.add("P6", lambda *_: 7, session=2, repeated={"L1": lambda *_: 1, "D2": lambda *_: None})
     results.exclude("P1", reason="held the\nwrong  handle, " + "very " * 40)
     results.exclude("P2", trial=results.trial("P2", "honey"), reason="the phone rang")
-    results.open()
-    return results.folder
-
-
-def many_excluded(folder: Path) -> Path:
-    results = small(folder)
-    for number in range(1, 24):
-        results.add(f"P{number:02d}", lambda c, i: None if i == "warm" else 4)
-        if number > 1:
-            results.exclude(f"P{number:02d}", reason=f"reason {number}")
-    path = results.responses("P01")
-    path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))
     results.open()
     return results.folder
 
@@ -103,37 +91,23 @@ def sites_of_statements(folder: Path) -> Path:
     return folder / "pooled"
 
 
-QUICK = {"one_sealed": one_sealed, "unfinished": unfinished, "matching": rehearsed(matching_file, 2)}
+QUICK = {"one_sealed": one_sealed, "unfinished": unfinished}
 SLOW = {
-    "excluded": excluded, "many_excluded": many_excluded, "mixed": rehearsed(mixed_file, 2), "grouped": grouped,
-    "adaptive": rehearsed(adaptive_file, 2, felt=False), "sites_of_statements": sites_of_statements,
+    "matching": rehearsed(matching_file, 2), "excluded": excluded, "mixed": rehearsed(mixed_file, 2),
+    "grouped": grouped, "adaptive": rehearsed(adaptive_file, 2, felt=False),
+    "sites_of_statements": sites_of_statements,
 }  # fmt: skip
-SHARED = {"many_excluded", "mixed"}
-"""Studies that are exported as Psych-DS too."""
-CELLS = 40
-"""Most cells of a column that are compared."""
-COLUMN = re.compile(r"\w+: \[")
-REPEATED = re.compile(r"/results/blocks/\d+/measures/|/files/\S+-wide_data\.csv/")
-"""Lines of report and codebook that tables and descriptions of Psych-DS hold too."""
-
-
-def shortened(line: str) -> str:
-    """Return a column of a table with at most the first and the last cells."""
-    cells = line.split(", ")
-    if len(cells) <= CELLS or not COLUMN.match(line):
-        return line
-    return ", ".join([*cells[: CELLS // 2], f"{len(cells)} in all", *cells[-CELLS // 2 :]])
+EXTRAS = {"mixed": ["wide", "psych-ds", "sav"]}
 
 
 @pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
 def test_the_outputs_of_unusual_results(name: str, tmp_path: Path, pytestconfig: pytest.Config) -> None:
     folder = (QUICK | SLOW)[name](tmp_path)
-    lines, told = list(report_lines(load_study(folder), ELSEWHERE | {"tests.csv"})), {"report.json"}
+    lines = list(report_lines(load_study(folder), ELSEWHERE | {"tests.csv"}))
     with figures_as_lines():
-        written = export(folder, tmp_path / "out", extras=["wide", *(["psych-ds"] if name in SHARED else [])])
-    for path in sorted(written):
-        if (path.suffix == ".json" or "description-wide" in path.name) and path.name not in told:
-            told.add(path.name)
-            lines += [f"##### export {path.name}", *file_lines(path.name, path.read_bytes())]
-    kept = (shortened(line) for line in lines if not REPEATED.match(line))
-    compare(GOLDEN / f"results-{name}.txt", kept, pytestconfig)
+        written = export(folder, tmp_path / "out", extras=EXTRAS.get(name, ["wide"]))
+    for file, path in sorted({path.name: path for path in written}.items()):
+        if (path.suffix in (".json", ".sav") or "description-wide" in file) and file != "report.json":
+            lines += [f"##### export {file}"]
+            lines += sav_lines(path) if path.suffix == ".sav" else file_lines(file, path.read_bytes())
+    compare(GOLDEN / f"results-{name}.txt", lines, pytestconfig, mask=CHANGING)

@@ -24,8 +24,9 @@ from study_app.gui.theme.theme import DARK
 from study_app.session.start import NewSession
 from study_app.store.exclusions import Exclusion
 from study_app.store.workstation import load
-from study_app.workers.server import Crashed, Refused
-from tests.golden_text import changed, compare, flat
+from study_app.workers.messages import Crashed, Refused
+from tests.golden import compare
+from tests.golden_values import changed, value_lines
 
 GOLDEN = Path(__file__).parent / "golden"
 STUDY, OTHER = Path("results", "one"), Path("results", "two")
@@ -125,7 +126,7 @@ def test_results(qtbot: Any, pytestconfig: pytest.Config) -> None:
                 controller.show_results(given)
             case _:
                 getattr(controller.place, name).emit(*given)
-        after = [f"busy: {controller.busy} {controller._listening.isActive()}", *flat("view", controller.view)]
+        after = [f"busy: {controller.busy} {controller._listening.isActive()}", *value_lines(controller.view, "view")]
         lines += [f"== {name} {given}", *done, *changed(before, after)]
         before = after
     compare(GOLDEN / "results.txt", lines, pytestconfig)
@@ -150,13 +151,15 @@ def test_settings(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: py
     heard: list[str] = []
     machine.changed.connect(lambda settings: heard.append(f"changed, kept: {settings == load()}"))
     machine.troubled.connect(lambda *words: heard.append(f"troubled {words[0]}"))
-    lines, before = [], list(flat("settings", machine.settings))
+    lines, before = [], list(value_lines(machine.settings, "settings"))
     actions: dict[str, Any] = {"measured": lambda values: machine.measured(*values)}
     actions |= {"operator": machine.remember_operator, "protocol": machine.remember_protocol, "change": machine.change}
     for name, value in CHANGES:
         heard.clear()
         machine.undo() if name == "undo" else actions[name](value)
-        settings = (line.replace(date.today().isoformat(), "TODAY") for line in flat("settings", machine.settings))
+        settings = (
+            line.replace(date.today().isoformat(), "TODAY") for line in value_lines(machine.settings, "settings")
+        )
         after = [*settings, f"undo: {machine.undo_called}"]
         lines += [f"== {name} {value}", *heard, *changed(before, after)]
         before = after
@@ -190,7 +193,7 @@ def test_devices(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: pyt
     devices = DevicesController(machine, look)
     devices.looked.connect(lambda shown: heard.append(f"looked {len(shown)}"))
     devices.troubled.connect(lambda *words: heard.append(f"troubled {words}"))
-    lines = [*flat("preferred", devices.preferred)]
+    lines = [*value_lines(devices.preferred, "preferred")]
     place = devices.make_place()
     qtbot.addWidget(place)
     steps: list[tuple[str, Any]] = [
@@ -208,7 +211,10 @@ def test_devices(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: pyt
             devices.looking.join()
             QApplication.sendPostedEvents(devices)
         lines += [f"== {name} {given}", *heard, f"refresh: {place.refresh.isEnabled()}"]
-        lines += [*flat("preferred", devices.preferred), *flat("shown", [one.word for one in devices.shown])]
+        lines += [
+            *value_lines(devices.preferred, "preferred"),
+            *value_lines([one.word for one in devices.shown], "shown"),
+        ]
     compare(GOLDEN / "devices.txt", lines, pytestconfig)
 
 

@@ -1,6 +1,5 @@
 """What each command prints, its exit code and its files, on a small study; and what is said of bad input."""
 
-import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -9,15 +8,10 @@ import pytest
 
 from study_app.cli import main
 from study_app.session.simulated.answers_only import rehearse_answers
-from tests.golden_text import compare
+from tests.golden import CHANGING, compare
 from tests.studies import made_up, once
 
 GOLDEN = Path(__file__).parent / "golden"
-CHANGING = re.compile(
-    r"\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d(?:\.\d+)?)?(?:Z|[+-]\d\d:\d\d)?)?"
-    r"|\b\d+\.\d+\.\d+\b|\b(?<!\.)[0-9a-f]{12,}\b"
-)
-"""Dates, versions and hashes."""
 COMMANDS = {
     "study": (
         "--version",
@@ -167,7 +161,5 @@ def test_commands(group: str, workspace: Path, capsys: Any, monkeypatch: Any, py
         lines += [*(f"! {one}" for one in err.splitlines()), *(f"+ {one}" for one in sorted(now - before))]
         lines += [f"- {one}" for one in sorted(before - now)]
         before = now
-    lines = [
-        CHANGING.sub("*", line.replace(str(workspace), "FOLDER").replace("python -m pytest.", "")) for line in lines
-    ]
-    compare(GOLDEN / f"{group}.txt", lines, pytestconfig)
+    lines = [line.replace(str(workspace), "FOLDER").replace("python -m pytest.", "") for line in lines]
+    compare(GOLDEN / f"{group}.txt", lines, pytestconfig, mask=CHANGING)

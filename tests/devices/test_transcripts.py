@@ -1,8 +1,6 @@
 """What each device says of itself and answers tick by tick, what is found by the facts of a Falcon, and descriptors."""
 
-import json
 import pickle
-import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -26,7 +24,8 @@ from study_app.devices.falcon.failures import (
 from study_app.devices.registry import discover
 from tests.compiled import needs_servo
 from tests.devices.subjects import Subject, falcon, force_dimension, inverse3, mouse, over, scripted
-from tests.golden_text import compare, flat
+from tests.golden import compare
+from tests.golden_values import value_lines
 
 GOLDEN = Path(__file__).parent / "golden"
 USB = ("access", "busy", "not-supported", "not-found", "no-device", "kernel-driver", "no-backend", "no-ftd2xx", "io",
@@ -80,12 +79,8 @@ def test_descriptors(pytestconfig: pytest.Config) -> None:
     for one in discover().devices:
         name = one.name
         values = one.window_values({"firmware": "/f.bin", "dhd-library": "/l.so", "nothing": "x"})
-        told += [*flat(name, one), f"{name}: {one.label} {dict(values)}"]
-    compare(
-        GOLDEN / "descriptors.txt",
-        (re.sub(r"<function.*>|functools.*", "FUNCTION", line) for line in told),
-        pytestconfig,
-    )
+        told += [*value_lines(one, name), f"{name}: {one.label} {dict(values)}"]
+    compare(GOLDEN / "descriptors.txt", told, pytestconfig)
 
 
 @needs_servo
@@ -98,12 +93,13 @@ def test_ticks(made: Callable[..., Subject], request: pytest.FixtureRequest, pyt
     def tell(what: str, ticks: Any, answers: Any = ()) -> None:
         reading = ticks.reading[0]
         said.append(f"== {what} {' '.join(map(str, answers))}")
-        said.extend(flat("reading", {name: reading[name] for name in reading.dtype.names if not name.endswith("_ns")}))
+        read = {name: reading[name] for name in reading.dtype.names if not name.endswith("_ns")}
+        said.extend(value_lines(read, "reading"))
         said.append(f"force: {' '.join(f'{one:.4f}' for one in np.round(subject.acting_n(), 4) + 0.0)}")
         said.append(f"failure: {device.failure}")
-        said.extend(flat("counters", getattr(device, "counters", {})))
+        said.extend(value_lines(getattr(device, "counters", {}), "counters"))
 
-    said += [json.dumps(device.describe(), indent=1, sort_keys=True), *flat("dynamics", device.dynamics)]
+    said += [*value_lines(device.describe()), *value_lines(device.dynamics, "dynamics")]
     ticks = subject.ticks()
     tell("opened", ticks, [ticks.after(5), ticks.read(), ticks.read(pause_ns=0)])
     for force in ((0.5, -1.0, 1.5), (0.0, 0.0, 9.0), (np.nan, 0.0, 0.0), (0.0, -3.0, 0.0), (0.0, 0.0, 0.0)):
@@ -124,4 +120,4 @@ def test_ticks(made: Callable[..., Subject], request: pytest.FixtureRequest, pyt
     subject.restore()
     device.close()
     tell("closed", ticks, [ticks.read() if device.name not in ("mouse", "scripted") else ""])
-    compare(GOLDEN / f"ticks_{made.__name__}.txt", "\n".join(said).split("\n"), pytestconfig)
+    compare(GOLDEN / f"ticks_{made.__name__}.txt", said, pytestconfig)

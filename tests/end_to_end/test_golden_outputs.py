@@ -3,7 +3,6 @@
 ``python -m pytest tests/end_to_end/test_golden_outputs.py --regenerate`` writes the files anew: read the difference.
 """
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,20 +12,21 @@ import pytest
 from study_app.analysis.export.export import export
 from study_app.analysis.report.write_report import report
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.blinded.unblinding import unblind_folder
-from study_app.store.tables.csv_files import unguarded
-from tests.analysis.levels.level_studies import levels_file, matching_file
-from tests.golden import compare, leaves, page_lines
-from tests.protocol.forms.mixed import mixed_file
-from tests.studies import made_up, once, quick_pdfs
+from study_app.store.sites.unblind_sites import unblind_folder
+from study_app.store.tables.formulas import unguarded
+from tests.analysis.levels.level_studies import levels_file
+from tests.analysis.outputs import figures_as_lines, sav_lines
+from tests.golden import CHANGING, compare
+from tests.golden_values import file_lines
+from tests.studies import made_up, once
 
 pytestmark = pytest.mark.slow
 
-pyreadstat = pytest.importorskip("pyreadstat", reason="the extra spss is not installed")
+pytest.importorskip("pyreadstat", reason="the extra spss is not installed")
 
 GOLDEN = Path(__file__).parent / "golden"
-FILES = {"mixed": mixed_file, "levels": levels_file, "matching": matching_file}
-PEOPLE = {"mixed": 3, "rek2024": 12, "viscosityjnd": 2, "levels": 3, "matching": 3}
+FILES = {"levels": levels_file}
+PEOPLE = {"rek2024": 12, "levels": 3}
 OUTPUTS = ("report.html", "report.json", "report.R", "codebook.json", "tests.csv", "methods.txt")
 IN_SPSS = ("responses", "wide", "thresholds", "settings")
 
@@ -41,7 +41,7 @@ def outputs(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
         results = folder / "results"
         rehearse_answers(protocol, participants=PEOPLE[name], seed=7, results=results, felt=made_up(protocol))
         unblind_folder(results, by="AB", reason="golden")
-        with quick_pdfs():
+        with figures_as_lines():
             report(results, folder / "outputs", failed=pytest.fail)
         export(results, folder / "outputs", extras=["wide", "parquet", "sav"])
 
@@ -53,7 +53,7 @@ def test_every_cell(outputs: Path, pytestconfig: pytest.Config) -> None:
     tables = [path.name.split("_")[1].removeprefix("description-") for path in outputs.glob("outputs/*_data.csv")]
     names = {*OUTPUTS, *(f"{name}.csv" for name in tables), *(f"{name}.sav" for name in tables if name in IN_SPSS)}
     for name in sorted(names):
-        compare(GOLDEN / study / f"{name}.txt", lines(outputs / "outputs", name), pytestconfig)
+        compare(GOLDEN / study / f"{name}.txt", lines(outputs / "outputs", name), pytestconfig, mask=CHANGING)
     assert {path.name.removesuffix(".txt") for path in (GOLDEN / study).iterdir()} == names
 
 
@@ -76,18 +76,4 @@ def lines(folder: Path, name: str) -> Iterator[str]:
     """Yield the cells, labels and texts of an output."""
     stem, kind = name.split(".")
     (path,) = folder.glob(f"*_description-{stem}_data.{kind}") if not (folder / name).exists() else [folder / name]
-    match kind:
-        case "html":
-            yield from page_lines(path.read_text(encoding="utf-8"))
-        case "json":
-            yield from leaves("", json.loads(path.read_bytes()))
-        case "sav":
-            frame, meta = pyreadstat.read_sav(str(path), user_missing=True)
-            for column in frame:
-                labels = meta.variable_value_labels.get(column, {})
-                missing = meta.missing_ranges.get(column, [])
-                kind = meta.variable_measure[column]
-                yield f"{column}: {meta.column_names_to_labels[column]} {kind} {labels} {missing}"
-            yield from frame.to_csv(index=False).splitlines()
-        case _:
-            yield from path.read_text(encoding="utf-8").splitlines()
+    yield from sav_lines(path) if kind == "sav" else file_lines(path.name, path.read_bytes())

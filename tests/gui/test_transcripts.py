@@ -21,6 +21,8 @@ from tests.gui.walk import settle
 from tests.gui.windows import WINDOWS, two_screens
 
 SEED = 1234
+SLOW = ("operator, single-blind", "lab", "settings", "home", "results", "diagnosis", "help", "new session")
+"""Windows with many states, which the quick circle leaves out."""
 CLOCKS = ("results.sidebar", "home.view", "home.sessions_card", "sessions.sessions_table")
 
 
@@ -79,7 +81,7 @@ def test_what_a_window_paints_and_tells(qtbot: Any, name: str, pytestconfig: pyt
     window.window().hide()
 
 
-@pytest.mark.parametrize("name", STATES)
+@pytest.mark.parametrize("name", [pytest.param(one, marks=[pytest.mark.slow] * (one in SLOW)) for one in STATES])
 def test_what_each_state_paints_and_tells(qtbot: Any, name: str, pytestconfig: pytest.Config) -> None:
     make, actions = STATES[name]
     window = make(qtbot)

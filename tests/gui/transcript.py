@@ -3,11 +3,10 @@
 ``python -m pytest tests/gui/test_transcripts.py --regenerate`` writes the files anew: read the difference.
 """
 
-import difflib
 import re
 from base64 import b64decode
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from itertools import groupby
 from pathlib import Path
@@ -49,6 +48,8 @@ from PySide6.QtWidgets import (
 )
 
 from study_app.gui.widgets.main_view import Place
+from tests import golden
+from tests.golden_values import changed
 
 Actions = Mapping[str, Callable[[Any], object]]
 """What brings a window into each of its states, by the state's name."""
@@ -57,6 +58,8 @@ QT_VERSION = GOLDEN / "qt_version"
 CONTROLS = (QAbstractButton, QAbstractItemView, QAbstractSlider, QAbstractSpinBox, QComboBox, QLineEdit, QPlainTextEdit)
 STATES = ("disabled", "checked", "readOnly", "expanded", "selected", "focused", "invisible", "offscreen")
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
+STILL = "matrix(1,0,0,1,"
+"""How a transform begins that only moves."""
 SVG = "{http://www.w3.org/2000/svg}"
 PLACES = ("d", "points", "x", "y", "width", "height", "x1", "x2", "y1", "y2", "cx", "cy", "r", "rx", "ry")
 HREF = "{http://www.w3.org/1999/xlink}href"
@@ -137,6 +140,7 @@ def _shapes(root: ElementTree.Element) -> Iterator[str]:
     )
     for (at, is_text), shapes in groupby(drawn, lambda one: (one[1].get("transform", ""), one[0] == "text")):
         looks: list[str] = []
+        corner = _rounded(at.removeprefix(STILL))
         places = ""
         for kind, group, shape in shapes:
             colours = _inks(group, gradients)
@@ -148,10 +152,10 @@ def _shapes(root: ElementTree.Element) -> Iterator[str]:
             place = " ".join(value for name, value in shape.items() if name in PLACES)
             if is_text:
                 size = f"{group.get('font-size')} {group.get('font-weight')}"
-                yield f"{looks[-1]} {size} @{_rounded(at)} {_rounded(place)} {(shape.text or '').strip()}"
+                yield f"{looks[-1]} {size} @{corner} {_rounded(place)} {(shape.text or '').strip()}"
             places += f" {place}"
         if looks and not is_text:
-            yield f"{', '.join(dict.fromkeys(looks))} @{_rounded(at)} {_rounded(places)}"
+            yield f"{', '.join(dict.fromkeys(looks))} @{corner} {_rounded(places)}"
 
 
 @cache
@@ -167,20 +171,25 @@ def told(window: QWidget) -> list[str]:
     """Return a line for each widget that has a name, a tip or a value: role, name, description, value and states."""
     lines = []
     for part in [window, *window.findChildren(QWidget)]:
-        interface = QAccessible.queryAccessibleInterface(part)
-        if not part.isVisible() or interface is None or isinstance(part, QScrollBar):
+        if not part.isVisible() or isinstance(part, QScrollBar):
+            continue
+        if (interface := QAccessible.queryAccessibleInterface(part)) is None:
             continue
         kinds = (QAccessible.Text.Name, QAccessible.Text.Description, QAccessible.Text.Value)
-        words = [interface.text(kind).replace("\n", " / ") for kind in kinds]
-        words.append(part.toolTip().replace("\n", " / "))
+        words = [*(interface.text(kind) for kind in kinds), part.toolTip()]
         state = interface.state()
         on = [name for name in STATES if getattr(state, name)]
         if any(words):
-            shown = " | ".join(words).rstrip(" |")
-            lines.append(" ".join([interface.role().name, *on, shown]))
+            lines.append(" ".join([interface.role().name, *on, _told_once(words)]))
         if isinstance(part, QAbstractItemView) and part.model() is not None:
             lines += _cells(part.model())
     return lines
+
+
+def _told_once(words: list[str]) -> str:
+    """Return texts beside each other, "=" for one that is told before."""
+    shown = ["=" if word and word in words[:at] else word for at, word in enumerate(words)]
+    return " | ".join(shown).replace("\n", " / ").rstrip(" |")
 
 
 def _cells(model: QAbstractItemModel) -> Iterator[str]:
@@ -303,7 +312,7 @@ class Recorder:
         yield f"== {name}"
         yield from self.heard
         yield from seen
-        yield from [line for line in difflib.unified_diff(before, self.lines, n=0, lineterm="") if line[0] in "+-"][2:]
+        yield from changed(before, self.lines)
 
 
 def steps(window: QWidget, settled: Callable[[], None]) -> Iterator[str]:
@@ -399,16 +408,11 @@ def _usable(control: QWidget) -> bool:
     )
 
 
-def compare(name: str, lines: list[str], config: pytest.Config) -> None:
-    """Compare lines with the golden file, or write it."""
-    kept = (GOLDEN / re.sub(r"\W+", "_", name)).with_suffix(".txt")
+def compare(name: str, lines: Iterable[str], config: pytest.Config) -> None:
+    """Compare lines with the golden file of a window, unless that was recorded with another version of Qt."""
     version = qVersion().rpartition(".")[0]
     if config.getoption("regenerate"):
-        kept.parent.mkdir(exist_ok=True)
         QT_VERSION.write_text(f"{version}\n")
-        kept.write_text("\n".join(lines) + "\n", encoding="utf-8")
     if (recorded := QT_VERSION.read_text().strip()) != version:
         pytest.skip(f"recorded with Qt {recorded}, here is Qt {version}: styles paint otherwise")
-    expected = kept.read_text(encoding="utf-8").splitlines()
-    different = [] if lines == expected else list(difflib.unified_diff(expected, lines, n=0, lineterm=""))[2:]
-    assert not different, "\n".join([f"{kept}: review, then --regenerate", *different[:40]])
+    golden.compare((GOLDEN / re.sub(r"\W+", "_", name)).with_suffix(".txt"), lines, config)

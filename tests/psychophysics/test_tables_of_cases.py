@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from study_app.psychophysics import delivery, detection, families, grid, precision, questplus, simulated_tracks, updown
-from tests.golden import compare, told
+from tests.golden import compare
+from tests.golden_values import one_line as told
 
 AXES = grid.evenly(-2, 0, 9), grid.geometric(0.3, 2, 3)
 SMALL = grid.Grid("weibull", *AXES, (0.8, 1.5), (0.0, 0.05), (0.7, 0.3), (0.5,))

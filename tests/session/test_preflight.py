@@ -20,7 +20,7 @@ from study_app.session import preflight_measurements
 from study_app.session.preflight import Facts, Screen, checks, refused
 from study_app.session.preflight_measurements import measure
 from tests.compiled import needs_servo
-from tests.golden_text import compare
+from tests.golden import compare
 from tests.protocol.edited_studies import text_of
 from tests.session import small
 

@@ -22,7 +22,8 @@ from study_app.validation.timing import delay_report, device_lateness, timing_re
 from study_app.validation.timing.delay_results import Shown
 from study_app.validation.velocity import criteria
 from tests.filled import filled
-from tests.golden import compare, figure_of, stub_png
+from tests.golden import CHANGING, compare
+from tests.golden_figures import figure_of, stub_png
 
 GOLDEN = Path(__file__).parent / "golden"
 
@@ -73,14 +74,14 @@ GIVEN: dict[str, Any] = {
     "after": lambda rng: tuple(tuple(rng.choice([0.0, 0.0004, 0.1], 4).tolist()) for _ in withheld_force.QUICK),
     "reasons": lambda rng: tuple(rng.choice(["not finite", "swing"], int(rng.integers(0, 3)), replace=False)),
 }  # fmt: skip
-REPORTS = (
-    timing_report.text, timing_report.write, delay_report.text, delay_report.write, device_lateness.text,
-    accuracy_report.write,
-    liquid_survey.survey_markdown, outlet_report.stream_text, outlet_report.trigger_text, verdicts.markdown,
-    verdicts.table, noticed_delays.markdown, rates.markdown, rates.table, stability_report.group_table,
-    stability_report.in_words, stability_report.summary, force_delay.report, criteria.report, withheld_force.report,
-    delivered_force.report, soaked,
+QUICK = (
+    timing_report.text, delay_report.text, device_lateness.text, outlet_report.stream_text, outlet_report.trigger_text,
+    verdicts.markdown, verdicts.table, noticed_delays.markdown, rates.markdown, rates.table,
+    stability_report.group_table, stability_report.in_words, stability_report.summary, force_delay.report,
+    criteria.report, withheld_force.report, delivered_force.report,
 )  # fmt: skip
+SLOW = (timing_report.write, delay_report.write, accuracy_report.write, liquid_survey.survey_markdown, soaked)
+REPORTS = (*QUICK, *(pytest.param(make, marks=pytest.mark.slow) for make in SLOW))
 
 
 def lines_of(make: Callable[..., Any], seed: int, folder: Path) -> Iterator[str]:
@@ -107,4 +108,4 @@ def test_reports_of_results(
     monkeypatch.setattr(Figure, "savefig", lambda figure, to, **_: to.write(stub_png(figure)))
     seeds = 1 if make is soaked else 2 if make.__name__ == "write" else 4
     found = [line for seed in range(seeds) for line in (f"##### {seed}", *lines_of(make, seed, tmp_path))]
-    compare(GOLDEN / f"{make.__module__.rpartition('.')[2]}-{make.__name__}.txt", found, pytestconfig)
+    compare(GOLDEN / f"{make.__module__.rpartition('.')[2]}-{make.__name__}.txt", found, pytestconfig, mask=CHANGING)

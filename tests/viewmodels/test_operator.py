@@ -15,6 +15,8 @@ from study_app.viewmodels.number_words import duration, duration_range, duration
 from study_app.viewmodels.operator import MEASURES
 from study_app.viewmodels.servo_health import ServoHealth
 from study_app.viewmodels.session.stages import stages
+from tests.golden import compare
+from tests.golden_values import changed, value_lines
 from tests.gui.operator.session import ticks
 from tests.protocol.trials.level_studies import study
 
@@ -86,19 +88,16 @@ def late():
 def test_a_view_after_each_event_is_the_reviewed_one(told, blinding, ended, pytestconfig):
     if blinding == "single":
         told.make_single_blind()
-    lines, before = [], {}
+    lines, before = list[str](), list[str]()
     end = (lambda it: it.tell("session_ended", 4.0, status=ended, reason="", fingerprint="k3vq-7m2p-xw4d"), {})
     for number, (event, said) in enumerate((*STORY, end)):
         event(told)
         view = told.view(late() if number == 4 else None, **said)
-        fields = {field.name: repr(getattr(view, field.name)) for field in dataclasses.fields(view)}
-        fields |= {"trials_line": view.trials_line, "time": view.trial_time and view.trial_time.words}
-        lines += [f"== {number}", *(f"{name}: {it}" for name, it in fields.items() if before.get(name) != it)]
-        before = fields
-    kept = Path(__file__).parent / "golden" / f"operator_{blinding}_{ended}.txt"
-    if pytestconfig.getoption("regenerate"):
-        kept.write_text("\n".join(lines), encoding="utf-8")
-    assert lines == kept.read_text(encoding="utf-8").splitlines()
+        time = view.trial_time and view.trial_time.words
+        after = [*value_lines(view), f"trials: {view.trials_line}", f"time: {time}"]
+        lines += [f"== {number}", *changed(before, after)]
+        before = after
+    compare(Path(__file__).parent / "golden" / f"operator_{blinding}_{ended}.txt", lines, pytestconfig)
 
 
 def test_time_in_a_trial_of_intervals_has_no_limit_of_a_single_interval(told):

@@ -22,7 +22,8 @@ from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.stimuli import analysis_grid, assumed_for
 from tests.analysis.levels.level_studies import STIMULUS
 from tests.analysis.outputs import GOLDEN
-from tests.golden import compare, told
+from tests.golden import compare
+from tests.golden_values import one_line as told
 
 NAN = np.nan
 LEVELS = (0.0, 50.0, 100.0, 200.0)

@@ -1,9 +1,8 @@
 """The designer's window, compared with reviewed texts: each kind of element in every tab, each field used once."""
 
-import difflib
 import re
-from collections.abc import Callable, Iterator
-from types import SimpleNamespace
+from collections.abc import Callable, Iterator, Mapping
+from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,18 +13,18 @@ from study_app.gui.widgets.background import wait_for_jobs
 from study_app.protocol.source.document import Path
 from study_app.viewmodels.designer.requests import ChangeLanguage, RetypeFile, SetValue
 from tests.app.designer.support.designer import DEMO
-from tests.authoring.test_study_transcripts import elements, generic
+from tests.authoring.test_study_transcripts import elements, generic, studies
+from tests.golden_values import changed
 from tests.gui.transcript import CONTROLS, compare, painted, told
 from tests.gui.transcript import _act as act
 from tests.gui.transcript import _usable as usable
 from tests.protocol.edited_studies import text_of
-from tests.value_text import changed
 
 TABS = ("measures", "file", "changes", "participant")
 LISTED = ("blocks", "liquids", "conditions")
 NEVER_MS = 10**8
 TIME = re.compile(r"\b\d\d:\d\d\b")
-TIP = re.compile(r"^(StaticText readOnly (.+)) \| \2 \|  \| \2$")
+TIP = re.compile(r"^(StaticText readOnly .+) \| = \|  \| =$")
 """A text with itself as its tip, which it has where it is cut."""
 
 
@@ -74,13 +73,12 @@ class Record:
         settle(self.designer)
         self.lines += [f"-- {name}", *self.said()]
         shown, key = (of, name) if of else (QApplication.activePopupWidget() or self.designer.window, "")
-        every = (TIP.sub(r"\1", TIME.sub("HH:MM", line)) for line in told(shown))
-        heard = [line for line in every if not line.startswith("ScrollBar")]
-        after = {f"{key} told": heard} | ({"painted": painted(self.designer.place.form)} if paints else {})
-        for way, lines in after.items():
-            found = difflib.unified_diff(self.before.get(way, []), lines, n=0, lineterm="")
-            self.lines += [TIME.sub("HH:MM", line) for line in list(found)[2:] if line[0] in "+-"]
-        self.before |= after
+        heard = [TIP.sub(r"\1", line) for line in told(shown) if not line.startswith("ScrollBar")]
+        seen = {f"{key} told": heard} | ({"painted": painted(self.designer.place.form)} if paints else {})
+        for way, lines in seen.items():
+            after = [TIME.sub("HH:MM", line) for line in lines]
+            self.lines += changed(self.before.get(way, []), after)
+            self.before[way] = after
 
     def said(self) -> Iterator[str]:
         """Yield messages, what is selected, and what changed in the text since the last time."""
@@ -93,7 +91,7 @@ class Record:
         focus = QApplication.focusWidget()
         at = f"{type(focus).__name__} {focus.accessibleName()!r}" if focus else "nothing"
         yield f"selected {'.'.join(map(str, designer.editing.selected))}, steps {designer.steps}, keyboard at {at}"
-        yield from changed(self.text, designer.text)
+        yield from changed(self.text.split("\n"), designer.text.split("\n"), numbered=True)
         self.text = designer.text
 
     def compare(self, name: str, config: pytest.Config) -> None:
@@ -114,22 +112,24 @@ class Record:
         self.note(f"press {name}", lambda: self.designer.click_on(self.designer.part(name, QAbstractButton)))
 
 
-def one_of_each(document: Any) -> list[Path]:
-    """Return the first element of each kind."""
+def one_of_each(document: Any, but: Mapping[str, Any] = MappingProxyType({})) -> list[Path]:
+    """Return the first element of each kind, without the kinds that another study has."""
     found: dict[Path, Path] = {}
     for path in elements(document):
         found.setdefault(generic(path), path)
-    return [path for path in found.values() if path != ("format",)]
+    known = {generic(path) for path in elements(but)} if but else set()
+    return [path for kind, path in found.items() if kind not in known and path != ("format",)]
 
 
 def each_element(record: Record) -> None:
     for path in one_of_each(record.designer.study.document):
-        record.select(*path)
+        record.select(*path, paints=len(path) > 1 and path[0] in ("blocks", "conditions"))
+    record.note("measures", lambda: record.designer.place.show_tab("measures"), paints=True)
 
 
-def each_tab(record: Record) -> None:
+def each_tab(record: Record, but: Mapping[str, Any]) -> None:
     place = record.designer.place
-    for path in one_of_each(record.designer.study.document):
+    for path in one_of_each(record.designer.study.document, but):
         record.select(*path, paints=path[0] in ("blocks", "stimuli", "liquids"))
         for tab in TABS:
             record.note(f"tab {tab}", lambda tab=tab: place.show_tab(tab), of=place.pane)
@@ -224,11 +224,12 @@ def copies(record: Record) -> None:
     record.hit("ctrl+1", "ctrl+c")
     record.lines += QApplication.clipboard().text().splitlines()
     record.hit("ctrl+v", "ctrl+z")
-    for text in ("1. How cold was it?\n- Did it smell?\n", "[liquids.thin]\n# own\ndensity_kg_m3 = 1000\n", "[study"):
-        for path in (("questionnaires", "liquid", "items", 1), ("study",)):
-            QApplication.clipboard().setText(text)
-            record.select(*path)
-            record.hit("ctrl+1", "ctrl+v", "ctrl+z")
+    questions, item = "1. How cold was it?\n- Did it smell?\n", ("questionnaires", "liquid", "items", 1)
+    liquid = "[liquids.thin]\n# own\ndensity_kg_m3 = 1000\n"
+    for text, path in ((questions, item), (questions, ("study",)), (liquid, item), ("[study", ("study",))):
+        QApplication.clipboard().setText(text)
+        record.select(*path)
+        record.hit("ctrl+1", "ctrl+v", "ctrl+z")
     record.select(*LISTED[:2])
     record.note("first entry", record.designer.field(*LISTED).rows[0].setFocus)
     record.hit("alt+Down", "shift+Up", "ctrl+c", "alt+Down", "Delete", "ctrl+z", "ctrl+z", "Return", "alt+Left")
@@ -269,13 +270,6 @@ def small_window(record: Record) -> None:
     record.hit("Return", "Return", "ctrl+1", "Escape", "ctrl+d", "shift+F1", "ctrl+2")
 
 
-def some_elements(record: Record) -> None:
-    for path in one_of_each(record.designer.study.document):
-        if len(path) > 1 or path == ("study",):
-            record.select(*path, paints=path[0] in ("blocks", "conditions"))
-    record.note("measures", lambda: record.designer.place.show_tab("measures"), paints=True)
-
-
 def editing(record: Record) -> None:
     record.hit("ctrl+1", "Insert", "Down", "Return", "ctrl+z")
     record.select("liquids", "thin")
@@ -285,9 +279,9 @@ def editing(record: Record) -> None:
     record.hit("F8", "Return", "ctrl+z", "shift+F1")
 
 
-QUICK = (some_elements, editing, on_disk, new_study)
+QUICK = (editing, new_study)
 FLOWS = (
-    each_element, by_keys, adding_and_deleting, problems, series, copies, finding, languages, small_window,
+    each_element, on_disk, by_keys, adding_and_deleting, problems, series, copies, finding, languages, small_window,
 )  # fmt: skip
 
 
@@ -299,10 +293,10 @@ def test_what_steps_change(designer: Any, flow: Callable[[Record], None], pytest
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("name", ["rek2024", "viscosityjnd"])
-def test_what_each_tab_shows(designer: Any, name: str, pytestconfig: pytest.Config) -> None:
+@pytest.mark.parametrize(("name", "but"), [("rek2024", None), ("viscosityjnd", "rek2024")])
+def test_what_each_tab_shows(designer: Any, name: str, but: str | None, pytestconfig: pytest.Config) -> None:
     record = Record(designer, text_of(name))
-    each_tab(record)
+    each_tab(record, {} if but is None else dict(studies((but,)))[but].document)
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     record.compare(name, pytestconfig)
 

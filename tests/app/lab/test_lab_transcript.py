@@ -16,10 +16,10 @@ from study_app.lab.presets import Choice
 from study_app.protocol.load import source_bytes
 from study_app.workers.server import Crashed
 from tests.app.lab.worlds import COSTS, ERRORS, SOON_MS
-from tests.golden_text import changed, compare, flat
+from tests.golden import compare
+from tests.golden_values import changed, value_lines
 
 GOLDEN = Path(__file__).parent / "golden" / "lab.txt"
-LEFT_OUT = ("view.device.choices.", "view.estimate.sources.")
 
 
 class Recorded:
@@ -210,13 +210,11 @@ def test_every_signal(qtbot: Any, tmp_path: Path, monkeypatch: Any, caplog: Any,
             qtbot.waitUntil(lambda: lab._opening.busy_with is None, timeout=SOON_MS)
         timers = [lab.frames.isActive(), lab._due.isActive(), lab._cost_due.isActive()]
         lab._frame()
-        kept: dict[str, Any] = {"liquids": (), "paths": (), "workbench": None}
-        found = "\n".join(flat("view", replace(lab.view(), **kept))).replace(str(tmp_path), "FOLDER").split("\n")
-        after = [
-            f"timers: {timers}",
-            f"bench: {short(lab.bench)}",
-            *(line for line in found if not line.startswith(LEFT_OUT)),
-        ]
+        view = lab.view()
+        parts = {"device": replace(view.device, choices=()), "estimate": replace(view.estimate, sources=())}
+        shown = value_lines(replace(view, liquids=(), paths=(), workbench=None, **parts), "view")
+        found = (line.replace(str(tmp_path), "FOLDER") for line in shown)
+        after = [f"timers: {timers}", f"bench: {short(lab.bench)}", *found]
         lines += [f"== {name}", *done, *(f"log {one.levelname} {one.getMessage()}" for one in caplog.records)]
         lines += changed(before, after)
         before = after

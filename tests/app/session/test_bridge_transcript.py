@@ -1,6 +1,7 @@
 """All that a session's bridge does at each signal of its windows: asked of servo and journal, paged, shown."""
 
 import logging
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,7 +16,8 @@ from study_app.gui.operator.strip import Strip
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_NORM, SAMPLE, records
 from study_app.session.transitions.events import Continue, ForceStopped
 from tests.app.world import World
-from tests.golden_text import changed, compare, flat
+from tests.golden import compare
+from tests.golden_values import changed, value_lines
 
 GOLDEN = Path(__file__).parent / "golden"
 
@@ -141,8 +143,7 @@ PLAYS = {
 
 def paged(page: Any) -> list[str]:
     """Return a page's kind and values but for the page that follows, which comes in its turn."""
-    lines = (line for line in flat("page", page) if ".coming." not in line)
-    return [f"page: {type(page).__name__}", *lines]
+    return list(value_lines(replace(page, coming=None) if getattr(page, "coming", None) else page, "page"))
 
 
 @pytest.mark.parametrize(
@@ -189,7 +190,7 @@ def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, ca
             *(f"log {one.levelname} {one.getMessage()}" for one in caplog.records if one.levelno >= logging.WARNING),
         ]
         if isValid(bridge) and not bridge._gone:
-            after = [*paged(bridge.participant.page), *flat("view", bridge.view()), f"trouble: {bridge.trouble}"]
+            after = [*paged(bridge.participant.page), *value_lines(bridge.view(), "view"), f"trouble: {bridge.trouble}"]
             lines += changed(before, after)
             before = after
     caplog.clear()

@@ -1,6 +1,5 @@
 """The participant's window, compared with reviewed texts: every kind of page; what keys, clicks and views change."""
 
-import difflib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -25,6 +24,7 @@ from study_app.session.pages import (
 )
 from study_app.session.trial import TankView
 from study_app.video.frames import VideoFrame
+from tests.golden_values import changed
 from tests.gui.drawn import shown
 from tests.gui.participant.driver import KEY, Participant
 from tests.gui.small import (
@@ -316,12 +316,11 @@ def transcript(seen: Participant, case: Case) -> Iterator[str]:
         yield f"-- {named(step)}"
         yield from (f"told {event}" for event in seen.events)
         for way, now in after.items():
-            changed = difflib.unified_diff(before.get(way, []), now, n=0, lineterm="")
-            yield from (line for line in list(changed)[2:] if line[0] in "+-")
+            yield from changed(before.get(way, []), now)
         before |= after
 
 
-@pytest.mark.parametrize("group", GROUPS)
+@pytest.mark.parametrize("group", ["tanks", *(pytest.param(one, marks=pytest.mark.slow) for one in list(GROUPS)[:2])])
 def test_what_pages_show_and_tell(opening: Callable[..., Participant], pytestconfig: pytest.Config, group: str) -> None:
     found = []
     for name, case in GROUPS[group].items():

@@ -15,7 +15,8 @@ from study_app.haptics.model.scene import Box, Knee
 from study_app.haptics.runtime.pack import built_alike
 from study_app.lab.changes import changed
 from study_app.protocol.load import load_scenes
-from tests.golden_text import compare, flat
+from tests.golden import compare
+from tests.golden_values import value_lines
 from tests.haptics.scenes import EVERYTHING, THESIS, TICK_NS, UNBENT, Hand, stroke
 from tests.haptics.single_effects import EMPTY, ESTIMATOR_NAMES, NAMES, in_lab
 
@@ -69,9 +70,9 @@ def follow(hand: Hand) -> Any:
 def test_forces(name: str, pytestconfig: pytest.Config) -> None:
     scene, given = CASES[name]
     hand = Hand(scene, **given)
-    lines = [*flat("parameters", hand.model.parameters[0])]
+    lines = [*value_lines(hand.model.parameters[0], "parameters")]
     for number in range(hand.model.parameters[0].liquids):
-        lines += flat(f"liquid {number}", hand.model.liquids[number])
+        lines += value_lines(hand.model.liquids[number], f"liquid {number}")
     samples = follow(hand)
     for column in (*VECTORS, *SCALARS):
         values = samples[column].reshape(TICKS, -1).astype(float)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path as File
+from typing import Any
 
 import pytest
 
@@ -25,60 +26,75 @@ from study_app.viewmodels.designer.problem_rows import problem_rows
 from study_app.viewmodels.designer.prompts import series_plan, series_prompt
 from study_app.viewmodels.designer.requests import AskSeries
 from tests.authoring.test_study_transcripts import elements, generic, studies
-from tests.golden_text import compare
-from tests.protocol.edited_studies import CASES, Case, cases_of
-from tests.value_text import changed, lines_of, short
+from tests.golden import compare
+from tests.golden_values import changed, one_line, value_lines
+from tests.protocol.edited_studies import CASES, cases_of
 
 GOLDEN = File(__file__).parent / "golden"
-QUICK = ("rows", "sound", "levels")
+STUDIES = ("rows", "sound", "every_design", "grouped", "slime")
+"""Studies of which each has kinds of elements that none before it has; the first is short."""
 
 
-def of_study(study: Study) -> Iterator[str]:
-    times = facts(study).steps_s
-    yield from lines_of(facts(study))
-    yield from lines_of(outline_rows(study, times))
-    yield from lines_of(outline(study))
-    for words in ("viscosity", "hon", "order"):
-        yield f"find {words}"
-        yield from lines_of(outline_rows(study, times, words))
-        yield from lines_of(found_fields(study, words))
-        yield from lines_of(fields_to_go_to(study, words, ("study",)))
+class Shown:
+    """What each view of the designer showed last, to note what changes."""
 
+    def __init__(self) -> None:
+        self.before: dict[str, list[str]] = {}
 
-def of_element(study: Study, path: Path) -> Iterator[str]:
-    document = study.document
-    marked = file_text(study, "study.toml", path)
-    yield f"brief: {brief(document, path)} | {used_by(document, path)} | {position_of(document, path)}"
-    yield f"lines: {marked.selected} {marked.faulty}"
-    yield from lines_of(form(study, path))
-    yield from lines_of(measures_view(study, facts(study), path, Controls(12), SlowResults(), {}))
-    yield from (f"add {one.words} | {one.icon} | {one.help}" for one in addable(study, path))
-    if (prompt := series_prompt(study, AskSeries(path))) is not None:
-        yield from lines_of(prompt)
-        for field, _ in prompt.fields:
-            yield from lines_of(series_plan(study, path, field, "2 5, 9.5"))
+    def note(self, view: str, value: Any) -> Iterator[str]:
+        """Yield the lines of a view that changed since it was last noted."""
+        lines = list(value_lines(value))
+        found = list(changed(self.before.get(view, []), lines))
+        self.before[view] = lines
+        yield from [f"{view}:", *found] if found else ()
+
+    def of_study(self, study: Study) -> Iterator[str]:
+        times = facts(study).steps_s
+        yield from self.note("facts", facts(study))
+        yield from self.note("rows of the outline", outline_rows(study, times))
+        yield from self.note("outline", outline(study))
+        for words in ("viscosity", "hon", "order"):
+            yield f"find {words}"
+            yield from self.note("rows found", outline_rows(study, times, words))
+            yield from self.note("fields found", found_fields(study, words))
+            fields = fields_to_go_to(study, words, ("study",))
+            yield from self.note("fields to go to", [f"{one.words} | {one_line(one.asks)}" for one in fields])
+
+    def of_element(self, study: Study, path: Path) -> Iterator[str]:
+        document = study.document
+        marked = file_text(study, "study.toml", path)
+        yield f"brief: {brief(document, path)} | {used_by(document, path)} | {position_of(document, path)}"
+        yield f"lines: {marked.selected} {marked.faulty}"
+        yield from value_lines(form(study, path), "form")
+        yield from self.note("measures", measures_view(study, facts(study), path, Controls(12), SlowResults(), {}))
+        yield from self.note("to add", tuple(addable(study, path)))
+        if (prompt := series_prompt(study, AskSeries(path))) is not None:
+            yield from value_lines(prompt)
+            for field, _ in prompt.fields:
+                yield from value_lines(series_plan(study, path, field, "2 5, 9.5"))
 
 
 def transcript(before: Iterable[str], names: Iterable[str]) -> Iterator[str]:
     """Yield what is shown of some studies, and of each kind of element that none of the studies before has."""
     seen = {generic(path) for _, study in studies(before) for path in elements(study.document)}
+    shown = Shown()
     for name, study in studies(names):
         yield f"== {name}"
-        yield from of_study(study)
+        yield from shown.of_study(study)
         for path in elements(study.document):
             if generic(path) not in seen:
                 seen.add(generic(path))
                 yield f"== {name} at {path}"
-                yield from of_element(study, path)
+                yield from shown.of_element(study, path)
 
 
 def of_faults(study: Study) -> Iterator[str]:
     """Yield the rows of a study's problems, and what each repair and addition is called and changes."""
-    yield from lines_of(problem_rows(study))
+    yield from value_lines(problem_rows(study))
     for fault in study.faults:
         for repair in (*repairs(study, fault), *additions_for(study, fault)):
-            yield f"repair {short(fault.path)}: {repair.words}"
-            yield from changed(study.text, study.edited(*repair.edits)[0].text)
+            yield f"repair {one_line(fault.path)}: {repair.words}"
+            yield from changed(study.text.split("\n"), study.edited(*repair.edits)[0].text.split("\n"), numbered=True)
 
 
 OBSERVED = Observed(
@@ -103,11 +119,13 @@ def of_blocks(study: Study, slow: SlowResults) -> Iterator[str]:
     for name in study.document["blocks"]:
         for people in (1, 13):
             controls = Controls(people, planned=12)
-            yield from lines_of(measures_view(study, facts(study), ("blocks", name), controls, slow, {}))
+            yield from value_lines(measures_view(study, facts(study), ("blocks", name), controls, slow, {}))
 
 
-def test_what_is_shown_of_small_studies(pytestconfig: pytest.Config) -> None:
-    compare(GOLDEN / "shown.txt", list(transcript((), QUICK)), pytestconfig)
+@pytest.mark.parametrize("name", [STUDIES[0], *(pytest.param(one, marks=pytest.mark.slow) for one in STUDIES[1:])])
+def test_what_is_shown_of_studies(name: str, pytestconfig: pytest.Config) -> None:
+    before = STUDIES[: STUDIES.index(name)]
+    compare(GOLDEN / f"shown_of_{name}.txt", transcript(before, (name,)), pytestconfig)
 
 
 @pytest.mark.parametrize("name", SIMULATED)
@@ -116,27 +134,13 @@ def test_what_is_shown_of_simulations(name: str, pytestconfig: pytest.Config) ->
     compare(GOLDEN / f"simulations_of_{name}.txt", list(of_blocks(study, SIMULATED[name])), pytestconfig)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", ["mixed", "every_design", "grouped", "rek2024", "viscosityjnd", "delaydetect", "slime"]
-)
-def test_what_is_shown_of_other_studies(name: str, pytestconfig: pytest.Config) -> None:
-    compare(GOLDEN / f"shown_of_{name}.txt", list(transcript((), (name,))), pytestconfig)
+FAULTS = ("designs", "formats", "adjustment", "groups", "impossible", "methods", "pace", "questions", "sound")
+"""Files of faults that together have each kind of repair; the first two are read fastest."""
 
 
-def problems(cases: Iterable[Case]) -> list[str]:
-    found = []
-    for case in cases:
+@pytest.mark.parametrize("name", [*FAULTS[:2], *(pytest.param(one, marks=pytest.mark.slow) for one in FAULTS[2:])])
+def test_repairs_of_faults(name: str, pytestconfig: pytest.Config) -> None:
+    found = list[str]()
+    for case in cases_of(CASES / f"{name}.txt"):
         found += [f"== {case.study}, {case.name}", *of_faults(read(case.text.encode(), File()))]
-    return found
-
-
-def test_repairs_of_some_faults(pytestconfig: pytest.Config) -> None:
-    some = (case for file in sorted(CASES.glob("*.txt")) for case in list(cases_of(file))[::13])
-    compare(GOLDEN / "repairs.txt", problems(some), pytestconfig)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("file", sorted(CASES.glob("*.txt")), ids=lambda file: file.stem)
-def test_repairs_of_all_faults(file: File, pytestconfig: pytest.Config) -> None:
-    compare(GOLDEN / f"repairs_in_{file.stem}.txt", problems(cases_of(file)), pytestconfig)
+    compare(GOLDEN / f"repairs_in_{name}.txt", found, pytestconfig)
