@@ -13,7 +13,6 @@ from study_app.analysis.figures.level_figures import level_pictures
 from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.figures.study_figures import pictures
 from study_app.analysis.report import write_report
-from study_app.analysis.tables.study_tables import Study
 from tests.golden_figures import figure_of, stub_png
 from tests.golden_values import file_lines, table_lines
 

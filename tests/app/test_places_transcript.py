@@ -24,7 +24,7 @@ from study_app.gui.theme.theme import DARK
 from study_app.session.start import NewSession
 from study_app.store.exclusions import Exclusion
 from study_app.store.workstation import load
-from study_app.workers.messages import Crashed, Refused
+from study_app.workers.server import Crashed, Refused
 from tests.golden import compare
 from tests.golden_values import changed, value_lines
 

@@ -1,11 +1,10 @@
 """The force link in a protocol: its keys, what check refuses and warns of, and what an interval presents of it."""
 
 import pytest
-from study_app.protocol.checks.returned_energy import longest_ms
 
 from study_app.haptics.model.scene import PROMPT_LINK, ForceLink
 from study_app.protocol.checks.delayed_force import STIRRED, delay_warnings
-from study_app.protocol.checks.force_limits import returned_j
+from study_app.protocol.checks.force_limits import longest_ms, returned_j
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
