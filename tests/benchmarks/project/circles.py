@@ -1,6 +1,6 @@
 """Choose which tests the quick and the full circle run, by what they cover in how much time; the others run less often.
 
-``python tests/benchmarks/project/circles.py FOLDER [--quick 60] [--full 840]`` reads the contexts and times that
+``python tests/benchmarks/project/circles.py FOLDER [--quick 54] [--full 640]`` reads the contexts and times that
 `faults` names from FOLDER and writes `tests/circles.txt`. A budget is processor time of the tests of a circle [s],
 without the start of the workers. A circle gets the tests that cover most lines of the program per second which no test
 before covers, and then the shortest ones. The full circle runs all tests of safety, of blinding and of the project.
@@ -17,7 +17,7 @@ from faults import CIRCLES, ROOT, durations
 
 LIST = ROOT / "tests" / "circles.txt"
 SAFETY = re.compile(
-    r"tests/(faults|end_to_end|project|session/sealed|haptics/runtime|devices/test_c)"
+    r"tests/(faults|end_to_end|project|session/sealed|haptics/runtime|devices/test_c|store/test_released|store/test_format_1)"
     r"|zero_force|stops_the_force|force_stop|lost_device|killed|sealed|blind|hidden"
 )
 SHORTEST_S = 0.003
@@ -91,8 +91,8 @@ def main() -> None:
     """Write the list."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--quick", type=float, default=60.0)
-    parser.add_argument("--full", type=float, default=840.0)
+    parser.add_argument("--quick", type=float, default=54.0)
+    parser.add_argument("--full", type=float, default=640.0)
     given = parser.parse_args()
     times = {circle: durations(given.folder, circle) for circle in CIRCLES}
     lines_of = {circle: covered(given.folder, circle) for circle in CIRCLES}
