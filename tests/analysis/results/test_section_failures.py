@@ -35,7 +35,7 @@ WRITING = {
     "report.write_report.sentences.findings": "texts: findings",
     "report.write_report.r_script": "report.R",
     "report.number_files.motion_csv": "motion.csv",
-    "findings.delays.table": "lowest delay",
+    "findings.delays.LowestDelay.section": "lowest delay",
     "report.write_report.sections.conduct": "section “How it was run”",
 }
 
