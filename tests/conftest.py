@@ -40,15 +40,18 @@ else:
 
 
 @functools.cache
-def listed_circles() -> dict[str, str]:
+def listed_circles(config: pytest.Config) -> dict[str, str]:
     """Return circles of tests that run later than their marks say, written by `tests/benchmarks/project/circles.py`."""
+    if config.getoption("by_marks"):
+        return {}
     lines = Path(__file__).with_name("circles.txt").read_text(encoding="utf-8").splitlines()
     return {name: circle for circle, _, name in (line.partition(" ") for line in lines)}
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the option that writes golden files anew."""
+    """Add the options that write golden files anew and that record tests for a new list of circles."""
     parser.addoption("--regenerate", action="store_true", help="write the golden files anew; review the difference")
+    parser.addoption("--by-marks", action="store_true", help="choose circles by the marks alone, not by circles.txt")
 
 
 def pytest_plugin_registered(plugin: object, manager: pytest.PytestPluginManager) -> None:
@@ -67,7 +70,7 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     """Do not import modules of slow tests that `-m` leaves out."""
     if "not slow" not in config.option.markexpr or collection_path.suffix != ".py":
         return None
-    if collection_path.relative_to(config.rootpath).as_posix() in listed_circles():
+    if collection_path.relative_to(config.rootpath).as_posix() in listed_circles(config):
         return True
     slow = re.search(
         r"^pytestmark = (\[[^\]]*)?pytest\.mark\.slow\b", collection_path.read_text(encoding="utf-8"), re.M
@@ -76,9 +79,9 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark the tests that `circles.txt` lists, and as nightly all but n variants, evenly spread, of `variants(n)`."""
-    listed = listed_circles()
+    listed = listed_circles(config)
     for item in items:
         names = item.nodeid.partition("::")[0], item.nodeid.partition("[")[0], item.nodeid
         for circle in {listed[name] for name in names if name in listed}:

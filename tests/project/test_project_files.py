@@ -72,3 +72,13 @@ def test_pre_commit_runs_the_linters_of_the_check() -> None:
     check = (ROOT / ".ci" / "run").read_text("utf-8")
     for entry in entries:
         assert f".venv/bin/{entry.split(' --')[0]}" in check
+
+
+def test_every_test_of_the_list_of_circles_exists() -> None:
+    missing = []
+    for line in (ROOT / "tests" / "circles.txt").read_text("utf-8").splitlines():
+        module, _, test = line.partition(" ")[2].partition("::")
+        function = test.partition("[")[0].rpartition("::")[2]
+        if not (ROOT / module).is_file() or f"def {function}" not in (ROOT / module).read_text("utf-8"):
+            missing.append(line)
+    assert missing == []

@@ -1,14 +1,17 @@
 """Choose which tests the quick and the full circle run, by what they cover in how much time; the others run less often.
 
 ``python tests/benchmarks/project/circles.py FOLDER [--quick 54] [--full 640]`` reads the contexts and times that
-`faults` names from FOLDER and writes `tests/circles.txt`. A budget is processor time of the tests of a circle [s],
-without the start of the workers. A circle gets the tests that cover most lines of the program per second which no test
-before covers, and then the shortest ones. The full circle runs all tests of safety, of blinding and of the project.
+`faults` names from FOLDER, recorded with ``--by-marks``, and writes `tests/circles.txt`. A budget is processor time of
+the tests of a circle [s], without the start of the workers. A circle gets the tests that cover most lines of the
+program per second which no test before covers, and then the shortest ones. The full circle runs all tests of safety, of
+blinding and of the project.
 """
 
 import argparse
 import heapq
 import re
+import subprocess
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -42,6 +45,13 @@ def covered(folder: Path, circle: str) -> dict[str, frozenset[int]]:
                 if name:
                     found.setdefault(name.split("|")[0], set()).add(hash((path, line)))
     return {test: frozenset(lines) for test, lines in found.items()}
+
+
+def collected() -> set[str]:
+    """Return the names of all tests as they are now."""
+    command = [sys.executable, "-m", "pytest", "--collect-only", "-q"]
+    listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    return {line for line in listed.splitlines() if "::" in line}
 
 
 def chosen(tests: Covered, times_s: Mapping[str, float], known: set[int], budget_s: float) -> set[str]:
@@ -94,7 +104,11 @@ def main() -> None:
     parser.add_argument("--quick", type=float, default=54.0)
     parser.add_argument("--full", type=float, default=640.0)
     given = parser.parse_args()
-    times = {circle: durations(given.folder, circle) for circle in CIRCLES}
+    present = collected()
+    times = {
+        circle: {test: took_s for test, took_s in durations(given.folder, circle).items() if test in present}
+        for circle in CIRCLES
+    }
     lines_of = {circle: covered(given.folder, circle) for circle in CIRCLES}
     lines_of["quick"] = {test: lines for test, lines in lines_of["quick"].items() if test in times["quick"]}
     quick = chosen(lines_of["quick"], times["quick"], set(), given.quick)
