@@ -187,7 +187,7 @@ def told(window: QWidget) -> list[str]:
 
 
 def _told_once(words: list[str]) -> str:
-    """Return texts beside each other, "=" for one that is told before."""
+    """Return texts beside each other, "=" in place of one that stands before."""
     shown = ["=" if word and word in words[:at] else word for at, word in enumerate(words)]
     return " | ".join(shown).replace("\n", " / ").rstrip(" |")
 
@@ -232,7 +232,7 @@ def _name(control: QWidget) -> str:
     return interface.text(QAccessible.Text.Name) if interface else ""
 
 
-def _act(control: QWidget) -> None:
+def use(control: QWidget) -> None:
     """Use a control as a person would: turn the wheel over it, click, choose the next entry, step, drag, type."""
     middle = QPointF(control.rect().center())
     control.clearFocus()
@@ -327,7 +327,7 @@ def steps(window: QWidget, settled: Callable[[], None]) -> Iterator[str]:
         kinds = type(chosen[1]), type(chosen[1].parent())
         alike[kinds] += 1
         if alike[kinds] <= ALIKE:
-            yield from recorder.record(chosen[0], lambda control=chosen[1]: _act(control))
+            yield from recorder.record(chosen[0], lambda control=chosen[1]: use(control))
     for shortcut in window.findChildren(QShortcut):
         yield from recorder.record(shortcut.key().toString(), shortcut.activated.emit)
     yield from recorder.record("Esc", lambda: QTest.keyClick(recorder.base, Qt.Key.Key_Escape))
@@ -335,7 +335,7 @@ def steps(window: QWidget, settled: Callable[[], None]) -> Iterator[str]:
 
 def _unused(window: QWidget, used: set[str | QWidget]) -> Iterator[tuple[str, QWidget]]:
     for one in window.findChildren(QWidget):
-        if isinstance(one, CONTROLS) and _usable(one) and one not in used:
+        if isinstance(one, CONTROLS) and is_usable(one) and one not in used:
             key = f"{type(one).__name__} {_name(one)!r}"
             if key not in used:
                 yield key, one
@@ -399,7 +399,7 @@ def _tab_order(window: QWidget) -> Iterator[str]:
         part = part.nextInFocusChain()
 
 
-def _usable(control: QWidget) -> bool:
+def is_usable(control: QWidget) -> bool:
     return (
         control.isVisible()
         and control.isEnabled()

@@ -15,9 +15,7 @@ from study_app.viewmodels.designer.requests import ChangeLanguage, RetypeFile, S
 from tests.app.designer.support.designer import DEMO
 from tests.authoring.test_study_transcripts import elements, generic, studies
 from tests.golden_values import changed
-from tests.gui.transcript import CONTROLS, compare, painted, told
-from tests.gui.transcript import _act as act
-from tests.gui.transcript import _usable as usable
+from tests.gui.transcript import CONTROLS, compare, is_usable, painted, told, use
 from tests.protocol.edited_studies import text_of
 
 TABS = ("measures", "file", "changes", "participant")
@@ -317,7 +315,7 @@ def test_each_field_of_a_form_used_once(designer: Any, name: str, section: str, 
             settle(designer)
             record.text = designer.text
             free = [
-                one for one in designer.place.form.findChildren(QWidget) if isinstance(one, CONTROLS) and usable(one)
+                one for one in designer.place.form.findChildren(QWidget) if isinstance(one, CONTROLS) and is_usable(one)
             ]
             named = {f"{type(one).__name__} {one.accessibleName() or one.property('text')!r}": one for one in free}
             key = next((key for key in named if key not in used), None)
@@ -325,7 +323,7 @@ def test_each_field_of_a_form_used_once(designer: Any, name: str, section: str, 
                 break
             used.add(key)
             record.lines.append(f"== {path}, {key}")
-            act(named[key])
+            use(named[key])
             settle(designer)
             record.lines += [*record.said(), *(row.message for row in designer.place.view.problems)]
             record.lines += told(popup) if (popup := QApplication.activePopupWidget()) else ()
