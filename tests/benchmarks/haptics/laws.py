@@ -5,8 +5,11 @@ motions; ticks of 0.25 to 4 ms compared with 1 ms. Yield stress at rest: how fas
 half the yield force, read in counts of 38 µm, with 0 and 1 % of the samples off by a count.
 """
 
+import numpy as np
+from scipy.spatial.transform import Rotation
+
 from tests.haptics.materials import creep_mps
-from tests.haptics.unsteady import FLUIDS, highest_gain, rotation_error, tick_error
+from tests.haptics.unsteady import FLUIDS, force, highest_gain, random_motion, tank
 
 ROTATIONS = 20
 MOTIONS = 300
@@ -26,6 +29,28 @@ def main() -> None:
     for name in ("ketchup", "toothpaste"):
         for noise in (0.0, 0.01):
             _row(f"creep of {name}, {noise:.0%} off by a count [mm/s]", 1e3 * creep_mps(name, 0.5, noise=noise), 1.0)
+
+
+def rotation_error(seed: int, ticks: int) -> float:
+    """Return the greatest difference between the force of a rotated motion and the rotated force, over the greatest."""
+    velocity = random_motion(seed, ticks=ticks, rest=20) + np.array([0.1, 0.2, 0.05])
+    rotation = Rotation.random(rng=np.random.default_rng(seed))
+    expected = rotation.apply(force(tank("glycerin"), velocity))
+    return float(abs(force(tank("glycerin"), rotation.apply(velocity)) - expected).max() / abs(expected).max())
+
+
+def tick_error(name: str, tick_s: float) -> float:
+    """Return the greatest difference between the force of a stroke in such ticks and in 1 ms, over the greatest."""
+
+    def stroke(interval_s: float) -> tuple[np.ndarray, np.ndarray]:
+        t_s = np.arange(0, 2, interval_s)
+        return np.outer(np.sin(6 * t_s), [0.3, 0.0, 0.4]), t_s
+
+    (usual, t_s), (other, other_s) = stroke(1e-3), stroke(tick_s)
+    expected = force(tank(name), usual)
+    found = force(tank(name), other, np.full(len(other), tick_s))
+    errors = [abs(np.interp(t_s, other_s, found[:, axis]) - expected[:, axis])[10:-10].max() for axis in range(3)]
+    return float(max(errors) / abs(expected).max())
 
 
 def _row(what: str, measured: float, limit: float) -> None:
