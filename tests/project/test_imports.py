@@ -39,6 +39,25 @@ def test_modules_that_packages_describe_exist() -> None:
     assert count > 20
 
 
+def test_benchmarks_import_names_that_exist() -> None:
+    """Nothing else notices a renamed function there: the check does not run benchmarks."""
+    missing = []
+    for path in (ROOT.parent / "tests" / "benchmarks").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_bytes())):
+            if not isinstance(node, ast.ImportFrom) or not (node.module or "").startswith(("study_app", "tests")):
+                continue
+            module = ROOT.parent / str(node.module).replace(".", "/")
+            files = [module.with_suffix(".py"), module / "__init__.py"]
+            source = "".join(file.read_text("utf-8") for file in files if file.is_file())
+            missing += [
+                f"{path.name}: {node.module}.{each.name}"
+                for each in node.names
+                if not re.search(rf"^(def |class |from .*)?{each.name}\b", source, re.MULTILINE)
+                and not (module / f"{each.name}.py").is_file()
+            ]
+    assert missing == []
+
+
 def test_no_module_imports_itself_through_others() -> None:
     graph = grimp.build_graph("study_app", cache_dir=None)
     imports = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
