@@ -2,14 +2,15 @@
 
 Once, hours before: the contexts of the quick and of the slow tests (``NUMBA_DISABLE_JIT=1`` covers compiled code)::
 
-    COVERAGE_FILE=FOLDER/quick.coverage python -m pytest -n 2 --dist loadfile -m "not slow and not nightly" \
-        --cov --cov-context=test --cov-report= --junitxml=FOLDER/quick.xml
-    COVERAGE_FILE=FOLDER/slow.coverage python -m pytest -n 2 --dist loadfile -m "slow and not nightly" \
-        --cov --cov-context=test --cov-report= --junitxml=FOLDER/slow.xml
+    COVERAGE_FILE=FOLDER/quick.coverage python -m pytest -n 2 --dist loadfile --by-marks \
+        -m "not slow and not nightly" --cov --cov-context=test --cov-report= --junitxml=FOLDER/quick.xml
+    COVERAGE_FILE=FOLDER/slow.coverage python -m pytest -n 2 --dist loadfile --by-marks \
+        -m "slow and not nightly" --cov --cov-context=test --cov-report= --junitxml=FOLDER/slow.xml
 
 Then ``python tests/benchmarks/project/faults.py FOLDER [--functions 100] [--seed 1] [--package haptics]``. Each fault
 runs in a copy of the work tree, with the quick tests first; the first failure ends it. Neither mutmut nor cosmic-ray
-exchanges arguments or columns, or chooses tests by contexts, so the faults are made here.
+exchanges arguments or columns, or chooses tests by contexts, so the faults are made here. A test counts for the circle
+in which `tests/circles.txt` has it run; those of the nightly circle are left out.
 """
 
 import argparse
@@ -190,6 +191,18 @@ def durations(folder: Path, circle: str) -> dict[str, float]:
 
 
 @cache
+def _listed() -> dict[str, str]:
+    lines = (ROOT / "tests" / "circles.txt").read_text(encoding="utf-8").splitlines()
+    return {name: circle for circle, _, name in (line.partition(" ") for line in lines)}
+
+
+def circle_of(test: str, recorded: str) -> str:
+    """Return the circle in which a test runs; ``recorded`` is the one of its marks."""
+    names = test.partition("::")[0], test.partition("[")[0], test
+    return next((_listed()[name] for name in names if name in _listed()), recorded)
+
+
+@cache
 def _is_left(test: str) -> bool:
     """Return whether a test of the contexts still exists: pytest runs none where one of those named does not."""
     module, _, name = test.partition("::")
@@ -199,14 +212,17 @@ def _is_left(test: str) -> bool:
 
 def covering(folder: Path, circle: str, fault: Fault) -> list[str]:
     """Return tests of a circle that run the function: first those of the faulty line, of its package, quick ones."""
-    data = CoverageData(str(folder / f"{circle}.coverage"))
-    data.read()
-    by_line = data.contexts_by_lineno(fault.path)
-    times_s = durations(folder, circle)
+    times_s = durations(folder, "quick") | durations(folder, "slow")
+    tests_of: dict[int, set[str]] = {}
+    for recorded in CIRCLES:
+        data = CoverageData(str(folder / f"{recorded}.coverage"))
+        data.read()
+        for line, contexts in data.contexts_by_lineno(fault.path).items():
+            names = {name.split("|")[0] for name in contexts if name}
+            tests_of.setdefault(line, set()).update(name for name in names if circle_of(name, recorded) == circle)
 
     def at(*lines: int) -> set[str]:
-        names = {name.split("|")[0] for line in lines for name in by_line.get(line, ()) if name}
-        return set(filter(_is_left, names))
+        return {test for line in lines for test in tests_of.get(line, ()) if _is_left(test)}
 
     at_fault, package = at(fault.line), f"tests/{Path(fault.path).parts[1]}/"
     total_s, chosen = 0.0, []
