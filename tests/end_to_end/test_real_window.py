@@ -57,6 +57,7 @@ def test_a_session_by_keys_and_clicks_from_the_home_window_into_the_csv(display,
         felt = explore_to_the_questionnaire(program)
         answer_nine_items(program, felt, qtbot)
         program.wait_for_event("responses")
+        wait_for(lambda: responses(tmp_path), "rows in the table of responses")  # written after the journal
         rows = responses(tmp_path)
         program.process.send_signal(signal.SIGTERM)
         program.process.wait(30)
