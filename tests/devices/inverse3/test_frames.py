@@ -13,6 +13,7 @@ from study_app.devices.inverse3.frames import (
     next_key,
     parse_header,
 )
+from tests.compiled import wraps
 
 
 def parsed(data: bytes) -> tuple[int, int, int]:
@@ -76,6 +77,7 @@ def test_parse_header_refuses_what_a_server_must_not_send(frame: bytes) -> None:
     assert parsed(frame)[0] == VIOLATION
 
 
+@wraps
 def test_next_key_does_not_repeat_soon() -> None:
     state = np.array([12345], np.uint64)
     keys = [next_key(state) for _ in range(10_000)]

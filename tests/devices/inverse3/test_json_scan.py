@@ -26,6 +26,9 @@ from study_app.devices.inverse3.json_scan import (
     text_hash,
 )
 from study_app.haptics.model.layout import records
+from tests.compiled import wraps
+
+pytestmark = wraps
 
 OWN = "049D"
 VALUES = st.recursive(
