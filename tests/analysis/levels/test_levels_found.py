@@ -1,0 +1,80 @@
+"""All that is found in the answers to levels of each design, compared with a reviewed file."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from study_app.analysis.data.blocks import LevelBlock, Setting
+from study_app.analysis.levels.summaries import levels_found
+from study_app.protocol.trials.designs import Rated
+from study_app.protocol.trials.presentation import arrangement_text
+from study_app.protocol.trials.stimuli import Stimulus
+from tests.analysis.levels.level_studies import ONE, STIMULUS, block
+from tests.analysis.made_up import delays, everybody, study
+from tests.analysis.outputs import GOLDEN
+from tests.golden import compare
+from tests.golden_values import value_lines
+
+LINK = Stimulus(vary="force_delay_ms", levels=(0, 100), standards=(10.0, 20.0), spacing="linear")
+CONDITIONS = tuple(Setting(f"V{number}", name) for number, name in enumerate(("water", "honey"), start=1))
+BLOCKS = {
+    "forced choice": replace(block("2ifc", STIMULUS, ONE), wrong_most=0.2),
+    "rating": block(Rated(kind="rating", scale="s"), LINK, (Setting("V1", "10/1"), Setting("V2", "20/1"))),
+    "estimation": block("estimation", STIMULUS, ONE),
+    "conditions": block("2ifc", None, CONDITIONS),
+}
+
+
+def rows(block: LevelBlock, seed: int) -> list[dict[str, Any]]:
+    """Return two people's answers to levels of each standard: some catch trials, one trial not analysed."""
+    draw, found = np.random.default_rng(seed), []
+    stimulus = block.stimulus
+    count = 10 if stimulus is LINK else 3
+    for person in ("P001", "P002"):
+        for trial in range(1, 37):
+            standard = stimulus.standards[trial % len(stimulus.standards)] if stimulus else None
+            level = stimulus.spaced(count)[trial // len(stimulus.standards) % count] if stimulus else None
+            arrangement = trial % max(1, len(block.design.arrangements))
+            choices = sorted(block.design.answers, key=lambda one: not block.design.is_correct(arrangement, one))
+            right = bool(draw.random() < 0.4 + 0.5 * (trial % 3) / 2)
+            letters = arrangement_text(block.design, arrangement) if block.design.arrangements else "C"
+            found.append(
+                {
+                    "participant": person, "session": 1, "trial": trial, "block": block.id, "code": "V1",
+                    "track": "honey" if stimulus is None and trial % 2 else "water" if stimulus is None else "8/1",
+                    "catch": trial % 9 == 0 and stimulus is not None, "standard": standard, "level": level,
+                    "level_delivered": level and level * (1.02 if trial % 5 else 0.97), "comparison": None,
+                    "arrangement": letters, "analysed": trial != 5, "reversal": trial % 7 == 0,
+                    "response": choices[not right] if choices else str(trial), "success": right, "right": right,
+                    "value": round(float(draw.lognormal()), 3) if block.design.reply == "number" else 1 + trial % 5,
+                    "response_s": round(float(draw.lognormal(0.2, 0.3)), 3), "setting": None,
+                }
+            )  # fmt: skip
+    return found
+
+
+def intervals(opened: pd.DataFrame) -> pd.DataFrame:
+    """Return what trials presented: every fifth was repeated for a reason, and force was withheld."""
+    presented = opened.assign(attempt=1, counted=True, presented="comparison", pace_mps=0.1 + opened["trial"] / 1000)
+    presented["withheld_share"] = (opened["trial"] % 4) / 10
+    presented["apparent_mass_kg"] = opened["trial"] / 100
+    again = presented[presented["trial"] % 5 == 0]
+    standards = presented.assign(presented="standard", withheld_share=0.9)
+    last = again.assign(attempt=2), again.assign(attempt=2, presented="standard", withheld_share=0.8)
+    first = presented.assign(
+        counted=presented["trial"] % 5 > 0, invalid_reasons=np.where(presented["trial"] % 5 == 0, "pace late", None)
+    )
+    return pd.concat([first, standards, *last])
+
+
+def test_what_is_found_in_answers_to_levels(pytestconfig: pytest.Config) -> None:
+    every = [replace(one, id=name, title=name.capitalize()) for name, one in BLOCKS.items()]
+    frame = pd.DataFrame([row for seed, one in enumerate(every) for row in rows(one, seed)])
+    opened = frame.astype({"level_delivered": "Float64", **dict.fromkeys(("success", "right", "catch"), "boolean")})
+    made = study(delays([0, 50]), list(everybody(delays([0, 50]), 2, lambda *_: 4)))
+    answered = opened.assign(onset_s=1.0, first_choice_s=1.0 + opened["response_s"], counted=opened["analysed"])
+    asked = replace(made, levels=tuple(every), intervals=intervals(opened), answered=answered)
+    compare(GOLDEN / "levels-found.txt", value_lines(levels_found(asked, opened)), pytestconfig)
