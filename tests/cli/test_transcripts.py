@@ -1,6 +1,9 @@
 """What each command prints, its exit code and its files, on a small study; and what is said of bad input."""
 
 import shutil
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -76,6 +79,8 @@ COMMANDS = {
         "merge --to merged",
         "merge --site A=results/demo --site B=results/copied --to merged",
         "merge --site A=results/demo --site B=nowhere --to merged",
+        "merge --site A=results/demo --to merged",
+        "sessions merged",
         "withdraw demo --participant P002 --by AK --reason left",
         "withdraw demo --participant P002 --by AK --reason again",
         "withdraw demo --participant P009 --by AK --reason left",
@@ -150,6 +155,12 @@ def test_commands(group: str, workspace: Path, capsys: Any, monkeypatch: Any, py
         found = (path.relative_to(workspace) for path in workspace.rglob("*") if path.is_file())
         return {str(path) for path in found}
 
+    @contextmanager
+    def progress(_otherwise: Any = None) -> Iterator[Any]:
+        yield lambda what, share=None: print(f"… {what}{'' if share is None else f' {share:.2f}'}", file=sys.stderr)
+
+    for module in ("data", "model"):
+        monkeypatch.setattr(f"study_app.cli.{module}.progress", progress)
     lines, before = list[str](), files()
     for line in COMMANDS[group]:
         monkeypatch.setattr("sys.argv", ["liquid-study", *line.split()])
