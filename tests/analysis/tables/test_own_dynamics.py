@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from study_app.analysis.data import blocks
 from study_app.analysis.data.blocks import OwnDynamics
-from study_app.analysis.data.motion import Targets, path_length_m, performance, reaches
+from study_app.analysis.data.motion import Targets, path_length_m, performance, reaches, submovements
 from study_app.analysis.data.study_tables import load_study, pooled
 from study_app.errors import AnalysisError
 from study_app.session.simulated.rehearsal import rehearse
@@ -143,6 +143,21 @@ def test_what_leaves_the_target_is_entered_anew_and_overshoots() -> None:
     assert second.path_mm == pytest.approx(75 + 9, abs=0.2)
     assert second.movement_time_s == pytest.approx(1.8 + 0.4 * 9 / 15 - 0.5, abs=0.002)
     assert second.submovements == 2
+
+
+@pytest.mark.parametrize(
+    ("samples", "rate_hz", "found"),
+    [(1000, 1000, 3), (32, 40, 3), (31, 40, 1), (52, 20.4, 3), (41, 20, 1)],
+    ids=["peaks", "shortest", "too short", "slowest", "too slow"],
+)
+def test_peaks_of_speed_are_counted_where_enough_samples_are_fast_enough(
+    samples: int, rate_hz: float, found: int
+) -> None:
+    seconds = 10.0 + np.arange(samples) / rate_hz
+    speed = np.sin(3 * np.pi * np.linspace(0, 1, samples)) ** 2 + 0.01
+    positions = np.zeros((samples, 3))
+    positions[:, 1] = np.cumsum(speed) / rate_hz
+    assert submovements(seconds, positions) == found
 
 
 def test_a_dwell_that_is_too_short_is_no_reach() -> None:
