@@ -1,6 +1,7 @@
 """What is said of a delay: never more than every delay up to it allows, and equivalent only where all checks agree."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import pytest
 
@@ -9,7 +10,7 @@ from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.findings.delay_answers import by_delay, meaning, tempting_ms
 from study_app.analysis.findings.delays import ContrastsWithControl, ContrastWithControl, Lowest, LowestDelay
 from study_app.analysis.report.sentences import findings, limits
-from study_app.analysis.results import BlockFound
+from study_app.analysis.results import BlockFound, Delivered
 from study_app.analysis.results import Results as Found
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.outcome import holm
@@ -151,6 +152,19 @@ def test_what_only_t_calls_equivalent_is_told_as_inconclusive(rek: Results) -> N
         "inconclusive or out of reach: 1 of 1 comparisons" in line
         for line in limits(load_study(rek.folder), found(block))
     )
+
+
+def test_what_was_achieved_at_the_delay_and_at_the_shortest_one_of_the_block_is_told() -> None:
+    measured = [("delays", 0.0, 21.36), ("delays", 50.0, 9.0), ("delays", 100.0, 121.24), ("others", 100.0, 9.0)]
+    delivered = tuple(Delivered(block, "D", ms, 9, 9, 9, 9, 0.1, 0.2, age_ms) for block, ms, age_ms in measured)
+    block = delays({50: CALM, 100: CALM})
+    told = meaning(block, replace(found(block), delivered=delivered))[0]
+    assert told.startswith("As a number. 100 ms is what was asked for. What was drawn was 121.2 ms old on average, on ")
+    assert "own clock, and 21.4 ms at the shortest delay, with which it is compared. The display's" in told
+    assert told.endswith("Only 0, 50 and 100 ms were presented: nothing was asked about delays between them.")
+    alone = meaning(block, replace(found(block), delivered=delivered[1:]))[0]
+    assert "own clock. The display's" in alone
+    assert "What was achieved was not measured. The" in meaning(block, found(block))[0]
 
 
 def test_every_delay_has_its_own_sentence() -> None:
