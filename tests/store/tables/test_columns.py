@@ -12,8 +12,9 @@ from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.exclusions import exclude
 from study_app.store.folders import StudyFolder
 from study_app.store.tables.column_dictionary import SECTIONS, dictionary_markdown
+from study_app.store.tables.columns import PARTICIPANTS, PARTICIPANTS_2
 from study_app.store.tables.csv_files import guarded, unguarded
-from study_app.store.tables.study_files import check_study, write_description
+from study_app.store.tables.study_files import check_study, columns_of, write_description
 from study_app.store.verification.psychds import validate
 from tests.store.conftest import Start
 
@@ -57,6 +58,21 @@ def test_every_text_reads_back_unchanged(text: str) -> None:
 @pytest.mark.parametrize("text", ['=HYPERLINK("http://x")', "+1", "-2", "@SUM(1)", "\t=1", "\r=1", "＝1", "'=1"])
 def test_a_formula_has_an_apostrophe_before_it(text: str) -> None:
     assert guarded(text) == "'" + text
+
+
+@pytest.mark.parametrize("opened", [False, True])
+@pytest.mark.parametrize(
+    ("rows", "grouped"), [((), False), (({}, {"study": "s"}), False), (({}, {"group": "A"}), True)]
+)
+def test_groups_are_a_column_of_participants_once_the_key_of_a_study_with_groups_is_open(
+    tmp_path: Path, rows: tuple[dict[str, str], ...], grouped: bool, opened: bool
+) -> None:
+    study = StudyFolder(tmp_path)
+    if opened:
+        reveal = {"at": "2026-01-05T10:00:00+01:00", "by": "AB", "reason": "closed", "key_hash": "f" * 64}
+        study.reveals.parent.mkdir()
+        study.reveals.write_text(json.dumps(reveal) + "\n")
+    assert columns_of(study, rows) == (PARTICIPANTS_2 if grouped and opened else PARTICIPANTS)
 
 
 def test_what_else_lies_there_is_known_to_be_no_table(tmp_path: Path, finished: Start) -> None:
