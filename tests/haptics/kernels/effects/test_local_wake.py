@@ -59,6 +59,19 @@ def test_within_one_cell_the_first_ticks_are_the_definition():
     assert vectors(simulate(felt, motion), "wake") == pytest.approx(literal(felt, motion), rel=1e-3)
 
 
+def test_cells_that_are_merged_stand_for_their_elements():
+    """Each tick that moves follows one at rest, so that each has a cell of its own, and the first 36 are merged."""
+    felt = tank(length=100, scaling=100, decay=0.995, exponent=0.5, spreading_m2ps=0.02, reach_m=0.02, axes="xyz")
+    ticks = np.arange(CELLS + 36)
+    speeds = np.stack([0.5 + 0.3 * np.cos(ticks), 0.4 * np.cos(ticks / 9), 0.5 * np.sin(ticks / 9)], axis=1)
+    motion = moving(speeds * (ticks % 2 == 0)[:, None])
+    exact = literal(felt, motion)
+    found = vectors(simulate(felt, motion), "wake")
+    assert found[:CELLS] == pytest.approx(exact[:CELLS], rel=1e-12)
+    assert found[CELLS:] == pytest.approx(exact[CELLS:], rel=0.02, abs=1e-3)
+    assert found[-1] == pytest.approx([0.116540706, -0.034358285, -0.036422561], rel=1e-6)  # as recorded
+
+
 @pytest.mark.parametrize("exponent", [0.5, 1.0, 2.0])
 def test_what_fades_counts_less_in_the_response_too(exponent):
     felt = tank(decay=0.95, exponent=exponent)
