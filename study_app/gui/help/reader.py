@@ -103,10 +103,10 @@ class PageReader(Themed, QTextBrowser):
         return picture
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Draw the page again, since pictures are as wide as the text."""
+        """Draw the page again, since pictures are as wide as the text; what is read stays in sight."""
+        at = self.verticalScrollBar().value() / max(1, self.verticalScrollBar().maximum())
         super().resizeEvent(event)
         if self.page and event.size().width() != event.oldSize().width():
-            at = self.verticalScrollBar().value() / max(1, self.verticalScrollBar().maximum())
             self._draw()
             self.verticalScrollBar().setValue(round(at * self.verticalScrollBar().maximum()))
 
