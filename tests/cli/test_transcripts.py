@@ -157,7 +157,7 @@ def test_commands(group: str, workspace: Path, capsys: Any, monkeypatch: Any, py
 
     @contextmanager
     def progress(_otherwise: Any = None) -> Iterator[Any]:
-        yield lambda what, share=None: print(f"… {what}{'' if share is None else f' {share:.2f}'}", file=sys.stderr)
+        yield lambda what, share=None: sys.stderr.write(f"… {what}{'' if share is None else f' {share:.2f}'}\n")
 
     for module in ("data", "model"):
         monkeypatch.setattr(f"study_app.cli.{module}.progress", progress)
