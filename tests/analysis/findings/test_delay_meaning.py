@@ -2,18 +2,22 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from study_app.analysis.data.blocks import NOTHING_DECIDED, Direction, Item, Setting
 from study_app.analysis.data.study_tables import load_study
+from study_app.analysis.findings.block_tests import MANY
 from study_app.analysis.findings.delay_answers import by_delay, meaning, tempting_ms
 from study_app.analysis.findings.delays import ContrastsWithControl, ContrastWithControl, Lowest, LowestDelay
+from study_app.analysis.findings.other_assumptions import asked_again
 from study_app.analysis.report.sentences import findings, limits
 from study_app.analysis.results import BlockFound, Delivered
 from study_app.analysis.results import Results as Found
 from study_app.analysis.statistics.equivalence import tost
-from study_app.analysis.statistics.outcome import holm
+from study_app.analysis.statistics.outcome import FEW, holm
 from study_app.analysis.statistics.trend import step_down
 from tests.analysis.conftest import Results
 
@@ -172,3 +176,23 @@ def test_every_delay_has_its_own_sentence() -> None:
     assert rows[0][-1].startswith("What can be said: at 50 ms the mean answers")
     assert "do not support the sentence “delays up to 125 ms do not matter”, and do not refute it" in rows[1][-1]
     assert rows[2][-1].startswith("These data speak against the sentence “delays up to 300 ms do not matter”: ")
+
+
+@pytest.mark.parametrize(
+    ("k", "sites", "revealed", "n", "reason"),
+    [
+        (1, (), True, 20, "there is one setting"),
+        (2, ("A", "B"), False, 20, "each site has settings of its own until the keys of all sites are open"),
+        (2, (), True, FEW - 1, f"with {FEW - 1} participants, below {FEW}, its estimates and errors would not hold"),
+        (2, (), True, MANY + 1, f"it is left out above {MANY} participants, where it takes minutes"),
+        (2, ("A", "B"), True, FEW, ""),
+        (2, (), False, MANY, ""),
+    ],
+)
+def test_the_mixed_model_is_left_out_for_a_reason(
+    k: int, sites: tuple[str, ...], revealed: bool, n: int, reason: str
+) -> None:
+    block = SimpleNamespace(revealed=revealed, items=())
+    asked: Any = SimpleNamespace(k=k, sites=sites, n=n, block=block, values={}, verdicts_only=False)
+    _, absent = asked_again(asked, None, "the settings")
+    assert [(one.what, one.why) for one in absent] == ([("mixed model of the settings", reason)] if reason else [])
