@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import threading
+from collections import deque
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -18,7 +20,7 @@ from study_app.store import workstation
 from study_app.store.workstation import MachineSettings
 from study_app.video import sources
 from study_app.video.frames import VideoFrame, VideoStatistics, stopped
-from study_app.video.sources import NOT_SHOWN, Videos, without_login
+from study_app.video.sources import NOT_SHOWN, Camera, Videos, without_login
 from tests.video.clips import write_clip
 
 
@@ -209,3 +211,31 @@ def test_a_video_that_stops_can_be_reconnected() -> None:
     error = stopped("it ended")
     assert isinstance(error, VideoError)
     assert broken(1.0, error) == Broke(1.0, str(error), "device")
+
+
+@pytest.mark.parametrize(
+    ("stamp_s", "age_ns"),
+    [(99.5, 500_000_000), (100.0005, 0), (100.002, None), (1e6 - 0.25, 250_000_000), (20.0, None), (None, None)],
+)
+def test_the_age_of_a_frame_is_by_the_clock_that_its_stamp_is_from(
+    stamp_s: float | None, age_ns: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sources, "time", SimpleNamespace(monotonic=lambda: 100.0, time=lambda: 1e6))
+    assert sources._age_ns(stamp_s) == age_ns
+
+
+def test_a_camera_shows_the_newest_frame_that_was_ready_and_says_what_ended_it() -> None:
+    camera = Camera.__new__(Camera)
+    now_ns = [40]
+    camera._now_ns, camera._changed, camera._failure = lambda: now_ns[0], threading.Condition(), ""
+    camera._frames = deque(VideoFrame(due_ns, 2, 2, 8, b"", due_ns, None, 10) for due_ns in (10, 20, 30))
+    shown = [camera.frame_at(moment_ns) for moment_ns in (9, 10, 29, 30, 99)]
+    assert [one and one.due_ns for one in shown] == [None, 10, 20, 30, 30]
+    now_ns[0] = 30 + round(sources.STALLS_S * 1e9)
+    assert camera.frame_at(30) is not None
+    now_ns[0] += 1
+    with pytest.raises(VideoError, match="no picture for 1 s"):
+        camera.frame_at(30)
+    camera._failure = "it ended"
+    with pytest.raises(VideoError, match="it ended"):
+        camera.frame_at(30)
