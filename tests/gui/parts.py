@@ -93,6 +93,7 @@ def outline() -> OutlineCard:
     for number, name in enumerate(("consent", "feel", "break")):
         rows.append(OutlineRow(("blocks", name), name.title(), "file", "5 min", 1, number, name, ("sequence", number)))
         rows += [OutlineRow(("tasks", f"{name}{at}"), f"Task {at}", "route", depth=2) for at in range(number + 1)]
+    rows += [OutlineRow((), "Settings"), OutlineRow(("limits",), "Limits", "check", depth=1)]
     card.show_outline(tuple(rows), ("blocks", "feel"))
     card.tree.expandAll()
     return card
