@@ -10,9 +10,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.gui.designer.outline.card import OutlineCard
-from study_app.gui.help.reader import PageReader
-from study_app.gui.lab.estimate_card import EstimateCard
-from study_app.gui.settings.screen_numbers import ScreenNumber
+from study_app.gui.help.view import PageReader
+from study_app.gui.lab.view import EstimateCard
+from study_app.gui.settings.view import ScreenNumber
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.boxes import hbox, vbox
@@ -21,7 +21,6 @@ from study_app.gui.widgets.controls import Cap
 from study_app.gui.widgets.dialogs import Notice
 from study_app.gui.widgets.labels import Clamped, Elided, set_ink
 from study_app.gui.widgets.live_plots import LatenessPlot, TracePlot
-from study_app.gui.widgets.masked_panel import MaskedPanel
 from study_app.viewmodels.designer.outline_rows import OutlineRow
 from tests.gui.lab.sample import blind, still_view, workbench
 from tests.gui.lab.states import FOUND_VALUES
@@ -184,5 +183,4 @@ PARTS: Final[dict[str, tuple[Callable[[], QWidget], tuple[int, int], Actions]]] 
     "plots": (Plots, (960, 220), {
         "waves": traces(1.0), "higher": traces(3.0), "late": histogram, "dark": dark,
     }),
-    "masked": (lambda: MaskedPanel("Force", "Hidden while the study is blind."), (320, 200), {"dark": dark}),
 }  # fmt: skip

@@ -6,8 +6,6 @@ from typing import Any
 import pytest
 from PySide6.QtWidgets import QWidget
 
-from study_app.gui.help import reader
-from study_app.gui.participant.pages.statement_field import statement_height
 from tests.gui.parts import PAGE_TEXT, PARTS
 from tests.gui.transcript import compare, states
 from tests.gui.walk import settle
@@ -26,18 +24,10 @@ def rooms(part: QWidget) -> Iterator[str]:
 def test_what_a_part_paints_and_tells(
     qtbot: Any, name: str, monkeypatch: pytest.MonkeyPatch, pytestconfig: pytest.Config
 ) -> None:
-    monkeypatch.setattr(reader, "text_of", lambda _name: PAGE_TEXT)
+    monkeypatch.setattr("study_app.gui.help.reader.text_of", lambda _name: PAGE_TEXT)
     make, size, actions = PARTS[name]
     part = shown(qtbot, make(), size)
     qtbot.waitUntil(part.isActiveWindow)
     settle(part)
     lines = [*rooms(part), *states(part, actions, lambda: settle(part))]
     compare(f"part {name}", lines, pytestconfig)
-
-
-def test_a_statement_is_as_high_as_its_lines(qapp: Any) -> None:
-    text = "The force was the same in both"
-    line, lines = (statement_height(text, 1.0, 400, width_px) for width_px in (2000, 150))
-    assert lines == pytest.approx(2 * line, abs=2)
-    assert statement_height(text, 2.0, 400, 2000) == pytest.approx(2 * line, abs=3)
-    assert statement_height("\n".join("abc"), 1.0, 400, 2000) == pytest.approx(3 * line, abs=3)
