@@ -6,11 +6,10 @@ page, the tables, d′, the report and simulated observers follow from its value
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from functools import reduce
 from operator import or_
-from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, Protocol, TypeAlias, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Protocol, TypeAlias, get_args
 
 from pydantic import Field
 
@@ -21,7 +20,6 @@ from study_app.protocol.table import Id, Localised, Table
 from study_app.protocol.wording.languages import words
 
 if TYPE_CHECKING:
-    from study_app.psychophysics import detection
     from study_app.psychophysics.detection import Sensitivity
 
 
@@ -31,7 +29,7 @@ Arrangement: TypeAlias = tuple[bool, ...]
 """Per interval whether it presents the comparison, in the order of presentation."""
 AnswerCounts: TypeAlias = Mapping[tuple[int, str], int]
 """How often each answer was given to each arrangement."""
-
+Model: TypeAlias = Literal["differencing", "independent"]
 ORDINALS: Final = ("first", "second", "third", "fourth")
 
 
@@ -56,9 +54,12 @@ class Modulus(Table):
 
 
 class Design(Table):
-    """How a trial is built and answered: the keys that all kinds share, and what each kind must say.
+    """How a trial is built and answered: the keys that all kinds share, and what each kind says of itself.
 
-    ``roving`` says that standards vary from trial to trial, so that intervals can only be compared with each other.
+    ``answers`` may be chosen, in temporal order, none where the reply is not a choice; all ``arrangements`` of standard
+    and comparison come equally often. ``guess_rate`` is the probability of a correct answer at chance, None where it is
+    free or no answer is correct. ``roving`` says that standards vary from trial to trial, so that intervals can only be
+    compared with each other.
     """
 
     if TYPE_CHECKING:
@@ -83,18 +84,20 @@ class Design(Table):
         default=0.6, description="How long the feedback is shown [s]."
     )
 
+    answers: ClassVar[tuple[str, ...]] = ()
+    arrangements: ClassVar[tuple[Arrangement, ...]] = ((True,),)
+    guess_rate: ClassVar[float | None] = None
     reply: ClassVar[Reply] = "choice"
-    has_standard: ClassVar[bool] = True
-    """Whether intervals are compared with a standard; otherwise there is one interval, the level itself."""
+    has_standard: ClassVar[bool] = True  # else there is one interval, the level itself
     has_correct_answer: ClassVar[bool] = True
-    has_noise: ClassVar[bool] = False
-    """Whether some slots present the standard alone."""
-    asks_for_more: ClassVar[bool] = False
-    """Whether the correct answer is the interval with more (or less), so that levels on both sides have none."""
-    success_name: ClassVar[str] = "correct"
-    """What `success` counts."""
-    adaptive: ClassVar[bool] = True
-    """Whether answers can choose the next level; otherwise the method must be "constant"."""
+    has_noise: ClassVar[bool] = False  # whether some slots present the standard alone
+    asks_for_more: ClassVar[bool] = False  # the interval with more, or less, is correct: levels on both sides have none
+    success_name: ClassVar[str] = "correct"  # what `success` counts
+    adaptive: ClassVar[bool] = True  # whether answers can choose the next level; else the method must be "constant"
+    paper_name: ClassVar[str]
+    """What a paper calls it."""
+    first: ClassVar[Modulus | None] = None
+    """What a block's first trial presents and names, before those that are analysed."""
 
     @property
     def adjusts(self) -> bool:
@@ -107,39 +110,13 @@ class Design(Table):
         return self.item or (self.kind if self.kind[:1].isalpha() else f"choice_{self.kind}")
 
     @property
-    def paper_name(self) -> str:
-        """What a paper calls it."""
-        return self.kind
-
-    @property
     def wording(self) -> str:
         """The name of its question among the program's own words."""
         return self.kind
 
     @property
-    @abstractmethod
-    def answers(self) -> tuple[str, ...]:
-        """The answers that may be chosen, in temporal order; empty where the reply is not a choice."""
-
-    @property
-    @abstractmethod
-    def arrangements(self) -> tuple[Arrangement, ...]:
-        """All arrangements of standard and comparison; each comes equally often."""
-
-    @property
-    @abstractmethod
-    def guess_rate(self) -> float | None:
-        """The probability of a correct answer at chance; None where it is free or no answer is correct."""
-
-    @property
     def intervals(self) -> int:
-        """How many intervals a trial has."""
         return len(self.arrangements[0])
-
-    @property
-    def first(self) -> Modulus | None:
-        """What a block's first trial presents and names, before those that are analysed; None: nothing."""
-        return None
 
     def noise(self, comparisons: int) -> int:
         """Return how many slots present the standard alone, in addition to so many comparisons."""
@@ -156,8 +133,7 @@ class Design(Table):
 
     def correct_of(self, answers: AnswerCounts) -> tuple[int, int]:
         """Return how many answers were correct, and of how many."""
-        right = sum(count for pair, count in answers.items() if self.is_correct(*pair))
-        return right, sum(answers.values())
+        return sum(count for pair, count in answers.items() if self.is_correct(*pair)), sum(answers.values())
 
     def success(self, arrangement: int, answer: str) -> bool | None:
         """Return what an answer counts as for a psychometric function; None where it does not enter one."""
@@ -165,13 +141,20 @@ class Design(Table):
 
     def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
         """Return d′ and bias of one observer; None where the answers do not give them."""
-        return None
+        from study_app.psychophysics import detection  # noqa: PLC0415 - loads numpy
+
+        found: Sensitivity | None = self._sensitivity(detection, answers, "differencing" if roving else "independent")
+        return found
+
+    def _sensitivity(self, detection: Any, answers: AnswerCounts, model: Model) -> Any:
+        return detection.from_correct(self.kind, *self.correct_of(answers)) if self.has_correct_answer else None
 
     def proportion_correct(self, d_prime: float, *, roving: bool) -> float:
         """Return P(correct) of an unbiased observer at a d′ of 0 or more, where answers can be correct."""
         from study_app.psychophysics import detection  # noqa: PLC0415 - loads numpy
 
-        return detection.proportion_correct(self.kind, d_prime)
+        model = f" {'differencing' if roving else 'independent'}" if self.kind in {"abx", "samedifferent"} else ""
+        return detection.proportion_correct(f"{self.kind}{model}", d_prime)
 
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
         """Return the answer of a simulated observer, where the reply is a choice.
@@ -197,10 +180,6 @@ def _one_differs(count: int, *, among: bool) -> tuple[Arrangement, ...]:
     return tuple(tuple((at == odd) is among for at in range(count)) for odd in range(count))
 
 
-def _model(roving: bool) -> detection.Model:
-    return "differencing" if roving else "independent"
-
-
 class ForcedChoice(Design):
     """The answer is the interval that held the comparison.
 
@@ -208,72 +187,38 @@ class ForcedChoice(Design):
     """
 
     kind: Literal["2ifc", "3ifc", "4ifc"] = "2ifc"
-
     wording: ClassVar = "forced_choice"
     asks_for_more: ClassVar = True
-
-    @property
-    def intervals(self) -> int:
-        """Two to four."""
-        return int(self.kind[0])
-
-    @property
-    def paper_name(self) -> str:
-        """The number of intervals, in words."""
-        return f"{('two', 'three', 'four')[self.intervals - 2]}-interval forced choice"
-
-    @property
-    def answers(self) -> tuple[str, ...]:
-        """The intervals, by their place in time."""
-        return ORDINALS[: self.intervals]
-
-    @property
-    def arrangements(self) -> tuple[Arrangement, ...]:
-        """The comparison in each interval once."""
-        return _one_differs(self.intervals, among=True)
-
-    @property
-    def guess_rate(self) -> float:
-        """1/m for m intervals."""
-        return 1 / self.intervals
+    paper_name = property(lambda self: f"{('two', 'three', 'four')[self.intervals - 2]}-interval forced choice")
+    answers = property(lambda self: ORDINALS[: self.intervals])
+    arrangements = property(lambda self: _one_differs(int(self.kind[0]), among=True))
+    guess_rate = property(lambda self: 1 / self.intervals)
 
     def correct(self, arrangement: int) -> str:
-        """Return the interval of the comparison."""
-        return self.answers[self.arrangements[arrangement].index(True)]
+        return ORDINALS[self.arrangements[arrangement].index(True)]
 
-    def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
+    def _sensitivity(self, detection: Any, answers: AnswerCounts, model: Model) -> Any:
         """Return d′ of the intervals, and of two intervals the criterion: above 0 the second is preferred."""
-        from study_app.psychophysics import detection  # noqa: PLC0415 - loads numpy
-
         if self.kind != "2ifc":
-            return detection.from_correct(self.kind, *self.correct_of(answers))
+            return super()._sensitivity(detection, answers, model)
         return detection.two_intervals(*_counts(answers, {0}, "first"), *_counts(answers, {1}, "first"))
 
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
-        """Return the strongest interval, or the weakest."""
-        return self.answers[perceived.index(min(perceived) if attention.smallest else max(perceived))]
+        return ORDINALS[perceived.index(min(perceived) if attention.smallest else max(perceived))]
 
 
 class Oddity(Design):
     """Which one differed? The odd one is the comparison or the standard (Frijters 1979, J. Math. Psychol. 20)."""
 
     kind: Literal["oddity"] = "oddity"
-
     paper_name: ClassVar = "oddity (triangle test)"
     answers: ClassVar = ORDINALS[:3]
     arrangements: ClassVar = _one_differs(3, among=True) + _one_differs(3, among=False)
     guess_rate: ClassVar = 1 / 3
 
     def correct(self, arrangement: int) -> str:
-        """Return the odd interval."""
         presented = self.arrangements[arrangement]
         return self.answers[presented.index(presented.count(True) == 1)]
-
-    def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
-        """Return d′ of the triangle test."""
-        from study_app.psychophysics import detection  # noqa: PLC0415 - loads numpy
-
-        return detection.from_correct(self.kind, *self.correct_of(answers))
 
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
         """Return the interval that is farthest from the mean of the others."""
@@ -282,68 +227,45 @@ class Oddity(Design):
         return self.answers[distances.index(max(distances))]
 
 
-class _TwoModels(Design):
-    """Designs with two models of the observer: differencing where standards rove, else independent observations."""
-
-    def proportion_correct(self, d_prime: float, *, roving: bool) -> float:
-        """Return P(correct) under the model of `sensitivity`."""
-        from study_app.psychophysics import detection  # noqa: PLC0415 - loads numpy
-
-        return detection.proportion_correct(f"{self.kind} {_model(roving)}", d_prime)
-
-
-class Abx(_TwoModels):
+class Abx(Design):
     """Which of the first two was repeated as the third? (Munson & Gardner 1950, J. Acoust. Soc. Am. 22, 675)."""
 
     kind: Literal["abx"] = "abx"
-
     paper_name: ClassVar = "ABX"
     answers: ClassVar = ("like_first", "like_second")
     arrangements: ClassVar = ((False, True, False), (False, True, True), (True, False, True), (True, False, False))
     guess_rate: ClassVar = 0.5
 
     def correct(self, arrangement: int) -> str:
-        """Return which of the first two was repeated."""
         first, _, third = self.arrangements[arrangement]
         return self.answers[first != third]
 
-    def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
-        """Return d′ under one model, and under the other one."""
-        from study_app.psychophysics import detection  # noqa: PLC0415 - loads numpy
-
-        return detection.abx(*self.correct_of(answers), _model(roving))
+    def _sensitivity(self, detection: Any, answers: AnswerCounts, model: Model) -> Any:
+        return detection.abx(*self.correct_of(answers), model)
 
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
-        """Return which of the first two is closer to the third."""
         first, second, third = perceived
         return self.answers[abs(third - first) >= abs(third - second)]
 
 
-class SameDifferent(_TwoModels):
+class SameDifferent(Design):
     """Were the two the same? (Macmillan & Creelman 2005, Detection Theory, chapter 9)."""
 
     kind: Literal["samedifferent"] = "samedifferent"
-
     paper_name: ClassVar = "same–different"
     answers: ClassVar = ("same", "different")
     arrangements: ClassVar = ((False, False), (True, True), (False, True), (True, False))
-    guess_rate: ClassVar = None
     adaptive: ClassVar = False
 
     def correct(self, arrangement: int) -> str:
-        """Return whether the two were the same."""
         first, second = self.arrangements[arrangement]
         return self.answers[first != second]
 
-    def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
-        """Return d′ under one model, with k of differencing, and d′ under the other one."""
-        from study_app.psychophysics import detection  # noqa: PLC0415 - loads numpy
-
+    def _sensitivity(self, detection: Any, answers: AnswerCounts, model: Model) -> Any:
         hits, false_alarms = _counts(answers, {2, 3}, "different"), _counts(answers, {0, 1}, "different")
-        return detection.same_different(*hits, *false_alarms, _model(roving))
+        return detection.same_different(*hits, *false_alarms, model)
 
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
-        """Return "different" where a difference is noticed."""
         first, second = perceived
         return self.answers[attention.distinct(first - second, (first + second) / 2)]
 
@@ -355,50 +277,35 @@ class YesNo(Design):
     noise_share: Annotated[float, within(0.05, 0.5, "fewer say nothing of false alarms; half is balanced")] = Field(
         default=0.3, description="Share of trials that present the standard."
     )
-
     paper_name: ClassVar = "yes–no"
     answers: ClassVar = ("yes", "no")
     arrangements: ClassVar = ((True,), (False,))
-    guess_rate: ClassVar = None
     has_noise: ClassVar = True
     success_name: ClassVar = "yes"
 
     def noise(self, comparisons: int) -> int:
-        """Return how many slots present the standard, so that they are a share of all."""
         return round(comparisons * self.noise_share / (1 - self.noise_share))
 
     def correct(self, arrangement: int) -> str:
-        """Return yes for the comparison, no for the standard."""
         return self.answers[arrangement]
 
     def success(self, arrangement: int, answer: str) -> bool:
         """Return whether the answer was yes, whatever was presented."""
         return answer == "yes"
 
-    def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
-        """Return d′ and the criterion: above 0 the observer says yes less often than no."""
-        from study_app.psychophysics import detection  # noqa: PLC0415 - loads numpy
-
+    def _sensitivity(self, detection: Any, answers: AnswerCounts, model: Model) -> Any:
         return detection.yes_no(*_counts(answers, {0}, "yes"), *_counts(answers, {1}, "yes"))
 
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
-        """Return "yes" above the mean of the intervals so far."""
         return "yes" if perceived[0] > mean else "no"
 
 
 class JudgementDesign(Design):
     """Designs whose reply is a scale point, a number or a setting."""
 
-    answers: ClassVar = ()
-    guess_rate: ClassVar = None
     has_standard: ClassVar = False
     has_correct_answer: ClassVar = False
     adaptive: ClassVar = False
-
-    @property
-    def arrangements(self) -> tuple[Arrangement, ...]:
-        """The comparison alone."""
-        return ((True,),)
 
 
 class Rated(JudgementDesign):
@@ -406,7 +313,6 @@ class Rated(JudgementDesign):
 
     kind: Literal["rating"] = "rating"
     scale: Id = Field(description="The scale of the answer.")
-
     paper_name: ClassVar = "ratings"
     reply: ClassVar = "rating"
 
@@ -416,14 +322,9 @@ class Estimation(JudgementDesign):
 
     kind: Literal["estimation"] = "estimation"
     modulus: Modulus | None = Field(default=None, description="The first trial's level and number; default: free.")
-
     paper_name: ClassVar = "magnitude estimation"
     reply: ClassVar = "number"
-
-    @property
-    def first(self) -> Modulus | None:
-        """The modulus."""
-        return self.modulus
+    first = property(lambda self: self.modulus)
 
 
 class Adjusted(JudgementDesign):
@@ -433,19 +334,13 @@ class Adjusted(JudgementDesign):
     standard: bool = Field(
         default=True, description="Whether an interval presents the standard before the one that is adjusted."
     )
-
     paper_name: ClassVar = "the method of adjustment"
     reply: ClassVar = "setting"
+    arrangements = property(lambda self: ((False, True),) if self.standard else ((True,),))
 
     @property
     def wording(self) -> str:
-        """The name of its question among the program's own words."""
         return self.kind if self.standard else "adjustment_alone"
-
-    @property
-    def arrangements(self) -> tuple[Arrangement, ...]:
-        """The standard and the interval that is adjusted, or the latter alone."""
-        return ((False, True),) if self.standard else ((True,),)
 
 
 KINDS: Final[dict[str, type[Design]]] = {
