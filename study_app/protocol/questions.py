@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import reduce
 from operator import or_
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Protocol, Self, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import ConfigDict, Discriminator, Field, SerializeAsAny, Tag, WrapValidator, model_validator
 
@@ -56,9 +56,7 @@ class ShowIf(Table):
     @property
     def permitted(self) -> tuple[int | float | str, ...]:
         """The answers that show the question; empty where bounds do."""
-        if self.values is None:
-            return ()
-        return self.values if isinstance(self.values, tuple) else (self.values,)
+        return self.values if isinstance(self.values, tuple) else () if self.values is None else (self.values,)
 
     def holds(self, answer: Value) -> bool:
         """Return whether an answer shows the question."""
@@ -77,19 +75,7 @@ class ShowIf(Table):
         return self
 
 
-class Conditional(Protocol):
-    """A question, or its view."""
-
-    @property
-    def id(self) -> str:
-        """Its name."""
-
-    @property
-    def show_if(self) -> ShowIf | None:
-        """When it is shown."""
-
-
-def shown(items: Iterable[Conditional], answers: Mapping[str, Value]) -> tuple[str, ...]:
+def shown(items: Iterable[Question | ItemView], answers: Mapping[str, Value]) -> tuple[str, ...]:
     """Return the ids of the items that are shown, in their order; ``answers`` are those given so far.
 
     Answers to items that are not shown count for nothing.
@@ -155,6 +141,9 @@ class Context:
         return text_in(value, self.language)
 
 
+V = TypeVar("V", bound=ItemView)
+
+
 class Question(ExtendedTable):
     """One question."""
 
@@ -203,9 +192,9 @@ class Question(ExtendedTable):
         """Return which of `levels` an answer counts for, as a table holds it: of a ranking, say, the first alone."""
         return tuple(response.split()) if self.names_several else (response,)
 
-    def _shown(self, number: int, context: Context) -> tuple[str, int, str, bool]:
-        """Return the fields that the views of all kinds have."""
-        return self.id, number, context.text(self.text), self.required
+    def _shown(self, kind: type[V], number: int, context: Context, **own: Any) -> V:
+        """Return its view: the fields that all kinds have, and those of its kind."""
+        return kind(self.id, number, context.text(self.text), self.required, show_if=self.show_if, **own)
 
 
 def plain_number(value: float) -> int | float:
@@ -220,28 +209,25 @@ def kind_id(kind: type[Question]) -> str:
     return "statement" if field_ is None else str(field_.default)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RatingView(ItemView):
     """A rating as shown: ``labels`` name the points, lowest first; ``cannot_judge`` the answer off the scale."""
 
     widget: ClassVar[str] = "rating"
 
-    labels: tuple[str, ...] = field(default=(), kw_only=True)
-    cannot_judge: str | None = field(default=None, kw_only=True)
+    labels: tuple[str, ...] = ()
+    cannot_judge: str | None = None
 
     @property
     def keys(self) -> str:
-        """The digits of its points; beyond 9 the arrows reach them."""
         return f"1–{min(len(self.labels), 9)}"
 
     def simulated(self, opinion: float, draw: Draw) -> Value:
-        """Return the nearest point."""
         points = len(self.labels)
         place = opinion if points == OPINION_POINTS else 1 + (opinion - 1) * (points - 1) / (OPINION_POINTS - 1)
         return min(points, max(1, math.floor(place + 0.5)))
 
     def nearby(self, answer: Value) -> Value:
-        """Return a neighbouring point."""
         if not isinstance(answer, int):
             return answer
         return answer - 1 if answer == len(self.labels) else answer + 1
@@ -260,17 +246,12 @@ class Rated(Question):
         raise NotImplementedError
 
     def view(self, number: int, context: Context) -> ItemView:
-        """Return the points with their names."""
         scale = self.scale_of(context)
-        return RatingView(
-            *self._shown(number, context),
-            show_if=self.show_if,
-            labels=scale.labels[context.language],
-            cannot_judge=None if scale.cannot_judge is None else context.text(scale.cannot_judge),
-        )
+        off_scale = None if scale.cannot_judge is None else context.text(scale.cannot_judge)
+        labels = scale.labels[context.language]
+        return self._shown(RatingView, number, context, labels=labels, cannot_judge=off_scale)
 
     def problem(self, answer: Value, context: Context) -> str | None:
-        """Return why something is not a point of the scale."""
         scale = self.scale_of(context)
         if answer is None:
             if scale.cannot_judge is not None:
@@ -281,11 +262,9 @@ class Rated(Question):
         return f"answer {answer} is not on the scale: choose 1 to {scale.points}"
 
     def bounds(self, context: Context) -> tuple[float, float] | None:
-        """Return the first and the last point."""
         return 1, self.scale_of(context).points
 
     def levels(self, context: Context) -> dict[str, str]:
-        """Return the points with their names."""
         labels = self.scale_of(context).labels[context.language]
         return {str(point): label for point, label in enumerate(labels, start=1)}
 
@@ -297,35 +276,30 @@ class Rating(Rated):
     scale: Id = Field(description="The scale, of 2 to 11 points.")
 
     def scale_of(self, context: Context) -> Scale:
-        """Return its own scale."""
         return context.scales[self.scale]
 
 
 class Statement(Rated):
     """A statement; if a questionnaire has only statements, they form a grid."""
 
-    widget: ClassVar[str] = "rating"
-
     def scale_of(self, context: Context) -> Scale:
-        """Return the questionnaire's scale."""
         return context.scales[context.scale or ""]
 
 
 FEWEST_OPTIONS, MOST_OPTIONS = 2, 12
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ChoiceView(ItemView):
     """Options as shown: their ids and words; of ``several`` any number can be chosen."""
 
     widget: ClassVar[str] = "choice"
 
-    options: tuple[tuple[str, str], ...] = field(default=(), kw_only=True)
-    several: bool = field(default=False, kw_only=True)
+    options: tuple[tuple[str, str], ...] = ()
+    several: bool = False
 
     @property
     def keys(self) -> str:
-        """The digits of its options; beyond 9 the arrows reach them."""
         return f"1–{min(len(self.options), 9)}"
 
     def simulated(self, opinion: float, draw: Draw) -> Value:
@@ -366,16 +340,10 @@ class Choice(Question):
         return self
 
     def view(self, number: int, context: Context) -> ItemView:
-        """Return the options."""
-        return ChoiceView(
-            *self._shown(number, context),
-            show_if=self.show_if,
-            options=tuple((option.id, context.text(option.text)) for option in self.options),
-            several=self.several,
-        )
+        options = tuple(self.levels(context).items())
+        return self._shown(ChoiceView, number, context, options=options, several=self.several)
 
     def problem(self, answer: Value, context: Context) -> str | None:
-        """Return why something is not a choice of the options."""
         ids = [option.id for option in self.options]
         if self.several:
             permitted = isinstance(answer, tuple) and 0 < len(set(answer)) == len(answer) and set(answer) <= set(ids)
@@ -385,25 +353,23 @@ class Choice(Question):
 
     @property
     def names_several(self) -> bool:
-        """Whether several options can be chosen."""
         return self.several
 
     def levels(self, context: Context) -> dict[str, str]:
-        """Return the options."""
         return {option.id: context.text(option.text) for option in self.options}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class NumberView(ItemView):
     """A field for a number as shown; ``least`` and ``most`` are None where nothing bounds it."""
 
     widget: ClassVar[str] = "number"
     keys: ClassVar[str] = "0–9"
 
-    least: float | None = field(default=None, kw_only=True)
-    most: float | None = field(default=None, kw_only=True)
-    whole: bool = field(default=False, kw_only=True)
-    unit: str = field(default="", kw_only=True)
+    least: float | None = None
+    most: float | None = None
+    whole: bool = False
+    unit: str = ""
 
     def permits(self, number: float) -> bool:
         """Return whether a number answers it."""
@@ -449,46 +415,37 @@ class Number(Question):
                 raise invalid(f"{self.most:g} is less than from = {self.least:g}", "to")
         return self
 
-    def view(self, number: int, context: Context) -> ItemView:
-        """Return the field."""
-        return NumberView(
-            *self._shown(number, context),
-            show_if=self.show_if,
-            least=self.least,
-            most=self.most,
-            whole=self.whole,
-            unit="" if self.unit is None else context.text(self.unit),
-        )
+    def view(self, number: int, context: Context) -> NumberView:
+        unit = "" if self.unit is None else context.text(self.unit)
+        limits = {"least": self.least, "most": self.most, "whole": self.whole}
+        return self._shown(NumberView, number, context, unit=unit, **limits)
 
     def problem(self, answer: Value, context: Context) -> str | None:
-        """Return why something is not a permitted number."""
-        view = self.view(0, context)
-        if isinstance(view, NumberView) and isinstance(answer, int | float) and view.permits(answer):
+        if isinstance(answer, int | float) and self.view(0, context).permits(answer):
             return None
         least = "" if self.least is None else f" from {self.least:g}"
         most = "" if self.most is None else f" to {self.most:g}"
         return f"answer {answer} is not permitted: give a {'whole ' if self.whole else ''}number{least}{most}"
 
     def bounds(self, context: Context) -> tuple[float, float] | None:
-        """Return smallest and largest number, where both are given."""
         return None if self.least is None or self.most is None else (self.least, self.most)
 
 
 MOST_STEPS = 10_000
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SliderView(ItemView):
     """A slider as shown, from ``least`` at the end called ``low`` to ``most`` at the end called ``high``."""
 
     widget: ClassVar[str] = "slider"
     keys: ClassVar[str] = "← →"
 
-    low: str = field(default="", kw_only=True)
-    high: str = field(default="", kw_only=True)
-    least: float = field(default=0.0, kw_only=True)
-    most: float = field(default=100.0, kw_only=True)
-    step: float = field(default=1.0, kw_only=True)
+    low: str = ""
+    high: str = ""
+    least: float = 0.0
+    most: float = 100.0
+    step: float = 1.0
 
     @property
     def steps(self) -> int:
@@ -500,7 +457,6 @@ class SliderView(ItemView):
         return plain_number(self.least + step * self.step)
 
     def simulated(self, opinion: float, draw: Draw) -> Value:
-        """Return the nearest step."""
         share = min(1.0, max(0.0, (opinion - 1) / (OPINION_POINTS - 1)))
         return self.at(round(share * self.steps))
 
@@ -533,19 +489,11 @@ class Slider(Question):
         return self
 
     def view(self, number: int, context: Context) -> ItemView:
-        """Return the line with its ends."""
-        return SliderView(
-            *self._shown(number, context),
-            show_if=self.show_if,
-            low=context.text(self.low),
-            high=context.text(self.high),
-            least=self.least,
-            most=self.most,
-            step=self.step,
-        )
+        ends = {"low": context.text(self.low), "high": context.text(self.high)}
+        numbers = {"least": self.least, "most": self.most, "step": self.step}
+        return self._shown(SliderView, number, context, **ends, **numbers)
 
     def problem(self, answer: Value, context: Context) -> str | None:
-        """Return why something is not a step of the slider."""
         if isinstance(answer, int | float) and self.least <= answer <= self.most:
             steps = (answer - self.least) / self.step
             if abs(steps - round(steps)) <= 1e-6:
@@ -553,25 +501,23 @@ class Slider(Question):
         return f"answer {answer} is not on the slider: choose {self.least:g} to {self.most:g} in steps of {self.step:g}"
 
     def bounds(self, context: Context) -> tuple[float, float] | None:
-        """Return the numbers of both ends."""
         return self.least, self.most
 
 
 SIMULATED: Final = "Simulated answer."
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TextView(ItemView):
     """A field for a text as shown: ``lines`` high, for at most ``longest`` characters."""
 
     widget: ClassVar[str] = "text"
     keys: ClassVar[str] = "A–Z"
 
-    lines: int = field(default=1, kw_only=True)
-    longest: int = field(default=500, kw_only=True)
+    lines: int = 1
+    longest: int = 500
 
     def simulated(self, opinion: float, draw: Draw) -> Value:
-        """Return a sentence that says what it is."""
         return SIMULATED[: self.longest]
 
 
@@ -587,11 +533,9 @@ class Text(Question):
     longest: int = Field(default=500, ge=1, le=5000, description="Largest number of characters.")
 
     def view(self, number: int, context: Context) -> ItemView:
-        """Return the field."""
-        return TextView(*self._shown(number, context), show_if=self.show_if, lines=self.lines, longest=self.longest)
+        return self._shown(TextView, number, context, lines=self.lines, longest=self.longest)
 
     def problem(self, answer: Value, context: Context) -> str | None:
-        """Return why something is not a text that can be kept."""
         if not isinstance(answer, str) or not answer.strip():
             return "the text is empty: write one, or leave the question open"
         if len(answer) > self.longest:
@@ -634,13 +578,5 @@ else:
 
 
 def question_of(table: Mapping[str, Any]) -> Question:
-    """Return a question of a receipt.
-
-    Raises
-    ------
-    KeyError
-        No kind has its name.
-    ValueError
-        It is not a question of its kind.
-    """
+    """Return a question of a receipt (KeyError if no kind has its name, ValueError if it is none of its kind)."""
     return KINDS[_kind_of(table)].model_validate(table)
