@@ -84,7 +84,7 @@ def simulated(protocol: Protocol, planted: float, unit: str, source: str) -> Kno
     apart = math.log10(BETWEEN_PEOPLE) * rng.standard_normal((STUDIES, people))
     estimates = plan.simulate((plan.stimulus.coordinate(planted) + apart).ravel(), rng)
     if estimates is None:
-        raise ValueError(f'no tracks of the method "{plan.method.name}" are simulated')
+        raise ValueError(f'no tracks of the method "{plan.method.kind}" are simulated')
     means = 10.0 ** estimates.medians.reshape(STUDIES, people).mean(axis=1)
     low, high = np.quantile(means, MIDDLE)
     figures = (round(float(one), 4) for one in (means.mean(), low, high))

@@ -209,7 +209,7 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
     tracks = "" if method.tracks == 1 else f" in {method.tracks} tracks"
     yield (
         "Levels",
-        f"{name} {levels[0]:.3g} to {levels[-1]:.3g} ({method.name}{aimed}), {trials} trials{of_each}{tracks}",
+        f"{name} {levels[0]:.3g} to {levels[-1]:.3g} ({method.kind}{aimed}), {trials} trials{of_each}{tracks}",
     )
     if isinstance(method, Adjustment):
         low, high = stimulus.domain

@@ -20,7 +20,7 @@ from study_app.protocol.describe import describe, limit_rows
 from study_app.protocol.model import Analysis, Protocol
 from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.table import text_in
-from study_app.protocol.trials.stimuli import Family, family_of
+from study_app.protocol.trials.stimuli import Family, assumed_for
 from study_app.protocol.trials.tracks import design_of, method_of, standards_of, stimulus_of
 from study_app.psychophysics.precision import BETWEEN_PEOPLE
 from study_app.store.atomic import parse_json
@@ -175,7 +175,7 @@ def analyses(protocol: Protocol) -> Iterator[str]:
             method = method_of(protocol, block)
             yield (
                 f"Block {block.id} ({design.paper_name}, {method.paper_name}): for each participant and standard the "
-                f"posterior median of the threshold ({FAMILIES[family_of(stimulus, design)]} function) with its "
+                f"posterior median of the threshold ({FAMILIES[assumed_for(stimulus, design).family]} function) with its "
                 "equal-tailed 95 % interval, at the delivered levels; the median under a flat prior of the width is "
                 "reported, too; goodness of fit by 999 simulated sets of answers, drift over trials."
             )

@@ -172,7 +172,7 @@ def _estimates(plan: ThresholdPlan, truth: Array, rng: np.random.Generator) -> t
     for first in range(0, len(truth), TRACKS_AT_ONCE):
         found = plan.simulate(truth[first : first + TRACKS_AT_ONCE], rng)
         if found is None:
-            raise AnalysisError(f'power simulates no tracks of the method "{plan.method.name}"')
+            raise AnalysisError(f'power simulates no tracks of the method "{plan.method.kind}"')
         medians.append(found.medians)
         variances.append(found.variances)
     return np.concatenate(medians), np.concatenate(variances)

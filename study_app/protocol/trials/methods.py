@@ -49,17 +49,7 @@ Answer: TypeAlias = tuple[float, bool]
 
 @dataclass(frozen=True, slots=True)
 class TrackSetting:
-    """What a method chooses levels for.
-
-    Attributes
-    ----------
-    stimulus : Stimulus
-        What is varied.
-    design : Design
-        How a trial is built.
-    number : int
-        Which of the tracks of its standard, from 1.
-    """
+    """What a method chooses levels for; ``number`` is which of the tracks of its standard, from 1."""
 
     stimulus: Stimulus
     design: Design
@@ -70,23 +60,9 @@ class TrackSetting:
 class Heard:
     """One answered trial: its last attempt, confirmed; never printed, since it reveals a level.
 
-    Attributes
-    ----------
-    trial : int
-        The trial's number in the session.
-    code : str
-        The code of its track.
-    level : float
-        The level that was presented.
-    success : bool or None
-        Whether the answer was correct; for yes–no whether it was yes; "comparison chosen" where no answer is correct;
-        None where the answer enters no psychometric function.
-    correct : bool or None
-        Whether the answer was correct; None where no answer is.
-    catch : bool
-        Whether it was a catch trial: no level follows from its answer.
-    noise : bool
-        Whether it presented the standard alone, so that it has no level of its own.
+    ``success`` is whether the answer was correct, for yes–no whether it was yes, "comparison chosen" where no answer is
+    correct, and None where the answer enters no psychometric function; ``correct`` is None where no answer is. No level
+    follows from the answer to a ``catch`` trial; a ``noise`` trial presented the standard alone.
     """
 
     trial: int
@@ -118,11 +94,8 @@ class Method(Table):
     """Whether answers choose the next level."""
     adjusts: ClassVar[bool] = False
     """Whether its levels are those at which settings start, so that the design must be "adjustment"."""
-
-    @property
-    def name(self) -> str:
-        """Its kind."""
-        return self.kind
+    target_percent: ClassVar[float | None] = None
+    """The percentage of successes at the mean of its reversals; None where it has no steps."""
 
     @property
     def paper_name(self) -> str:
@@ -141,16 +114,8 @@ class Method(Table):
     def level(self, track: TrackSetting, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float:
         """Return the level of a track's comparison ``number`` (from 0), where the track has not ended.
 
-        Parameters
-        ----------
-        track : TrackSetting
-            What is varied, and how it is asked.
-        number : int
-            Which comparison of the track.
-        heard : sequence of Heard
-            The track's earlier answers, in the order of presentation.
-        draws : sequence of callable
-            Secret uniform numbers in [0, 1), one source per round of levels.
+        ``heard`` are the track's earlier answers in the order of presentation, ``draws`` secret uniform numbers in
+        [0, 1), one source per round of levels.
         """
 
     def assumed(self, stimulus: Stimulus, design: Design) -> Assumed:
@@ -176,11 +141,6 @@ class Method(Table):
         """
         return None
 
-    @property
-    def target_percent(self) -> float | None:
-        """The percentage of successes at the mean of its reversals; None where it has no steps."""
-        return None
-
     def reversals(self, track: TrackSetting, answers: Sequence[Answer]) -> tuple[int, ...]:
         """Return the places, from 0, of a track's answers at which its direction changed; none if it has no steps."""
         return ()
@@ -194,16 +154,7 @@ class Method(Table):
     ) -> Answers | None:
         """Return the answers of simulated observers to one track each; None: the method has no such tracks.
 
-        Parameters
-        ----------
-        track : TrackSetting
-            What is varied, and how it is asked.
-        observers : Observers
-            Who answers.
-        random : random.Generator
-            Where their answers are drawn from.
-        noise : (tracks, noise trials) array or None
-            The uniform numbers of the answers to noise trials.
+        ``noise`` (tracks, noise trials) are the uniform numbers of the answers to noise trials.
         """
         return None
 
@@ -226,15 +177,12 @@ class Adaptive(Method):
     )
 
     def presentations(self, stimulus: Stimulus) -> int:
-        """Return the trials of one track."""
         return self.trials // self.tracks
 
     def asked(self, stimulus: Stimulus) -> tuple[float, ...]:
-        """Return the grid of the stimulus."""
         return stimulus.grid
 
     def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
-        """Yield what is wrong with the number of trials and with the first levels."""
         if self.trials % self.tracks:
             message = f"{self.trials} trials cannot be divided among {self.tracks} tracks"
             yield "trials", message, f"a multiple of {self.tracks}"
@@ -284,15 +232,12 @@ class Adjustment(Method):
     )
 
     def asked(self, stimulus: Stimulus) -> tuple[float, ...]:
-        """Return the ends: every level between them can be set."""
         return stimulus.levels
 
     def presentations(self, stimulus: Stimulus) -> int:
-        """Return the settings of one track."""
         return self.repetitions
 
     def rounds(self, stimulus: Stimulus) -> int:
-        """Return the settings: each has a source of its own."""
         return self.repetitions
 
     def level(self, track: TrackSetting, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float:
@@ -303,7 +248,6 @@ class Adjustment(Method):
         return track.stimulus.level_of(low + away if first_at_low is (number % 2 == 0) else high - away)
 
     def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
-        """Yield that a step leads nowhere, or beyond all levels."""
         low, high = stimulus.domain
         if stimulus.spacing == "log" and self.step_size is not None and self.step_size <= 1:
             yield "step_size", f"is {self.step_size:g}; on log spacing a step is a factor above 1", "such as 1.05"
@@ -312,7 +256,6 @@ class Adjustment(Method):
             yield "step_size", f"is {self.step_size:g}: more than half the range of levels", f"such as {most:.3g}"
 
     def warnings(self) -> Iterator[tuple[str, str]]:
-        """Yield that the settings cannot start equally often at both ends."""
         if self.repetitions % 2:
             message = f"{self.repetitions} settings cannot start equally often at both ends: choose an even number"
             yield "repetitions", message
@@ -333,18 +276,8 @@ class Adjustment(Method):
 class Adjusting:
     """One setting: from which level it starts, and what its steps lead to; never printed, since it reveals the level.
 
-    A place is a number of steps from the start, above 0 towards more of the varied number. Places end with the levels.
-
-    Attributes
-    ----------
-    stimulus : Stimulus
-        What is varied.
-    standard : float or None
-        The standard, in the unit of the varied number.
-    start : float
-        The starting level.
-    step : float
-        What a step adds to u; below 0 where more of the number is a smaller level.
+    A place is a number of steps from the ``start``, a level, above 0 towards more of the varied number. Places end with
+    the levels. ``step`` is what a step adds to u, below 0 where more of the number is a smaller level.
     """
 
     stimulus: Stimulus
@@ -395,15 +328,12 @@ class Constant(Method):
     )
 
     def asked(self, stimulus: Stimulus) -> tuple[float, ...]:
-        """Return the levels that are presented, in the order written."""
         return stimulus.spaced(self.levels) if isinstance(self.levels, int) else self.levels
 
     def presentations(self, stimulus: Stimulus) -> int:
-        """Return levels × repetitions."""
         return len(self.asked(stimulus)) * self.repetitions
 
     def rounds(self, stimulus: Stimulus) -> int:
-        """Return the repetitions."""
         return self.repetitions
 
     def level(self, track: TrackSetting, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float:
@@ -412,7 +342,6 @@ class Constant(Method):
         return shuffle(levels, draws[number // len(levels)])[number % len(levels)]
 
     def simulated(self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None) -> Answers:
-        """Return the answers of simulated observers to every level, equally often."""
         from study_app.psychophysics.simulated_tracks import constant_tracks  # noqa: PLC0415 - loads numpy
 
         levels = [track.stimulus.coordinate(level) for level in self.asked(track.stimulus)]
@@ -456,7 +385,6 @@ class QuestPlus(Adaptive):
     stop: Precision | None = Field(default=None, description="When a track ends early; left out: never.")
 
     def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
-        """Yield what is wrong with its keys, too."""
         yield from super().faults(stimulus)
         if self.widths is not None and not self.widths[0] < self.widths[1]:
             low, high = self.widths
@@ -466,16 +394,13 @@ class QuestPlus(Adaptive):
 
     @property
     def paper_name(self) -> str:
-        """What a paper calls it, with its source."""
         what, prins = ("the threshold", "; Prins 2013") if self.learn == "threshold" else ("all parameters", "")
         return f"QUEST+, which minimises the expected entropy of {what} (Watson 2017{prins})"
 
     def target(self, guess: float | None, success: str) -> str | None:
-        """Return the percentage of the threshold."""
         return None if guess is None else f"threshold at {50 * (1 + guess):.3g} % {success}"
 
     def ended(self, track: TrackSetting, heard: Sequence[Heard]) -> bool:
-        """Return whether the threshold's interval is narrow enough."""
         if self.stop is None or sum(not one.noise for one in heard) < self.stop.after:
             return False
         search, counts = self._search(track), self._counts(track, heard)
@@ -566,17 +491,14 @@ class UpDown(Adaptive):
     stop: Reversals | None = Field(default=None, description="When a track ends early; left out: never.")
 
     def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
-        """Yield what is wrong with its keys, too."""
         yield from super().faults(stimulus)
         if stimulus.spacing == "log" and self.step_up is not None and self.step_up <= 1:
             yield "step_up", f"is {self.step_up:g}; on log spacing a step is a factor above 1", "such as 1.4"
 
     def warnings(self) -> Iterator[tuple[str, str]]:
-        """Yield that a ratio converges for small steps alone, and that one track can be predicted."""
-        if self.ratio is not None and self.ratio != self._published_ratio:
-            reached, published = (
-                100 * converges_to(int(self.rule[0]), ratio) for ratio in (self.ratio, self._published_ratio)
-            )
+        successes = int(self.rule[0])
+        if self.ratio is not None and self.ratio != RATIOS[successes]:
+            reached, published = (100 * converges_to(successes, ratio) for ratio in (self.ratio, RATIOS[successes]))
             yield (
                 "ratio",
                 f"{self.rule} with ratio {self.ratio:g} converges to {reached:.1f} % for small steps alone: "
@@ -586,32 +508,19 @@ class UpDown(Adaptive):
             yield "tracks", "participants can predict a single up–down track: choose tracks = 2"
 
     def target(self, guess: float | None, success: str) -> str | None:
-        """Return the percentage to which it converges."""
         return f"converges to {self.target_percent:.1f} % {success}"
 
     @property
     def paper_name(self) -> str:
-        """What a paper calls it, with its source."""
         return (
             f"weighted up–down tracks ({self.rule}, steps down {self._ratio:.4g} of those up; García-Pérez 1998), "
             f"which converge to {self.target_percent:.1f} %"
         )
 
-    @property
-    def target_percent(self) -> float:
-        """The percentage to which the rule converges."""
-        return 100 * converges_to(int(self.rule[0]), self._ratio)
-
-    @property
-    def _ratio(self) -> float:
-        return self._published_ratio if self.ratio is None else self.ratio
-
-    @property
-    def _published_ratio(self) -> float:
-        return RATIOS[int(self.rule[0])]
+    target_percent = property(lambda self: 100 * converges_to(int(self.rule[0]), self._ratio))
+    _ratio = property(lambda self: RATIOS[int(self.rule[0])] if self.ratio is None else self.ratio)
 
     def ended(self, track: TrackSetting, heard: Sequence[Heard]) -> bool:
-        """Return whether there are as many reversals as asked for."""
         if self.stop is None:
             return False
         answers = _answers(track, heard)
@@ -625,7 +534,6 @@ class UpDown(Adaptive):
         return min(max(track.stimulus.level_of(u), low), high)
 
     def simulated(self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None) -> Answers:
-        """Return the tracks of simulated observers."""
         from study_app.psychophysics.simulated_tracks import staircase_tracks  # noqa: PLC0415 - loads numpy
 
         draws = random.random((len(observers.thresholds), self.presentations(track.stimulus)))
@@ -633,7 +541,6 @@ class UpDown(Adaptive):
         return staircase_tracks(self.staircase(track.stimulus, track.number), observers, draws, stop)
 
     def reversals(self, track: TrackSetting, answers: Sequence[Answer]) -> tuple[int, ...]:
-        """Return the places of the answers at which the direction changed."""
         return tuple(self.staircase(track.stimulus, track.number).reversals_at(_in_u(track.stimulus, answers)))
 
     def reversal_mean(self, track: TrackSetting, answers: Sequence[Answer]) -> float | None:

@@ -99,18 +99,8 @@ STANDARD_ALONE: Final = 1
 class Due:
     """What a trial presents; never printed.
 
-    Attributes
-    ----------
-    level : float or None
-        The level; 0 where only the standard is presented, None where conditions are compared.
-    standard : float or None
-        The standard, in the unit of the varied number; None without one.
-    arrangement : int
-        Which of the design's arrangements.
-    intervals : tuple of Stimulated
-        What each interval presents, in order.
-    catch : bool
-        True for a catch trial, which presents the largest level.
+    ``level`` is 0 where only the standard is presented, None where conditions are compared; ``arrangement`` is which of
+    the design's, ``intervals`` what each of them presents. A ``catch`` trial presents the largest level.
     """
 
     level: float | None
@@ -123,18 +113,8 @@ class Due:
 def next_level(protocol: Protocol, key: Key, schedule: Schedule, trial: Trial, heard: Sequence[Heard]) -> Due | None:
     """Return what a trial presents; None where its track has ended or its block met its criterion: it is passed over.
 
-    Parameters
-    ----------
-    protocol : Protocol
-        The study.
-    key : Key
-        Its opened key.
-    schedule : Schedule
-        The session's steps; participant and seed name the draws.
-    trial : Trial
-        A trial of a block with a design.
-    heard : sequence of Heard
-        The answered trials, in any order; only earlier ones count.
+    The trial is of a block with a design; participant and seed of the schedule name the draws. Of the answered trials,
+    ``heard``, in any order, only earlier ones count.
     """
     block = protocol.blocks[trial.block]
     track = track_of(protocol, block, key.codes[block.id][trial.code])
@@ -231,19 +211,12 @@ def _interval(protocol: Protocol, block: Block, track: Track, level: float | Non
 def presented_by(protocol: Protocol, codes: Mapping[str, Mapping[str, str]], started: Mapping[str, Any]) -> Due:
     """Return what a trial presented, from the line on its beginning whose sealed fields are opened.
 
-    Raises
-    ------
-    KeyError
-        The line lacks what lines of its event hold, or its sealed fields are not opened; or the key has no such code.
-    ValueError
-        The design has no such arrangement.
-    StopIteration
-        The block has no such track.
+    A line, or a key, that does not fit the study raises KeyError, ValueError (its arrangement) or StopIteration (its
+    track).
     """
     block = protocol.blocks[started["block"]]
-    design = design_of(protocol, block)
     track = track_of(protocol, block, codes[block.id][started["code"]])
-    arrangement = arrangement_of(design, started["arrangement"])
+    arrangement = arrangement_of(design_of(protocol, block), started["arrangement"])
     return due_of(protocol, block, track, arrangement, started["level"], catch=started.get("catch", False))
 
 
@@ -269,12 +242,7 @@ def heard_of(
 def heard_in(protocol: Protocol, lines: Iterable[Mapping[str, Any]]) -> tuple[Heard, ...]:
     """Return the answered trials, each at the level that was presented, by number; the last answer counts.
 
-    Raises
-    ------
-    KeyError
-        A line lacks what lines of its event hold, or sealed fields are not opened.
-    ValueError
-        A design has no such arrangement.
+    Lines that do not fit the study, or whose sealed fields are not opened, raise KeyError or ValueError.
     """
     started: dict[tuple[int, int], Mapping[str, Any]] = {}
     found: dict[int, Heard] = {}
@@ -287,15 +255,6 @@ def heard_in(protocol: Protocol, lines: Iterable[Mapping[str, Any]]) -> tuple[He
             if block.design is None:
                 continue
             arrangement = arrangement_of(design_of(protocol, block), start["arrangement"])
-            answer = line["items"][0]["value"]
-            found[line["trial"]] = heard_of(
-                protocol,
-                block,
-                line["trial"],
-                start["code"],
-                start["level"],
-                arrangement,
-                answer,
-                catch=start.get("catch", False),
-            )
+            of_trial = line["trial"], start["code"], start["level"], arrangement, line["items"][0]["value"]
+            found[line["trial"]] = heard_of(protocol, block, *of_trial, catch=start.get("catch", False))
     return tuple(found[number] for number in sorted(found))

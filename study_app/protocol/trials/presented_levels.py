@@ -32,21 +32,11 @@ _HALVINGS: Final = 32
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """One level of one standard.
+    """One level of one standard, None where the level is the value itself; ``comparison`` is what it stands for.
 
-    Attributes
-    ----------
-    standard : float or None
-        The standard, in the unit of the varied number; None where the level is the value itself.
-    level, comparison : float
-        The level as it is asked, and the value that it stands for.
-    asked_n, sent_n : float or None
-        Force of its drag at the task's fastest point, and of what the limits leave of it [N]; None for a number of the
-        condition.
-    clipped_by : str or None
-        The "norm" (``device.force_limit_n``) or the "slope" limit of the loop (`haptics.model.slope_limits`).
-    damping_nspm : float
-        Of a linear law [N·s/m at the hand]; 0 of others.
+    ``asked_n`` is the force of its drag at the task's fastest point, ``sent_n`` what limits leave of it [N], None for a
+    number of the condition; ``clipped_by`` is the "norm" (``device.force_limit_n``) or the "slope" limit of the loop
+    (`haptics.model.slope_limits`), ``damping_nspm`` that of a linear law, 0 of others.
     """
 
     standard: float | None
@@ -77,18 +67,11 @@ class LevelLimits:
 
 @dataclass(frozen=True, slots=True)
 class Clipping:
-    """How limits clip what a block presents at one standard.
+    """How limits clip what a block presents at one standard, None where the level is the value itself.
 
-    Attributes
-    ----------
-    standard : float or None
-        The standard; None where the level is the value itself.
-    limit : float
-        The value of the varied number that is presented instead of every higher one.
-    paced : bool
-        Whether the task sets the pace; otherwise levels are clipped in fast motions alone, whose trials are repeated.
-    others : tuple of float
-        The other standards of the block, which are lower.
+    ``limit`` is the value of the varied number that is presented instead of every higher one. Where the task is not
+    ``paced``, levels are clipped in fast motions alone, whose trials are repeated. ``others`` are the block's other
+    standards, which are lower.
     """
 
     standard: float | None
@@ -113,15 +96,7 @@ class Clipping:
         return stimulus.level_between(self.standard, self.limit)
 
     def presented(self, stimulus: Stimulus, levels: Floats) -> Floats:
-        """Return levels as they are presented: between what the limits leave of the standard and of the comparison.
-
-        Parameters
-        ----------
-        stimulus : Stimulus
-            What is varied.
-        levels : (n,) array
-            Levels as they are asked.
-        """
+        """Return levels (n,) as they are presented: between what limits leave of the standard and of the comparison."""
         import numpy as np  # noqa: PLC0415 - protocols do not load it
 
         standard = None if self.standard is None else min(self.standard, self.limit)
@@ -130,13 +105,7 @@ class Clipping:
 
 
 def levels(protocol: Protocol, block_id: str) -> tuple[Level, ...]:
-    """Return every level that a block with a stimulus can present, standard by standard, the smallest first.
-
-    Raises
-    ------
-    KeyError
-        There is no such block.
-    """
+    """Return every level that a block with a stimulus can present, standard by standard, the smallest first."""
     block = protocol.blocks[block_id]
     if block.stimulus is None:
         return ()
@@ -191,22 +160,21 @@ def level_limits(protocol: Protocol, block: Block) -> LevelLimits | None:
 
 def _last(beyond: Callable[[float], bool], most: float) -> float | None:
     """Return the highest value, up to some times ``most``, that is not beyond a limit; None where none is."""
-    high = next((factor * most for factor in BEYOND if _holds(beyond, factor * most)), None)
+
+    def holds(value: float) -> bool:
+        try:
+            return beyond(value)
+        except StudyError:  # a liquid cannot have such a value
+            return False
+
+    high = next((factor * most for factor in BEYOND if holds(factor * most)), None)
     if high is None:
         return None
     low = 0.0
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
-        low, high = (low, middle) if _holds(beyond, middle) else (middle, high)
+        low, high = (low, middle) if holds(middle) else (middle, high)
     return low
-
-
-def _holds(beyond: Callable[[float], bool], value: float) -> bool:
-    """Return whether a value is beyond a limit; one that a liquid cannot have is not."""
-    try:
-        return beyond(value)
-    except StudyError:
-        return False
 
 
 def clipping(protocol: Protocol, block: Block, limits: LevelLimits | None = None) -> Clipping | None:

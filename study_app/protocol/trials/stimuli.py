@@ -134,18 +134,12 @@ class Stimulus(Table):
 
     @property
     def level_kind(self) -> LevelKind:
-        """What a level is."""
         return self.level or ("difference" if self.vary.endswith("_ms") else "weber")
 
     def comparison(self, standard: float | None, level: Level) -> Level:
-        """Return the comparison at a level, in the unit of the varied number.
+        """Return the comparison at a level (0 is the standard itself), in the unit of the varied number.
 
-        Parameters
-        ----------
-        standard : float or None
-            The standard; None where the level is the value itself.
-        level : float or array
-            The level; 0 is the standard itself.
+        ``standard`` is None where the level is the value itself.
         """
         if standard is None or self.level_kind == "value":
             return level
@@ -166,7 +160,6 @@ class Stimulus(Table):
         return math.log10(level) if level > 0 else -math.inf
 
     def level_of(self, u: float) -> float:
-        """Return the level at u."""
         return 10.0**u if self.spacing == "log" else u
 
     @property
@@ -214,14 +207,7 @@ class Stimulus(Table):
 class Stimulated:
     """What one interval presents: a condition with its varied number; never printed, since it reveals the level.
 
-    Attributes
-    ----------
-    condition : str
-        The condition.
-    vary : str or None
-        The varied number; None where the condition is presented as it is.
-    value : float
-        Its value, in the unit that ends its name; 0 where nothing is varied.
+    ``vary`` is None where the condition is presented as it is; ``value`` is in the unit that ends its name.
     """
 
     condition: str
@@ -249,14 +235,7 @@ BEYOND_DECADES: Final = 0.2
 class Assumed:
     """What is assumed about the psychometric function of a block, while levels are chosen and in the analysis.
 
-    Attributes
-    ----------
-    family : "weibull" | "normal" | "logistic"
-        Its shape.
-    widths : tuple of float
-        The smallest and the largest width, in u.
-    width_prior : tuple of float
-        Median and factor of the log-normal prior on the width, in u.
+    ``widths`` are the smallest and the largest width, ``width_prior`` median and factor of its log-normal prior, in u.
     """
 
     family: Family
@@ -268,8 +247,10 @@ def assumed_for(stimulus: Stimulus, design: Design) -> Assumed:
     """Return what is assumed where the method states nothing else."""
     low, high = stimulus.domain
     log, span = stimulus.spacing == "log", high - low
+    # Weibull where a distance of zero must mean chance
+    by_chance = is_distance(stimulus) and log and design.guess_rate is not None
     return Assumed(
-        family=family_of(stimulus, design),
+        family="weibull" if by_chance else "normal",
         widths=WIDTHS if log else (span / 8, 2 * span),
         width_prior=LINEAR_OBSERVER if log and is_distance(stimulus) else (span / 2, 2.0),
     )
@@ -287,12 +268,6 @@ def rises(stimulus: Stimulus, design: Design) -> bool:
     standard and below it.
     """
     return design.adaptive and (is_distance(stimulus) or not design.has_standard or design.asks_for_more)
-
-
-def family_of(stimulus: Stimulus, design: Design) -> Family:
-    """Return the default family: Weibull where a distance of zero must mean chance, else normal."""
-    by_chance = is_distance(stimulus) and stimulus.spacing == "log" and design.guess_rate is not None
-    return "weibull" if by_chance else "normal"
 
 
 def guesses_of(stimulus: Stimulus, design: Design) -> tuple[float, ...] | None:

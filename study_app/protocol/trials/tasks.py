@@ -24,12 +24,10 @@ class Stroke(NamedTuple):
 
     @property
     def speed_mps(self) -> float:
-        """The greatest speed [m/s]."""
         return 2.0 * math.pi * self.frequency_hz * self.amplitude_m
 
     @property
     def acceleration_mps2(self) -> float:
-        """The greatest acceleration [m/s²]."""
         return 2.0 * math.pi * self.frequency_hz * self.speed_mps
 
 
@@ -39,7 +37,11 @@ SHAKE_M: Final = 0.03
 
 
 class Explore(Table):
-    """Free motion in the tank, for ``min_s`` to ``max_s``; after ``min_s`` the participant may continue."""
+    """Free motion in the tank, for ``min_s`` to ``max_s``; after ``min_s`` the participant may continue.
+
+    A task of any kind takes about ``expected_s`` and ends by itself after ``limit_s``; ``summary`` and ``activity`` are
+    words for those who read the study. The ball must be at ``start_m`` before an interval begins, if that is given.
+    """
 
     kind: Literal["explore"]
     min_s: float = Field(ge=0, le=3600, description="Least time before the participant may go on [s].")
@@ -52,12 +54,10 @@ class Explore(Table):
 
     @property
     def summary(self) -> str:
-        """What is done, for those who read the study."""
         return f"explore for {self.min_s:g} to {self.max_s:g} s"
 
     @property
     def expected_s(self) -> float:
-        """About how long it takes [s]."""
         return (self.min_s + self.max_s) / 2
 
     def fastest_stroke(self, workspace_m: Point) -> Stroke:
@@ -66,7 +66,6 @@ class Explore(Table):
 
     @property
     def limit_s(self) -> float:
-        """When the task ends by itself [s]."""
         return self.max_s
 
     @model_validator(mode="after")
@@ -103,7 +102,6 @@ class Follow(Table):
 
     @property
     def summary(self) -> str:
-        """What is done, for those who read the study."""
         swings = f"{self.cycles} swing" if self.cycles == 1 else f"{self.cycles} swings"
         return (
             f"follow a target of {self.radius_mm:g} mm that swings ±{self.amplitude_mm:g} mm at {self.frequency_hz:g} "
@@ -112,27 +110,22 @@ class Follow(Table):
 
     @property
     def limit_s(self) -> float:
-        """When the task ends by itself [s]."""
         return self.lead_s + self.cycles / self.frequency_hz
 
     @property
     def expected_s(self) -> float:
-        """How long it takes [s]."""
         return self.limit_s
 
     @property
     def radius_m(self) -> float:
-        """Radius of the target [m]."""
         return self.radius_mm / 1000
 
     @property
     def start_m(self) -> Point:
-        """Where the target starts, hand frame [m]: the ball must be there before an interval begins."""
         return self.target_m(0.0)
 
     @property
     def amplitude_m(self) -> float:
-        """From the middle to either end [m]."""
         return self.amplitude_mm / 1000
 
     @property
@@ -141,18 +134,12 @@ class Follow(Table):
         return 2 * math.pi * self.frequency_hz * self.amplitude_m / math.sqrt(2)
 
     def fastest_stroke(self, _workspace_m: Point) -> Stroke:
-        """Return the swing of the target."""
         return Stroke(self.frequency_hz, self.amplitude_m)
 
     def target_m(self, t_s: float) -> Point:
         """Return where the target is ``t_s`` after the task began, hand frame [m]; before it in the middle."""
-        return self.amplitude_m * self._ramp(t_s) * math.sin(2 * math.pi * self.frequency_hz * t_s), 0.0, 0.0
-
-    def _ramp(self, t_s: float) -> float:
-        """Return the ramp r, 0 … 1."""
-        if t_s <= 0:
-            return 0.0
-        return 1.0 if t_s >= self.lead_s else (1 - math.cos(math.pi * t_s / self.lead_s)) / 2
+        ramp = 1.0 if t_s >= self.lead_s else (1 - math.cos(math.pi * max(t_s, 0.0) / self.lead_s)) / 2
+        return self.amplitude_m * ramp * math.sin(2 * math.pi * self.frequency_hz * t_s), 0.0, 0.0
 
 
 Millimetres: TypeAlias = Annotated[float, within(-500, 500, "the tank reaches to 500 mm on either side at most")]
@@ -189,7 +176,6 @@ class Reach(Table):
 
     @property
     def summary(self) -> str:
-        """What is done, for those who read the study."""
         end = f"until {self.count} are reached" if self.count is not None else f"for {self.duration_s:g} s"
         return (
             f"reach for {len(self.targets_mm)} targets of {self.radius_mm:g} mm in turn, {self.dwell_s:g} s in each, "
@@ -198,7 +184,6 @@ class Reach(Table):
 
     @property
     def expected_s(self) -> float:
-        """About how long it takes [s]."""
         if self.count is not None:
             return min(self.timeout_s, self.count * (self.dwell_s + MOVE_S))
         return self.duration_s or 0.0
@@ -211,17 +196,14 @@ class Reach(Table):
 
     @property
     def targets_m(self) -> tuple[Point, ...]:
-        """Centres of the targets, hand frame [m]."""
         return tuple((x / 1000, y / 1000, z / 1000) for x, y, z in self.targets_mm)
 
     @property
     def limit_s(self) -> float:
-        """When the task ends by itself [s]."""
         return self.timeout_s if self.duration_s is None else self.duration_s
 
     @property
     def radius_m(self) -> float:
-        """Radius of a target [m]."""
         return self.radius_mm / 1000
 
     @model_validator(mode="after")

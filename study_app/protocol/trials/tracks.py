@@ -14,22 +14,12 @@ from study_app.protocol.trials.stimuli import OF_CONDITION, Stimulus
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """Trials whose levels are chosen together.
+    """Trials whose levels are chosen together, at most ``slots`` of them.
 
-    Attributes
-    ----------
-    name : str
-        What its code stands for: the standard and a number ("8/1", "/1" without a standard), or a condition.
-    standard : float or None
-        The standard, in the unit of the varied number.
-    comparison : str or None
-        The condition that is compared with the block's standard; None where a number is varied.
-    slots : int
-        How many trials it has at most.
-    number : int
-        Which of the tracks of its standard, from 1.
-    catch : tuple of range
-        Of each catch trial the slots, from 0, among which its own is drawn.
+    Its code stands for ``name``: the standard and a number ("8/1", "/1" without a standard), or a condition.
+    ``comparison`` is the condition that is compared with the block's standard, None where a number is varied,
+    ``number`` which of the tracks of its standard, from 1; ``catch`` has of each catch trial the slots, from 0, among
+    which its own is drawn.
     """
 
     name: str
