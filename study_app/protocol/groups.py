@@ -51,16 +51,11 @@ class HasSteps(Protocol):
     """A protocol, from its file or from a receipt."""
 
     @property
-    def sequence(self) -> Steps:
-        """The steps of every session."""
-
+    def sequence(self) -> Steps: ...  # noqa: D102
     @property
-    def sequences(self) -> Sequences:
-        """The steps of the first session, the second, and so on."""
-
+    def sequences(self) -> Sequences: ...  # noqa: D102
     @property
-    def groups(self) -> Mapping[str, Group]:
-        """The groups by name."""
+    def groups(self) -> Mapping[str, Group]: ...  # noqa: D102
 
 
 def sessions_differ(protocol: HasSteps) -> bool:
@@ -74,13 +69,7 @@ def session_count(protocol: HasSteps, group: str | None) -> int | None:
 
 
 def steps_of(protocol: HasSteps, group: str | None, session: int) -> Steps:
-    """Return the steps of a session (from 1) of a participant of a group; None in a study without groups.
-
-    Raises
-    ------
-    StudyError
-        The participant has fewer sessions.
-    """
+    """Return the steps of a session (from 1) of a participant of a group; StudyError if the participant has fewer."""
     sequences = _sequences(protocol, group)
     if not sequences:
         own = () if group is None else protocol.groups[group].sequence
@@ -102,13 +91,7 @@ def beyond_last(session: int, last: int) -> StudyError:
 
 
 def refuse_beyond_last(protocol: HasSteps, session: int) -> None:
-    """Refuse a session that no group has.
-
-    Raises
-    ------
-    StudyError
-        Every group has fewer sessions.
-    """
+    """Refuse, as StudyError, a session that no group has."""
     counts = [session_count(protocol, group) for group in protocol.groups or (None,)]
     known = [count for count in counts if count is not None]
     if len(known) == len(counts) and session > max(known):
@@ -119,19 +102,17 @@ def every_step(protocol: HasSteps) -> Steps:
     """Return the steps of all groups and sessions, each once, in order of first use; of one sequence as they are."""
     if not sessions_differ(protocol):
         return protocol.sequence
-    used: list[Steps] = []
-    for group in protocol.groups or (None,):
-        used += _sequences(protocol, group) or (steps_of(protocol, group, 1),)
-    return tuple(dict.fromkeys(step for steps in used for step in steps))
+    of_groups = (_of_group(protocol, group) for group in protocol.groups or (None,))
+    return tuple(dict.fromkeys(step for steps in of_groups for step in steps))
 
 
 def groups_with(protocol: HasSteps, step: str) -> tuple[str, ...]:
     """Return the groups in which a step comes; none in a study without groups."""
-    return tuple(
-        group
-        for group in protocol.groups
-        if any(step in steps for steps in _sequences(protocol, group) or (steps_of(protocol, group, 1),))
-    )
+    return tuple(group for group in protocol.groups if step in _of_group(protocol, group))
+
+
+def _of_group(protocol: HasSteps, group: str | None) -> Steps:
+    return sum(_sequences(protocol, group) or (steps_of(protocol, group, 1),), ())
 
 
 def numbered_parts(steps: Iterable[str], parts: Mapping[str, int | None]) -> dict[str, int]:

@@ -46,13 +46,7 @@ QUANTITIES: Final = _OF_THE_SCENE | {it.name: it for effect in EFFECTS for it in
 
 
 def quantity(name: str) -> Parameter:
-    """Return what a stimulus varies: ``table.field``, or a field alone, which is that of the first table that has it.
-
-    Raises
-    ------
-    KeyError
-        The table has no such quantity.
-    """
+    """Return what a stimulus varies: ``table.field``, or a field alone, that of the first table that has it."""
     for known, row in QUANTITIES.items():
         if name in {known, known.partition(".")[2]}:
             return row

@@ -51,14 +51,8 @@ def score(
 ) -> float | None:
     """Return a score; None where an answer that it needs is missing.
 
-    Parameters
-    ----------
-    asked : Score
-        How the score is computed.
-    answers : mapping of str to float or str
-        Item id → the number it was answered with, or the option that was chosen.
-    bounds : mapping of str to (float, float) or None
-        Item id → its smallest and largest answer, for reversed items.
+    ``answers`` are by item the number it was answered with, or the option that was chosen; ``bounds`` its smallest and
+    largest answer, for reversed items.
     """
     if any(name not in answers for name in (*asked.items, *asked.weights_from)):
         return None
@@ -105,10 +99,7 @@ class Questionnaire(ExtendedTable):
 
     def item(self, item_id: str) -> Question:
         """Return the item of that id (KeyError if there is none)."""
-        for item in self.items:
-            if item.id == item_id:
-                return item
-        raise KeyError(item_id)
+        return {item.id: item for item in self.items}[item_id]
 
     def context(self, scales: Mapping[str, Scale], language: str) -> Context:
         """Return what its items are asked with."""

@@ -53,12 +53,8 @@ def shuffle(items: Iterable[T], draw: Draw) -> tuple[T, ...]:
 class Key:
     """The opened key of a study; never printed.
 
-    Attributes
-    ----------
-    codes : mapping
-        Block → code → what the code stands for: a condition, or a track such as "8/1".
-    secret : bytes
-        The nonce, from which sub-keys are derived.
+    ``codes`` is block → code → what the code stands for: a condition, or a track such as "8/1". Sub-keys are derived
+    from ``secret``, the nonce.
     """
 
     codes: Mapping[str, Mapping[str, str]]

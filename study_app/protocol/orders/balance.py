@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count, pairwise
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 from study_app.errors import StudyError
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.block_orders import BlockOrder, CodeOrder, orders_of
+from study_app.protocol.orders.block_orders import CodeOrder, orders_of
 from study_app.protocol.orders.durations import variants
 from study_app.protocol.orders.schedule import codes_of
 from study_app.protocol.orders.sequences import borders_even, enrolment, longest_run, row_count, shortest_distance
@@ -27,14 +27,8 @@ Table: TypeAlias = tuple[tuple[int, ...], ...]
 class Evenness:
     """Orders of one set of codes, counted.
 
-    Attributes
-    ----------
-    positions
-        How often each code (column) came in each position (row).
-    follows
-        How often each code (column) came right after each code (row), breaks and borders of repetitions not minded.
-    longest_run, shortest_distance
-        The most of a kind in a row, and the fewest trials from one to the next of its kind (None: each came once).
+    ``positions`` and ``follows`` say how often each code (column) came in each position (row), and right after each
+    code (row), breaks and borders of repetitions not minded. ``shortest_distance`` is None where each code came once.
     """
 
     codes: tuple[str, ...]
@@ -50,6 +44,11 @@ class Evenness:
         return len({count for line in self.positions for count in line}) <= 1
 
     @property
+    def after_another(self) -> tuple[int, ...]:
+        """How often each code followed each other one."""
+        return tuple(count for at, line in enumerate(self.follows) for then, count in enumerate(line) if at != then)
+
+    @property
     def follows_even(self) -> bool:
         """Whether each code followed each other one equally often."""
         return len({*self.after_another}) <= 1
@@ -58,13 +57,6 @@ class Evenness:
     def balanced(self) -> bool:
         """Whether both are so."""
         return self.positions_even and self.follows_even
-
-    @property
-    def after_another(self) -> tuple[int, ...]:
-        """How often each code followed each other one."""
-        return tuple(
-            count for first, line in enumerate(self.follows) for then, count in enumerate(line) if first != then
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,11 +80,6 @@ class Balance:
     participants: int
     seed: int
     blocks: tuple[BlockBalance, ...]
-
-    @property
-    def balanced(self) -> bool:
-        """Whether every block is even in position and carry-over."""
-        return all(block.evenness.balanced for block in self.blocks)
 
 
 def numbered(count: int) -> tuple[str, ...]:
@@ -124,41 +111,26 @@ def evenness(codes: Sequence[str], orders: Iterable[Sequence[str]]) -> Evenness:
 def balance(protocol: Protocol, participants: Sequence[str], seed: int, session: str = "") -> Balance:
     """Return how even the orders of ``participants`` (ids) would be, all of them under ``seed``.
 
-    In a study each session has a seed of its own; orders from a square do not depend on the seed.
-
-    Raises
-    ------
-    StudyError
-        There are no participants.
+    In a study each session has a seed of its own; orders from a square do not depend on the seed. Without
+    participants it raises StudyError.
     """
     if not participants:
         raise StudyError("no participants: a design is judged over at least one")
     orders = orders_of(protocol)
-    language = protocol.study.languages[0]
-    return Balance(
-        study=orders.study,
-        session=session,
-        participants=len(participants),
-        seed=seed,
-        blocks=tuple(
-            _block_balance(
-                orders.study, block, protocol.text(protocol.blocks[block.id].title, language), participants, seed
-            )
-            for block in orders.blocks
-            if len(block.codes) > 1
-        ),
-    )
+    unnumbered = tuple(participant for participant in participants if enrolment(participant) is None)
+    blocks = []
+    for block in orders.blocks:
+        if len(block.codes) > 1:
+            title = protocol.text(protocol.blocks[block.id].title, protocol.study.languages[0])
+            counted = evenness(block.codes, [codes_of(orders.study, block, who, seed) for who in participants])
+            blocks.append(BlockBalance(block.id, title, block.order, block.repetitions, counted, unnumbered))
+    return Balance(orders.study, session, len(participants), seed, tuple(blocks))
 
 
 def balances(protocol: Protocol, participants: Sequence[str], seed: int) -> Iterator[Balance]:
-    """Yield the balance of each kind of session, over the participants of its group.
+    """Yield the balance of each kind of session, over the participants of its group (StudyError without any).
 
     Participants come into the groups that a rehearsal with this seed would allocate; a group of none is left out.
-
-    Raises
-    ------
-    StudyError
-        There are no participants.
     """
     shares = {name: group.share for name, group in protocol.groups.items()}
     secret = draw_secret(stream(seed, "blinding").random)
@@ -167,18 +139,6 @@ def balances(protocol: Protocol, participants: Sequence[str], seed: int) -> Iter
         own = [who for who, group in zip(participants, groups, strict=True) if group == one.group]
         if own or not shares:
             yield balance(one.protocol, own, seed, one.name)
-
-
-def _block_balance(study: str, block: BlockOrder, title: str, participants: Sequence[str], seed: int) -> BlockBalance:
-    drawn = [codes_of(study, block, participant, seed) for participant in participants]
-    return BlockBalance(
-        id=block.id,
-        title=title,
-        order=block.order,
-        repetitions=block.repetitions,
-        evenness=evenness(block.codes, drawn),
-        unnumbered=tuple(participant for participant in participants if enrolment(participant) is None),
-    )
 
 
 def describe_balance(judged: Balance) -> str:
@@ -196,23 +156,20 @@ def _section(block: BlockBalance) -> Iterator[str]:
     times = "" if block.repetitions == 1 else f", each {block.repetitions} times"
     yield f"{block.title} (block {block.id}): {len(counted.codes)} codes{times}, order {block.order}"
     yield ""
-    yield from _table("position", [str(number) for number in range(1, len(counted.positions) + 1)], block, "positions")
+    yield from _table("position", range(1, len(counted.positions) + 1), counted.codes, counted.positions)
     yield ""
-    yield from _table("after", counted.codes, block, "follows")
+    yield from _table("after", counted.codes, counted.codes, counted.follows)
     yield ""
     yield from (f"  {sentence}" for sentence in (*_verdict(counted), *_advice(block)))
 
 
-def _table(
-    corner: str, names: Sequence[str], block: BlockBalance, which: Literal["positions", "follows"]
-) -> Iterator[str]:
+def _table(corner: str, names: Sequence[object], codes: Sequence[str], counts: Table) -> Iterator[str]:
     """Yield a table of counts, a row for each name and a column for each code."""
-    codes, counts = block.evenness.codes, getattr(block.evenness, which)
     width = max(len(str(cell)) for cell in (*codes, *(count for line in counts for count in line)))
     first = len("position")
     yield f"  {corner:<{first}}  {'  '.join(f'{code:>{width}}' for code in codes)}"
     for name, line in zip(names, counts, strict=True):
-        yield f"  {name:<{first}}  {'  '.join(f'{count:>{width}}' for count in line)}"
+        yield f"  {name!s:<{first}}  {'  '.join(f'{count:>{width}}' for count in line)}"
 
 
 def _verdict(counted: Evenness) -> Iterator[str]:

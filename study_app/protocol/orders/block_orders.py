@@ -110,8 +110,12 @@ def order_of(protocol: Protocol, block: Block) -> BlockOrder:
     if block.design is not None:
         order = "interleaved" if block.stimulus is None else method_of(protocol, block).order
         slots = tuple(track.slots for track in tracks_of(protocol, block))
-    codes, asked = block_codes(protocol, block), protocol.questionnaire_of(block.id)
-    return BlockOrder(id=block.id, codes=codes, order=order, slots=slots, **_same(block), **_items(asked))
+    keys = ("phase", "part", "max_repeats", "min_distance", "repetitions", "break_every", "break_page")
+    same = {key: getattr(block, key) for key in keys}
+    asked = protocol.questionnaire_of(block.id)
+    return BlockOrder(
+        id=block.id, codes=block_codes(protocol, block), order=order, slots=slots, **same, **_items(asked)
+    )
 
 
 class _Kept(BaseModel):
@@ -160,33 +164,15 @@ class _KeptProtocol(_KeptSteps):
 
 
 def every_step_of(protocol: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the steps of all groups and sessions of the protocol in a receipt, each once.
-
-    Raises
-    ------
-    ValueError
-        It has none.
-    """
+    """Return the steps of all groups and sessions of the protocol in a receipt, each once (ValueError: it has none)."""
     return every_step(_KeptSteps.model_validate(protocol))
 
 
 def orders_of_receipt(protocol: Mapping[str, Any], *, group: str | None = None, session: int = 1) -> Orders:
     """Return what scheduling needs of the protocol in a receipt: without conditions, blocks with their codes.
 
-    Parameters
-    ----------
-    protocol : mapping
-        The protocol as the receipt holds it.
-    group : str, optional
-        The participant's group in a study with groups.
-    session : int
-        The session's number.
-
-    Raises
-    ------
-    StudyError
-        It does not state the orders: it was changed, or is of a version that this one does not know; or the participant
-        has fewer sessions.
+    StudyError says that it does not state the orders, since it was changed or is of a version that this one does not
+    know, or that the participant, of ``group`` in a study with groups, has fewer sessions.
     """
     try:
         kept = _KeptProtocol.model_validate(protocol)
@@ -200,7 +186,15 @@ def orders_of_receipt(protocol: Mapping[str, Any], *, group: str | None = None, 
                 for name, block in kept.blocks.items()
             }
             kept = kept.model_copy(update={"blocks": own})
-        blocks = {name: _of_kept(kept, name, block) for name, block in kept.blocks.items()}
+        forms = kept.questionnaires
+        blocks = {
+            name: BlockOrder(
+                name,
+                **block.model_dump(exclude={"questionnaire"}),
+                **_items(None if block.questionnaire is None else forms[block.questionnaire]),
+            )
+            for name, block in kept.blocks.items()
+        }
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         raise _untold(".".join(str(step) for step in first["loc"]), first["msg"]) from error
@@ -218,18 +212,6 @@ def orders_of_receipt(protocol: Mapping[str, Any], *, group: str | None = None, 
     }
     steps |= blocks
     return Orders(kept.study.name, tuple(steps.get(step, step) for step in shown))
-
-
-def _of_kept(protocol: _KeptProtocol, name: str, block: _KeptBlock) -> BlockOrder:
-    asked = None if block.questionnaire is None else protocol.questionnaires[block.questionnaire]
-    own: dict[str, Any] = {"codes": block.codes, "order": block.order, "slots": block.slots}
-    return BlockOrder(id=name, **own, **_same(block), **_items(asked))
-
-
-def _same(block: Block | _KeptBlock) -> dict[str, Any]:
-    """Return what a block states as scheduling sees it."""
-    keys = ("phase", "part", "max_repeats", "min_distance", "repetitions", "break_every", "break_page")
-    return {key: getattr(block, key) for key in keys}
 
 
 def _items(asked: Questionnaire | _KeptQuestionnaire | None) -> dict[str, Any]:

@@ -17,11 +17,7 @@ def own_protocol(protocol: Protocol, group: str | None, session: int) -> Protoco
     """Return the protocol of a session of a participant of ``group``, which has one sequence and no groups.
 
     Parts are numbered in the order of this session. A study whose sessions do not differ is returned as it is.
-
-    Raises
-    ------
-    StudyError
-        The participant has fewer sessions.
+    StudyError says that the participant has fewer sessions.
     """
     if not sessions_differ(protocol):
         return protocol

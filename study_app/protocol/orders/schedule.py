@@ -206,12 +206,8 @@ class RecordedTrial:
 def recorded_trials(lines: Iterable[Mapping[str, Any]]) -> tuple[RecordedTrial | int, ...]:
     """Return what the lines of a journal say was presented: every attempt, in the order of time.
 
-    A trial that was passed over is its number alone.
-
-    Raises
-    ------
-    KeyError
-        A line lacks what lines of its event hold, or answers a trial that never started.
+    A trial that was passed over is its number alone. KeyError says that a line lacks what lines of its event hold, or
+    answers a trial that never started.
     """
     attempts: list[RecordedTrial | int] = []
     place: dict[tuple[int, int], int] = {}
@@ -244,39 +240,15 @@ def reproduce(
 ) -> tuple[str, ...]:
     """Return how the trials that were run differ from those that receipt, seed and participant give.
 
-    Parameters
-    ----------
-    protocol : mapping
-        The protocol as the receipt holds it: without conditions, blocks with their codes.
-    seed : int
-        The session's seed, from its receipt.
-    participant : str
-        The participant's id.
-    recorded : iterable of RecordedTrial or int
-        What was run, in the order of time; of trials that were passed over their numbers.
-    complete : bool
-        Whether the session went to its end, so that no trial may be missing.
-    group : str, optional
-        The participant's group in a study with groups.
-    session : int
-        The session's number.
-    row_of : str, optional
-        The id whose rows of squares the session took; None: the participant's own.
-
-    Raises
-    ------
-    StudyError
-        The receipt's protocol does not state the orders.
+    ``protocol`` is that of the receipt (see `orders_of_receipt`, whose StudyError it raises); ``recorded`` is what was
+    run, in the order of time. A ``complete`` session went to its end, so that no trial may be missing. ``row_of`` is
+    the id whose rows of squares the session took, None the participant's own.
     """
     orders = orders_of_receipt(protocol, group=group, session=session)
     planned = {trial.number: trial for trial in build_schedule(orders, participant, seed, row_of).trials}
     attempts = tuple(recorded)
-    found = [
-        sentence
-        for trial in attempts
-        if isinstance(trial, RecordedTrial)
-        for sentence in _against(planned.get(trial.number), trial)
-    ]
+    run = [trial for trial in attempts if isinstance(trial, RecordedTrial)]
+    found = [sentence for trial in run for sentence in _against(planned.get(trial.number), trial)]
     numbers = [trial if isinstance(trial, int) else trial.number for trial in attempts]
     blocks = protocol["study"].get("resume") == "block"
     found += _progress(numbers, planned, complete=complete, blocks=blocks)
@@ -291,12 +263,14 @@ def _against(planned: Trial | None, run: RecordedTrial) -> Iterator[str]:
     for name in _TOLD:
         ours, theirs = getattr(planned, name), getattr(run, name)
         if ours != theirs:
-            yield f"trial {run.number}: {name} {_named(theirs)} recorded, the seed gives {_named(ours)}"
+            said, given = ("none" if value is None else value for value in (theirs, ours))
+            yield f"trial {run.number}: {name} {said} recorded, the seed gives {given}"
     if run.items is None:
         return
     expected = tuple(item for item in planned.items if item in run.items) if run.may_hide else planned.items
     if run.items != expected:
-        yield f"trial {run.number}: items {_listed(run.items)} recorded, the seed gives {_listed(planned.items)}"
+        said, given = (", ".join(items) or "none" for items in (run.items, planned.items))
+        yield f"trial {run.number}: items {said} recorded, the seed gives {given}"
 
 
 def _progress(numbers: list[int], planned: dict[int, Trial], *, complete: bool, blocks: bool) -> Iterator[str]:
@@ -317,11 +291,3 @@ def _progress(numbers: list[int], planned: dict[int, Trial], *, complete: bool, 
     if complete and before < last:
         missing = f"trial {last} was" if before + 1 == last else f"trials {before + 1} to {last} were"
         yield f"{missing} not recorded, though the session is complete"
-
-
-def _named(value: object) -> str:
-    return "none" if value is None else str(value)
-
-
-def _listed(items: tuple[str, ...]) -> str:
-    return ", ".join(items) if items else "none"

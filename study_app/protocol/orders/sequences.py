@@ -151,12 +151,7 @@ def arrange(codes: Sequence[T], repetitions: int, constraint: Constraint, draw: 
     """Return every code ``repetitions`` times in a random order that keeps a constraint.
 
     ``draw`` gives uniform numbers in [0, 1); at most (len(codes) · repetitions + 1) · ``PROPOSALS`` + len(codes) of
-    them are drawn.
-
-    Raises
-    ------
-    ValueError
-        No order keeps the constraint.
+    them are drawn. ValueError says that no order keeps the constraint.
     """
     if (impossible := constraint.impossible(len(codes), repetitions)) is not None:
         raise ValueError(" ".join(impossible))
@@ -220,7 +215,9 @@ class Remaining:
         """Return the codes that may come next without making the rest impossible."""
         if self._apart > 1:
             recent = self.taken[-(self._apart - 1) :]
-            least = self._tight() + 1
+            # of the largest k whose last k · apart trials need all that is left of every code with up to k
+            most = min(len(self._slack) - 1, (self._total - 1) // self._apart)
+            least = next((k for k in range(most, 0, -1) if self._slack[k] <= 0), 0) + 1
             return [code for code, left in enumerate(self.count) if left >= least and code not in recent]
         spent = self.taken[-1:] if self._in_a_row >= self._run else []
         urgent = [code for code, left in enumerate(self.count) if left > self._run * (self._total - left)]
@@ -234,8 +231,3 @@ class Remaining:
         self.count[code] -= 1
         self.taken.append(code)
         self._total -= 1
-
-    def _tight(self) -> int:
-        """Return the largest k whose last k · apart trials need all that is left of every code with up to k."""
-        most = min(len(self._slack) - 1, (self._total - 1) // self._apart)
-        return next((k for k in range(most, 0, -1) if self._slack[k] <= 0), 0)
