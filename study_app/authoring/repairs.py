@@ -1,8 +1,5 @@
 """Repairs: edits that remove a fault, each with the words of its button; only those are offered that do."""
 
-import difflib
-import math
-import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -11,7 +8,6 @@ from typing import Final
 from study_app.authoring.changes.initial_values import initial
 from study_app.authoring.changes.languages import filled_in
 from study_app.authoring.edited_study import Study
-from study_app.authoring.names import choices_at
 from study_app.authoring.writer.edits import Edit, Insert, Rename, Set, Unset
 from study_app.authoring.writer.refused import Refused
 from study_app.number_text import number_of
@@ -20,10 +16,6 @@ from study_app.protocol.source.document import value_at
 from study_app.protocol.source.problems import Fault, shown
 from study_app.protocol.wording.languages import language_name
 
-_MEANT: Final = re.compile(r'did you mean "([^"]+)"\?')
-_BOUND: Final = re.compile(r"must be (?:at least |at most )?([\d.e+-]+)(?: |$)")
-_ORDER: Final = re.compile(r'belongs to order = "([a-z]+)"')
-_OUTSIDE: Final = re.compile(r"([xyz]) = [-\d.e+]+ mm with radius ([\d.e+-]+) mm leaves the tank")
 _HALVINGS: Final = 12
 
 
@@ -52,20 +44,21 @@ def removes(study: Study, fault: Fault, repair: Repair) -> bool:
     return (fault.path, fault.message) not in found and len(found) <= len(known)
 
 
-def _meant(study: Study, fault: Fault) -> Iterator[Repair]:
-    """Yield the word that was meant, for a key or a value."""
-    if found := _MEANT.search(fault.hint):
-        word = found[1]
-        edit = Rename(fault.path, word) if fault.message == "unknown key" else Set(fault.path, word)
-        yield Repair(f'Use "{word}"', (edit,))
-
-
-def _named(study: Study, fault: Fault) -> Iterator[Repair]:
-    """Yield the nearest name for one that names nothing."""
-    name, choices = value_at(study.document, fault.path), choices_at(study.document, fault.path)
-    if is_unknown_name(fault) and isinstance(name, str) and choices and not _MEANT.search(fault.hint):
-        nearest = difflib.get_close_matches(name, choices, n=1, cutoff=0.0)[0]
-        yield Repair(f'Use "{nearest}"', (Set(fault.path, nearest),))
+def _stated(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield the value that the fault states, or the key that was meant; of a wrong sign the number without it."""
+    if fault.use is None:
+        return
+    path, value = fault.use
+    now = value_at(study.document, path)
+    if fault.message == "unknown key":
+        yield Repair(f'Use "{value}"', (Rename(path, value),))
+    elif path != fault.path:
+        words = f"Move to {value:g} mm" if isinstance(path[-1], int) else f"Use {path[-1]} = {shown(value)}"
+        yield Repair(words, (Set(path, value),))
+    elif isinstance(now, int | float) and isinstance(value, int | float) and now < 0 < value:
+        yield Repair(f"Use {shown(-now)}", (Set(path, -now),))
+    else:
+        yield Repair(f"Use {shown(value)}", (Set(path, value),))
 
 
 def is_unknown_name(fault: Fault) -> bool:
@@ -87,37 +80,6 @@ def _surplus(study: Study, fault: Fault) -> Iterator[Repair]:
         yield Repair("Remove", (Unset(fault.path),))
     if message == "is not a language of the study":
         yield Repair("Remove this text", (Unset(fault.path),))
-
-
-def _constrained(study: Study, fault: Fault) -> Iterator[Repair]:
-    """Yield the order that a key belongs to."""
-    if found := _ORDER.match(fault.message):
-        edit = Set((*fault.path[:-1], "order"), found[1])
-        yield Repair(f'Use order = "{found[1]}"', (edit,))
-
-
-def _targets(study: Study, fault: Fault) -> Iterator[Repair]:
-    """Yield the nearest place in the tank for a target."""
-    found, point = _OUTSIDE.match(fault.message), value_at(study.document, fault.path)
-    size = value_at(study.document, ("device", "workspace_mm"))
-    if found is None or not isinstance(point, tuple) or not isinstance(size, tuple):
-        return
-    axis = "xyz".index(found[1])
-    most = math.floor(size[axis] / 2 - float(found[2]))
-    if most >= 0:
-        place = math.copysign(most, point[axis])
-        yield Repair(f"Move to {place:g} mm", (Set((*fault.path, axis), int(place)),))
-
-
-def _within_bounds(study: Study, fault: Fault) -> Iterator[Repair]:
-    """Yield the nearest permitted number; of one with a wrong sign that without it."""
-    if found := _BOUND.search(fault.message):
-        now, number = value_at(study.document, fault.path), float(found[1])
-        if isinstance(now, int | float) and now < 0 < number:
-            yield Repair(f"Use {shown(-now)}", (Set(fault.path, -now),))
-            return
-        value = int(number) if number.is_integer() else number
-        yield Repair(f"Use {found[1]}", (Set(fault.path, value),))
 
 
 def _quoted_numbers(study: Study, fault: Fault) -> Iterator[Repair]:
@@ -219,6 +181,5 @@ def _exponent(value: float, digits: int) -> int:
 
 
 _KINDS: Final[tuple[Callable[[Study, Fault], Iterator[Repair]], ...]] = (
-    _meant, _named, _within_bounds, _quoted_numbers, _levels, _targets, _texts, _steps, _constrained, _missing,
-    _surplus,
+    _stated, _quoted_numbers, _levels, _texts, _steps, _missing, _surplus,
 )  # fmt: skip

@@ -190,6 +190,7 @@ class Block(ExtendedTable):
                     f'belongs to order = "constrained", this is "{self.order}"',
                     given[0],
                     'write order = "constrained", or omit the key',
+                    ("order", "constrained"),
                 )
             return self
         if not given:
@@ -209,7 +210,7 @@ class Block(ExtendedTable):
         keys = {"break_every": self.break_every, "break_page": self.break_page}
         missing = [name for name, value in keys.items() if value is None]
         if len(missing) == 1:
-            raise invalid("is missing: break_every and break_page need each other", *missing)
+            raise invalid("is missing: break_every and break_page need each other", missing[0])
         trials = len(self.conditions) * self.repetitions
         if self.break_every is not None and self.design is None and trials <= self.break_every:
             counted = "1 trial" if trials == 1 else f"{trials} trials"

@@ -70,7 +70,7 @@ HandForceN: TypeAlias = Annotated[
 
 def _whole(value: Any) -> Any:
     if type(value) is not int:
-        raise invalid("must be 1 or 2, the number of this format")
+        raise invalid("must be 1 or 2, the number of this format", use=("format", 1))
     return value
 
 

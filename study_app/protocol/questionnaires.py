@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from study_app.haptics.model.ranges import within
 from study_app.protocol.questions import KINDS, STATEMENT, AnyQuestion, Context, Question, Scale, Statement
 from study_app.protocol.source.document import entries
-from study_app.protocol.source.problems import Fault, did_you_mean
+from study_app.protocol.source.problems import Fault, unknown
 from study_app.protocol.table import ExtendedTable, Id, Localised, Table, invalid
 
 Weight = Annotated[float, within(-1e6, 1e6, "no instrument has larger weights")]
@@ -135,8 +135,8 @@ def with_instruments(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[
             continue
         path = ("questionnaires", name, "instrument")
         if table["instrument"] not in instruments():
-            known = did_you_mean(str(table["instrument"]), instruments())
-            faults.append(Fault(path, f'there is no instrument "{table["instrument"]}"', known))
+            wrong = str(table["instrument"])
+            faults.append(unknown(path, f'there is no instrument "{wrong}"', wrong, instruments()))
             continue
         missing = _missing_scales(table["instrument"], languages, scales)
         filled[name], lacking = _filled(name, table, languages)
@@ -176,7 +176,7 @@ def _filled(name: str, table: Mapping[str, Any], languages: tuple[str, ...]) -> 
     known = [item["id"] for item in source["items"]]
     place = ("questionnaires", name)
     faults = [
-        Fault((*place, "items", index, "id"), f'"{item["id"]}" is not an item of {of}', did_you_mean(item["id"], known))
+        unknown((*place, "items", index, "id"), f'"{item["id"]}" is not an item of {of}', item["id"], known)
         for index, item in enumerate(_own_items(table))
         if item["id"] not in known
     ]

@@ -115,10 +115,13 @@ NOT_WITH: Final = "not with"
 """Where it keeps `Table.NOT_WITH`, for forms."""
 
 
-def invalid(message: str, key: str = "", hint: str = "") -> PydanticCustomError:
-    """Return the error of a table that is not valid: a sentence, the key that it is about, and what to do."""
-    stated = {"message": message, "place": key, "hint": hint}
-    return PydanticCustomError("invalid", "{message}", {name: text for name, text in stated.items() if text})
+def invalid(message: str, key: str = "", hint: str = "", use: tuple[str, Any] | None = None) -> PydanticCustomError:
+    """Return the error of a table that is not valid: a sentence, the key that it is about, and what to do.
+
+    ``use`` is a key of the table with a value that repairs it.
+    """
+    stated = {"message": message, "place": key, "hint": hint, "use": use}
+    return PydanticCustomError("invalid", "{message}", {name: one for name, one in stated.items() if one})
 
 
 class Table(BaseModel):

@@ -144,12 +144,15 @@ def targets(parts: Draft) -> Iterator[Fault]:
         if not isinstance(task, Reach):
             continue
         for index, target in enumerate(task.targets_mm):
-            for axis, place, room in zip("xyz", target, half, strict=True):
+            for axis, (place, room) in enumerate(zip(target, half, strict=True)):
                 if abs(place) + task.radius_mm > room:
+                    path = ("tasks", name, "targets_mm", index)
+                    most = math.floor(room - task.radius_mm)
                     yield Fault(
-                        ("tasks", name, "targets_mm", index),
-                        f"{axis} = {place:g} mm with radius {task.radius_mm:g} mm leaves the tank",
+                        path,
+                        f"{'xyz'[axis]} = {place:g} mm with radius {task.radius_mm:g} mm leaves the tank",
                         f"device.workspace_mm reaches to {room:g} mm on either side",
+                        use=((*path, axis), int(math.copysign(most, place))) if most >= 0 else None,
                     )
 
 
@@ -271,8 +274,9 @@ def counted_parts(parts: Draft) -> Iterator[Fault]:
         if part is None:
             continue
         if part not in {latest, latest + 1}:
-            expected = f"{latest} or {latest + 1}" if latest else "1"
-            yield Fault(("blocks", name, "part"), f"is {part}, must be {expected} at its place in sequence")
+            expected, path = f"{latest} or {latest + 1}" if latest else "1", ("blocks", name, "part")
+            message = f"is {part}, must be {expected} at its place in sequence"
+            yield Fault(path, message, use=(path, latest or 1))
         latest = max(latest, part)
 
 

@@ -6,16 +6,16 @@ These checks read the document itself, so that they also see the sound keys of t
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
 from study_app.protocol import formats
 from study_app.protocol.groups import SEQUENCES, sequences_in
 from study_app.protocol.questions import POINTS, Context, Question, Scale, ShowIf, Statement, question_of
-from study_app.protocol.source.document import Path, entries, names
-from study_app.protocol.source.problems import ALIKE, ONE_LANGUAGE, Fault, did_you_mean
+from study_app.protocol.source.document import Path, entries, names, value_at
+from study_app.protocol.source.problems import ALIKE, ONE_LANGUAGE, Fault, did_you_mean, unknown
 from study_app.protocol.wording.languages import LANGUAGES, language_name
 
 REFERENCES = {
@@ -81,19 +81,26 @@ WITHOUT_REPEATS = ("study.languages", "conditions.*.liquids", "blocks.*.conditio
 DECIDED_LISTS = ("primary", "names", "rising", "falling")
 
 Document = Mapping[str, Any]
+T = TypeVar("T")
 
 
 def _unknown(path: Path, name: Any, kind: str, known: Collection[str]) -> Iterator[Fault]:
     if isinstance(name, str) and name not in known:
-        yield Fault(path, f'there is no {kind} "{name}"', did_you_mean(name, known))
+        yield unknown(path, f'there is no {kind} "{name}"', name, known)
+
+
+def _twice(listed: Sequence[tuple[Path, Any]]) -> Iterator[Fault]:
+    for at, (path, name) in enumerate(listed):
+        if name in [earlier for _, earlier in listed[:at]]:
+            yield Fault(path, f'"{name}" is listed twice', "remove one")
 
 
 def references(document: Document) -> Iterator[Fault]:
     """Check that every name that stands for a table names one."""
     for pattern, section in REFERENCES.items():
-        known = names(document, section)
+        known, kind = names(document, section), "stimulus" if section == "stimuli" else section.removesuffix("s")
         for path, name in entries(document, pattern):
-            yield from _unknown(path, name, "stimulus" if section == "stimuli" else section.removesuffix("s"), known)
+            yield from _unknown(path, name, kind, known)
 
 
 def sequence(document: Document) -> Iterator[Fault]:
@@ -101,11 +108,11 @@ def sequence(document: Document) -> Iterator[Fault]:
 
     Blocks and forms come once in a sequence. `groups` checks that no block is left out of a study with groups.
     """
-    pages, blocks = names(document, "pages"), names(document, "blocks")
-    forms = names(document, "questionnaires")
+    pages, blocks, forms = (names(document, section) for section in ("pages", "blocks", "questionnaires"))
+    apart = "rename one: sequence could not tell them apart"
     for name in pages:
         if name in blocks:
-            yield Fault(("blocks", name), "a page has this name too", "rename one: sequence could not tell them apart")
+            yield Fault(("blocks", name), "a page has this name too", apart)
     if not document.keys() & {"sequence", "sequences", "groups"}:
         yield Fault(("sequence",), "is missing", "list the pages and blocks of a session in their order")
     breaks = [page for _, page in entries(document, "blocks.*.break_page")]
@@ -119,43 +126,37 @@ def sequence(document: Document) -> Iterator[Fault]:
                 yield Fault(path, f'block "{name}" comes twice', "give the block repetitions")
             elif name in forms and (name in pages or name in blocks) and name not in used:
                 other = "page" if name in pages else "block"
-                where = ("questionnaires", name)
-                yield Fault(where, f"a {other} has this name too", "rename one: sequence could not tell them apart")
+                yield Fault(("questionnaires", name), f"a {other} has this name too", apart)
             elif name in forms and name in seen:
                 yield Fault(path, f'form "{name}" comes twice', "give the second one a name of its own")
             seen.add(str(name))
         used |= seen
-    if not used:
-        return
-    for section, tables in (("pages", pages), ("blocks", () if "groups" in document else blocks)):
-        for name in tables:
-            if name not in used and not (section == "pages" and name in breaks):
-                yield Fault((section, name), "comes nowhere in sequence", "add it there, or take it out")
+    unused = [("pages", name) for name in pages if name not in breaks]
+    unused += [("blocks", name) for name in blocks if "groups" not in document]
+    for place in unused if used else ():
+        if place[1] not in used:
+            yield Fault(place, "comes nowhere in sequence", "add it there, or take it out")
 
 
 def repeats(document: Document) -> Iterator[Fault]:
     """Check that no list names a thing twice."""
     for pattern in WITHOUT_REPEATS:
         for path, listed in entries(document, pattern):
-            if isinstance(listed, tuple):
-                for index, entry in enumerate(listed):
-                    if entry in listed[:index]:
-                        yield Fault((*path, index), f'"{entry}" is listed twice', "remove one")
+            yield from _twice([((*path, *at), entry) for at, entry in entries(listed, "*")])
 
 
 def items(document: Document) -> Iterator[Fault]:
     """Check that an item's id is its own, and the same statement wherever two questionnaires share one."""
     statements: dict[str, Any] = {}
     seen: set[tuple[Any, str]] = set()
-    for path, item in entries(document, "questionnaires.*.items.*"):
-        name = item.get("id") if isinstance(item, Mapping) else None
+    for path, name in entries(document, "questionnaires.*.items.*.id"):
         if not isinstance(name, str):
             continue
+        text = value_at(document, (*path[:-1], "text"))
         if (path[1], name) in seen:
-            yield Fault((*path, "id"), f'a second item "{name}" in this questionnaire', "every item needs its own id")
-        elif statements.setdefault(name, item.get("text")) != item.get("text"):
-            message = f'item "{name}" has another text in another questionnaire'
-            yield Fault((*path, "id"), message, "give it another id")
+            yield Fault(path, f'a second item "{name}" in this questionnaire', "every item needs its own id")
+        elif statements.setdefault(name, text) != text:
+            yield Fault(path, f'item "{name}" has another text in another questionnaire', "give it another id")
         seen.add((path[1], name))
 
 
@@ -165,7 +166,7 @@ def alike(document: Document) -> Iterator[Fault]:
         for key in ("text", "short"):
             yield from _alike(list(entries(document, f"questionnaires.{name}.items.*.{key}")), "item")
     for path, labels in entries(document, "scales.*.labels.*"):
-        points = [((*path, index), label) for index, label in enumerate(labels if isinstance(labels, tuple) else ())]
+        points = [((*path, *at), label) for at, label in entries(labels, "*")]
         for _, off in entries(document, f"scales.{path[1]}.cannot_judge"):
             points.append(((*path[:2], "cannot_judge"), off.get(path[-1]) if isinstance(off, Mapping) else off))
         yield from _alike(points, "label")
@@ -191,30 +192,24 @@ def _alike(found: list[tuple[Path, Any]], kind: str) -> Iterator[Fault]:
 
 def languages(document: Document) -> Iterator[Fault]:
     """Check that every text exists in every language of the study and in no other."""
-    wanted = tuple(name for _, name in entries(document, "study.languages.*") if isinstance(name, str))
-    for path, name in entries(document, "study.languages.*"):
-        if isinstance(name, str) and name not in LANGUAGES:
-            hint = f"known: {', '.join(LANGUAGES)}"
-            yield Fault(path, f'the program has no words in "{name}"', hint)
-    if not wanted:
-        return
-    for pattern in TEXTS:
-        for path, text in entries(document, pattern):
-            yield from _translations(path, text, wanted)
-
-
-def _translations(path: Path, text: Any, wanted: tuple[str, ...]) -> Iterator[Fault]:
-    if isinstance(text, str) and len(wanted) > 1:
-        listed = ", ".join(f'{language} = "…"' for language in wanted)
-        yield Fault(path, ONE_LANGUAGE, f"write {{ {listed} }}")
-    elif isinstance(text, Mapping):
-        for language in wanted:
-            if language not in text:
-                hint = f"add {language}: every text exists in every language of the study"
-                yield Fault(path, f"is missing in {language_name(language)}", hint, missing_language=language)
-        for language in text:
-            if language not in wanted:
-                yield Fault((*path, language), "is not a language of the study", f"these are: {', '.join(wanted)}")
+    written = [(path, name) for path, name in entries(document, "study.languages.*") if isinstance(name, str)]
+    for path, name in written:
+        if name not in LANGUAGES:
+            yield Fault(path, f'the program has no words in "{name}"', f"known: {', '.join(LANGUAGES)}")
+    wanted = tuple(name for _, name in written)
+    texts = (found for pattern in TEXTS for found in entries(document, pattern)) if wanted else ()
+    for path, text in texts:
+        if isinstance(text, str) and len(wanted) > 1:
+            listed = ", ".join(f'{language} = "…"' for language in wanted)
+            yield Fault(path, ONE_LANGUAGE, f"write {{ {listed} }}")
+        elif isinstance(text, Mapping):
+            for language in wanted:
+                if language not in text:
+                    hint = f"add {language}: every text exists in every language of the study"
+                    yield Fault(path, f"is missing in {language_name(language)}", hint, missing_language=language)
+            for language in text:
+                if language not in wanted:
+                    yield Fault((*path, language), "is not a language of the study", f"these are: {', '.join(wanted)}")
 
 
 OWN = ("sequence", "sequences")
@@ -243,20 +238,15 @@ def decisions(document: Document) -> Iterator[Fault]:
     """Check that what is decided is about statements there are, each once, and that liquids are named by such items."""
     asked = (item for _, item in entries(document, "questionnaires.*.items.*") if isinstance(item, Mapping))
     items = {item["id"] for item in asked if isinstance(item.get("id"), str) and "kind" not in item}
-    for key in DECIDED_LISTS:
-        found = list(entries(document, f"analysis.{key}.*"))
+    decided = {key: list(entries(document, f"analysis.{key}.*")) for key in DECIDED_LISTS}
+    for found in (*decided.values(), list(entries(document, "analysis.noticed"))):
         for path, name in found:
             yield from _unknown(path, name, "item", items)
-        for place, (path, name) in enumerate(found):
-            if name in [earlier for _, earlier in found[:place]]:
-                yield Fault(path, f'"{name}" is listed twice', "remove one")
-    for path, name in entries(document, "analysis.noticed"):
-        yield from _unknown(path, name, "item", items)
-    falling = [name for _, name in entries(document, "analysis.falling.*")]
-    for path, name in entries(document, "analysis.rising.*"):
+        yield from _twice(found)
+    falling, named = ([name for _, name in decided[key]] for key in ("falling", "names"))
+    for path, name in decided["rising"]:
         if name in falling:
             yield Fault(path, f'"{name}" is expected to fall too', "an item rises, falls, or is in neither list")
-    named = [name for _, name in entries(document, "analysis.names.*")]
     for path, name in entries(document, "conditions.*.label"):
         if isinstance(name, str) and name not in named:
             yield Fault(path, f'"{name}" is not among analysis.names', "add it there, or leave the label out")
@@ -264,46 +254,47 @@ def decisions(document: Document) -> Iterator[Fault]:
 
 def questions(document: Document) -> Iterator[Fault]:
     """Check the items of every questionnaire: their scales, when they are shown, and what is computed of them."""
-    scales = {str(path[1]): scale for path, table in entries(document, "scales.*") if (scale := _scale(table))}
+    scales = {
+        str(path[1]): scale
+        for path, table in entries(document, "scales.*")
+        if (scale := _sound(Scale.model_validate, table)) is not None
+    }
+    second = formats.is_second(document)  # format 1 has one length of scales, checked before
     for name, scale in scales.items():
-        if formats.is_second(document) and len(counts := {len(labels) for labels in scale.labels.values()}) > 1:
+        if second and len(counts := {len(labels) for labels in scale.labels.values()}) > 1:
             listed = " and ".join(map(str, sorted(counts)))
             yield Fault(("scales", name, "labels"), f"has {listed} points", "every language has the same points")
-    languages = [name for _, name in entries(document, "study.languages.*") if isinstance(name, str)]
+    language = next((name for _, name in entries(document, "study.languages.*") if isinstance(name, str)), "en")
     for path, table in entries(document, "questionnaires.*"):
-        if isinstance(table, Mapping):
-            items = [(place, _question(item)) for place, item in entries(table, "items.*")]
-            context = Context(scales, table.get("scale"), languages[0] if languages else "en")
-            sound = [((*path, *place), item) for place, item in items if item is not None]
-            rated = scales if formats.is_second(document) else {}  # format 1 has one length, checked before
-            yield from _statements(path, table, [item for _, item in sound], rated)
-            yield from _show_ifs(table, sound, context)
-            yield from _scores(path, table, [item for _, item in sound])
+        if not isinstance(table, Mapping):
+            continue
+        read = (((*path, *at), _sound(question_of, item)) for at, item in entries(table, "items.*"))
+        sound = [(place, item) for place, item in read if item is not None]
+        items = [item for _, item in sound]
+        if any(isinstance(item, Statement) for item in items):
+            if "scale" not in table:
+                message = "statements are rated on it; other items have a kind"
+                yield Fault((*path, "scale"), "is missing", message)
+            elif second and (scale := scales.get(str(table["scale"]))) is not None and scale.points != POINTS:
+                message = f"has {scale.points} points, and statements need {POINTS}"
+                hint = f'write kind = "rating" and scale = "{table["scale"]}" in the items'
+                yield Fault((*path, "scale"), message, hint)
+        yield from _show_ifs(table, sound, Context(scales, table.get("scale"), language))
+        numbers = [item.id for item in items if item.value_type != "text"]
+        choices = [item.id for item in items if item.value_type == "text"]
+        for key, answered, known in (("items", "a number", numbers), ("weights_from", "a choice", choices)):
+            for place, name in entries(table, f"scores.*.{key}.*"):
+                if isinstance(name, str) and name not in known:
+                    message = f'there is no item "{name}" that is answered with {answered}'
+                    yield unknown((*path, *place), message, name, known)
 
 
-def _scale(table: Any) -> Scale | None:
+def _sound(read: Callable[[Any], T], table: Any) -> T | None:
+    """Return a scale or a question that is sound by itself."""
     try:
-        return Scale.model_validate(table)
-    except ValidationError:
-        return None
-
-
-def _question(table: Any) -> Question | None:
-    """Return a question that is sound by itself."""
-    try:
-        return question_of(table) if isinstance(table, Mapping) else None
+        return read(table) if isinstance(table, Mapping) else None
     except (KeyError, ValidationError):
         return None
-
-
-def _statements(path: Path, table: Document, items: Sequence[Question], scales: Mapping[str, Scale]) -> Iterator[Fault]:
-    if not any(isinstance(item, Statement) for item in items):
-        return
-    if "scale" not in table:
-        yield Fault((*path, "scale"), "is missing", "statements are rated on it; other items have a kind")
-    elif (scale := scales.get(str(table["scale"]))) is not None and scale.points != POINTS:
-        message = f"has {scale.points} points, and statements need {POINTS}"
-        yield Fault((*path, "scale"), message, f'write kind = "rating" and scale = "{table["scale"]}" in the items')
 
 
 def _show_ifs(table: Document, items: Sequence[tuple[Path, Question]], context: Context) -> Iterator[Fault]:
@@ -338,16 +329,3 @@ def _answers(place: Path, asked: ShowIf, earlier: Question, context: Context) ->
             yield Fault(place, f'"{value}" is not one of its answers', "give a number")
     if not asked.permitted and earlier.value_type == "text":
         yield Fault(place, f'the answer to "{asked.item}" is not a number', 'write is = "…"')
-
-
-def _scores(path: Path, table: Document, items: Sequence[Question]) -> Iterator[Fault]:
-    """Check that scores are computed of items there are, whose answers are numbers."""
-    numbers = [item.id for item in items if item.value_type != "text"]
-    choices = [item.id for item in items if item.value_type == "text"]
-    for key, known in (("items", numbers), ("weights_from", choices)):
-        for place, name in entries(table, f"scores.*.{key}.*"):
-            if isinstance(name, str) and name not in known:
-                message = (
-                    f'there is no item "{name}" that is answered with {"a number" if key == "items" else "a choice"}'
-                )
-                yield Fault((*path, *place), message, did_you_mean(name, known))

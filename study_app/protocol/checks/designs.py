@@ -16,7 +16,7 @@ from study_app.protocol.model import Protocol, Published
 from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.quantities import can_vary
 from study_app.protocol.source.document import Path, entries, names
-from study_app.protocol.source.problems import Fault, did_you_mean
+from study_app.protocol.source.problems import Fault, unknown
 from study_app.protocol.table import Table
 from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
 from study_app.protocol.trials.methods import KINDS as METHOD_KINDS
@@ -51,7 +51,7 @@ def kinds(document: Mapping[str, Any]) -> Iterator[Fault]:
             if not isinstance(name, str) or name in tables:
                 continue
             if name not in known:
-                yield Fault(path, f'there is no {key} "{name}"', did_you_mean(name, {*tables, *known}))
+                yield unknown(path, f'there is no {key} "{name}"', name, {*tables, *known})
             elif needed := [of for of, field in known[name].model_fields.items() if field.is_required()]:
                 example = f'write [{section}.NAME] with kind = "{name}" and {", ".join(needed)}, and {key} = "NAME"'
                 yield Fault(path, f'the kind "{name}" has no default for {", ".join(needed)}', example)
@@ -123,8 +123,8 @@ def _published(protocol: Protocol, one: Published, place: Path) -> Iterator[Faul
     """Check that a published value belongs to a block of levels, and its standard to the block."""
     of_levels = [block.id for block in protocol.blocks.values() if block.stimulus is not None]
     if one.block not in of_levels:
-        known = did_you_mean(one.block, set(of_levels)) if of_levels else "omit it"
-        yield Fault((*place, "block"), f'there is no block of levels "{one.block}"', known)
+        fault = unknown((*place, "block"), f'there is no block of levels "{one.block}"', one.block, of_levels)
+        yield fault if of_levels else fault._replace(hint="omit it")
         return
     standards = [standard for standard in standards_of(protocol, protocol.blocks[one.block]) if standard is not None]
     if one.standard is not None and one.standard not in standards:
@@ -158,7 +158,7 @@ def _varied(protocol: Protocol, name: str, stimulus: Stimulus) -> Iterator[Fault
         except StudyError:
             known = {*OF_CONDITION, *filter(can_vary, number_names(protocol.scene_for(condition)))}
             message = f'there is no number "{stimulus.vary}" in condition "{condition}"'
-            yield Fault((*place, "vary"), message, did_you_mean(stimulus.vary, known))
+            yield unknown((*place, "vary"), message, stimulus.vary, known, cutoff=0.6)
         else:
             if not can_vary(stimulus.vary):
                 message = f"{stimulus.vary} does not belong to a liquid: it holds for the whole session"

@@ -24,7 +24,8 @@ ALIKE: Final = "reads as an earlier"
 class Fault(NamedTuple):
     """A problem before its line is known; indices in ``path`` count from 0.
 
-    ``missing_language`` is the code of the language that a text lacks, "" where another thing is wrong.
+    ``missing_language`` is the code of the language that a text lacks, "" where another thing is wrong. ``use`` is a
+    place and the value that may repair the fault there, for an unknown key the key that was meant.
     """
 
     path: Path
@@ -32,6 +33,7 @@ class Fault(NamedTuple):
     hint: str = ""
     counts_entries: bool = False
     missing_language: str = ""
+    use: tuple[Path, Any] | None = None
 
     @property
     def in_one_language(self) -> bool:
@@ -80,6 +82,11 @@ _BOUNDS = {
     "less_than": ("lt", "less than"),
     "less_than_equal": ("le", "at most"),
 }
+_LENGTHS = {
+    "too_short": "has {actual_length} entries, needs at least {min_length}",
+    "too_long": "has {actual_length} entries, more than {max_length}",
+    "string_too_long": "{shown} is longer than {max_length} characters",
+}
 
 
 def shown(value: Any) -> str:
@@ -107,10 +114,17 @@ def did_you_mean(word: str, permitted: Iterable[str]) -> str:
     return f"known: {', '.join(words)}" if words else ""
 
 
-def _near(word: str, permitted: str) -> str:
-    """Return "did you mean …?" for the nearest of some quoted words, "" if none is near."""
-    near = difflib.get_close_matches(word, re.findall('"([^"]*)"', permitted), n=1)
-    return f'did you mean "{near[0]}"?' if near else ""
+def unknown(path: Path, message: str, word: str, permitted: Iterable[str], cutoff: float = 0.0) -> Fault:
+    """Return the fault of a word that names nothing: with the nearest permitted one, or the list of them."""
+    words = sorted(permitted)
+    nearest = difflib.get_close_matches(word, words, n=1, cutoff=cutoff)
+    return Fault(path, message, did_you_mean(word, words), use=(path, nearest[0]) if nearest else None)
+
+
+def _quoted(path: Path, value: Any, message: str, permitted: str) -> Fault:
+    """Return the fault of a value that is none of some quoted words: with the one that is near."""
+    near = difflib.get_close_matches(str(value), re.findall('"([^"]*)"', permitted), n=1)
+    return Fault(path, message, f'did you mean "{near[0]}"?', use=(path, near[0])) if near else Fault(path, message)
 
 
 def faults_of(error: ValidationError, document: Mapping[str, Any], schema: Schema) -> list[Fault]:
@@ -134,39 +148,35 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
         return Fault(path, f"entry {last + 1} is missing" if isinstance(last, int) else "is missing")
     if kind == "extra_forbidden":
         permitted = {key for node in _nodes_at(document, path[:-1], schema) for key in node.get("properties", {})}
-        return Fault(path, "unknown key", did_you_mean(str(path[-1]), permitted))
+        hint = did_you_mean(str(path[-1]), permitted)
+        meant = difflib.get_close_matches(str(path[-1]), sorted(permitted), n=1)
+        return Fault(path, "unknown key", hint, use=(path, meant[0]) if meant else None)
     if kind == "union_tag_not_found":
         return Fault((*path, _tag_key(context)), "is missing", f"one of {context.get('expected_tags', '')}".strip())
     if kind == "union_tag_invalid":
         tag, tags = context["tag"], str(context["expected_tags"]).replace("'", '"')
-        return Fault((*path, _tag_key(context)), f'"{tag}" is not one of {tags}', _near(str(tag), tags))
+        return _quoted((*path, _tag_key(context)), tag, f'"{tag}" is not one of {tags}', tags)
     if kind == "question_kind":
         tag = str(value["kind"])
-        return Fault(path, f"{shown(tag)} {details['msg']}", did_you_mean(tag, context["permitted"].split(", ")))
-    sentence, hint = _sentence(kind, value, context, details["msg"])
-    if kind in _BOUNDS:
-        hint = next((node[REASON] for node in _nodes_at(document, path, schema) if REASON in node), "")
-    return Fault(path, sentence, context.get("hint", hint), counts_entries=kind == "too_short")
-
-
-def _sentence(kind: str, value: Any, context: Mapping[str, Any], message: str) -> tuple[str, str]:
-    if kind in _KINDS:
-        return f"must be {_KINDS[kind]}, not {shown(value)}", ""
-    if kind in _BOUNDS:
-        key, words = _BOUNDS[kind]
-        return f"is {shown(value)}, must be {words} {shown(context[key])}", ""
+        return unknown(path, f"{shown(tag)} {details['msg']}", tag, context["permitted"].split(", "))
     if kind == "literal_error":
-        permitted = str(context["expected"]).replace("'", '"')
-        return f"{shown(value)} is not {permitted}", _near(str(value), permitted)
+        words = str(context["expected"]).replace("'", '"')
+        return _quoted(path, value, f"{shown(value)} is not {words}", words)
+    if kind in _BOUNDS:
+        (key, words), hints = _BOUNDS[kind], (node.get(REASON, "") for node in _nodes_at(document, path, schema))
+        bound = int(context[key]) if float(context[key]).is_integer() else context[key]
+        sentence = f"is {shown(value)}, must be {words} {shown(bound)}"
+        return Fault(path, sentence, next(filter(None, hints), ""), use=(path, bound) if key in {"ge", "le"} else None)
+    if kind in _KINDS:
+        return Fault(path, f"must be {_KINDS[kind]}, not {shown(value)}")
     if kind == "string_pattern_mismatch":
-        return f"{shown(value)} is not permitted: {rule_of(str(context['pattern']))}", ""
-    if kind == "too_short":
-        return f"has {context['actual_length']} entries, needs at least {context['min_length']}", ""
-    if kind == "too_long":
-        return f"has {context['actual_length']} entries, more than {context['max_length']}", ""
-    if kind == "string_too_long":
-        return f"{shown(value)} is longer than {context['max_length']} characters", ""
-    return message.removeprefix("Value error, "), ""
+        return Fault(path, f"{shown(value)} is not permitted: {rule_of(str(context['pattern']))}")
+    if kind in _LENGTHS:
+        about = {**context, "shown": shown(value)}
+        return Fault(path, _LENGTHS[kind].format(**about), counts_entries=kind == "too_short")
+    use = context.get("use")
+    sentence = details["msg"].removeprefix("Value error, ")
+    return Fault(path, sentence, context.get("hint", ""), use=(((*path[:-1], use[0]), use[1]) if use else None))
 
 
 def _tag_key(context: Mapping[str, Any]) -> str:
