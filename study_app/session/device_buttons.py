@@ -26,20 +26,14 @@ class DeviceButtons:
     def events(
         self, samples: Any, since_ns: int, now_s: float, where: Callable[[], tuple[SessionState, bool]]
     ) -> Iterator[Event]:
-        """Yield what buttons that went down mean; a press from before the present page is no answer to it.
+        """Yield what buttons that went down in ``samples`` (n,) of telemetry mean.
 
-        Parameters
-        ----------
-        samples : (n,) array
-            The newest samples of telemetry, with named fields, at least one.
-        since_ns : int
-            When the page was presented [ns].
-        now_s : float
-            Now, on the session's clock [s].
-        where : callable
-            Returns the session's state, after each event that was yielded, and whether an interval can be adjusted.
+        A press from before the present page, presented at ``since_ns``, is no answer to it. ``where`` returns the
+        session's state after each event that was yielded, and whether an interval can be adjusted.
         """
-        pressed = self._pressed(samples)
+        down = np.concatenate(([self._down], samples["buttons"]))
+        self._down = int(down[-1])
+        pressed = down[1:] & ~down[:-1]  # which went down at each sample, as bits
         if (pressed & BUTTON_STOP).any():
             yield ForceStopped(now_s, "device")
         pressed = pressed[samples["time_ns"] >= since_ns]
@@ -56,12 +50,6 @@ class DeviceButtons:
         if continues and state.phase is Phase.READING and state.plan.protocol.pages[state.page_id].kind != "consent":
             yield Continue(now_s)
         yield from _answers(where()[0], pressed, now_s)
-
-    def _pressed(self, samples: Any) -> Any:
-        """Return which buttons went down at each of the newest samples (n,), as bits."""
-        down = np.concatenate(([self._down], samples["buttons"]))
-        self._down = int(down[-1])
-        return down[1:] & ~down[:-1]
 
     def _steps(self, pressed: Any, now_ns: int) -> int:
         """Return the steps that are due: one of each press, and of a button that stays down one every `STEP_S`."""

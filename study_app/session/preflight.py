@@ -137,24 +137,7 @@ class Check:
 
 def checks(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
     """Return what is to be said of ``facts``, for a session of ``protocol``."""
-    found = [
-        _device(facts),
-        _loop_delay(facts, protocol),
-        _rate(facts, protocol),
-        _lateness(facts, protocol),
-        _priority(facts),
-    ]
-    found += _levels(facts, protocol)
-    found += [
-        _delay(facts, protocol),
-        _screen(facts),
-        _folder(facts),
-        _space(facts, protocol),
-        _blinding(facts, protocol),
-        *_video(facts),
-    ]
-    found += _outlets(facts)
-    return (*found, *_cost(facts, protocol), *_velocity(facts), *_withheld(facts, protocol), *_balance(facts, protocol))
+    return tuple(check for of in (_servo, _levels, _surroundings, _outlets, _costs) for check in of(facts, protocol))
 
 
 def refused(found: Iterable[Check]) -> str:
@@ -162,133 +145,110 @@ def refused(found: Iterable[Check]) -> str:
     return "; ".join(f"{check.name.lower()}: {check.advice}" for check in found if check.verdict == "failure")
 
 
-def _device(facts: Facts) -> Check:
+def _warned(name: str, value: str, about: str, advice: str, *, well: bool, share: float | None = None) -> Check:
+    """Return a check that is a warning, with its advice, unless all is well."""
+    return Check(name, "ok" if well else "warning", value, about, "" if well else advice, share)
+
+
+def _servo(facts: Facts, protocol: Protocol) -> Iterator[Check]:
+    """Say how the device responds, how late its force acts, and how the servo keeps its rate."""
     share = f"{100 * facts.fresh_share:.0f} %"
     about = f"{facts.device}, a new sample on {share} of ticks"
     if facts.timing.ticks == 0 or facts.fresh_share < LEAST_FRESH:
         advice = f"{facts.device} sends a new sample on only {share} of ticks: check its cable and power"
-        return Check("Device", "failure", "not responding", about, advice)
-    return Check("Device", "ok", "responding", about)
+        yield Check("Device", "failure", "not responding", about, advice)
+    else:
+        yield Check("Device", "ok", "responding", about)
+
+    about, asked = "assumed: the device does not measure its delay", protocol.device.rate_hz
+    if facts.dynamics.delay_s is not None:
+        about = f"delay until a force acts: {1e3 * facts.dynamics.delay_s:.2f} ms, measured by the device"
+        if facts.delay_ticks > facts.dynamics.delay_ticks(asked):
+            about += " when it was opened; it measured more since"
+    well = facts.dynamics.delay_s is None or facts.delay_ticks <= BELIEVED_TICKS
+    advice = "Forces are limited more strictly: connect the device without a hub."
+    yield _warned("Loop delay", counted(facts.delay_ticks, "tick"), about, advice, well=well)
+
+    value, about = f"{facts.timing.rate_hz:.1f} Hz", f"requested: {asked:g} Hz"
+    error = abs(facts.timing.rate_hz / asked - 1)
+    refusal = refuses(asked) or (f"{value}, {about}: close other programs" if error > RATE_FAILURE else None)
+    if refusal is not None:
+        yield Check("Servo rate", "failure", value, about, refusal)
+    else:
+        yield _warned("Servo rate", value, about, "Close other programs.", well=error <= RATE_WARNING)
+
+    limits = protocol.limits
+    late_ms, gap_ms = facts.timing.lateness_p99_s * 1e3, facts.timing.worst_gap_s * 1e3
+    worst = max(late_ms / limits.lateness_ms, gap_ms / limits.worst_gap_ms)
+    about = (
+        f"99 % of ticks, limit {limits.lateness_ms:g} ms; worst gap {gap_ms:.1f} of {limits.worst_gap_ms:g} ms, "
+        f"{facts.timing.overruns} overruns"
+    )
+    advice = "Trials would be invalid: close other programs."
+    yield _warned("Servo lateness", f"{late_ms:.2f} ms", about, advice, well=worst <= 1, share=worst)
+
+    grant = facts.grant  # others make an ordinary thread late
+    memory = {None: "", True: ", memory locked", False: ", memory not locked"}[grant.locked]
+    advice = "; ".join(f"{it[0].upper()}{it[1:]}" for it in grant.advice)
+    verdict: Verdict = "ok" if grant.level in {"real-time", "none"} else "warning"
+    yield Check("Priority", verdict, grant.level, f"{grant.how}{memory}", f"{advice}." if advice else "")
 
 
-def _loop_delay(facts: Facts, protocol: Protocol) -> Check:
-    """Say how late a force acts, which the force's limits follow."""
-    value = _ticks(facts.delay_ticks)
-    if facts.dynamics.delay_s is None:
-        return Check("Loop delay", "ok", value, "assumed: the device does not measure its delay")
-    about = f"delay until a force acts: {1e3 * facts.dynamics.delay_s:.2f} ms, measured by the device"
-    if facts.delay_ticks > facts.dynamics.delay_ticks(protocol.device.rate_hz):
-        about += " when it was opened; it measured more since"
-    if facts.delay_ticks > BELIEVED_TICKS:
-        return Check(
-            "Loop delay", "warning", value, about, "Forces are limited more strictly: connect the device without a hub."
-        )
-    return Check("Loop delay", "ok", value, about)
-
-
-def _levels(facts: Facts, protocol: Protocol) -> list[Check]:
+def _levels(facts: Facts, protocol: Protocol) -> Iterator[Check]:
     """Say whether every level can be delivered with the device's delay: the highest one, of blocks with a damper."""
     blocks = [block for block in protocol.blocks_in_order if block.stimulus is not None]
     highest_nspm = max((highest_damping(protocol, block) for block in blocks), default=0.0)
     if highest_nspm == 0:
-        return []
-    value, about = f"up to {highest_nspm:g} N·s/m", f"with a delay of {_ticks(facts.delay_ticks)}"
-    for alike in by_stimulus(protocol):
-        if (beyond := beyond_slope_limit(protocol, alike, facts.delay_ticks)) is not None:
-            return [Check("Levels", "failure", value, about, f"{beyond.message}: {beyond.hint}")]
-    return [Check("Levels", "ok", value, about)]
+        return
+    value, about = f"up to {highest_nspm:g} N·s/m", f"with a delay of {counted(facts.delay_ticks, 'tick')}"
+    found = (beyond_slope_limit(protocol, alike, facts.delay_ticks) for alike in by_stimulus(protocol))
+    beyond = next(filter(None, found), None)
+    advice = "" if beyond is None else f"{beyond.message}: {beyond.hint}"
+    yield Check("Levels", "ok" if beyond is None else "failure", value, about, advice)
 
 
-def _ticks(count: int) -> str:
-    return counted(count, "tick")
+def _surroundings(facts: Facts, protocol: Protocol) -> Iterator[Check]:
+    """Say what of screen, disk, key and videos would make trials invalid, or refuses the session."""
+    limit_ms, screen = protocol.limits.delay_error_ms, facts.screen
+    seen_ms = (facts.sample_age_s + 1 / max(screen.refresh_hz, 1.0)) * 1e3  # the age of a sample, and a frame
+    about, advice = f"beyond the requested delay, limit {limit_ms:g} ms", "use a screen with a higher refresh rate."
+    share = seen_ms / limit_ms
+    advice = f"Trials would be invalid: {advice}"
+    yield _warned("Visual delay", f"up to {seen_ms:.1f} ms", about, advice, well=seen_ms <= limit_ms, share=share)
 
-
-def _rate(facts: Facts, protocol: Protocol) -> Check:
-    asked, achieved = protocol.device.rate_hz, facts.timing.rate_hz
-    value, about = f"{achieved:.1f} Hz", f"requested: {asked:g} Hz"
-    unfelt = refuses(asked)
-    if unfelt is not None:
-        return Check("Servo rate", "failure", value, about, unfelt)
-    error = abs(achieved / asked - 1)
-    if error > RATE_FAILURE:
-        return Check("Servo rate", "failure", value, about, f"{value}, {about}: close other programs")
-    if error > RATE_WARNING:
-        return Check("Servo rate", "warning", value, about, "Close other programs.")
-    return Check("Servo rate", "ok", value, about)
-
-
-def _lateness(facts: Facts, protocol: Protocol) -> Check:
-    limits, timed = protocol.limits, facts.timing
-    late_ms, gap_ms = timed.lateness_p99_s * 1e3, timed.worst_gap_s * 1e3
-    share = max(late_ms / limits.lateness_ms, gap_ms / limits.worst_gap_ms)
-    about = (
-        f"99 % of ticks, limit {limits.lateness_ms:g} ms; worst gap {gap_ms:.1f} of {limits.worst_gap_ms:g} ms, "
-        f"{timed.overruns} overruns"
-    )
-    advice = "" if share <= 1 else "Trials would be invalid: close other programs."
-    verdict: Verdict = "ok" if share <= 1 else "warning"
-    return Check("Servo lateness", verdict, f"{late_ms:.2f} ms", about, advice, share)
-
-
-def _priority(facts: Facts) -> Check:
-    """Say what the servo's thread was granted, and how to be granted more: others make an ordinary thread late."""
-    grant = facts.grant
-    memory = {None: "", True: ", memory locked", False: ", memory not locked"}[grant.locked]
-    advice = "; ".join(f"{it[0].upper()}{it[1:]}" for it in grant.advice)
-    verdict: Verdict = "ok" if grant.level in {"real-time", "none"} else "warning"
-    return Check("Priority", verdict, grant.level, f"{grant.how}{memory}", f"{advice}." if advice else "")
-
-
-def _delay(facts: Facts, protocol: Protocol) -> Check:
-    """Judge the least delay that can be seen: the age of a sample, and a frame until it is on the screen."""
-    limit_ms = protocol.limits.delay_error_ms
-    seen_ms = (facts.sample_age_s + 1 / max(facts.screen.refresh_hz, 1.0)) * 1e3
-    within = seen_ms <= limit_ms
-    advice = "" if within else "Trials would be invalid: use a screen with a higher refresh rate."
-    about = f"beyond the requested delay, limit {limit_ms:g} ms"
-    verdict: Verdict = "ok" if within else "warning"
-    return Check("Visual delay", verdict, f"up to {seen_ms:.1f} ms", about, advice, seen_ms / limit_ms)
-
-
-def _screen(facts: Facts) -> Check:
-    screen = facts.screen
+    value, about = f"{screen.refresh_hz:.1f} Hz, {100 * screen.scaling:.0f} %", "refresh rate and scaling of the "
+    advice = "Set the participant's screen to 100 % scaling and at least 50 Hz."
     well = screen.refresh_hz >= LEAST_REFRESH_HZ and screen.scaling == 1
-    advice = "" if well else "Set the participant's screen to 100 % scaling and at least 50 Hz."
-    value = f"{screen.refresh_hz:.1f} Hz, {100 * screen.scaling:.0f} %"
-    return Check(
-        "Screen", "ok" if well else "warning", value, ("refresh rate and scaling of the participant's screen"), advice
-    )
+    yield _warned("Screen", value, f"{about}participant's screen", advice, well=well)
 
-
-def _folder(facts: Facts) -> Check:
     if facts.probe_s is None:
-        return Check("Results folder", "failure", "not usable", "no file could be written", facts.probe_fault)
-    slow = facts.probe_s > SLOW_PROBE_S
-    value, about = f"{facts.probe_s * 1e3:.1f} ms", "time to write a file"
-    return Check("Results folder", "warning" if slow else "ok", value, about, "Use a local disk." if slow else "")
+        yield Check("Results folder", "failure", "not usable", "no file could be written", facts.probe_fault)
+    else:
+        value, well = f"{facts.probe_s * 1e3:.1f} ms", facts.probe_s <= SLOW_PROBE_S
+        yield _warned("Results folder", value, "time to write a file", "Use a local disk.", well=well)
 
-
-def _space(facts: Facts, protocol: Protocol) -> Check:
     recorded = RECORDED_BYTES_PER_S * expected_duration_s(protocol) if facts.recordings else 0.0
     needed = SPARE * (TABLES_BYTES + recorded)
     about = f"a session needs about {_megabytes(needed)} MB"
     if facts.free_bytes is None:
-        return Check("Free space", "warning", "not known", about, "The system does not report the free space.")
-    value = f"{_megabytes(facts.free_bytes)} MB free"
-    if facts.free_bytes < needed:
-        return Check("Free space", "failure", value, about, f"{value}, {about}: free disk space")
-    return Check("Free space", "ok", value, about)
+        yield Check("Free space", "warning", "not known", about, "The system does not report the free space.")
+    else:
+        value, well = f"{_megabytes(facts.free_bytes)} MB free", facts.free_bytes >= needed
+        advice = "" if well else f"{value}, {about}: free disk space"
+        yield Check("Free space", "ok" if well else "failure", value, about, advice)
+
+    about = "the key is drawn and sealed when the first session begins"
+    if facts.key_hash is not None:
+        about = f"the key is sealed; its hash begins with {facts.key_hash[:8]}"
+    yield Check("Blinding", "ok", f"{protocol.study.blinding}-blind", about)
+
+    if facts.video is not None:  # nothing tells which condition shows one
+        fault = facts.video.fault
+        value = "not usable" if fault else "ready"
+        yield Check("Video", "failure" if fault else "ok", value, facts.video.about, fault)
 
 
-def _blinding(facts: Facts, protocol: Protocol) -> Check:
-    """Say whether the study's key is sealed already; a study without a hidden condition has none."""
-    blind = f"{protocol.study.blinding}-blind"
-    if facts.key_hash is None:
-        return Check("Blinding", "ok", blind, "the key is drawn and sealed when the first session begins")
-    return Check("Blinding", "ok", blind, f"the key is sealed; its hash begins with {facts.key_hash[:8]}")
-
-
-def _outlets(facts: Facts) -> Iterator[Check]:
+def _outlets(facts: Facts, _protocol: Protocol) -> Iterator[Check]:
     """Say of each outlet who listens, why it does not work, or why a double-blind study has none."""
     for one in facts.outlets:
         if one.withheld:
@@ -307,64 +267,41 @@ def _outlets(facts: Facts) -> Iterator[Check]:
             yield Check(one.title, "ok", "ready" if one.listens is None else "listener", about)
 
 
-def _video(facts: Facts) -> tuple[Check, ...]:
-    """Say whether the study's videos can be shown; nothing that tells which condition shows one."""
-    if facts.video is None:
-        return ()
-    if facts.video.fault:
-        return (Check("Video", "failure", "not usable", facts.video.about, facts.video.fault),)
-    return (Check("Video", "ok", "ready", facts.video.about),)
+def _costs(facts: Facts, protocol: Protocol) -> Iterator[Check]:
+    """Say what the scenes cost, what is not known of the device, what is withheld, and the row of a square."""
+    if facts.tick_s is not None:
+        share = facts.tick_s * protocol.device.rate_hz
+        value, about = (
+            f"{facts.tick_s * 1e9:.0f} ns per tick",
+            f"most expensive scene: {100 * share:.2g} % of each tick",
+        )
+        advice, well = "Remove an effect from the scene.", share <= MOST_OF_A_TICK
+        yield _warned("Cost of the scenes", value, about, advice, well=well, share=share)
 
+    if facts.velocity_errors and facts.dynamics.unknown and descriptor_of(facts.device).kind == "felt":
+        now, known = (100 * error for error in facts.velocity_errors)
+        missing = [_UNKNOWN[name] for name in facts.dynamics.unknown]
+        listed = " and ".join(filter(None, (", ".join(missing[:-1]), missing[-1])))
+        well = now <= SAME * known
+        why = f"{'although' if well else 'because'} the device's {listed} {'are' if len(missing) > 1 else 'is'} unknown"
+        value = f"{now:.2g} %" if well else f"{now:.2g} % instead of {known:.2g} %"
+        advice = f"Measure the device: liquid-study devices bench {facts.device}."
+        yield _warned("Velocity", value, f"error at 2 Hz, {why}", advice, well=well)
 
-def _cost(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
-    """Return how much of a tick the most expensive scene takes, if it was measured."""
-    if facts.tick_s is None:
-        return ()
-    share = facts.tick_s * protocol.device.rate_hz
-    value, about = f"{facts.tick_s * 1e9:.0f} ns per tick", f"most expensive scene: {100 * share:.2g} % of each tick"
-    if share > MOST_OF_A_TICK:
-        return (Check("Cost of the scenes", "warning", value, about, "Remove an effect from the scene.", share),)
-    return (Check("Cost of the scenes", "ok", value, about, share=share),)
+    if facts.withheld:
+        limit_percent, most_percent = protocol.limits.withheld_percent, 100 * max(facts.withheld.values())
+        about = f"in the fastest stroke of a task, limit {limit_percent:g} %"
+        if protocol.study.blinding == "single":  # the operator may know liquids
+            about += ": " + ", ".join(f"{name} {100 * of:.1f} %" for name, of in sorted(facts.withheld.items()))
+        share, value = most_percent / limit_percent, f"at most {most_percent:.1f} %"
+        advice = "Trials with such strokes would be invalid."
+        yield _warned("Force withheld", value, about, advice, well=most_percent <= limit_percent, share=share)
 
-
-def _velocity(facts: Facts) -> tuple[Check, ...]:
-    """Say what is not known of a device that gives force, and what that costs."""
-    if facts.velocity_errors is None or not facts.dynamics.unknown or descriptor_of(facts.device).kind != "felt":
-        return ()
-    now, known = (100 * error for error in facts.velocity_errors)
-    missing = [_UNKNOWN[name] for name in facts.dynamics.unknown]
-    listed = " and ".join(filter(None, (", ".join(missing[:-1]), missing[-1])))
-    about = f"error at 2 Hz, because the device's {listed} {'are' if len(missing) > 1 else 'is'} unknown"
-    if now <= SAME * known:
-        return (Check("Velocity", "ok", f"{now:.2g} %", about.replace("because", "although")),)
-    advice = f"Measure the device: liquid-study devices bench {facts.device}."
-    return (Check("Velocity", "warning", f"{now:.2g} % instead of {known:.2g} %", about, advice),)
-
-
-def _withheld(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
-    """Say what share of the force will be withheld, by liquid only where the operator may know liquids."""
-    if not facts.withheld:
-        return ()
-    limit_percent, most_percent = protocol.limits.withheld_percent, 100 * max(facts.withheld.values())
-    about = f"in the fastest stroke of a task, limit {limit_percent:g} %"
-    if protocol.study.blinding == "single":
-        about += ": " + ", ".join(f"{name} {100 * of:.1f} %" for name, of in sorted(facts.withheld.items()))
-    within = most_percent <= limit_percent
-    share = most_percent / limit_percent
-    advice = "" if within else "Trials with such strokes would be invalid."
-    verdict: Verdict = "ok" if within else "warning"
-    return (Check("Force withheld", verdict, f"at most {most_percent:.1f} %", about, advice, share),)
-
-
-def _balance(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
-    """Say which row of a square the participant takes, where the protocol assigns rows."""
-    if not protocol.assigns_rows:
-        return ()
-    number = enrolment(facts.participant)
-    if number is None:
+    if protocol.assigns_rows and (number := enrolment(facts.participant)) is not None:
+        yield Check("Balance", "ok", f"participant number {number}", "determines the row of the square")
+    elif protocol.assigns_rows:
         advice = f"{facts.participant} has no number, so its row is drawn at random; use ids such as P007."
-        return (Check("Balance", "warning", "drawn", "the row of the square", advice),)
-    return (Check("Balance", "ok", f"participant number {number}", "determines the row of the square"),)
+        yield Check("Balance", "warning", "drawn", "the row of the square", advice)
 
 
 def _megabytes(count: float) -> str:

@@ -53,7 +53,13 @@ def measure(
         if newest is not None:
             ages_s.append((servo.now_ns() - int(newest["time_ns"])) * 1e-9)
     samples = reader.read()
-    probe_s, free_bytes, fault = _probe(results)
+    probe_s: float | None = None
+    free_bytes, fault, began = None, "", time.perf_counter()
+    try:
+        free_bytes = probe(results)
+        probe_s = time.perf_counter() - began
+    except StoreError as error:
+        fault = str(error)
     return Facts(
         device=device,
         fresh_share=float((samples["fresh"] != 0).mean()) if len(samples) else 0.0,
@@ -71,13 +77,3 @@ def measure(
         key_hash=sealed_hash(results),
         lateness_ns=np.asarray(samples["lateness_ns"], np.int64),
     )
-
-
-def _probe(results: Path) -> tuple[float | None, int | None, str]:
-    """Return how long the disk took for a small file [s] and how much room it has [bytes], or what is wrong with it."""
-    began = time.perf_counter()
-    try:
-        free_bytes = probe(results)
-    except StoreError as error:
-        return None, None, str(error)
-    return time.perf_counter() - began, free_bytes, ""

@@ -49,12 +49,8 @@ def resume_at(
 
     A trial whose answers are not all confirmed is presented again as its next attempt, so that nobody answers what they
     felt before the gap; one that asks nothing and was done is over. With ``resume = "block"`` the whole block is
-    presented again, unless the session is to go on ``exactly`` where it was.
-
-    Raises
-    ------
-    SessionError
-        The journal is not of this schedule.
+    presented again, unless the session is to go on ``exactly`` where it was. SessionError says that the journal is not
+    of this schedule.
     """
     lines = list(lines)
     progress = progress_of(lines)
@@ -84,15 +80,7 @@ def is_rehearsal(session_receipt: Mapping[str, Any]) -> bool:
 
 
 def source_to_resume(session_folder: Path, name: str) -> bytes:
-    """Return the source of a protocol to go on with a session: with the liquid files as they were sealed.
-
-    Raises
-    ------
-    ProtocolError
-        There is no such file.
-    StoreError
-        It is not a session folder.
-    """
+    """Return the source of a protocol to go on with a session: with the liquid files as they were sealed."""
     return sealed_source(session_folder, source_bytes(name))
 
 
@@ -101,19 +89,8 @@ def find_protocol(
 ) -> str:
     """Return the file or name of the protocol that a session began with, from its journal's first line.
 
-    Parameters
-    ----------
-    start : Line
-        The first line of the session's journal.
-    candidates : iterable of str, optional
-        Where to look: files or names; by default those in the workspace, those that ship, and recent ones.
-    read : callable
-        Returns a candidate's bytes: `source_to_resume` of a session.
-
-    Raises
-    ------
-    SessionError
-        There is none of that study.
+    It is looked for among ``candidates``, by default those in the workspace, those that ship, and recent ones; ``read``
+    returns the bytes of one. SessionError says that none is of that study.
     """
     names = dict.fromkeys((*at_hand(), *recent_protocols()) if candidates is None else candidates)
     sources: dict[str, bytes] = {}

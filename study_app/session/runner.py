@@ -65,24 +65,9 @@ RETRY_S = 1.0  # a disk that took nothing is tried again so often
 
 
 class Runner:
-    """Runs one session.
+    """Runs one session; ``key`` has the condition of each code by block, ``start`` is where a resumed session goes on.
 
-    Parameters
-    ----------
-    protocol : Study
-        What is run.
-    schedule : Schedule
-        In what order.
-    key : mapping of str to mapping
-        The condition of each code, by block.
-    ports : Ports
-        Servo, journal, windows and clock.
-    language : str
-        In which language.
-    start : Start
-        Where a resumed session goes on.
-    secret : bytes
-        The sealed key's nonce, from which levels are drawn; a study without designs needs none.
+    ``secret`` is the sealed key's nonce, from which levels are drawn; a study without designs needs none.
     """
 
     def __init__(
@@ -113,7 +98,6 @@ class Runner:
 
     @property
     def state(self) -> SessionState:
-        """Where the session is."""
         return self._state
 
     @property
@@ -146,14 +130,9 @@ class Runner:
         self._listeners.append(listener)
 
     def post(self, event: Event) -> None:
-        """Let something have happened.
+        """Let something have happened; SessionError says that it cannot happen now, and nothing was changed.
 
-        Raises
-        ------
-        SessionError
-            It cannot happen now; nothing was changed.
-        StoreError
-            The session was to end while it stalled, and its end could not be written: it stays unfinished.
+        StoreError says that the session was to end while it stalled: its end could not be written, it stays unfinished.
         """
         if isinstance(event, ForceStopped):
             self._ports.servo.stop_force()
@@ -296,7 +275,9 @@ class Runner:
                 if self._running is not None:
                     self._running.leave()
             case StopTrial():
-                self._stop_trial()
+                self._recording.stop()
+                if self._running is not None:
+                    self._measured, self._running = self._running.summary(), None
             case Rest():
                 servo.rest()
             case FadeIn():
@@ -349,12 +330,6 @@ class Runner:
                 *broken_limits(summary, limits.model_dump()),
             )
         return TaskDone(self._ports.clock(), outcome, summary, reasons)
-
-    def _stop_trial(self) -> None:
-        self._recording.stop()
-        if self._running is not None:
-            self._measured = self._running.summary()
-            self._running = None
 
     def _follow(self, samples: Any) -> None:
         if (running := self._running) is None:

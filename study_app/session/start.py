@@ -107,14 +107,8 @@ def resumed(
 ) -> NewSession:
     """Return the choices to go on with the session in a folder: its own, and where its windows open now.
 
-    Raises
-    ------
-    StoreError
-        It cannot go on: it is not a session folder, open in another program, finished, damaged, or of another protocol.
-    SessionError
-        No protocol at hand is of its study.
-    ProtocolError
-        The protocol cannot be used.
+    StoreError says that it cannot go on: it is not a session folder, open in another program, finished, damaged, or of
+    another protocol; SessionError that no protocol at hand is of its study.
     """
     study, folder = locate(session_folder)
     refuse_never_begun(folder)
@@ -149,13 +143,7 @@ def resumed(
 
 
 def check_row(row_of: str | None, study: Protocol) -> None:
-    """Refuse an id whose rows of squares a session is to take where that decides nothing.
-
-    Raises
-    ------
-    SessionError
-        The study assigns no rows, or the id has no number that would determine one.
-    """
+    """Refuse (SessionError) an id whose rows of squares a session is to take where that decides nothing."""
     if row_of is None:
         return
     if not study.assigns_rows:
@@ -275,37 +263,27 @@ def open_store(
     videos: Videos | None = None,
 ) -> SessionStore:
     """Claim a new session on the disk, or open the one that goes on; ``outlets`` get the markers of its events."""
-    sent = None if outlets is None else outlets.described
-    video = None if videos is None else videos.describe()
+    here: dict[str, Any] = {
+        "operator": chosen.operator,
+        "device": with_bench(rig.described),
+        "screens": screens,
+        "motors_masked": None if masking is None else masking.entry,
+        "outlets": None if outlets is None else outlets.described,
+        "video": None if videos is None else videos.describe(),
+    }
     if chosen.resumes is not None:
-        store = reopen(
-            chosen.resumes,
-            protocol,
-            source,
-            operator=chosen.operator,
-            device=with_bench(rig.described),
-            screens=screens,
-            motors_masked=None if masking is None else masking.entry,
-            outlets=sent,
-            video=video,
-            now_ns=rig.servo.now_ns,
-        )
+        store = reopen(chosen.resumes, protocol, source, now_ns=rig.servo.now_ns, **here)
     else:
         start = SessionStart(
             chosen.participant,
             session=chosen.session,
             seed=chosen.seed,
-            operator=chosen.operator,
             language=chosen.language,
-            device=with_bench(rig.described),
-            screens=screens,
             simulated=descriptor_of(chosen.device).simulated,
             pilot=chosen.pilot,
             recordings=chosen.recordings,
-            motors_masked=None if masking is None else masking.entry,
-            outlets=sent,
-            video=video,
             row_of=chosen.row_of,
+            **here,
         )
         store = begin(chosen.results, protocol, source, start, clock=SessionClock(rig.servo.now_ns))
     if outlets is not None:

@@ -172,7 +172,6 @@ class ReachTracker(Tracker):
         self._mark_times = [0]
 
     def summary(self) -> dict[str, Any]:
-        """Return the task's part of the trial row."""
         return super().summary() | {"targets_reached": self._marks[-1].reached, "targets": self._count}
 
     def _view(self, time_ns: int, elapsed_ns: int) -> TaskView:
@@ -183,7 +182,6 @@ class ReachTracker(Tracker):
         return TaskView(mark.lit, mark.reached, self._count, dwell, elapsed_ns / _NS)
 
     def _follow(self, times: NDArray[np.int64], positions: NDArray[np.float64]) -> list[TargetReached]:
-        """Walk from change to change; ``times`` (n,) [ns], ``positions`` (n, 3) [m]."""
         reached: list[TargetReached] = []
         first = 0
         while first < len(times) and (lit := self._marks[-1].lit) is not None:

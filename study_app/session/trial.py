@@ -38,15 +38,7 @@ FROZEN_S = 1.0
 
 
 class Recording:
-    """Hands the samples of trials, and the frames shown in them, to the recorder; without one it does nothing.
-
-    Parameters
-    ----------
-    recorder : RecorderPort or None
-        Where they go.
-    rate_hz : float
-        The servo's nominal rate.
-    """
+    """Hands the samples of trials, and the frames shown in them, to the recorder; without one it does nothing."""
 
     def __init__(self, recorder: RecorderPort | None, rate_hz: float) -> None:
         self._recorder = recorder
@@ -162,26 +154,16 @@ class TrialStatistics:
     def summary(self, *, samples_dropped: int, worst_gap_s: float, until_ns: int) -> dict[str, Any]:
         """Return the measured columns of the trial row, to six decimals; None where nothing was measured.
 
-        Parameters
-        ----------
-        samples_dropped : int
-            How many samples of the trial were not read.
-        worst_gap_s : float
-            The longest time between two ticks, as the servo kept it [s].
-        until_ns : int
-            When the trial ended: until then the last frame stood [ns].
+        ``worst_gap_s`` is the longest time between two ticks, as the servo kept it; until ``until_ns``, when the trial
+        ended, the last frame stood.
         """
-        return {
-            name: round(value, 6) if isinstance(value, float) else value
-            for name, value in self._columns(samples_dropped, worst_gap_s, until_ns).items()
-        }
-
-    def _columns(self, samples_dropped: int, worst_gap_s: float, until_ns: int) -> dict[str, Any]:
         times = np.concatenate([np.empty(0, _TIMES), *self._times]).view(np.recarray)
         timed = timing(times, self._rate_hz)
         ticks = timed.ticks
         elapsed_s = float(times.time_ns[-1] - times.time_ns[0]) * 1e-9 if ticks else 0.0
-        return {
+        errors_s = np.asarray(self._errors_s, np.float64)
+        seen = errors_s.size > 0
+        columns = {
             "ticks": ticks,
             "tick_rate_hz": timed.rate_hz if ticks > 1 else None,
             "lateness_p99_ms": timed.lateness_p99_s * 1e3 if ticks else None,
@@ -196,9 +178,16 @@ class TrialStatistics:
             "loop_delay_ticks": self._most_delay_ticks if ticks else None,
             "loop_delay_changes": self._delay_changes if ticks else None,
             **{f"limiter_{name}": int(count) for name, count in zip(LIMITER_NAMES, self._limited, strict=True)},
-            **self._frames(until_ns),
+            "frames": int(errors_s.size),
+            "frames_late": int((errors_s > self._late_s).sum()),
+            "delay_error_mean_ms": float(errors_s.mean()) * 1e3 if seen else None,
+            "delay_error_p95_ms": float(np.percentile(errors_s, 95)) * 1e3 if seen else None,
+            "delay_error_max_ms": float(errors_s.max()) * 1e3 if seen else None,
+            "first_frame_gap_ms": self._first_gap_ns * 1e-6 if seen else None,
+            "worst_frame_gap_ms": self.frame_gap_ns(until_ns) * 1e-6 if errors_s.size >= self._fewest else None,
             **({} if self._video is None else self._video.columns()),
         }
+        return {name: round(value, 6) if isinstance(value, float) else value for name, value in columns.items()}
 
     def _move(self, positions: NDArray[np.float64]) -> None:
         """Add the path through ``positions`` (n, 3) [m]; non-finite ones are left out."""
@@ -218,19 +207,6 @@ class TrialStatistics:
         self._delay_changes += int(np.count_nonzero(np.diff(delay_ticks, prepend=before)))
         self._most_delay_ticks = max(self._most_delay_ticks, int(delay_ticks.max()))
         self._delay_ticks = int(delay_ticks[-1])
-
-    def _frames(self, until_ns: int) -> dict[str, Any]:
-        errors_s = np.asarray(self._errors_s, np.float64)
-        seen = errors_s.size > 0
-        return {
-            "frames": int(errors_s.size),
-            "frames_late": int((errors_s > self._late_s).sum()),
-            "delay_error_mean_ms": float(errors_s.mean()) * 1e3 if seen else None,
-            "delay_error_p95_ms": float(np.percentile(errors_s, 95)) * 1e3 if seen else None,
-            "delay_error_max_ms": float(errors_s.max()) * 1e3 if seen else None,
-            "first_frame_gap_ms": self._first_gap_ns * 1e-6 if seen else None,
-            "worst_frame_gap_ms": self.frame_gap_ns(until_ns) * 1e-6 if errors_s.size >= self._fewest else None,
-        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -300,13 +276,7 @@ class RunningTrial:
         return TankView(position_m, task, shown_ns, hidden, self._drawn_video)
 
     def frame(self, painted_ns: int, sample_ns: int) -> None:
-        """Take a frame that was painted at one moment and showed another [ns, servo's clock]; the first one begins.
-
-        Raises
-        ------
-        StudyError
-            The servo cannot load the scene.
-        """
+        """Take a frame that was painted at one moment and showed another [ns, servo's clock]; the first one begins."""
         if self._serial is None:
             self._serial = self._servo.load(self._scene)
             self._dropped_before = self._reader.dropped
@@ -337,11 +307,6 @@ class RunningTrial:
         """Present other numbers of the same scene (None: no force depends on what is set), and a delay [s].
 
         Returns the number of the scene in telemetry from then on; None where it stays what it is.
-
-        Raises
-        ------
-        StudyError
-            The servo cannot go on with these numbers.
         """
         self._delay_s = delay_s
         return None if scene is None else self._servo.adjust(scene)
@@ -387,24 +352,18 @@ class RunningTrial:
 
     def summary(self) -> dict[str, Any]:
         """Return what its row records until now (``store.tables.columns``)."""
-        return (
-            self._tracker.summary()
-            | self._statistics.summary(
-                samples_dropped=0 if self._serial is None else self._reader.dropped - self._dropped_before,
-                worst_gap_s=self._servo.worst_gap_s,
-                until_ns=self._until_ns,
-            )
-            | {"delivered_error": self._delivered_error()}
+        measured = self._statistics.summary(
+            samples_dropped=0 if self._serial is None else self._reader.dropped - self._dropped_before,
+            worst_gap_s=self._servo.worst_gap_s,
+            until_ns=self._until_ns,
         )
+        error = None  # where the participant set the force, or the study delays it
+        if self._serial is not None and not self.command.adjusts and not self._scene.link.acts:
+            from study_app.haptics.runtime.offline import law_along  # noqa: PLC0415 - the compiler: the servo loaded it
 
-    def _delivered_error(self) -> float | None:
-        """Return the error of the force sent; None where the participant set it, or the study delays it."""
-        if self._serial is None or self.command.adjusts or self._scene.link.acts:
-            return None
-        from study_app.haptics.runtime.offline import law_along  # noqa: PLC0415 - the compiler: the servo has loaded it
-
-        law_n = partial(law_along, self._scene)
-        return delivered_error(self.samples, self._servo.rate_hz, self._scene.fade_s, law_n)
+            law_n = partial(law_along, self._scene)
+            error = delivered_error(self.samples, self._servo.rate_hz, self._scene.fade_s, law_n)
+        return self._tracker.summary() | measured | {"delivered_error": error}
 
 
 def resting_view(servo: ServoPort, task: AnyTask, now_ns: int) -> TankView:

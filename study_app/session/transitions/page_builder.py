@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal, TypeAlias
 
-from study_app.protocol.blocks import Block
 from study_app.protocol.model import PageText, Protocol, Questionnaire
 from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Trial, build_schedule, draw_key, stream
@@ -100,7 +99,8 @@ def consent_hash(state: SessionState, text: PageText) -> str:
 def _task_page(state: SessionState, trial: Trial) -> TaskPage:
     protocol = state.plan.protocol
     block = protocol.blocks[trial.block]
-    task = protocol.tasks[block.task]
+    task, asked = protocol.tasks[block.task], protocol.questionnaire_of(block.id)
+    set_by_hand = block.design is not None and design_of(protocol, block).adjusts
     return TaskPage(
         trial=trial.number,
         instruction=_words(state).follow_target if task.instruction is None else _text(state, task.instruction),
@@ -108,7 +108,7 @@ def _task_page(state: SessionState, trial: Trial) -> TaskPage:
         workspace_m=protocol.device.workspace_m,
         body_radius_m=protocol.scene_for(_drawn_condition(state, trial)).body.diameter_m / 2 / protocol.scene.scale,
         progress=_progress(state, trial),
-        question=_setting_question(state, block),
+        question=_text(state, asked.intro) if set_by_hand and asked is not None else "",
     )
 
 
@@ -127,14 +127,6 @@ def _presenting(state: SessionState, made: TaskPage) -> TaskPage:
     condition = state.plan.protocol.conditions[named]
     shown = condition.overlay == "shown"
     return replace(made, adjusts=state.adjusts, video=condition.shows_video, overlay=shown)
-
-
-def _setting_question(state: SessionState, block: Block) -> str:
-    """Return what a level is set to in the trials of a block; "" where none is."""
-    protocol = state.plan.protocol
-    asked = protocol.questionnaire_of(block.id)
-    set_by_hand = block.design is not None and design_of(protocol, block).adjusts
-    return _text(state, asked.intro) if set_by_hand and asked is not None else ""
 
 
 def _interval(state: SessionState) -> Interval | None:
@@ -186,18 +178,7 @@ def questions_page(
 ) -> QuestionnairePage:
     """Return the page of some questions of a questionnaire before any answer, outside a session.
 
-    Parameters
-    ----------
-    protocol : Protocol
-        The study.
-    questionnaire : Questionnaire
-        What is asked.
-    questions : sequence of Question
-        Its questions, in the order shown.
-    context : Context
-        What they are asked with.
-    label : str
-        What the page is called where the questionnaire has no title.
+    ``questions`` are in the order shown; ``label`` is what the page is called where the questionnaire has no title.
     """
     statements = len(questionnaire.statements) == len(questionnaire.items)
     scale = protocol.scales[questionnaire.scale or ""] if statements else None
@@ -253,18 +234,9 @@ def _among(state: SessionState, trial: Trial, label: str, index: int) -> Progres
 
 @dataclass(frozen=True, slots=True)
 class Preview:
-    """One session of a study.
+    """One session of a study, with its own protocol: in a study with groups, with the steps of the participant's group.
 
-    Attributes
-    ----------
-    protocol : Protocol
-        The session's protocol: in a study with groups, with the steps of the participant's group.
-    schedule : Schedule
-        Its steps in order.
-    codes : mapping
-        Block → code → condition or track.
-    secret : bytes
-        What levels are drawn from.
+    ``codes`` is block → code → condition or track; levels are drawn from ``secret``.
     """
 
     protocol: Protocol = field(repr=False)
@@ -276,14 +248,8 @@ class Preview:
 def preview(study: Protocol, seed: int = SEED, participant: str = PARTICIPANT) -> Preview:
     """Return the first session of the first participant of a folder that begins with this seed.
 
-    Parameters
-    ----------
-    study : Protocol
-        The study.
-    seed : int
-        What all randomness of the session comes from, the codes too.
-    participant : str
-        The participant's id, whose number determines the row of a square.
+    All its randomness comes from the seed, the codes too; the number in the participant's id determines the row of a
+    square.
     """
     draw = stream(seed, "blinding").random
     secret = draw_secret(draw)
@@ -323,20 +289,9 @@ def moments(shown: Preview, index: int) -> tuple[Moment, ...]:
 def previewed_page(
     shown: Preview, index: int, moment: Moment, language: str, answers: Mapping[str, Value] | None = None
 ) -> Page:
-    """Return a page of a step, as a session would show it.
+    """Return a page of a step (by its index in the schedule), as a session would show it in one of the languages.
 
-    Parameters
-    ----------
-    shown : Preview
-        The session.
-    index : int
-        The step's index in the schedule.
-    moment : Moment
-        Which of the step's pages.
-    language : str
-        One of the study's languages.
-    answers : mapping, optional
-        Answers that were given before, by the id of the item; what would not be accepted is left out.
+    Of ``answers`` that were given before, by item, those that would not be accepted are left out.
     """
     if moment.kind == "feedback":
         return FeedbackPage(right=True)
@@ -346,7 +301,12 @@ def previewed_page(
     if moment.kind == "text":
         made = page(replace(state, phase=Phase.READING))
         return replace(made, coming=None) if isinstance(made, TextPage) else made
-    kept = {} if not answers else dict(_accepted(state, answers))
+    asked = {question.id: question for question in state.questions}
+    kept = {
+        item: Answer(onset_s=0.0, first_s=0.0, last_s=0.0, value=value)
+        for item, value in (answers or {}).items()
+        if item in asked and asked[item].problem(value, state.context) is None
+    }
     return page(replace(state, phase=Phase.ANSWERING, answers=kept))
 
 
@@ -355,21 +315,9 @@ def tested_condition(shown: Preview, index: int) -> str | None:
     step = shown.schedule.steps[index]
     if not isinstance(step, Trial):
         return None
-    if shown.protocol.blocks[step.block].design is not None:
-        return shown.protocol.conditions_in(step.block)[0]
-    return shown.codes[step.block][step.code]
+    return _drawn_condition(_state(shown, index, shown.protocol.study.languages[0]), step)
 
 
 def _state(shown: Preview, index: int, language: str) -> SessionState:
     plan = Plan(shown.protocol, shown.schedule, shown.codes, language, secret=shown.secret)
     return SessionState(plan, index=index)
-
-
-def _accepted(state: SessionState, answers: Mapping[str, Value]) -> list[tuple[str, Answer]]:
-    """Return the answers that the questions of the page accept."""
-    asked = {question.id: question for question in state.questions}
-    return [
-        (item, Answer(onset_s=0.0, first_s=0.0, last_s=0.0, value=value))
-        for item, value in answers.items()
-        if item in asked and asked[item].problem(value, state.context) is None
-    ]

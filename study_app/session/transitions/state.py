@@ -152,13 +152,7 @@ class SessionState:
 
     @property
     def page_id(self) -> str:
-        """The id of the page that is read.
-
-        Raises
-        ------
-        SessionError
-            None is.
-        """
+        """The id of the page that is read (SessionError if none is)."""
         if isinstance(step := self.step, PageStep):
             return step.page_id
         raise SessionError("no page is being read: wait for the next one")
@@ -179,13 +173,7 @@ class SessionState:
 
     @property
     def trial(self) -> Trial:
-        """The trial under way.
-
-        Raises
-        ------
-        SessionError
-            No trial is under way.
-        """
+        """The trial under way (SessionError if none is)."""
         if isinstance(step := self.step, Trial):
             return step
         raise SessionError("no trial is under way: wait for the next one")
@@ -245,13 +233,7 @@ class SessionState:
 
     @property
     def questionnaire(self) -> Questionnaire:
-        """What is answered after the trial under way, or the form.
-
-        Raises
-        ------
-        SessionError
-            Nothing is.
-        """
+        """What is answered after the trial under way, or the form (SessionError if nothing is)."""
         if isinstance(self.step, FormStep):
             return self.plan.protocol.questionnaires[self.step.form]
         if (questionnaire := self.plan.protocol.questionnaire_of(self.trial.block)) is None:
