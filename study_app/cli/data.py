@@ -8,15 +8,17 @@ import click
 
 from study_app.cli.options import (
     BY,
-    EXIT_FOUND,
     PARTICIPANT,
     REASON,
     SESSION,
     Target,
+    echo_files,
+    end_if,
     progress,
     takes_session,
     takes_study,
 )
+from study_app.number_text import counted
 
 
 @click.command()
@@ -60,8 +62,7 @@ def export(
     with progress() as show:
         show("writing the tables")
         files = export_study(results, to, extras=extras, warn=partial(click.echo, err=True), failed=failed.append)
-    for written in files:
-        click.echo(written)
+    echo_files(files)
     if validator is not None:
         _validate(validator, to)
     _say(failed)
@@ -71,8 +72,7 @@ def _say(failed: list[str]) -> None:
     """Say which sections of a report could not be computed; end with exit code 3 if there are any."""
     for line in failed:
         click.echo(line, err=True)
-    if failed:
-        raise click.exceptions.Exit(EXIT_FOUND)
+    end_if(failed)
 
 
 def _validate(validator: Path, to: Path) -> None:
@@ -85,8 +85,7 @@ def _validate(validator: Path, to: Path) -> None:
         ended = subprocess.run([validator.absolute(), to / FOLDER], check=False)  # noqa: S603 - named by the user
     except OSError as error:
         raise click.UsageError(f"{validator} cannot be run: {error.strerror}; give an executable file") from error
-    if ended.returncode:
-        raise click.exceptions.Exit(EXIT_FOUND)
+    end_if(ended.returncode)
 
 
 @click.command()
@@ -99,8 +98,7 @@ def plot(results: Path, to: Path) -> None:
     with progress() as show:
         show("drawing the responses")
         files = plot_study(results, to, warn=partial(click.echo, err=True))
-    for written in files:
-        click.echo(written)
+    echo_files(files)
 
 
 @click.command()
@@ -245,9 +243,8 @@ def merge(sites: dict[str, Path], to: Path) -> None:
         show("copying")
         made = merge_sites(sites, to)
     for site in made.sites:
-        many = "1 session" if site.sessions == 1 else f"{site.sessions} sessions"
         new = "merged" if site.name in sites else "kept  "
-        click.echo(f"{new}  site {site.name}: {many}, key {site.key_hash[:12]}")
+        click.echo(f"{new}  site {site.name}: {counted(site.sessions, 'session')}, key {site.key_hash[:12]}")
     click.echo(f"study {made.study}, protocol {made.protocol_hash[:12]}: {to}")
 
 
@@ -279,8 +276,7 @@ def reproduce(session: Path) -> None:
         click.echo(line)
     same = "reproduced: trials and statements have the order of the receipt"
     click.echo("orders or levels differ" if found.differences else same)
-    if found.differences:
-        click.get_current_context().exit(EXIT_FOUND)
+    end_if(found.differences)
 
 
 @click.command()
@@ -304,11 +300,9 @@ def verify(results: Path, fingerprints: Path | None) -> None:
     ):
         for finding in findings:
             click.echo(f"{kind}: {finding}")
-    many = "1 session" if found.sessions == 1 else f"{found.sessions} sessions"
     running = f", {found.running} running" if found.running else ""
-    click.echo(f"{many}{running}: {'sound' if found.sound else 'not sound'}")
-    if not found.sound:
-        click.get_current_context().exit(EXIT_FOUND)
+    click.echo(f"{counted(found.sessions, 'session')}{running}: {'sound' if found.sound else 'not sound'}")
+    end_if(not found.sound)
 
 
 @click.command()
@@ -338,5 +332,4 @@ def replay(session: Path) -> None:
         )
     else:
         click.echo(verdict)
-    if not found.proved:
-        click.get_current_context().exit(EXIT_FOUND)
+    end_if(not found.proved)

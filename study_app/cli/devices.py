@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from study_app.cli.options import EXIT_FOUND, TakesDeviceOptions, given
+from study_app.cli.options import TakesDeviceOptions, end_if
 from study_app.errors import DeviceError
 
 if TYPE_CHECKING:
@@ -57,14 +57,15 @@ def list_devices() -> None:
         click.echo(f"{backend.name:<19} {backend.state}  ({about})")
         for line in (backend.can, backend.why):
             if line:
-                click.echo(_indented(line, 20))
+                space = " " * 20
+                click.echo(fill(line, _WIDTH, initial_indent=space, subsequent_indent=space, break_long_words=False))
 
 
 @devices.command(cls=TakesDeviceOptions)
 @DEVICE
 @click.option("--fault", "faults", multiple=True, metavar="NAME", help="Fault of an emulated device: drop=0.01, nan …")
 @click.option("--to", type=click.Path(path_type=Path), metavar="FILE", help="Write a zip file for support.")
-def doctor(name: str, faults: tuple[str, ...], to: Path | None, **device_options: str | Path | None) -> None:
+def doctor(name: str, faults: tuple[str, ...], to: Path | None, device_options: dict[str, str | Path]) -> None:
     """Examine a device: find, open and run it without force; report each fault with its cause and remedy.
 
     NAME is a device that can be examined: falcon, falcon:SERIAL, falcon-emulated, falcon-socket:PATH, inverse3,
@@ -76,9 +77,8 @@ def doctor(name: str, faults: tuple[str, ...], to: Path | None, **device_options
     from study_app.devices.doctor_report import lines
     from study_app.devices.registry import check_options, doctor_of
 
-    options = given(device_options)
-    check_options(name, options)
-    found = doctor_of(name).examine(name, options=options, faults=faults, progress=click.echo)
+    check_options(name, device_options)
+    found = doctor_of(name).examine(name, options=device_options, faults=faults, progress=click.echo)
     for line in lines(found):
         click.echo(line)
     if to is not None:
@@ -86,8 +86,7 @@ def doctor(name: str, faults: tuple[str, ...], to: Path | None, **device_options
 
         write_support(to, "\n".join(lines(found)).strip() + "\n")
         click.echo(f"Written: {to}")
-    if not found.well:
-        click.get_current_context().exit(EXIT_FOUND)
+    end_if(not found.well)
 
 
 @devices.command()
@@ -121,10 +120,9 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
     for line in _calibrated(found, notes):
         click.echo(line)
     if found.residual_n > calibration.MOST_RESIDUAL_N:
-        click.echo(
-            f"More than {calibration.MOST_RESIDUAL_N} N is unexplained, so nothing was saved. Repeat the calibration."
-        )
-        click.get_current_context().exit(EXIT_FOUND)
+        unexplained = f"More than {calibration.MOST_RESIDUAL_N} N is unexplained"
+        click.echo(f"{unexplained}, so nothing was saved. Repeat the calibration.")
+        end_if(found)
     if name.startswith("falcon-socket"):
         click.echo("A device at a socket is not calibrated permanently: nothing was saved.")
     else:
@@ -139,7 +137,7 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
     metavar="FOLDER",
     help="Folder for the report; default: bench-NAME in the current folder.",
 )
-def bench(name: str, to: Path | None, **device_options: str | Path | None) -> None:
+def bench(name: str, to: Path | None, device_options: dict[str, str | Path]) -> None:
     """Measure a device in ten minutes: timing, noise, mass, friction, force on a scale, stable damping.
 
     Stay within reach of its power switch: the handle moves by itself, with at most 4 N. Enter, Ctrl+C and the handle's
@@ -148,8 +146,8 @@ def bench(name: str, to: Path | None, **device_options: str | Path | None) -> No
     """
     from study_app.devices.registry import check_options, descriptor_of
 
-    descriptor, options = descriptor_of(name), given(device_options)
-    check_options(name, options)
+    descriptor = descriptor_of(name)
+    check_options(name, device_options)
     if descriptor.kind == "seen":
         raise DeviceError(
             f"device '{name}' has no force to measure: see 'liquid-study devices list' for those that have"
@@ -161,7 +159,7 @@ def bench(name: str, to: Path | None, **device_options: str | Path | None) -> No
 
     folder = to if to is not None else Path(f"bench-{descriptor.name}")
     folder.mkdir(parents=True, exist_ok=True)
-    with open_device(name, options=options, progress=click.echo) as device:
+    with open_device(name, options=device_options, progress=click.echo) as device:
         simulated = descriptor.moves_by_itself
         found = run_bench(
             device,
@@ -193,7 +191,7 @@ def _keep_bench(found: Found, folder: Path, *, simulated: bool) -> None:
         return
     if not found.fits:
         click.echo("Nothing was kept for receipts: mass, damping and friction do not explain how the handle moved.")
-        click.get_current_context().exit(EXIT_FOUND)
+        end_if(found)
     report = str((folder / "bench.md").resolve())
     bench = workstation.DeviceBench.model_validate({**kept(found, day), "report": report})
     workstation.save(workstation.load_or_default()[0].with_bench(bench))
@@ -289,11 +287,6 @@ def _ask_emulator(emulator: Emulator, weight_n: float) -> Ask:
         return lambda: ""
 
     return ask
-
-
-def _indented(words: str, by: int) -> str:
-    space = " " * by
-    return fill(words, _WIDTH, initial_indent=space, subsequent_indent=space, break_long_words=False)
 
 
 @click.command("emulate-falcon")

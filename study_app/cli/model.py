@@ -8,20 +8,25 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from study_app.cli.options import EXIT_FOUND, SCENE_FILE, Target, progress
+from study_app.cli.options import SCENE_FILE, Target, echo_files, end_if, progress
 from study_app.errors import StudyError
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, MOST_DELAY
 
 if TYPE_CHECKING:
+    from study_app.haptics.model.scene import Scene
     from study_app.lab.estimation.estimator import Estimate
 
+LIQUID = click.option("--liquid", required=True, metavar="NAME", help="Id of the liquid in that file.")
+INITIAL = click.option(
+    "--set", "changes", multiple=True, metavar="NAME=VALUE", help="Initial value, or a fixed parameter."
+)
 POLL_S: Final = 0.03
 SHOWN_S: Final = 1.0
 
 
 @click.command()
 @SCENE_FILE
-@click.option("--liquid", required=True, metavar="NAME", help="Id of the liquid in that file.")
+@LIQUID
 @click.option("--path", required=True, metavar="PATH", help="Motion CSV, or a programmed path: circle, line, stop …")
 @click.option("--to", required=True, type=Target(), metavar="CSV", help="File to write.")
 @click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Override a parameter; repeatable.")
@@ -31,12 +36,10 @@ def simulate(scene: str, liquid: str, path: str, to: Path, changes: tuple[str, .
     Every row of the motion is one tick: give rows at the scene's rate (1 kHz unless its rate_hz differs).
     """
     from study_app.haptics.model import motion, paths
-    from study_app.haptics.model.overrides import override_all
     from study_app.haptics.runtime import offline
-    from study_app.protocol.load import load_scene
     from study_app.store.tables import csv_files
 
-    chosen = override_all(load_scene(scene, liquid), dict(assignment(change) for change in changes))
+    chosen = _changed(scene, liquid, changes)
     programmed = path in paths.NAMES or not (Path(path).suffix or Path(path).exists())
     moved = paths.path(path, rate_hz=chosen.rate_hz) if programmed else motion.read(Path(path))
     table = offline.simulate(chosen, moved)
@@ -44,12 +47,18 @@ def simulate(scene: str, liquid: str, path: str, to: Path, changes: tuple[str, .
     click.echo(f"{to}: {len(table)} rows")
 
 
-def assignment(change: str) -> tuple[str, str]:
-    """Return name and value of a --set."""
-    name, separator, value = change.partition("=")
-    if not separator:
-        raise click.UsageError(f"--set {change}: write NAME=VALUE, such as --set density_kg_m3=1200")
-    return name.strip(), value.strip()
+def _changed(file: str, liquid: str, changes: tuple[str, ...]) -> Scene:
+    """Return the scene of one liquid of a file, with each --set."""
+    from study_app.haptics.model.overrides import override_all
+    from study_app.protocol.load import load_scene
+
+    values = {}
+    for change in changes:
+        name, separator, value = change.partition("=")
+        if not separator:
+            raise click.UsageError(f"--set {change}: write NAME=VALUE, such as --set density_kg_m3=1200")
+        values[name.strip()] = value.strip()
+    return override_all(load_scene(file, liquid), values)
 
 
 @click.command()
@@ -79,8 +88,7 @@ def figures(to: Path) -> None:
     """Redraw the thesis' Figs 3 to 8: force over time on programmed paths, with captions."""
     from study_app.validation.thesis_figures import figures as draw
 
-    for written in draw(to):
-        click.echo(written)
+    echo_files(draw(to))
 
 
 @click.command()
@@ -92,9 +100,9 @@ def figures(to: Path) -> None:
     metavar="CSV",
     help="Motion and force, or a flow curve.",
 )
-@click.option("--liquid", required=True, metavar="NAME", help="Id of the liquid in that file.")
+@LIQUID
 @click.option("--fit", "names", required=True, metavar="NAMES", help="Parameters, such as drag_coefficient,length.")
-@click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Initial value, or a fixed parameter.")
+@INITIAL
 @click.option(
     "--velocity",
     type=click.Choice(["centred", "scene"]),
@@ -116,10 +124,8 @@ def identify(
     from study_app.evaluation.identify import preset as identified
     from study_app.evaluation.identify.fit import Fit, fit
     from study_app.evaluation.identify.flow_curve import CurveFit, fit_curve
-    from study_app.haptics.model.overrides import override_all
-    from study_app.protocol.load import load_scene
 
-    chosen = override_all(load_scene(scene, liquid), dict(assignment(change) for change in changes))
+    chosen = _changed(scene, liquid, changes)
     read = measurements.read(measured)
     fitted = [name.strip() for name in names.split(",")]
     found: Fit | CurveFit
@@ -131,8 +137,7 @@ def identify(
             motion = measurements.centred(read.motion) if velocity == "centred" else read.motion
             found = fit(chosen, liquid, fitted, motion, read.force_n)
     click.echo(identified.text(found))
-    for written in identified.write(found, to, measured) if to is not None else ():
-        click.echo(written)
+    echo_files(identified.write(found, to, measured) if to is not None else ())
 
 
 @click.command()
@@ -141,7 +146,7 @@ def identify(
     "--measured", type=click.Path(path_type=Path), metavar="CSV", help="Motion and force; the file may still grow."
 )
 @click.option("--lsl", "stream", metavar="NAME", help="A stream of the Lab Streaming Layer instead.")
-@click.option("--liquid", required=True, metavar="NAME", help="Id of the liquid in that file.")
+@LIQUID
 @click.option(
     "--fit",
     "names",
@@ -150,7 +155,7 @@ def identify(
     metavar="NAMES",
     help="Parameters: drag_coefficient, optionally with length, scaling or both, separated by commas.",
 )
-@click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Initial value, or a fixed parameter.")
+@INITIAL
 @click.option(
     "--memory",
     "memory_s",
@@ -185,16 +190,14 @@ def estimate(
     vy_mps, vz_mps where they are known; the channels of a stream have these labels. Ends with 3 if the motion did not
     identify the parameters.
     """
-    from study_app.haptics.model.overrides import override_all
     from study_app.lab.estimation.estimator import OnlineEstimator
     from study_app.lab.estimation.growing_csv import GrowingCsv
     from study_app.lab.estimation.liquid_model import prepare
     from study_app.lab.estimation.lsl_stream import LslForce
-    from study_app.protocol.load import load_scene
 
     if (measured is None) == (stream is None):
         raise StudyError("name either a file (--measured CSV) or a stream (--lsl NAME)")
-    chosen = override_all(load_scene(scene, liquid), dict(assignment(change) for change in changes))
+    chosen = _changed(scene, liquid, changes)
     fitted = tuple(name.strip() for name in names.split(","))
     estimator = OnlineEstimator(chosen, fitted, memory_s=memory_s)
     source = LslForce(stream or "") if measured is None else GrowingCsv(measured)
@@ -218,8 +221,7 @@ def estimate(
         raise StudyError(f"nothing came for {max(idle_s, SHOWN_S):g} s from {measured or stream}")
     last = estimator.estimate
     click.echo(f"at the end:\n{_line(last)}\n{rows} rows, {1e6 * computing_s / rows:.1f} µs of computing per row")
-    if not last.identified:
-        click.get_current_context().exit(EXIT_FOUND)
+    end_if(not last.identified)
 
 
 def _line(found: Estimate) -> str:

@@ -1,7 +1,7 @@
 """The arguments, options, groups and exit codes that commands share, their executor, and progress on the terminal."""
 
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
@@ -142,6 +142,26 @@ def keep_offered_workspace() -> None:
         click.echo(f"workspace of this machine: {offered.folder} (liquid-study workspace DIR changes it)", err=True)
 
 
+def end_if(found: object) -> None:
+    """End the command with exit code 3 if a check found a problem."""
+    if found:
+        raise click.exceptions.Exit(EXIT_FOUND)
+
+
+def echo_files(written: Iterable[Path]) -> None:
+    """Print the paths of the files that a command wrote."""
+    for path in written:
+        click.echo(path)
+
+
+def prepare(to: Path | None) -> None:
+    """Make the folder to write into, if one was given, before a long computation."""
+    from study_app.store.output_files import make_folder
+
+    if to is not None:
+        make_folder(to)
+
+
 class ShowProgress(Protocol):
     """Shows what is being done, and which share of all is done (0 to 1), if that is known."""
 
@@ -260,7 +280,14 @@ class DeviceName(click.Option):
 
 
 class TakesDeviceOptions(click.Command):
-    """A command that also takes the options of all devices; the function gets them as keywords."""
+    """A command that also takes the options of all devices; the function gets those given as ``device_options``."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Call the function with its own parameters and the device options, by their own names."""
+        of_devices = ctx.params.keys() - {parameter.name for parameter in self.params}
+        taken = {name.replace("_", "-"): ctx.params.pop(name) for name in sorted(of_devices)}
+        ctx.params["device_options"] = {name: value for name, value in taken.items() if value is not None}
+        return super().invoke(ctx)
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         """Return the command's own options, then those of the devices whose names are free."""
@@ -280,8 +307,3 @@ class TakesDeviceOptions(click.Command):
             if (keyword := option.name.replace("-", "_")) not in taken
         ]
         return [*own[:-1], *added, *own[-1:]]  # --help stays the last
-
-
-def given(options: Mapping[str, str | Path | None]) -> dict[str, str | Path]:
-    """Return the device options that were given, by their own names."""
-    return {name.replace("_", "-"): value for name, value in options.items() if value is not None}

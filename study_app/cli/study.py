@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import click
 from click.core import ParameterSource
@@ -14,7 +15,6 @@ from study_app.cli.options import (
     DeviceName,
     TakesDeviceOptions,
     Target,
-    given,
     keep_offered_workspace,
     study_at,
     takes_session,
@@ -144,45 +144,13 @@ def design(protocol: str, participants: int, seed: int) -> None:
 @click.option("--pilot", is_flag=True, help="Pilot session: in a marked window, stored in results/<study>-pilot.")
 @click.option("--no-recordings", is_flag=True, help="Store answers and trial rows only, not every sample and frame.")
 @RESULTS
-def run(
-    protocol: str,
-    participant: str,
-    session: int,
-    seed: int | None,
-    device: str,
-    language: str | None,
-    operator: str,
-    row_of: str | None,
-    *,
-    windowed: bool,
-    screen: int | None,
-    pilot: bool,
-    no_recordings: bool,
-    results: Path | None,
-    **device_options: str | Path | None,
-) -> None:
+def run(protocol: str, *, no_recordings: bool, results: Path | None, **chosen: Any) -> None:
     """Run a session with a participant, without dialogs."""
     from study_app import app
 
     if results is None:
         keep_offered_workspace()
-    code = app.run(
-        protocol,
-        participant=participant,
-        session=session,
-        seed=seed,
-        device=device,
-        device_options=given(device_options),
-        language=language,
-        operator=operator,
-        row_of=row_of,
-        windowed=windowed,
-        screen=screen,
-        results=results,
-        pilot=pilot,
-        recordings=not no_recordings,
-        progress=click.echo,
-    )
+    code = app.run(protocol, results=results, recordings=not no_recordings, progress=click.echo, **chosen)
     click.get_current_context().exit(code)
 
 
@@ -213,38 +181,22 @@ def run(
 )
 @click.pass_context
 def rehearse(
-    context: click.Context,
-    protocol: str,
-    participants: int,
-    seed: int,
-    device: str,
-    *,
-    no_recordings: bool,
-    answers_only: bool,
-    results: Path | None,
+    context: click.Context, /, protocol: str, *, device: str, no_recordings: bool, answers_only: bool, **chosen: Any
 ) -> None:
     """Run complete sessions with simulated participants, faster than real time; every row is marked as simulated."""
-    if results is None:
+    if chosen["results"] is None:
         keep_offered_workspace()
     if answers_only:
         if context.get_parameter_source("device") is not ParameterSource.DEFAULT:
             raise click.UsageError("--answers-only uses no device: omit --device")
         from study_app.session.simulated.answers_only import rehearse_answers
 
-        folder = rehearse_answers(protocol, participants=participants, seed=seed, results=results, progress=click.echo)
+        folder = rehearse_answers(protocol, progress=click.echo, **chosen)
     else:
         from study_app.session.simulated.rehearsal import rehearse as rehearse_study
 
-        folder = rehearse_study(
-            protocol,
-            participants=participants,
-            seed=seed,
-            device=device,
-            results=results,
-            recordings=not no_recordings,
-            progress=click.echo,
-        )
-    click.echo(f"{folder}: {participants} simulated participant{'s' if participants > 1 else ''}")
+        folder = rehearse_study(protocol, device=device, recordings=not no_recordings, progress=click.echo, **chosen)
+    click.echo(f"{folder}: {counted(chosen['participants'], 'simulated participant')}")
 
 
 @click.command(cls=TakesDeviceOptions)
@@ -254,30 +206,11 @@ def rehearse(
 @OPERATOR
 @WINDOWED
 @SCREEN
-def resume(
-    session: Path,
-    protocol: str | None,
-    device: str | None,
-    operator: str,
-    *,
-    windowed: bool,
-    screen: int | None,
-    **device_options: str | Path | None,
-) -> None:
+def resume(session: Path, **chosen: Any) -> None:
     """Resume an interrupted session: same order and seed, at the interrupted trial."""
     from study_app import app
 
-    code = app.resume(
-        session,
-        protocol=protocol,
-        device=device,
-        device_options=given(device_options),
-        operator=operator,
-        windowed=windowed,
-        screen=screen,
-        progress=click.echo,
-    )
-    click.get_current_context().exit(code)
+    click.get_current_context().exit(app.resume(session, progress=click.echo, **chosen))
 
 
 @click.command()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from study_app.cli.options import Target, exclude_each_other, executor_for, progress, takes_workers
+from study_app.cli.options import Target, echo_files, exclude_each_other, executor_for, prepare, progress, takes_workers
 from study_app.workers.executors import Workers
 
 if TYPE_CHECKING:
@@ -47,7 +47,6 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
         exclude_each_other(liquids=every, path=None if path == DEFAULT_PATH else path)
         _survey(scene, to)
         return
-    from study_app.store.output_files import make_folder
     from study_app.validation.accuracy.accuracy_report import markdown
     from study_app.validation.accuracy.accuracy_report import write as write_all
     from study_app.validation.accuracy.comparison import accuracy as measure
@@ -57,26 +56,22 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
     motion = motion_along(path, one) if one is not None else None
     if motion is None:
         raise click.UsageError(f"nothing can be measured: {'; '.join(notes)}")
-    if to is not None:
-        make_folder(to)
+    prepare(to)
     named = "stirring" if path == DEFAULT_PATH else path
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
         found = measure(numerical, physical, motion, named=named, notes=notes, progress=show)
     if to is None:
         click.echo(markdown(found), nl=False)
         return
-    for written in write_all(found, to):
-        click.echo(written)
+    echo_files(write_all(found, to))
 
 
 def _survey(file: str | None, to: Path | None) -> None:
     """Print or write the error of the force of every liquid of a file."""
     from study_app.protocol.load import load_scenes
-    from study_app.store.output_files import make_folder
     from study_app.validation.accuracy.liquid_survey import survey, survey_markdown, write_survey
 
-    if to is not None:
-        make_folder(to)
+    prepare(to)
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
         found = survey(load_scenes(file or REAL), show)
     if not found:
@@ -147,7 +142,6 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
     A ball of 68 mm starts, moves at constant speed and stops abruptly, at 0.2 and 0.6 m/s. Fitting takes about a
     minute. Further motions, such as oscillations and a reversal, are used by --refit.
     """
-    from study_app.store.output_files import make_folder
     from study_app.validation.cfd.fits import fit_all
     from study_app.validation.cfd.law_fit import refit as refit_all
     from study_app.validation.cfd.law_fit import refit_markdown, write_refit
@@ -158,8 +152,7 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
     exclude_each_other(refit=refit, materials=materials)
     if solve and to is None:
         raise click.UsageError("--solve needs --to: the folder for the solver's tables")
-    if to is not None:
-        make_folder(to)
+    prepare(to)
     if materials:
         _materials(to, workers, solve=solve)
         return
@@ -172,20 +165,11 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
         tables, drag = stored(source), steady(source)
         found = refit_all((*tables, *training(source)), held_out(source), show) if refit else None
         fits = fit_all(tables, show) if found is None else ()
-    for written in solved:
-        click.echo(written)
-    if found is not None and to is None:
-        click.echo(refit_markdown(found))
-        return
-    if found is not None and to is not None:
-        for written in write_refit(found, to):
-            click.echo(written)
-        return
+    echo_files(solved)
     if to is None:
-        click.echo(f"{steady_markdown(drag)}\n\n{fits_markdown(fits)}")
-        return
-    for written in write(tables, drag, fits, to):
-        click.echo(written)
+        click.echo(f"{steady_markdown(drag)}\n\n{fits_markdown(fits)}" if found is None else refit_markdown(found))
+    else:
+        echo_files(write(tables, drag, fits, to) if found is None else write_refit(found, to))
 
 
 def _materials(to: Path | None, workers: Workers, *, solve: bool) -> None:

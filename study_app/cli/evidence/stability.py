@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from study_app.cli.options import EXIT_FOUND, Target, exclude_each_other, executor_for, progress, takes_workers
+from study_app.cli.options import Target, end_if, exclude_each_other, executor_for, prepare, progress, takes_workers
 from study_app.errors import StudyError
 from study_app.workers.executors import Workers
-
-if TYPE_CHECKING:
-    from study_app.validation.stability.case_groups import Group
-    from study_app.validation.stability.verdict import Verdict
 
 
 @click.command()
@@ -69,56 +63,44 @@ def stability(
     model of hand and device, a wrong delay estimate, lost samples, releases in mid-stroke, and the driver of the Falcon
     with its emulator. Ends with exit code 3 if a case is unstable with the safety layer on.
     """
-    from study_app.store.output_files import make_folder
     from study_app.validation.stability import stability_report as found
     from study_app.validation.stability.case_groups import groups, some, sweep
     from study_app.validation.stability.fidelity import fidelities
     from study_app.validation.stability.stability_cases import parse
 
-    exclude_each_other(
-        to=to,
-        case=line,
-        table=table,
-        withheld=withheld,
-        delivered=delivered,
-        velocity=velocity,
-        delayed=delayed,
-        estimation=estimated,
-        only=only,
-    )
-    if to is not None:
-        make_folder(to)
+    instead = {"withheld": withheld, "delivered": delivered, "velocity": velocity, "delayed": delayed}
+    exclude_each_other(to=to, case=line, table=table, **instead, estimation=estimated, only=only)
+    prepare(to)
     if line is not None:
         case = parse(line)
         click.echo(str(case))
         verdicts = found.verdicts_on(case)
         click.echo("\n".join(found.in_words(verdict) for verdict in verdicts))
-        _end(verdicts[-1:])
+        end_if(not verdicts[-1].stable)
         return
     if table is not None:
         with progress() as show, executor_for(workers) as executor:
             found.write_limits(table, executor, lambda done, of: show(f"{done} of {of} limits", done / of))
         click.echo(table)
         return
-    if withheld:
-        _print_withheld(workers)
-        return
-    if delivered:
-        _print_delivered(workers)
-        return
-    if velocity:
-        _print_velocity()
+    if withheld or delivered or velocity or estimated is not None:
+        _print_one(workers, withheld=withheld, delivered=delivered, velocity=velocity, estimated=estimated or 0)
         return
     if delayed is not None:
-        _write_delayed(delayed)
+        from study_app.validation.stability import force_delay
+
+        with progress() as show:
+            shares = force_delay.write(delayed, lambda done, of: show(f"{done} of {of} delays", done / of))
+        click.echo(f"{force_delay.report(shares)}\n{delayed}")
         return
-    if estimated is not None:
-        _print_estimated(estimated, workers)
-        return
+    chosen = groups(seed, cases) if only is None else tuple(it for it in groups(seed, cases) if only in it.name)
+    if not chosen:
+        names = ", ".join(group.name for group in groups(seed, cases))
+        raise StudyError(f"no group has {only!r} in its name: there are {names}")
     with progress() as show, executor_for(workers) as executor:
         swept = found.run_sweep(
             some(sweep(seed), cases) if only is None else (),
-            groups(seed, cases) if only is None else _named(groups(seed, cases), only),
+            chosen,
             executor,
             lambda done, of: show(f"{done} of {of} verdicts", done / of),
         )
@@ -130,76 +112,30 @@ def stability(
     if swept.unstable:
         click.echo("\nunstable with safety on; repeat one with --case:", err=True)
         click.echo("\n".join(str(verdict.case) for verdict in swept.unstable), err=True)
-    _end(swept.unstable)
+    end_if(swept.unstable)
 
 
-def _named(groups: Sequence[Group], text: str) -> tuple[Group, ...]:
-    """Return the groups with a text in their name."""
-    chosen = tuple(group for group in groups if text in group.name)
-    if not chosen:
-        names = ", ".join(group.name for group in groups)
-        raise StudyError(f"no group has {text!r} in its name: there are {names}")
-    return chosen
-
-
-def _print_withheld(workers: Workers) -> None:
-    """Print the shares of force withheld; end with 3 if a goal is not met."""
-    from study_app.validation.stability.withheld_force import measure, report
+def _print_one(workers: Workers, *, withheld: bool, delivered: bool, velocity: bool, estimated: int) -> None:
+    """Print one measurement of its own; end with 3 if a goal is not met, or a loop became unstable."""
+    from study_app.validation.online_estimation import applied_estimates
+    from study_app.validation.stability import delivered_force, withheld_force
+    from study_app.validation.velocity import criteria
 
     with progress() as show, executor_for(workers) as executor:
-        show("measuring the force withheld")
-        shares = measure(executor=executor)
-    click.echo(report(shares))
-    if not all(share.met for share in shares):
-        click.get_current_context().exit(EXIT_FOUND)
-
-
-def _print_delivered(workers: Workers) -> None:
-    """Print the errors of the forces sent; end with 3 if a limit is missed."""
-    from study_app.validation.stability.delivered_force import measure, report
-
-    with progress() as show, executor_for(workers) as executor:
-        show("measuring the force delivered")
-        found = measure(executor=executor)
-    click.echo(report(found))
-    if not all(it.met for it in found):
-        click.get_current_context().exit(EXIT_FOUND)
-
-
-def _print_estimated(count: int, workers: Workers) -> None:
-    """Print what became of loops in which estimates are applied; end with 3 if one became unstable."""
-    from study_app.validation.online_estimation.applied_estimates import applied_cases, judge_all, report
-
-    with progress() as show, executor_for(workers) as executor:
-        show("applying estimates in closed loops")
-        verdicts = judge_all(applied_cases(count), executor)
-    click.echo(report(verdicts))
-    if any(it.harmed for it in verdicts):
-        click.get_current_context().exit(EXIT_FOUND)
-
-
-def _print_velocity() -> None:
-    """Print the measurements of the velocity estimators; end with 3 if the Kalman filter misses a limit."""
-    from study_app.validation.velocity.criteria import measure, report
-
-    with progress() as show:
-        rows = measure(lambda what: show(f"measuring {what}"))
-    click.echo(report(rows))
-    if not all(row.met for row in rows):
-        click.get_current_context().exit(EXIT_FOUND)
-
-
-def _write_delayed(file: Path) -> None:
-    """Write the table of delayed forces, and print the shares that are left."""
-    from study_app.validation.stability import force_delay
-
-    with progress() as show:
-        found = force_delay.write(file, lambda done, of: show(f"{done} of {of} delays", done / of))
-    click.echo(force_delay.report(found))
-    click.echo(file)
-
-
-def _end(verdicts: Sequence[Verdict]) -> None:
-    """End with 3 if one of the verdicts is unstable."""
-    if not all(verdict.stable for verdict in verdicts):
-        click.get_current_context().exit(EXIT_FOUND)
+        if velocity:
+            rows = criteria.measure(lambda what: show(f"measuring {what}"))
+            text, missed = criteria.report(rows), not all(row.met for row in rows)
+        elif estimated:
+            show("applying estimates in closed loops")
+            verdicts = applied_estimates.judge_all(applied_estimates.applied_cases(estimated), executor)
+            text, missed = applied_estimates.report(verdicts), any(it.harmed for it in verdicts)
+        elif withheld:
+            show("measuring the force withheld")
+            shares = withheld_force.measure(executor=executor)
+            text, missed = withheld_force.report(shares), not all(share.met for share in shares)
+        else:
+            show("measuring the force delivered")
+            errors = delivered_force.measure(executor=executor)
+            text, missed = delivered_force.report(errors), not all(it.met for it in errors)
+    click.echo(text)
+    end_if(missed)

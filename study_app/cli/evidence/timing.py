@@ -6,22 +6,24 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import click
 
-from study_app.cli.options import EXIT_FOUND, Target, exclude_each_other, progress
+from study_app.cli.options import ShowProgress, Target, echo_files, end_if, exclude_each_other, prepare, progress
 from study_app.errors import DisplayError, StudyError
 
 if TYPE_CHECKING:
     from study_app.app.windows_load import WindowsThread
     from study_app.validation.timing.machine_load import LoadName
 
+Result: TypeAlias = tuple[str, str, bool]
+"""A text, the name of its file, and whether a limit is missed."""
 MOST_COMPARED_S = 300.0
 LOAD = click.Choice(("none", "gui", "gui+cpu"))
 
@@ -75,118 +77,91 @@ def timing(
     With --triggers a byte is sent to a port for each event, and its delay is measured.
     """
     exclude_each_other(delays=of_delays, devices=of_devices, lsl=lsl, triggers=triggers)
-    if (lsl or triggers is not None) and spin_us is not None:
-        raise StudyError("--spin applies to the servo's loops: omit it with --lsl and --triggers")
-    if lsl:
-        measure_streams(seconds, load, to)
-        return
-    if triggers is not None:
-        measure_triggers(triggers, seconds, load, to)
-        return
-    if of_devices:
-        if spin_us is not None:
-            raise StudyError("--spin applies to the servo's loops: omit it with --devices")
-        compare_devices(seconds, load, to)
-        return
+    outlets = lsl or triggers is not None
+    for options, chosen in (("lsl and --triggers", outlets), ("devices", of_devices), ("delays", of_delays)):
+        if chosen and spin_us is not None:
+            raise StudyError(f"--spin applies to the servo's loops: omit it with --{options}")
+    if outlets:
+        check_seconds(seconds)
     if of_delays:
-        if spin_us is not None:
-            raise StudyError("--spin applies to the servo's loops: omit it with --delays")
         time_delays(seconds, load, to)
-        return
-    from study_app.store.output_files import make_folder
-    from study_app.validation.timing.measurement import timing as time_loops
-    from study_app.validation.timing.timing_report import text, write
+    elif of_devices:
+        measured(partial(compare_devices, seconds), load, to)
+    elif lsl:
+        measured(partial(measure_streams, seconds), load, to)
+    elif triggers is not None:
+        measured(partial(measure_triggers, triggers, seconds), load, to)
+    else:
+        from study_app.validation.timing.measurement import timing as time_loops
+        from study_app.validation.timing.timing_report import text, write
 
-    if to is not None:
-        make_folder(to)
-    with ending_by_signal() as ending, progress(partial(click.echo, err=True)) as show:
-        found = time_loops(seconds, load, windows_thread(load), spin_us=spin_us, ending=ending, progress=show)
-    click.echo(text(found), nl=False)
-    for written in write(found, to) if to is not None else ():
-        click.echo(written)
+        prepare(to)
+        with ending_by_signal() as (ending, _), progress(partial(click.echo, err=True)) as show:
+            found = time_loops(seconds, load, windows_thread(load), spin_us=spin_us, ending=ending, progress=show)
+        click.echo(text(found), nl=False)
+        echo_files(write(found, to) if to is not None else ())
 
 
 def time_delays(seconds: float, load: LoadName, to: Path | None) -> None:
     """Print how well delays are kept; without a display, on none."""
-    from study_app.store.output_files import make_folder
     from study_app.validation.timing.delay_report import text, write
 
     if sys.platform == "linux" and not any(map(os.environ.get, ("QT_QPA_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY"))):
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
-    if to is not None:
-        make_folder(to)
+    prepare(to)
     from study_app.app.delay_session import delays
 
     with progress(partial(click.echo, err=True)) as show:
         found = delays(seconds, load, progress=show)
     click.echo(text(found), nl=False)
-    for written in write(found, to) if to is not None else ():
-        click.echo(written)
+    echo_files(write(found, to) if to is not None else ())
 
 
-def compare_devices(seconds: float, load: LoadName, to: Path | None) -> None:
-    """Print how late ticks begin with each emulated device; end with 3 where the limit is missed."""
-    from study_app.store.output_files import make_folder
-    from study_app.validation.timing.device_lateness import emulated_devices, text, time_devices
+def measured(measure: Callable[[threading.Event, ShowProgress], Result], load: LoadName, to: Path | None) -> None:
+    """Print and keep what is measured under load, until Ctrl+C; end with 3 where a limit is missed."""
+    from study_app.store.atomic import write_file
     from study_app.validation.timing.machine_load import under_load
 
+    prepare(to)
+    windows = windows_thread(load) if load != "none" else None
+    with ending_by_signal() as (ending, _), progress(partial(click.echo, err=True)) as show:
+        text, name, missed = under_load(load, windows, lambda: measure(ending, show))
+    click.echo(text, nl=False)
     if to is not None:
-        make_folder(to)
-    with ending_by_signal() as ending, progress(partial(click.echo, err=True)) as show:
-        found = under_load(
-            load,
-            windows_thread(load) if load != "none" else None,
-            lambda: time_devices(seconds, emulated_devices(), ending=ending, progress=show),
-        )
-    print_and_keep(text(found), to, "devices.txt")
-    if any(one.missed for one in found):
-        click.get_current_context().exit(EXIT_FOUND)
+        write_file(to / name, text.encode())
+        click.echo(to / name)
+    end_if(missed)
 
 
-def measure_streams(seconds: float, load: LoadName, to: Path | None) -> None:
-    """Print what another process receives, and what that costs the servo; end with 3 where a limit is missed."""
-    from study_app.store.output_files import make_folder
+def compare_devices(seconds: float, ending: threading.Event, show: ShowProgress) -> Result:
+    """Return how late ticks begin with each emulated device."""
+    from study_app.validation.timing.device_lateness import emulated_devices, text, time_devices
+
+    found = time_devices(seconds, emulated_devices(), ending=ending, progress=show)
+    return text(found), "devices.txt", any(one.missed for one in found)
+
+
+def measure_streams(seconds: float, ending: threading.Event, show: ShowProgress) -> Result:
+    """Return what another process receives, and what that costs the servo."""
     from study_app.validation.outlets.lateness import compare
     from study_app.validation.outlets.localhost import localhost_only
     from study_app.validation.outlets.outlet_report import stream_text
     from study_app.validation.outlets.streams import stream
-    from study_app.validation.timing.machine_load import under_load
 
-    check_seconds(seconds)
     localhost_only()
-    if to is not None:
-        make_folder(to)
-    windows = windows_thread(load) if load != "none" else None
-    with ending_by_signal() as ending, progress(partial(click.echo, err=True)) as show:
-        found, ratios = under_load(
-            load,
-            windows,
-            lambda: (
-                stream(seconds, ending=ending, progress=show),
-                compare(min(seconds, MOST_COMPARED_S), ending=ending, progress=show),
-            ),
-        )
-    print_and_keep(stream_text(found, ratios), to, "streams.txt")
-    if not found.met or any(one.percentile == 50 and one.verdict == "missed" for one in ratios):
-        click.get_current_context().exit(EXIT_FOUND)
+    found = stream(seconds, ending=ending, progress=show)
+    ratios = compare(min(seconds, MOST_COMPARED_S), ending=ending, progress=show)
+    missed = not found.met or any(one.percentile == 50 and one.verdict == "missed" for one in ratios)
+    return stream_text(found, ratios), "streams.txt", missed
 
 
-def measure_triggers(port: str, seconds: float, load: LoadName, to: Path | None) -> None:
-    """Print how long events take to their bytes on a port."""
-    from study_app.store.output_files import make_folder
+def measure_triggers(port: str, seconds: float, ending: threading.Event, show: ShowProgress) -> Result:
+    """Return how long events take to their bytes on a port."""
     from study_app.validation.outlets.outlet_report import trigger_text
     from study_app.validation.outlets.trigger_delays import measure
-    from study_app.validation.timing.machine_load import under_load
 
-    check_seconds(seconds)
-    if to is not None:
-        make_folder(to)
-    windows = windows_thread(load) if load != "none" else None
-    with ending_by_signal() as ending, progress(partial(click.echo, err=True)) as show:
-        found = under_load(load, windows, lambda: measure(port, seconds, ending=ending, progress=show))
-    print_and_keep(trigger_text(found), to, "triggers.txt")
-    if found.wrong:
-        click.get_current_context().exit(EXIT_FOUND)
+    found = measure(port, seconds, ending=ending, progress=show)
+    return trigger_text(found), "triggers.txt", bool(found.wrong)
 
 
 def check_seconds(seconds: float) -> None:
@@ -195,16 +170,6 @@ def check_seconds(seconds: float) -> None:
 
     if not LEAST_S <= seconds <= MOST_S:
         raise StudyError(f"outlets are measured for {LEAST_S:g} to {MOST_S:g} s, not {seconds:g}")
-
-
-def print_and_keep(text: str, to: Path | None, name: str) -> None:
-    """Print a text, and write it into a folder where one was given."""
-    from study_app.store.atomic import write_file
-
-    click.echo(text, nl=False)
-    if to is not None:
-        write_file(to / name, text.encode())
-        click.echo(to / name)
 
 
 def windows_thread(load: LoadName) -> WindowsThread | None:
@@ -219,16 +184,18 @@ def windows_thread(load: LoadName) -> WindowsThread | None:
 
 
 @contextmanager
-def ending_by_signal() -> Iterator[threading.Event]:
-    """Set an event on Ctrl+C and when asked to terminate, instead of breaking off."""
+def ending_by_signal() -> Iterator[tuple[threading.Event, list[int]]]:
+    """Set an event on Ctrl+C and when asked to terminate, instead of breaking off; give it and the signals received."""
     ending = threading.Event()
+    received: list[int] = []
 
-    def end(_number: int, _frame: FrameType | None) -> None:
+    def end(number: int, _frame: FrameType | None) -> None:
+        received.append(number)
         ending.set()
 
     before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield ending
+        yield ending, received
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
@@ -252,34 +219,19 @@ def soak(
     FILE defines the liquids; default: rek2024. Ctrl+C ends it with the report so far.
     """
     from study_app.protocol.load import load_scenes
-    from study_app.store.output_files import make_folder
     from study_app.validation.soak.soak import soak as soak_servo
     from study_app.validation.timing.machine_load import under_load
 
     scenes = load_scenes(protocol)
-    if to is not None:
-        make_folder(to)
-    ending = threading.Event()
-    heard: list[int] = []
-
-    def end(number: int, _frame: FrameType | None) -> None:
-        heard.append(number)
-        ending.set()
-
-    before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
+    prepare(to)
+    with ending_by_signal() as (ending, received):
         found = under_load(
             load,
             windows_thread(load) if load != "none" else None,
             lambda: soak_servo(scenes, hours, virtual=virtual, seed=seed, ending=ending, progress=click.echo),
         )
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
     click.echo(("" if found.ticks == 0 else "\n") + found.text())
-    for written in found.write(to) if to is not None else ():
-        click.echo(written)
-    if found.findings:
-        context.exit(EXIT_FOUND)
-    if heard:
-        context.exit(128 + heard[0])
+    echo_files(found.write(to) if to is not None else ())
+    end_if(found.findings)
+    if received:
+        context.exit(128 + received[0])

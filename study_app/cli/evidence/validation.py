@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from study_app.cli.options import EXIT_FOUND, Target, executor_for, progress, takes_workers
+from study_app.cli.options import Target, echo_files, end_if, executor_for, prepare, progress, takes_workers
 from study_app.workers.executors import Workers
 
 EXIT_UNDECIDED = 4
@@ -36,13 +36,12 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     from study_app.analysis.planning.simulated_studies import plan
     from study_app.protocol.load import load
     from study_app.session.simulated.rehearsal import condition_features
-    from study_app.store.output_files import make_folder, write_files
+    from study_app.store.output_files import write_files
     from study_app.validation.report_rates.known_effects import simulated
     from study_app.validation.report_rates.rates import Rate, markdown, table
     from study_app.validation.report_rates.simulation import validate
 
-    if to is not None:
-        make_folder(to)
+    prepare(to)
     rates: tuple[Rate, ...] = ()
     begun, done = time.monotonic(), 0
 
@@ -63,26 +62,20 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     words = f"{done} studies in {time.monotonic() - begun:.0f} s\n\n{markdown(rates)}"
     click.echo(words, nl=False)
     if to is not None:
-        for path in write_files(to, {"rates.md": words.encode(), "rates.csv": table(rates)}):
-            click.echo(path)
+        echo_files(write_files(to, {"rates.md": words.encode(), "rates.csv": table(rates)}))
     beyond, undecided = (sum(one.holds == verdict for one in rates) for verdict in ("no", "too few studies"))
     limited = sum(one.holds != "counted" for one in rates)
-    click.echo(_summary(beyond, undecided, limited))
-    if beyond:
-        click.get_current_context().exit(EXIT_FOUND)
+    verdict = "every rate is within its limit"
+    if not limited:
+        verdict = "no rate was counted"
+    elif beyond:
+        verdict = f"{beyond} of {limited} rates exceed their limits, {undecided} undecided"
+    elif undecided:
+        verdict = f"{undecided} of {limited} rates undecided: simulate more studies"
+    click.echo(verdict)
+    end_if(beyond)
     if undecided or not limited:
         click.get_current_context().exit(EXIT_UNDECIDED)
-
-
-def _summary(beyond: int, undecided: int, limited: int) -> str:
-    """Return how many of the rates that have a limit are beyond it, or may be."""
-    if not limited:
-        return "no rate was counted"
-    if beyond:
-        return f"{beyond} of {limited} rates exceed their limits, {undecided} undecided"
-    if undecided:
-        return f"{undecided} of {limited} rates undecided: simulate more studies"
-    return "every rate is within its limit"
 
 
 @click.command()
@@ -106,7 +99,7 @@ def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, 
     with exit code 3 if a value exceeds its limit.
     """
     from study_app.protocol.load import load, source_bytes
-    from study_app.store.output_files import make_folder, write_files
+    from study_app.store.output_files import write_files
     from study_app.validation.thresholds.many_studies import NAMES, methods_alone, plant
     from study_app.validation.thresholds.verdicts import Verdict, markdown, table
     from study_app.validation.thresholds.whole_pipeline import PEOPLE, judged, rehearsed
@@ -115,8 +108,7 @@ def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, 
         chosen = [(source_bytes(name), plant(Path(name).stem, load(name))) for name in files or NAMES]
     except ValueError as error:
         raise click.UsageError(str(error)) from error
-    if to is not None:
-        make_folder(to)
+    prepare(to)
     begun = time.monotonic()
     judgements: list[Verdict] = []
     with progress() as show, executor_for(workers) as executor:
@@ -134,14 +126,12 @@ def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, 
     words = f"{studies} studies of each protocol, seed {seed}, in {took}\n\n{markdown(judgements)}"
     click.echo(words, nl=False)
     if to is not None:
-        for path in write_files(to, {"thresholds.md": words.encode(), "thresholds.csv": table(judgements)}):
-            click.echo(path)
+        echo_files(write_files(to, {"thresholds.md": words.encode(), "thresholds.csv": table(judgements)}))
     beyond = sum(not one.holds for one in judgements)
     click.echo(
         f"{beyond} of {len(judgements)} values exceed their limits" if beyond else "every value is within its limit"
     )
-    if beyond:
-        click.get_current_context().exit(EXIT_FOUND)
+    end_if(beyond)
 
 
 @click.command("delay-thresholds")
@@ -161,8 +151,7 @@ def delay_thresholds(people: int, seed: int, to: Path | None) -> None:
         found = compare(people, seed)
     click.echo(markdown(found), nl=False)
     if to is not None:
-        for path in write(found, to):
-            click.echo(path)
+        echo_files(write(found, to))
 
 
 @click.command()
@@ -174,7 +163,6 @@ def screenshots(to: Path, only: str | None) -> None:
     """Take pictures of every window of the program in both themes; takes some minutes and needs no display."""
     os.environ["QT_QPA_PLATFORM"] = "offscreen"  # the same pictures on every machine
     from study_app.app.screenshots import screenshots as take
-    from study_app.store.output_files import make_folder
 
-    make_folder(to)
+    prepare(to)
     take(to, only=only, progress=click.echo)
