@@ -3,7 +3,6 @@
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from pathlib import Path as File
 from typing import Any, TypeVar
 
@@ -69,19 +68,9 @@ class SceneFile(Table):
 
 
 def load(name_or_path: str | File, *, delay_ticks: int = BELIEVED_TICKS) -> Protocol:
-    """Return the protocol of a file, or of a name (see ``files.find``).
+    """Return the protocol of a file, or of a name (see ``files.find``); ProtocolError lists every problem of the file.
 
-    Parameters
-    ----------
-    name_or_path : str or Path
-        The file or name.
-    delay_ticks : int
-        Levels are checked for a device whose forces act so many ticks late.
-
-    Raises
-    ------
-    ProtocolError
-        Every problem of the file, with line and hint.
+    Levels are checked for a device whose forces act ``delay_ticks`` ticks late.
 
     Examples
     --------
@@ -95,13 +84,7 @@ def load(name_or_path: str | File, *, delay_ticks: int = BELIEVED_TICKS) -> Prot
 
 
 def parse(source: bytes, name: str, *, delay_ticks: int = BELIEVED_TICKS) -> Protocol:
-    """Return the protocol written in ``source``; ``name`` is what messages call it, ``delay_ticks`` is as in `load`.
-
-    Raises
-    ------
-    ProtocolError
-        Every problem of the text, with line and hint.
-    """
+    """Return the protocol written in ``source``; ``name`` is what messages call it, the rest is as in `load`."""
     document, places = read_document(source, name)
     protocol, faults = examined(document, delay_ticks=delay_ticks)
     if protocol is None or faults:
@@ -148,10 +131,7 @@ def _outside(broken: Iterable[Path], faults: Iterable[Fault]) -> list[Fault]:
 def load_scene(name_or_path: str | File, liquid_id: str) -> Scene:
     """Return the scene of one liquid of a protocol, or of a file with only ``[scene]`` and ``[liquids.*]``.
 
-    Raises
-    ------
-    ProtocolError
-        Every problem of the file, or a liquid that is not in it.
+    ProtocolError lists every problem of the file, or says that the liquid is not in it.
     """
     scenes = load_scenes(name_or_path)
     if liquid_id not in scenes:
@@ -162,13 +142,7 @@ def load_scene(name_or_path: str | File, liquid_id: str) -> Scene:
 
 
 def load_scenes(name_or_path: str | File) -> dict[str, Scene]:
-    """Return a scene of each liquid of a protocol or scene file by its name, those of no condition too.
-
-    Raises
-    ------
-    ProtocolError
-        Every problem of the file.
-    """
+    """Return a scene of each liquid of a protocol or scene file by its name, those of no condition too."""
     name = str(name_or_path)
     source = source_bytes(name_or_path)
     document, places = read_document(source, name)
@@ -196,10 +170,7 @@ def _sound_scene(document: dict[str, Any], name: str, places: Places) -> dict[st
 def is_scene_file(name_or_path: str | File) -> bool:
     """Return whether a file holds liquids and no other part of a study.
 
-    Raises
-    ------
-    ProtocolError
-        The file does not exist or is not TOML.
+    ProtocolError if it is not there or no TOML.
     """
     document, _ = read_document(source_bytes(name_or_path), str(name_or_path))
     return "liquids" in document and not _holds_study(document)
@@ -217,12 +188,8 @@ def _with_liquids_of_files(document: dict[str, Any]) -> tuple[dict[str, Any], li
     resolved: dict[str, Any] = dict(liquids)
     faults: list[Fault] = []
     for name in named:
-        table = liquids[name]
-        faults += [
-            Fault(("liquids", name, key), "belongs into the liquid file", "give file alone")
-            for key in table
-            if key != "file"
-        ]
+        table, alone = liquids[name], ("belongs into the liquid file", "give file alone")
+        faults += [Fault(("liquids", name, key), *alone) for key in table if key != "file"]
         try:
             resolved[name] = _liquid_of_file(table["file"], texts)
         except _LiquidFileFault as fault:
@@ -281,41 +248,25 @@ def _holds_study(document: Mapping[str, Any]) -> bool:
 
 
 def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
-    """Return the tables of a text, arrays as tuples, and the lines they stand on.
-
-    Raises
-    ------
-    ProtocolError
-        It is not UTF-8 text or not TOML.
-    """
+    """Return the tables of a text, arrays as tuples, and the lines they stand on (ProtocolError if it is no TOML)."""
     try:
         text = source.decode("utf-8").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         line = source.count(b"\n", 0, error.start) + 1
         raise ProtocolError(name, (Problem("file", "is not UTF-8 text", line, "save it as UTF-8"),)) from error
     try:
-        document = frozen(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise ProtocolError(name, (_broken(str(error), text),)) from error
+        return frozen(tomllib.loads(text)), Places(text)
+    except tomllib.TOMLDecodeError as error:  # which names the place in its message
+        sentence = re.sub(r" \(at .*\)$", "", str(error))
+        place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
+        line, column = (int(place[1]), int(place[2])) if place else (text.count("\n") + 1, 1)
+        broken = Problem("file", f"not TOML at column {column}: {sentence}", line, "see toml.io for the notation")
+        raise ProtocolError(name, (broken,)) from error
     except RecursionError as error:
-        raise ProtocolError(
-            name, (Problem("file", "is nested too deeply", hint="use fewer brackets within brackets"),)
-        ) from error
+        broken = Problem("file", "is nested too deeply", hint="use fewer brackets within brackets")
+        raise ProtocolError(name, (broken,)) from error
     except ValueError as error:  # Python's own limit of digits names no place either
         raise ProtocolError(name, (Problem("file", "holds a whole number beyond 64 bits"),)) from error
-    return document, Places(text)
-
-
-def _broken(message: str, text: str) -> Problem:
-    """Return the problem of a text that is not TOML: ``tomllib`` names the place in its message."""
-    sentence, place = re.sub(r" \(at .*\)$", "", message), re.search(r"\(at line (\d+), column (\d+)\)", message)
-    line, column = (int(place[1]), int(place[2])) if place else (text.count("\n") + 1, 1)
-    return Problem("file", f"not TOML at column {column}: {sentence}", line, "see toml.io for the notation")
-
-
-def _shortened(words: str) -> str:
-    """Return words that repeat at most `SHOWN` characters of a bad value, in quotes or not."""
-    return _LONG.sub(lambda found: f"{found[0][:SHOWN]}…", words)
 
 
 def _validated(model: type[M], document: Mapping[str, Any]) -> tuple[M | None, list[Fault]]:
@@ -333,13 +284,13 @@ def _validated(model: type[M], document: Mapping[str, Any]) -> tuple[M | None, l
 
 def located(faults: Iterable[Fault], places: Places) -> tuple[Problem, ...]:
     """Return faults as problems with their lines, in the order of the lines."""
-    problems = [
-        replace(
-            problem, place=_shortened(problem.place), message=_shortened(problem.message), hint=_shortened(problem.hint)
-        )
-        for problem in (fault.located(places) for fault in faults)
-    ]
-    return tuple(sorted(problems, key=lambda problem: problem.line or 0))
+
+    def shortened(words: str) -> str:
+        return _LONG.sub(lambda found: f"{found[0][:SHOWN]}…", words)
+
+    problems = (fault.located(places) for fault in faults)
+    short = [Problem(shortened(it.place), shortened(it.message), it.line, shortened(it.hint)) for it in problems]
+    return tuple(sorted(short, key=lambda problem: problem.line or 0))
 
 
 def _raise(name: str, faults: list[Fault], places: Places) -> None:

@@ -58,13 +58,7 @@ def names(document: Any, section: str) -> tuple[str, ...]:
 
 
 def frozen(value: Any) -> Any:
-    """Return what ``tomllib`` read with its arrays as tuples.
-
-    Raises
-    ------
-    ValueError
-        It holds a whole number beyond 64 bits, which TOML does not have.
-    """
+    """Return what ``tomllib`` read with its arrays as tuples (ValueError of whole numbers beyond 64 bits, TOML's)."""
     if isinstance(value, list):
         return tuple(frozen(entry) for entry in value)
     if isinstance(value, dict):
@@ -92,17 +86,11 @@ Kind: TypeAlias = Literal["table", "array table", "key", "pair", "entry"]
 class Node(NamedTuple):
     """One header, key or array entry of a text; positions count characters from 0, ends are exclusive.
 
-    Attributes
-    ----------
-    kind : str
-        "table" is a header ``[a.b]``, "array table" a header ``[[a.b]]``, "key" a key on lines of its own, "pair" a key
-        of an inline table, "entry" an entry of an array.
-    path : tuple of str or int
-        Keys and, for entries of arrays, indices from 0: ``("blocks", "liquids", "conditions", 2)``.
-    parts : tuple of (int, int)
-        Where each part of its key is written: ``a`` and ``"b c"`` of ``a . "b c"``; none for an entry.
-    start, value, end : int
-        Where it begins, where its value begins (for a header: its end), and where it ends, without a comma or comment.
+    Its ``kind`` is "table" of a header ``[a.b]``, "array table" of ``[[a.b]]``, "key" of a key on lines of its own,
+    "pair" of a key of an inline table, "entry" of an entry of an array. The path is keys and, for entries of arrays,
+    indices from 0: ``("blocks", "liquids", "conditions", 2)``; ``parts`` say where each part of its key is written:
+    ``a`` and ``"b c"`` of ``a . "b c"``. Its value begins at ``value`` (of a header: its end); it ends without a comma
+    or comment.
     """
 
     kind: Kind
@@ -224,10 +212,7 @@ class _Scan:
 
 
 class Places:
-    """The line of every key, table and array entry of a TOML text.
-
-    Paths are keys and, for entries of arrays, indices from 0: ``("blocks", "liquids", "conditions", 2)``.
-    """
+    """The line of every key, table and array entry of a TOML text."""
 
     def __init__(self, source: str) -> None:
         self._source = source

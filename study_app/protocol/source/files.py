@@ -46,14 +46,7 @@ def bundled(
 ) -> bytes:
     """Return a study's file followed by what it names.
 
-    Parameters
-    ----------
-    study : bytes
-        The study's file.
-    text_of : callable
-        Gives the text of a liquid file, None if it is lost.
-    hashes : mapping of str to str
-        The SHA-256 of its footage, by name.
+    ``text_of`` gives the text of a liquid file, None if it is lost; ``hashes`` are the SHA-256 of its footage, by name.
     """
     texts = {name: text for name in _values(study, "liquids", "file") if (text := text_of(name)) is not None}
     return study + _table(_FOOTAGE_HEADER, hashes) + _table(_HEADER, texts)
@@ -77,7 +70,10 @@ def _split(source: bytes, header: bytes) -> tuple[bytes, dict[str, str]]:
 
 
 def _table(header: bytes, texts: Mapping[str, str]) -> bytes:
-    rows = "".join(f"{_quoted(name)} = {_quoted(text)}\n" for name, text in texts.items())
+    def quoted(text: str) -> str:
+        return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+    rows = "".join(f"{quoted(name)} = {quoted(text)}\n" for name, text in texts.items())
     return header + rows.encode() if texts else b""
 
 
@@ -131,11 +127,6 @@ def _read(path: Path) -> str | None:
         return None
 
 
-def _quoted(text: str) -> str:
-    """Return a text as a TOML string of one line."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
 _PACKAGE = Path(__file__).resolve().parents[2]
 # A checkout is offered as the workspace: then the folder of these protocols also holds the studies made there.
 _SHIPPED = (
@@ -174,13 +165,7 @@ def at_hand() -> tuple[str, ...]:
 
 
 def find(name_or_path: str | Path) -> Path:
-    """Return the file of a protocol.
-
-    Raises
-    ------
-    ProtocolError
-        There is none.
-    """
+    """Return the file of a protocol (ProtocolError if there is none)."""
     path = Path(name_or_path)
     if path.is_file():
         return path
@@ -199,13 +184,7 @@ def _not_found(name_or_path: str | Path, message: str, hint: str) -> ProtocolErr
 
 
 def source_bytes(name_or_path: str | Path) -> bytes:
-    """Return a protocol's file as it is on disk, followed by the liquid files it names (`with_liquid_files`).
-
-    Raises
-    ------
-    ProtocolError
-        It does not exist or cannot be read.
-    """
+    """Return a protocol's file as it is on disk, followed by the liquid files it names (`with_liquid_files`)."""
     path = find(name_or_path)
     try:
         return with_liquid_files(path.read_bytes(), path.parent)
