@@ -14,7 +14,7 @@ from study_app.number_text import counted
 from study_app.protocol.checks.expected_precision import precision_rows
 from study_app.protocol.checks.warnings import warnings
 from study_app.protocol.groups import sessions_differ
-from study_app.protocol.model import Block, Condition, Protocol, Questionnaire
+from study_app.protocol.model import Block, Condition, Protocol
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
 from study_app.protocol.orders.durations import Variant, block_duration_s, expected_duration_s, variants
 from study_app.protocol.orders.sequences import row_count
@@ -66,6 +66,10 @@ def describe(protocol: Protocol, delay_ticks: int = BELIEVED_TICKS) -> str:
         for name, condition in protocol.conditions.items()
     ]
     warned = [f"  {sentence}" for sentence in warnings(protocol)]
+    decided = [("nothing", "there is no table [analysis]: the report will call all it finds exploratory")]
+    if protocol.analysis is not None:
+        named = [f"{name} by {one.label}" for name, one in protocol.conditions.items() if one.label]
+        decided = list(protocol.analysis.described(named))
     sections = (
         _head(protocol, language),
         *(_titled(_title(one), _session(one.protocol, language)) for one in variants(protocol)),
@@ -74,7 +78,7 @@ def describe(protocol: Protocol, delay_ticks: int = BELIEVED_TICKS) -> str:
         ("Effects in each liquid", *(f"  {line}".rstrip() for line in effects[:-1])),
         _titled("Conditions", conditions),
         *(_statements(protocol, name, language) for name in protocol.questionnaires),
-        _titled("Decided about the analysis", _analysis(protocol)),
+        _titled("Decided about the analysis", decided),
         _titled("A trial is valid up to", limit_rows(protocol)),
         *([("Warnings", *warned)] if warned else []),
     )
@@ -136,7 +140,6 @@ def spread(numbers: Sequence[int]) -> str:
 
 
 def _title(one: Variant) -> str:
-    """Return the heading of a session's steps: with group, number, duration and answers where sessions differ."""
     if not one.name:
         return "Session"
     minutes = f"about {expected_duration_s(one.protocol) / 60:.0f} min"
@@ -162,26 +165,27 @@ def _session(protocol: Protocol, language: str) -> list[tuple[str, str, str]]:
 def _block(protocol: Protocol, block: Block, language: str, delay_ticks: int) -> Iterable[str]:
     part = "" if block.part is None else f"Part {block.part}: "
     questionnaire, compared = protocol.questionnaire_of(block.id), protocol.compared_in(block.id)
+    trials = order_of(protocol, block).trials
+    times = f"every condition {block.repetitions} times" if block.repetitions > 1 else ""
     rows = [
-        ("Trials", _presentation(protocol, block)),
+        ("Trials", ", ".join(filter(None, (counted(trials, "trial"), times, _order(block))))),
         *_beside_the_trials(protocol, block, language),
-        (
-            "Shown as",
-            protocol.text(block.setting_label, language) + (" 1, 2, …" if order_of(protocol, block).trials > 1 else ""),
-        ),
+        ("Shown as", protocol.text(block.setting_label, language) + (" 1, 2, …" if trials > 1 else "")),
         ("Recorded as", ", ".join(block_codes(protocol, block))),
         ("Conditions", ", ".join(protocol.conditions_in(block.id))),
         *([] if block.design is not None or compared is None else [("Compared", compared)]),
-        *(_design_rows(protocol, block, delay_ticks) if block.design is not None else ()),
-        *(
-            [("Duration", f"about {block_duration_s(protocol, block, language) / 60:.0f} min")]
-            if block.design is not None
-            else []
-        ),
-        ("Task", protocol.tasks[block.task].summary),
     ]
-    if block.design is None:
-        rows.append(("Asked", "nothing" if questionnaire is None else _asked(questionnaire, str(block.questionnaire))))
+    if block.design is not None:
+        rows += _design_rows(protocol, block, delay_ticks)
+        rows.append(("Duration", f"about {block_duration_s(protocol, block, language) / 60:.0f} min"))
+    rows.append(("Task", protocol.tasks[block.task].summary))
+    if block.design is None and questionnaire is None:
+        rows.append(("Asked", "nothing"))
+    elif block.design is None and questionnaire is not None:
+        order = "in the order written" if questionnaire.item_order == "fixed" else "in another order each time"
+        noun = "statement" if len(questionnaire.statements) == len(questionnaire.items) else "question"
+        asked = counted(len(questionnaire.items), noun)
+        rows.append(("Asked", f"{asked} (questionnaire {block.questionnaire}), {order}"))
     return _titled(f"{part}{protocol.text(block.title, language)} (block {block.id}, {block.phase})", rows)
 
 
@@ -239,34 +243,23 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
     yield from precision_rows(protocol, block)
 
 
-def _presentation(protocol: Protocol, block: Block) -> str:
-    words = counted(order_of(protocol, block).trials, "trial")
-    if block.repetitions > 1:
-        words += f", every condition {block.repetitions} times"
-    return words if len(block.conditions) < 2 else f"{words}, {_order(block)}"
-
-
 def _order(block: Block) -> str:
+    if len(block.conditions) < 2:
+        return ""
     match block.order:
         case "fixed":
             return "in the order written: who reads the protocol can tell the codes"
         case "shuffled":
             return "another order for each participant"
         case "constrained":
-            return f"another order for each participant, {_constraint(block)}"
+            most, least = block.max_repeats, block.min_distance
+            kept = [] if most is None else [f"at most {most} of a kind in a row"]
+            kept += [] if least is None else [f"at least {least} trials from one to the next of its kind"]
+            return f"another order for each participant, {' and '.join(kept)}"
         case "williams" | "latin" as square:
             rows = row_count(square, len(block.conditions))
             name = "a Williams design" if square == "williams" else "a Latin square"
             return f"in {name} of {rows} rows"
-
-
-def _constraint(block: Block) -> str:
-    kept = []
-    if block.max_repeats is not None:
-        kept.append(f"at most {block.max_repeats} of a kind in a row")
-    if block.min_distance is not None:
-        kept.append(f"at least {block.min_distance} trials from one to the next of its kind")
-    return " and ".join(kept)
 
 
 def _beside_the_trials(protocol: Protocol, block: Block, language: str) -> Iterator[tuple[str, str]]:
@@ -279,12 +272,6 @@ def _beside_the_trials(protocol: Protocol, block: Block, language: str) -> Itera
             "Breaks",
             f"{order_of(protocol, block).breaks}, after every {counted(block.break_every or 0, 'trial')}: {title}",
         )
-
-
-def _asked(questionnaire: Questionnaire, name: str) -> str:
-    order = "in the order written" if questionnaire.item_order == "fixed" else "in another order each time"
-    noun = "statement" if len(questionnaire.statements) == len(questionnaire.items) else "question"
-    return f"{counted(len(questionnaire.items), noun)} (questionnaire {name}), {order}"
 
 
 def _liquids(protocol: Protocol) -> list[tuple[str, ...]]:
@@ -332,16 +319,11 @@ def _statements(protocol: Protocol, name: str, language: str) -> Iterable[str]:
         )
         for item in questionnaire.items
     ]
-    scores = f"  Scores: {', '.join(questionnaire.scores)}" if questionnaire.scores else ""
-    return (title, *_aligned(rows), *([scores] if scores else []), *(f"  {line}" for line in _sources(questionnaire)))
-
-
-def _sources(questionnaire: Questionnaire) -> Iterator[str]:
-    """Yield where a questionnaire's items and scores come from, and what these were compared with."""
+    more = [f"  Scores: {', '.join(questionnaire.scores)}"] if questionnaire.scores else []
     if questionnaire.instrument is not None:
         found = instrument(questionnaire.instrument)
-        yield f"Source: {found['source']}"
-        yield f"Compared: {found['compared']}"
+        more += [f"  Source: {found['source']}", f"  Compared: {found['compared']}"]
+    return (title, *_aligned(rows), *more)
 
 
 def _kind(item: Question, context: Context) -> str:
@@ -355,19 +337,8 @@ def _kind(item: Question, context: Context) -> str:
     return f"{item.kind_id}{answers}{condition}"
 
 
-def _analysis(protocol: Protocol) -> list[tuple[str, str]]:
-    decided = protocol.analysis
-    if decided is None:
-        return [("nothing", "there is no table [analysis]: the report will call all it finds exploratory")]
-    return list(decided.described([f"{name} by {one.label}" for name, one in protocol.conditions.items() if one.label]))
-
-
 def limit_rows(protocol: Protocol) -> list[tuple[str, str]]:
     """Return the limits up to which a trial is valid: each value, and what it is of."""
     units = {"ms": " ms", "percent": " %"}
-    values = {key: getattr(protocol.limits, key) for key in LIMITS}
-    return [
-        (f"{value:g}{units.get(key.rpartition('_')[2], '')}", LIMITS[key])
-        for key, value in values.items()
-        if value is not None
-    ]
+    values = ((key, getattr(protocol.limits, key), of) for key, of in LIMITS.items())
+    return [(f"{value:g}{units.get(key.rpartition('_')[2], '')}", of) for key, value, of in values if value is not None]

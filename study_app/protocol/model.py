@@ -214,7 +214,7 @@ class StudyLiquid(Liquid):
 
 
 def scene_with(scene: SceneDefaults, device: DeviceNeeds, liquids: Sequence[StudyLiquid], form: Literal[1, 2]) -> Scene:
-    """Return a scene of some liquids, of a file's format; they have one ball (`checks.balls`)."""
+    """Return a scene of some liquids, of a file's format; they have one ball (`checks.consistency.liquids`)."""
     return Scene(
         **dict(scene) | {"body": liquids[0].body_in(scene)},
         rate_hz=device.rate_hz,

@@ -115,21 +115,8 @@ def check(document: Mapping[str, Any], broken: Iterable[Path], valid: Protocol |
     for of_names in (references, kinds, sequence, groups, repeats, items, alike, languages, questions, decisions):
         yield from of_names(document)
     parts = draft(document, broken, valid)
-    for of_tables in (balls, targets, crowded, outside, unfelt, equal_liquids, equal_conditions):
+    for of_tables in (targets, liquids, unfelt, equal_liquids, equal_conditions, compares, blocks, counted_parts):
         yield from of_tables(parts)
-    for of_tables in (codes, compares, breaks, counted_parts):
-        yield from of_tables(parts)
-
-
-def balls(parts: Draft) -> Iterator[Fault]:
-    """Check that the liquids of a condition have one ball: it is one body that moves through all of them."""
-    if parts.scene is None:
-        return
-    for name, condition in parts.conditions.items():
-        liquids = [parts.liquids[liquid] for liquid in condition.liquid_ids if liquid in parts.liquids]
-        if len({liquid.body_in(parts.scene) for liquid in liquids}) > 1:
-            message = "its liquids have different balls, and one ball moves through all of them"
-            yield Fault(("conditions", name, "liquids"), message, "give them the same body")
 
 
 def targets(parts: Draft) -> Iterator[Fault]:
@@ -156,24 +143,21 @@ def targets(parts: Draft) -> Iterator[Fault]:
                     )
 
 
-def crowded(parts: Draft) -> Iterator[Fault]:
-    """Check that no condition has more liquids than a scene holds."""
+def liquids(parts: Draft) -> Iterator[Fault]:
+    """Check that a condition's liquids fit into a scene and have one ball, which meets each somewhere in the tank."""
     for name, condition in parts.conditions.items():
+        place, known = ("conditions", name, "liquids"), [one for one in condition.liquid_ids if one in parts.liquids]
+        if parts.scene is not None and len({parts.liquids[one].body_in(parts.scene) for one in known}) > 1:
+            message = "its liquids have different balls, and one ball moves through all of them"
+            yield Fault(place, message, "give them the same body")
         if len(condition.liquids) > MAX_LIQUIDS:
-            yield Fault(
-                ("conditions", name, "liquids"), f"has {len(condition.liquids)} liquids", f"at most {MAX_LIQUIDS}"
-            )
-
-
-def outside(parts: Draft) -> Iterator[Fault]:
-    """Check that the ball meets every liquid of a condition somewhere in the tank."""
-    if parts.device is None or parts.scene is None:
-        return
-    for name, condition in parts.conditions.items():
-        for liquid in condition.liquid_ids:
-            if liquid in parts.liquids and not within_tank(parts.liquids[liquid], parts.scene, parts.device):
+            yield Fault(place, f"has {len(condition.liquids)} liquids", f"at most {MAX_LIQUIDS}")
+        for liquid in known:
+            if parts.device is None or parts.scene is None:
+                continue
+            if not within_tank(parts.liquids[liquid], parts.scene, parts.device):
                 message = f'the region of "{liquid}" lies outside the tank, where no hand meets it'
-                yield Fault(("conditions", name), message, "move or enlarge the region, or scene.origin_m")
+                yield Fault(place[:2], message, "move or enlarge the region, or scene.origin_m")
 
 
 def unfelt(parts: Draft) -> Iterator[Fault]:
@@ -220,15 +204,6 @@ def equal_conditions(parts: Draft) -> Iterator[Fault]:
                 yield Fault(("blocks", name, "conditions", index), message, hint)
 
 
-def codes(parts: Draft) -> Iterator[Fault]:
-    """Check that the codes of different blocks differ."""
-    owners: dict[str, str] = {}
-    for name, block in parts.blocks.items():
-        if block.code_prefix is not None and owners.setdefault(block.code_prefix, name) != name:
-            message = f'block "{owners[block.code_prefix]}" has the prefix "{block.code_prefix}" too'
-            yield Fault(("blocks", name, "code_prefix"), message, "choose another letter")
-
-
 def compares(parts: Draft) -> Iterator[Fault]:
     """Check that the conditions of a main block differ in one thing, which is what the block says that it compares.
 
@@ -250,9 +225,13 @@ def compares(parts: Draft) -> Iterator[Fault]:
             yield Fault(("blocks", name, "compares"), message, "correct it, or leave it out")
 
 
-def breaks(parts: Draft) -> Iterator[Fault]:
-    """Check that a break is a page of that kind."""
+def blocks(parts: Draft) -> Iterator[Fault]:
+    """Check that the codes of different blocks differ, and that a break is a page of that kind."""
+    owners: dict[str, str] = {}
     for name, block in parts.blocks.items():
+        if block.code_prefix is not None and owners.setdefault(block.code_prefix, name) != name:
+            message = f'block "{owners[block.code_prefix]}" has the prefix "{block.code_prefix}" too'
+            yield Fault(("blocks", name, "code_prefix"), message, "choose another letter")
         page = parts.pages.get(block.break_page or "")
         if page is not None and page.kind != "break":
             message = f'page "{block.break_page}" is of kind "{page.kind}"'

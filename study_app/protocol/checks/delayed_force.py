@@ -10,6 +10,7 @@ import csv
 from collections.abc import Iterator
 from functools import cache
 from importlib import resources
+from itertools import takewhile
 from operator import attrgetter
 from typing import Final, NamedTuple
 
@@ -26,22 +27,11 @@ WITHHELD_PERCENT: Final = 5.0
 
 
 class Entry(NamedTuple):
-    """One line: a liquid in a hand, its force late by ``delay_ms``.
+    """One line: a liquid of ``rek2024``, or of ``physical2`` as "physical2_water", in a hand.
 
-    Parameters
-    ----------
-    liquid : str
-        A liquid of ``rek2024``, or one of ``physical2`` as "physical2_water".
-    estimator : str
-        The velocity estimator.
-    hand : str
-        The grip: "light", "middle" or "firm".
-    delay_ms : float
-        Delay of the force [ms], in addition to that of the device.
-    left_percent : float
-        RMS of the force sent over RMS of the force asked for [%].
-    withheld_percent : float
-        Share of the force that is withheld, as in a trial [%].
+    The grip is "light", "middle" or "firm"; the force is late by ``delay_ms`` in addition to the device's delay.
+    ``left_percent`` is RMS of the force sent over RMS of the force asked for, ``withheld_percent`` the share of the
+    force that is withheld, as in a trial.
     """
 
     liquid: str
@@ -63,26 +53,18 @@ def table() -> tuple[Entry, ...]:
 
 
 def longest_ms(liquid: str, estimator: str, hand: str = "light", withheld_percent: float = WITHHELD_PERCENT) -> float:
-    """Return up to which delay [ms] no more than ``withheld_percent`` of the force is withheld; -1 if at none.
-
-    Raises
-    ------
-    KeyError
-        The table has no such liquid, estimator or hand.
-    """
-    found = sorted(
-        (it.delay_ms, it.withheld_percent)
-        for it in table()
-        if (it.liquid, it.estimator, it.hand) == (liquid, estimator, hand)
-    )
+    """Return up to which delay [ms] no more than ``withheld_percent`` of the force is withheld; -1 if at none."""
+    found = _rows(liquid, estimator, hand)
     if not found:
         raise KeyError((liquid, estimator, hand))
-    longest = -1.0
-    for delay_ms, withheld in found:
-        if withheld > withheld_percent:
-            break
-        longest = delay_ms
-    return longest
+    permitted = takewhile(lambda it: it.withheld_percent <= withheld_percent, found)
+    return max((it.delay_ms for it in permitted), default=-1.0)
+
+
+def _rows(liquid: str, estimator: str, hand: str) -> list[Entry]:
+    """Return what the table has of a liquid, the shortest delay first."""
+    rows = (it for it in table() if (it.liquid, it.estimator, it.hand) == (liquid, estimator, hand))
+    return sorted(rows, key=attrgetter("delay_ms"))
 
 
 STIRRED: Final = Stroke(frequency_hz=1.061, amplitude_m=0.03)
@@ -124,9 +106,9 @@ def _of_table(protocol: Protocol, name: str, liquid: str, delay_ms: float) -> st
 
 def _withheld_percent(liquid: str, estimator: str, delay_ms: float) -> float:
     """Return the share that is withheld [%], interpolated in the stored table."""
-    rows = [it for it in table() if (it.liquid, it.estimator, it.hand) == (liquid, estimator, "light")]
-    before = max((it for it in rows if it.delay_ms <= delay_ms), key=attrgetter("delay_ms"))
-    after = min((it for it in rows if it.delay_ms >= delay_ms), key=attrgetter("delay_ms"), default=before)
+    rows = _rows(liquid, estimator, "light")
+    before = [it for it in rows if it.delay_ms <= delay_ms][-1]
+    after = next((it for it in rows if it.delay_ms >= delay_ms), before)
     if after.delay_ms == before.delay_ms:
         return before.withheld_percent
     share = (delay_ms - before.delay_ms) / (after.delay_ms - before.delay_ms)

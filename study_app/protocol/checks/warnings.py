@@ -38,7 +38,7 @@ def warnings(protocol: Protocol, *, simulates: bool = True) -> tuple[str, ...]:
 
 
 def liquid_warnings(protocol: Protocol) -> tuple[str, ...]:
-    """Return what is permitted and may still be a mistake, a sentence each."""
+    """Return what may be a mistake of the liquids, a sentence each."""
     felt = {name: steady(protocol.scene_of(name)) for name in protocol.liquids}
     return (
         *_alike(protocol, felt),
@@ -53,10 +53,7 @@ def _alike(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
     """Yield the pairs of liquids of a block that are hard to tell apart."""
     seen: set[frozenset[str]] = set()
     for block in protocol.main_blocks:
-        names = dict.fromkeys(
-            name for it in protocol.conditions_in(block.id) for name in protocol.conditions[it].liquid_ids
-        )
-        for one, other in combinations(names, 2):
+        for one, other in combinations(_liquids_of(protocol, block), 2):
             pair = frozenset((one, other))
             smaller_n, greater_n = sorted((felt[one].force_n, felt[other].force_n))
             if (greater_n > 0 and greater_n - smaller_n >= TELLING * smaller_n) or pair in seen:
@@ -67,6 +64,12 @@ def _alike(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
                 f"{felt[other].force_n:.2f} N at {HAND_MPS:g} m/s of the hand, less than {TELLING:.0%} of the smaller "
                 "between them"
             )
+
+
+def _liquids_of(protocol: Protocol, block: Block) -> dict[str, None]:
+    """Return the liquids that a block presents, each once."""
+    conditions = (protocol.conditions[it] for it in protocol.conditions_in(block.id))
+    return dict.fromkeys(name for condition in conditions for name in condition.liquid_ids)
 
 
 def _clipped(felt: dict[str, Steady]) -> Iterator[str]:
@@ -104,12 +107,7 @@ def _ignoring_viscosity(protocol: Protocol, felt: dict[str, Steady]) -> Iterator
 
 def _practised(protocol: Protocol) -> Iterator[str]:
     """Yield the liquids that are practised in and judged in another block; levels are practised for their task."""
-    used = {
-        block.id: dict.fromkeys(
-            name for it in protocol.conditions_in(block.id) for name in protocol.conditions[it].liquid_ids
-        )
-        for block in protocol.blocks_in_order
-    }
+    used = {block.id: _liquids_of(protocol, block) for block in protocol.blocks_in_order}
     judged = {name: block.id for block in reversed(protocol.main_blocks) for name in used[block.id]}
     for block in protocol.blocks_in_order:
         if block.phase != "practice" or block.stimulus is not None:
@@ -168,8 +166,7 @@ def _of_block(protocol: Protocol, block: Block, simulates: bool) -> Iterator[str
 
 def _unpaced(protocol: Protocol, block: Block) -> Iterator[str]:
     """Yield that fast motions of a task without a pace are not delivered as requested."""
-    task = protocol.tasks[block.task]
-    if isinstance(task, Follow) or block.stimulus is None:
+    if isinstance(protocol.tasks[block.task], Follow) or block.stimulus is None:
         return
     alike = [one for one in protocol.blocks.values() if (one.stimulus, one.task) == (block.stimulus, block.task)]
     if (said := clipped_unpaced(protocol, alike)) is not None:
