@@ -26,7 +26,9 @@ from study_app.store.delivered import JUDGED, delivered_error, judged
 from study_app.video.frames import VideoFrame, VideoSource, VideoStatistics
 
 LEAD_S = 0.6  # longer than the slowest fade
-_TIMES = np.dtype([(name, SAMPLE[name]) for name in ("tick", "time_ns", "lateness_ns")])
+_OF_ROW = ("tick", "lateness_ns", "permitted_n", "withheld_n", "delay_ticks")
+_KEPT = np.dtype([(name, SAMPLE[name]) for name in (*(JUDGED.names or ()), *_OF_ROW)])
+"""What is kept of the samples of a trial: 128 of 320 bytes."""
 # Everything is drawn this much later than the trial asks. Then the moment to draw lies between two samples at every
 # delay, none included, and is met exactly; else the newest sample, up to a tick old, would stand in where there is no
 # delay, and the error of the delay would tell such trials from all others. Two ticks at 1 kHz.
@@ -86,51 +88,20 @@ class Recording:
         self._running = False
 
 
-class TrialStatistics:
-    """Adds up samples and frames as they come."""
+class FrameStatistics:
+    """Adds up frames as they come.
 
-    def __init__(
-        self, *, rate_hz: float, late_s: float, due_ns: int, paints: bool = True, videos: bool = False
-    ) -> None:
+    Without a window that paints, the first frame is reported and a later one need not.
+    """
+
+    def __init__(self, *, late_s: float, due_ns: int, paints: bool = True, videos: bool = False) -> None:
         self._video = VideoStatistics() if videos else None
-        self._rate_hz = rate_hz
         self._late_s = late_s
         self._fewest = 1 if paints else 2  # frames before the first of them can have stood
-        self._times: list[Any] = []
         self._errors_s: list[float] = []
         self._painted_ns = due_ns
         self._first_gap_ns = 0
         self._frame_gap_ns = 0
-        self._last_m: NDArray[np.float64] | None = None
-        self._path_m = 0.0
-        self._force_sum_n = 0.0
-        self._force_peak_n = 0.0
-        self._limited = np.zeros(len(LIMITER_NAMES), np.int64)
-        self._permitted_sum_n = 0.0
-        self._withheld_sum_n = 0.0
-        self._delay_ticks: int | None = None
-        self._most_delay_ticks = 0
-        self._delay_changes = 0
-
-    def feed(self, samples: Any) -> None:
-        """Take the next samples, in order (recarray of ``layout.SAMPLE``)."""
-        if len(samples) == 0:
-            return
-        times = np.empty(len(samples), _TIMES)
-        for name in _TIMES.fields or ():
-            times[name] = samples[name]
-        self._times.append(times)
-        self._move(samples["position_m"][samples["limiters"] & LIMITER_GLITCH == 0])
-        force_n = np.sqrt(np.einsum("ij,ij->i", samples["device_force_n"], samples["device_force_n"]))
-        self._force_sum_n += float(force_n.sum())
-        self._force_peak_n = max(self._force_peak_n, float(force_n.max()))
-        self._permitted_sum_n += float(samples["permitted_n"].sum())
-        self._withheld_sum_n += float(samples["withheld_n"].sum())
-        self._follow_delay(samples["delay_ticks"])
-        limiters = samples["limiters"]
-        if limiters.any():
-            bits = np.arange(len(LIMITER_NAMES))
-            self._limited += ((limiters[:, None] >> bits) & 1).sum(axis=0)
 
     def frame(self, painted_ns: int, shown_ns: int, delay_s: float, video: VideoFrame | None = None) -> None:
         """Take a frame that was painted at one moment and showed another [ns], at the delay then asked for [s].
@@ -151,33 +122,11 @@ class TrialStatistics:
         """Return the longest time that a frame stood, the newest one until a moment [ns]; 0 before the first frame."""
         return max(self._frame_gap_ns, until_ns - self._painted_ns) if len(self._errors_s) >= self._fewest else 0
 
-    def summary(self, *, samples_dropped: int, worst_gap_s: float, until_ns: int) -> dict[str, Any]:
-        """Return the measured columns of the trial row, to six decimals; None where nothing was measured.
-
-        ``worst_gap_s`` is the longest time between two ticks, as the servo kept it; until ``until_ns``, when the trial
-        ended, the last frame stood.
-        """
-        times = np.concatenate([np.empty(0, _TIMES), *self._times]).view(np.recarray)
-        timed = timing(times, self._rate_hz)
-        ticks = timed.ticks
-        elapsed_s = float(times.time_ns[-1] - times.time_ns[0]) * 1e-9 if ticks else 0.0
+    def columns(self, until_ns: int) -> dict[str, Any]:
+        """Return the columns of the trial row; until a moment [ns] the last frame stood."""
         errors_s = np.asarray(self._errors_s, np.float64)
         seen = errors_s.size > 0
-        columns = {
-            "ticks": ticks,
-            "tick_rate_hz": timed.rate_hz if ticks > 1 else None,
-            "lateness_p99_ms": timed.lateness_p99_s * 1e3 if ticks else None,
-            "worst_gap_ms": worst_gap_s * 1e3 if ticks else None,
-            "overruns": timed.overruns,
-            "samples_dropped": samples_dropped,
-            "path_length_m": self._path_m,
-            "mean_speed_mps": self._path_m / elapsed_s if elapsed_s > 0 else None,
-            "force_mean_n": self._force_sum_n / ticks if ticks else None,
-            "force_peak_n": self._force_peak_n if ticks else None,
-            "withheld_share": self._withheld_sum_n / self._permitted_sum_n if self._permitted_sum_n > 0 else None,
-            "loop_delay_ticks": self._most_delay_ticks if ticks else None,
-            "loop_delay_changes": self._delay_changes if ticks else None,
-            **{f"limiter_{name}": int(count) for name, count in zip(LIMITER_NAMES, self._limited, strict=True)},
+        return {
             "frames": int(errors_s.size),
             "frames_late": int((errors_s > self._late_s).sum()),
             "delay_error_mean_ms": float(errors_s.mean()) * 1e3 if seen else None,
@@ -187,26 +136,40 @@ class TrialStatistics:
             "worst_frame_gap_ms": self.frame_gap_ns(until_ns) * 1e-6 if errors_s.size >= self._fewest else None,
             **({} if self._video is None else self._video.columns()),
         }
-        return {name: round(value, 6) if isinstance(value, float) else value for name, value in columns.items()}
 
-    def _move(self, positions: NDArray[np.float64]) -> None:
-        """Add the path through ``positions`` (n, 3) [m]; non-finite ones are left out."""
-        finite = np.isfinite(positions).all(axis=1)
-        places = positions if finite.all() else positions[finite]
-        if self._last_m is not None:
-            places = np.concatenate((self._last_m, places))
-        if len(places) == 0:
-            return
-        steps = np.diff(places, axis=0)
-        self._path_m += float(np.sqrt(np.einsum("ij,ij->i", steps, steps)).sum())
-        self._last_m = places[-1:].copy()
 
-    def _follow_delay(self, delay_ticks: NDArray[np.int64]) -> None:
-        """Count how often the loop's delay (n,) [ticks] changed, and keep the longest."""
-        before = int(delay_ticks[0]) if self._delay_ticks is None else self._delay_ticks
-        self._delay_changes += int(np.count_nonzero(np.diff(delay_ticks, prepend=before)))
-        self._most_delay_ticks = max(self._most_delay_ticks, int(delay_ticks.max()))
-        self._delay_ticks = int(delay_ticks[-1])
+def sample_columns(samples: Any, rate_hz: float, samples_dropped: int, worst_gap_s: float) -> dict[str, Any]:
+    """Return the columns of a trial's row that its samples (array of ``layout.SAMPLE``) give; None where none do.
+
+    ``worst_gap_s`` is the longest time between two ticks, as the servo kept it.
+    """
+    timed = timing(samples.view(np.recarray), rate_hz)
+    ticks = timed.ticks
+    elapsed_s = float(samples["time_ns"][-1] - samples["time_ns"][0]) * 1e-9 if ticks else 0.0
+    places = samples["position_m"][samples["limiters"] & LIMITER_GLITCH == 0]
+    steps = np.diff(places[np.isfinite(places).all(axis=1)], axis=0)
+    path_m = float(np.sqrt(np.einsum("ij,ij->i", steps, steps)).sum())
+    force_n = np.sqrt(np.einsum("ij,ij->i", samples["device_force_n"], samples["device_force_n"]))
+    permitted_n, delay_ticks = float(samples["permitted_n"].sum()), samples["delay_ticks"]
+    return {
+        "ticks": ticks,
+        "tick_rate_hz": timed.rate_hz if ticks > 1 else None,
+        "lateness_p99_ms": timed.lateness_p99_s * 1e3 if ticks else None,
+        "worst_gap_ms": worst_gap_s * 1e3 if ticks else None,
+        "overruns": timed.overruns,
+        "samples_dropped": samples_dropped,
+        "path_length_m": path_m,
+        "mean_speed_mps": path_m / elapsed_s if elapsed_s > 0 else None,
+        "force_mean_n": float(force_n.sum()) / ticks if ticks else None,
+        "force_peak_n": float(force_n.max()) if ticks else None,
+        "withheld_share": float(samples["withheld_n"].sum()) / permitted_n if permitted_n > 0 else None,
+        "loop_delay_ticks": int(delay_ticks.max()) if ticks else None,
+        "loop_delay_changes": int(np.count_nonzero(np.diff(delay_ticks))) if ticks else None,
+        **{
+            f"limiter_{name}": int(np.count_nonzero(samples["limiters"] >> bit & 1))
+            for bit, name in enumerate(LIMITER_NAMES)
+        },
+    }
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,9 +219,7 @@ class RunningTrial:
         self._serial: int | None = None
         self._dropped_before = 0
         self._tracker = track(command.task)
-        self._statistics = TrialStatistics(
-            rate_hz=servo.rate_hz, late_s=late_s, due_ns=servo.now_ns(), paints=paints, videos=videos
-        )
+        self._frames = FrameStatistics(late_s=late_s, due_ns=servo.now_ns(), paints=paints, videos=videos)
 
     @property
     def task(self) -> TaskView:
@@ -283,7 +244,7 @@ class RunningTrial:
             self._recording.start(self.trial, self.command.attempt, self.command.interval)
             if self._video is not None:
                 self._video.begin(painted_ns)
-        self._statistics.frame(painted_ns, sample_ns, self._drawn_delay_s, self._drawn_video)
+        self._frames.frame(painted_ns, sample_ns, self._drawn_delay_s, self._drawn_video)
         self._recording.frame(painted_ns, sample_ns, self._drawn_video)
 
     def follow(self, samples: Any) -> list[TargetReached]:
@@ -294,8 +255,10 @@ class RunningTrial:
         reached = self._tracker.feed(mine[mine["limiters"] & LIMITER_GLITCH == 0])
         end_ns = self._tracker.end_ns
         mine = mine if end_ns is None else mine[mine["time_ns"] <= end_ns]
-        self._statistics.feed(mine)
-        self._taken.append(judged(mine).tobytes())
+        kept = np.empty(len(mine), _KEPT)
+        for name in _KEPT.names or ():
+            kept[name] = mine[name]
+        self._taken.append(kept.tobytes())
         return reached
 
     @property
@@ -330,9 +293,12 @@ class RunningTrial:
     @property
     def samples(self) -> Any:
         """What is judged of the trial or interval so far (array of ``delivered.JUDGED``)."""
-        return np.frombuffer(
-            b"".join(self._taken), JUDGED
-        )  # records are concatenated field by field, five times slower
+        return judged(self._samples)
+
+    @property
+    def _samples(self) -> Any:
+        # records are concatenated field by field, five times slower
+        return np.frombuffer(b"".join(self._taken), _KEPT)
 
     @property
     def frozen(self) -> bool:
@@ -342,7 +308,7 @@ class RunningTrial:
         """
         if self._serial is None:
             return False
-        gap_s = max(self._servo.worst_gap_s, self._statistics.frame_gap_ns(self._until_ns) * 1e-9)
+        gap_s = max(self._servo.worst_gap_s, self._frames.frame_gap_ns(self._until_ns) * 1e-9)
         return gap_s > FROZEN_S
 
     @property
@@ -352,11 +318,12 @@ class RunningTrial:
 
     def summary(self) -> dict[str, Any]:
         """Return what its row records until now (``store.tables.columns``)."""
-        measured = self._statistics.summary(
-            samples_dropped=0 if self._serial is None else self._reader.dropped - self._dropped_before,
-            worst_gap_s=self._servo.worst_gap_s,
-            until_ns=self._until_ns,
-        )
+        dropped = 0 if self._serial is None else self._reader.dropped - self._dropped_before
+        measured = {
+            **sample_columns(self._samples, self._servo.rate_hz, dropped, self._servo.worst_gap_s),
+            **self._frames.columns(self._until_ns),
+        }
+        measured = {name: round(value, 6) if isinstance(value, float) else value for name, value in measured.items()}
         error = None  # where the participant set the force, or the study delays it
         if self._serial is not None and not self.command.adjusts and not self._scene.link.acts:
             from study_app.haptics.runtime.offline import law_along  # noqa: PLC0415 - the compiler: the servo loaded it
