@@ -96,7 +96,8 @@ class TankWidget(QWidget):
     ) -> None:
         super().__init__(parent)
         if by_mouse:
-            words = replace(words, continue_now=words.click_now, pause_hint=words.pause_title)
+            for_mouse = {"continue_now": words.click_now, "pause_hint": words.pause_title}
+            words = type(words)({**vars(words), **for_mouse})
         self._words = words
         self._by_mouse = by_mouse
         self._photodiode = photodiode

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Any, Final
 
 from study_app.errors import StudyError
 from study_app.protocol.source.problems import did_you_mean
@@ -17,109 +16,24 @@ from study_app.protocol.source.problems import did_you_mean
 RIGHT_TO_LEFT = frozenset({"ar", "dv", "fa", "he", "ks", "ps", "sd", "ug", "ur", "yi"})
 
 
-@dataclass(frozen=True, slots=True)
 class Words:
-    """One language's words; ``small_numbers`` are the numbers from one as they begin a sentence."""
+    """One language's words: an attribute for each key of its file, a text, or a template with the slots in its braces.
 
-    language: str
-    name: str  # of the language, in itself
-    english_name: str
-    choose_language: str
+    ``small_numbers`` are the numbers from one as they begin a sentence; ``interval_coming`` is said in the rest before
+    the first interval, the second …; questions are by the kind of design, answers by their id.
+    """
 
-    # progress, at the top of every page of a part
-    part: str  # {part} {parts}
-    setting: str  # {label}, the trial's name with its number, and {of}
-    setting_at_most: str  # the same in a block that may end early
-
-    # pages to read
-    continue_: str
-    decline: str  # on the consent
-    space_key: str
-    enter_key: str
-    escape_key: str
-
-    # tank
-    targets_reached: str
-    reached: str  # {reached} {of}
-    seconds_left: str  # {seconds}
-    continue_in: str  # {seconds}
-    continue_now: str
-    click_now: str  # where the mouse is the device
-    further_away: str  # of the target, where the mouse's wheel moves the hand in depth
-    nearer: str
-    time_is_up: str
-    follow_target: str  # where a study gives no instruction of its own
-    back_to_target: str  # in a rest that waits for it
-    pause_hint: str
-
-    trial: str  # the name of a trial where the study gives none
-
-    # questionnaire
-    please_answer: str
-    press_keys: str
-    answered: str  # {done} {of}
-    answers_kept: str
-    key_answer: str
-    key_move: str
-    optional: str
-    chosen: str
-    one_missing: str  # {list}
-    many_missing: str  # {n} {list}
-    one_question_missing: str  # {list}, of a form
-    many_questions_missing: str  # {n} {list}
-    no_answer_yet: str
-    several_possible: str  # of a choice
-    whole_number: str  # as {kind} in the lines below, as any_number
-    any_number: str
-    number_between: str  # {kind} {least} {most}
-    number_from: str  # {kind} {least}
-    number_to: str  # {kind} {most}
-    number_needed: str  # {kind}
-    and_: str
     small_numbers: tuple[str, ...]
+    interval_coming: tuple[str, ...]
+    design_questions: Mapping[str, str]
+    design_answers: Mapping[str, str]
 
-    # trials of intervals
-    design_short: str  # names the answer to a design's question, in figures and tables
-    design_questions: Mapping[str, str]  # by the kind of design; forced choices share one
-    design_answers: Mapping[str, str]  # by the answer's id
-    interval_begins: str  # {ordinal}, an answer such as "First", and {of}
-    interval_coming: tuple[str, ...]  # in the rest before the first, the second …
-    once_more: str  # a trial is presented again
-    right: str
-    not_right: str
-    number_wanted: str
-    modulus: str  # {number}, of the first trial of a magnitude estimation
-    delete_digit: str
-    less: str  # of what an adjustment sets
-    more: str
-    done: str
+    if TYPE_CHECKING:
 
-    # pause and force stop
-    pause_title: str
-    pause_body: str
-    pause_held_body: str
-    resume: str
-    force_off_title: str
-    force_off_body: str
-    force_held_title: str
-    force_held_body: str
-    force_on: str
+        def __getattr__(self, name: str) -> str: ...
 
-    # trouble
-    trouble_title: str
-    trouble_body: str
-
-    # ends
-    end_title: str
-    end_body: str
-    ended_early_title: str
-    ended_early_body: str
-    let_go: str  # after either, where the mouse is not the device
-    close: str
-
-    # before the first page
-    window_title: str
-    preparing: str
+    def __init__(self, table: Mapping[str, Any]) -> None:
+        vars(self).update({key: tuple(value) if isinstance(value, list) else value for key, value in table.items()})
 
     @property
     def right_to_left(self) -> bool:
@@ -150,16 +64,10 @@ class Words:
 
 
 _FOLDER: Final = Path(__file__).parent
-_LISTS: Final = ("small_numbers", "interval_coming")
-
-
-def _words(code: str) -> Words:
-    """Return the words of a language as its file holds them."""
-    table = tomllib.loads((_FOLDER / f"{code}.toml").read_text(encoding="utf-8"))
-    return Words(**table | {key: tuple(table[key]) for key in _LISTS})
-
-
-LANGUAGES: Final = {code: _words(code) for code in ("en", "nl", "de", "fr", "ar")}
+LANGUAGES: Final = {
+    code: Words(tomllib.loads((_FOLDER / f"{code}.toml").read_text(encoding="utf-8")))
+    for code in ("en", "nl", "de", "fr", "ar")
+}
 
 
 def language_name(code: str) -> str:
