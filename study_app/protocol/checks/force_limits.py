@@ -21,6 +21,7 @@ from study_app.haptics.model.slope_limits import slope_limit, steady
 from study_app.number_text import counted
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol, Reach
+from study_app.protocol.source.document import Path
 from study_app.protocol.source.problems import Fault
 from study_app.protocol.trials.presentation import scene_of
 from study_app.protocol.trials.presented_levels import (
@@ -53,26 +54,18 @@ def paced(protocol: Protocol, delay_ticks: int = BELIEVED_TICKS) -> Iterator[Fau
 
     The study is sound but for this; a force acts ``delay_ticks`` ticks late.
     """
-    yield from _hidden(protocol)
+    for block in protocol.blocks.values():
+        for name in protocol.conditions_in(block.id) if isinstance(protocol.tasks[block.task], Reach) else ():
+            if protocol.conditions[name].ball == "hidden":
+                message = f'is hidden, but block "{block.id}" has a reaching task: it cannot be aimed'
+                yield Fault(("conditions", name, "ball"), message, 'a task of kind "follow" or "explore"')
     yield from _lagging(protocol)
     for blocks in by_stimulus(protocol):
         yield from clipped(protocol, blocks, delay_ticks)
     for block in protocol.blocks.values():
-        task = protocol.tasks[block.task]
-        if block.stimulus is None and isinstance(task, Follow):
-            for index, name in enumerate(block.conditions):
-                for message, hint in clipped_at_pace(protocol.scene_for(name), task, f'"{name}" is'):
-                    yield Fault(("blocks", block.id, "conditions", index), message, hint)
-
-
-def _hidden(protocol: Protocol) -> Iterator[Fault]:
-    for block in protocol.blocks.values():
-        if not isinstance(protocol.tasks[block.task], Reach):
-            continue
-        for name in protocol.conditions_in(block.id):
-            if protocol.conditions[name].ball == "hidden":
-                message = f'is hidden, but block "{block.id}" has a reaching task: it cannot be aimed'
-                yield Fault(("conditions", name, "ball"), message, 'a task of kind "follow" or "explore"')
+        for index, name in enumerate(block.conditions if block.stimulus is None else ()):
+            place = ("blocks", block.id, "conditions", index)
+            yield from clipped_at_pace(protocol, block, protocol.scene_for(name), f'"{name}" is', place)
 
 
 def _lagging(protocol: Protocol) -> Iterator[Fault]:
@@ -142,7 +135,7 @@ def clipped(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> It
     condition = condition_of(protocol, stimulus)
     if stimulus.vary in OF_LINK:
         block, scene = max(found, key=lambda one: hand_mps_of(protocol, one[0]))
-        yield from _at_pace(protocol, block, scene, f'"{condition}" is')
+        yield from clipped_at_pace(protocol, block, scene, f'"{condition}" is', place)
         return
     every, scene = _every(protocol, blocks), protocol.scene_for(condition)
     limit_nspm, loop = _loop(scene, delay_ticks)
@@ -159,14 +152,7 @@ def clipped(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> It
         most = max(by_force, key=lambda one: one.asked_n or 0.0)
         strongest = override(scene, stimulus.vary, most.comparison)
         named = _named(list(every), by_force, _IS)
-        yield from _at_pace(protocol, every[most], strongest, named)
-
-
-def _at_pace(protocol: Protocol, block: Block, scene: Scene, what: str) -> Iterator[Fault]:
-    task = protocol.tasks[block.task]
-    if isinstance(task, Follow):
-        for message, hint in clipped_at_pace(scene, task, what):
-            yield Fault(("stimuli", str(block.stimulus), "levels"), message, hint)
+        yield from clipped_at_pace(protocol, every[most], strongest, named, place)
 
 
 def _every(protocol: Protocol, blocks: Sequence[Block]) -> dict[Level, Block]:
@@ -197,11 +183,14 @@ def clipped_unpaced(protocol: Protocol, blocks: Sequence[Block]) -> str | None:
     return f"tasks.{task}: at {UNPACED_MPS:g} m/s the force{of} is clipped {limit}: such trials are repeated: {PACED}"
 
 
-def clipped_at_pace(scene: Scene, task: Follow, what: str) -> Iterator[tuple[str, str]]:
-    """Yield how much of a scene's force the force limit clips at the pace, and what would not be clipped.
+def clipped_at_pace(protocol: Protocol, block: Block, scene: Scene, what: str, place: Path) -> Iterator[Fault]:
+    """Yield how much of a scene's force the force limit clips at the pace of a block, and what would not be clipped.
 
     ``what`` is the subject of the sentence with its verb: "standard 32 at level 0.6 is".
     """
+    task = protocol.tasks[block.task]
+    if not isinstance(task, Follow):
+        return
     pace_mps = task.fastest_stroke((0.0, 0.0, 0.0)).speed_mps
     if len(scene.liquids) != 1 or (drag_n := steady(scene, FASTER * pace_mps).drag_n) <= scene.force_limit_n:
         return
@@ -210,7 +199,8 @@ def clipped_at_pace(scene: Scene, task: Follow, what: str) -> Iterator[tuple[str
         share = (least + most) / 2
         fits = steady(scene, FASTER * share * pace_mps).drag_n <= scene.force_limit_n
         least, most = (share, most) if fits else (least, share)
-    yield (
+    yield Fault(
+        place,
         f"{what} {drag_n:.1f} N at {FASTER:g} times the paced {pace_mps:.3g} m/s; device.force_limit_n is "
         f"{scene.force_limit_n:g}",
         f"amplitude_mm = {floored(least * task.amplitude_mm, 1):g} or "
@@ -273,16 +263,12 @@ def _listed(every: Sequence[Level], some: Sequence[Level]) -> str:
                 rows[-1].append(one)
             else:
                 rows.append([one])
-        words = [_number(row[0].level) + (f" to {_number(row[-1].level)}" if row[1:] else "") for row in rows]
+        ends = [[f"{float(f'{one.level:.3g}'):g}" for one in (row[0], row[-1])] for row in rows]
+        words = [f"{low} to {high}" if row[1:] else low for row, (low, high) in zip(rows, ends, strict=True)]
         joined = " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
         levels_ = f"level{'s' * (len(rows) > 1 or len(rows[0]) > 1)} {joined}"
         found.append(levels_ if standard is None else f"standard {standard:g} at {levels_}")
     return " and ".join(filter(None, (", ".join(found[:-1]), found[-1])))
-
-
-def _number(level: float) -> str:
-    """Return a level with three digits."""
-    return f"{float(f'{level:.3g}'):g}"
 
 
 def passed_share(velocity: Velocity, rate_hz: float, frequency_hz: float) -> float:
@@ -307,15 +293,12 @@ def fastest_hz(velocity: Velocity, rate_hz: float, share: float) -> float:
 
 def returned(protocol: Protocol) -> Iterator[Fault]:
     """Yield the blocks of levels in a paced motion whose late force returns more than the limit."""
-    yielded: set[Fault] = set()
-    for block in protocol.blocks.values():
-        task = protocol.tasks[block.task]
-        if block.stimulus is None or not isinstance(task, Follow):
-            continue
-        fault = _returned(protocol, block, task.fastest_stroke(protocol.device.workspace_m))
-        if fault is not None and fault not in yielded:
-            yielded.add(fault)
-            yield fault
+    strokes = (
+        (block, task.fastest_stroke(protocol.device.workspace_m))
+        for block in protocol.blocks.values()
+        if block.stimulus is not None and isinstance(task := protocol.tasks[block.task], Follow)
+    )
+    yield from dict.fromkeys(filter(None, (_returned(protocol, block, stroke) for block, stroke in strokes)))
 
 
 def _returned(protocol: Protocol, block: Block, stroke: Stroke) -> Fault | None:
