@@ -172,10 +172,10 @@ def analyses(protocol: Protocol) -> Iterator[str]:
         plan = threshold_plan(protocol, block)
         if plan is not None:
             stimulus, design = stimulus_of(protocol, block), design_of(protocol, block)
-            method = method_of(protocol, block)
+            method, family = method_of(protocol, block), FAMILIES[assumed_for(stimulus, design).family]
             yield (
                 f"Block {block.id} ({design.paper_name}, {method.paper_name}): for each participant and standard the "
-                f"posterior median of the threshold ({FAMILIES[assumed_for(stimulus, design).family]} function) with its "
+                f"posterior median of the threshold ({family} function) with its "
                 "equal-tailed 95 % interval, at the delivered levels; the median under a flat prior of the width is "
                 "reported, too; goodness of fit by 999 simulated sets of answers, drift over trials."
             )
