@@ -76,7 +76,6 @@ def _say(failed: list[str]) -> None:
 
 
 def _validate(validator: Path, to: Path) -> None:
-    """Run a Psych-DS validator on the folder of an export."""
     import subprocess
 
     from study_app.analysis.export.psychds_dataset import FOLDER
@@ -208,7 +207,6 @@ def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[
 
 
 def _site(_context: click.Context, _parameter: click.Parameter, words: tuple[str, ...]) -> dict[str, Path]:
-    """Return the folders of sites by their names."""
     sites: dict[str, Path] = {}
     for text in words:
         name, equals, folder = text.partition("=")

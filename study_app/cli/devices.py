@@ -218,7 +218,6 @@ def _falcon(name: str, firmware: Path | None, grams: float | None) -> tuple[Falc
 
 
 def _calibrated(found: Calibration, notes: Notes) -> list[str]:
-    """Return what was found, and what it leaves of each rest."""
     from study_app.devices.falcon.mechanics.calibration import UNCALIBRATED_UNITS_PER_NM, left_over
 
     lines = ["", "rest  load [N]  unexplained x, y, z [N]"]
@@ -321,7 +320,6 @@ def emulate_falcon(
 
 
 def _state_reporter(emulator: Emulator) -> Callable[[], None]:
-    """Return what prints the state when it has changed."""
     printed = ""
 
     def report_state() -> None:

@@ -225,7 +225,6 @@ def estimate(
 
 
 def _line(found: Estimate) -> str:
-    """Return an estimate as one line."""
     from study_app.lab.estimation.estimator import value_words
 
     if not found.identified:

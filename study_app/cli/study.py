@@ -287,7 +287,6 @@ def sessions(named: str | None, results: Path | None) -> None:
 
 
 def _studies(results: Path) -> Iterator[Path]:
-    """Yield the studies' folders, sorted."""
     from study_app.store.tables.study_files import study_folders
 
     if results.is_dir():

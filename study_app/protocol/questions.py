@@ -33,7 +33,6 @@ class Scale(Table):
 
     @property
     def points(self) -> int:
-        """How many points the scale has."""
         return max(map(len, self.labels.values()), default=0)
 
 
@@ -59,7 +58,6 @@ class ShowIf(Table):
         return self.values if isinstance(self.values, tuple) else () if self.values is None else (self.values,)
 
     def holds(self, answer: Value) -> bool:
-        """Return whether an answer shows the question."""
         if self.values is not None:
             given = answer if isinstance(answer, tuple) else (answer,)
             return any(one in self.permitted for one in given)
@@ -137,7 +135,6 @@ class Context:
     language: str
 
     def text(self, value: str | dict[str, str]) -> str:
-        """Return a localised text in the language."""
         return text_in(value, self.language)
 
 
@@ -164,11 +161,9 @@ class Question(ExtendedTable):
 
     @property
     def kind_id(self) -> str:
-        """The id of its kind."""
         return kind_id(type(self))
 
     def view(self, number: int, context: Context) -> ItemView:
-        """Return what its page shows."""
         raise NotImplementedError
 
     def problem(self, answer: Value, context: Context) -> str | None:
@@ -242,7 +237,6 @@ class Rated(Question):
     value_type: ClassVar[ValueType] = "integer"
 
     def scale_of(self, context: Context) -> Scale:
-        """Return the scale that it is rated on."""
         raise NotImplementedError
 
     def view(self, number: int, context: Context) -> ItemView:
@@ -372,7 +366,6 @@ class NumberView(ItemView):
     unit: str = ""
 
     def permits(self, number: float) -> bool:
-        """Return whether a number answers it."""
         return (
             (self.least is None or number >= self.least)
             and (self.most is None or number <= self.most)

@@ -54,7 +54,6 @@ def _liquid(liquid: Liquid) -> Mapping[str, Any]:
 
 
 def _tables(place: Place, table: Mapping[str, Any], notes: Mapping[Place, str]) -> Iterator[str]:
-    """Yield a table of a TOML file, then those inside it."""
     yield ""
     yield f"[{'.'.join(place)}]"
     for key, value in table.items():

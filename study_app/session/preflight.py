@@ -55,7 +55,6 @@ class Masking:
 
     @property
     def entry(self) -> dict[str, Any]:
-        """The answer as the receipt has it."""
         return {"means": self.means, "noise_db": self.noise_db}
 
 
@@ -123,7 +122,6 @@ class Check:
 
     @property
     def said(self) -> str:
-        """All of it in one line."""
         return "; ".join(filter(None, (self.value, self.about, self.advice)))
 
     @property

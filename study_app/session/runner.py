@@ -102,7 +102,6 @@ class Runner:
 
     @property
     def finished(self) -> bool:
-        """Whether the session is over."""
         return self._state.over and self._ending is None
 
     @property
@@ -262,7 +261,6 @@ class Runner:
         return True
 
     def _fail(self, error: StudyError) -> None:
-        """Stop the force, and call the operator."""
         self._ports.servo.stop_force()
         self.post(broken(self._ports.clock(), error))
 

@@ -65,7 +65,6 @@ class Tracker:
 
     @property
     def done(self) -> bool:
-        """Whether the task is over."""
         return self.outcome is not None
 
     def feed(self, samples: Any) -> list[TargetReached]:
@@ -131,7 +130,6 @@ class ExploreTracker(Tracker):
         self._least_s = task.min_s
 
     def leave(self) -> bool:
-        """End the exploration if it has had its least time."""
         return self.finish(self._least_s)
 
 

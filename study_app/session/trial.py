@@ -82,7 +82,6 @@ class Recording:
             self._recorder.frame(painted_ns, sample_ns, video)
 
     def stop(self) -> None:
-        """End the recording."""
         if self._recorder is not None and self._running:
             self._recorder.stop()
         self._running = False
@@ -313,7 +312,6 @@ class RunningTrial:
 
     @property
     def _until_ns(self) -> int:
-        """When the task ended, or now [ns, servo's clock]."""
         return self._servo.now_ns() if self._tracker.end_ns is None else self._tracker.end_ns
 
     def summary(self) -> dict[str, Any]:

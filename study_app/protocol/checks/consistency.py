@@ -275,7 +275,6 @@ def force_n(scene: Scene, stroke: Stroke) -> float:
 
 
 def _in_range(value: float) -> float:
-    """Return a value of a motion that its model takes."""
     return min(max(value, 1e-3), 1000.0)
 
 

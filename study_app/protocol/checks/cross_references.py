@@ -317,7 +317,6 @@ def _show_ifs(table: Document, items: Sequence[tuple[Path, Question]], context: 
 
 
 def _answers(place: Path, asked: ShowIf, earlier: Question, context: Context) -> Iterator[Fault]:
-    """Check that the earlier item can be answered so."""
     try:
         levels = list(earlier.levels(context))
     except KeyError:  # its scale, or a text in the language, is missing: another check says so

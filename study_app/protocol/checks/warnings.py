@@ -50,7 +50,6 @@ def liquid_warnings(protocol: Protocol) -> tuple[str, ...]:
 
 
 def _alike(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
-    """Yield the pairs of liquids of a block that are hard to tell apart."""
     seen: set[frozenset[str]] = set()
     for block in protocol.main_blocks:
         for one, other in combinations(_liquids_of(protocol, block), 2):
@@ -73,7 +72,6 @@ def _liquids_of(protocol: Protocol, block: Block) -> dict[str, None]:
 
 
 def _clipped(felt: dict[str, Steady]) -> Iterator[str]:
-    """Yield the liquids whose drag the safety limits shorten."""
     for name, it in felt.items():
         if it.limit is not None:
             limit = "the force limit" if it.limit == "norm" else "the slope limit, which keeps the servo stable,"
@@ -165,7 +163,6 @@ def _of_block(protocol: Protocol, block: Block, simulates: bool) -> Iterator[str
 
 
 def _unpaced(protocol: Protocol, block: Block) -> Iterator[str]:
-    """Yield that fast motions of a task without a pace are not delivered as requested."""
     if isinstance(protocol.tasks[block.task], Follow) or block.stimulus is None:
         return
     alike = [one for one in protocol.blocks.values() if (one.stimulus, one.task) == (block.stimulus, block.task)]
@@ -193,7 +190,6 @@ def _incomplete(protocol: Protocol) -> Iterator[str]:
 
 
 def _from_memory(protocol: Protocol) -> Iterator[str]:
-    """Yield what is reproduced from memory in a questionnaire that the study uses."""
     for name, questionnaire in protocol.questionnaires.items():
         of = questionnaire.instrument
         if of is not None and (recalled := instrument(of).get("from_memory")) is not None:

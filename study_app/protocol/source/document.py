@@ -119,7 +119,6 @@ class _Scan:
             table = self._header() if text.startswith("[", self._at) else self._assignment(table, "key")
 
     def _header(self) -> Path:
-        """Read a header and return the path of its table."""
         start = self._at
         many = self._take("[[")
         if not many:
@@ -181,7 +180,6 @@ class _Scan:
             self._at += len(scalar.group().rstrip(" \t"))
 
     def _key(self) -> tuple[Path, tuple[tuple[int, int], ...]]:
-        """Read a key, dotted or not, quoted or not; return its parts and where they are written."""
         keys: list[str] = []
         parts: list[tuple[int, int]] = []
         while True:

@@ -155,7 +155,6 @@ def _table(node: Node, root: Node, headings: Mapping[str, str]) -> list[str]:
 
 
 def _values(node: Node, headings: Mapping[str, str]) -> str:
-    """Return what a key may be given, as words."""
     found = dict.fromkeys(_alternatives(node, headings))
     return " or ".join(words for words in found if words)
 

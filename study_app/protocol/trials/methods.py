@@ -200,7 +200,6 @@ class Adaptive(Method):
         return self.begin[track - 1] if isinstance(self.begin, tuple) else self.begin
 
     def level(self, track: TrackSetting, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float:
-        """Return the level of comparison ``number``: that after the answers so far."""
         return self.after(track, heard)
 
     @abstractmethod
@@ -261,7 +260,6 @@ class Adjustment(Method):
             yield "repetitions", message
 
     def adjusting(self, stimulus: Stimulus, standard: float | None, start: float) -> Adjusting:
-        """Return a setting that starts at a level."""
         low, high = (stimulus.comparison(standard, level) for level in stimulus.levels)
         step = self.step(stimulus)
         return Adjusting(stimulus, standard, start, step if high > low else -step)
@@ -292,14 +290,12 @@ class Adjusting:
         return min(max(place + steps, least), most)
 
     def level(self, place: int) -> float:
-        """Return the level at a place."""
         if place == 0:
             return self.start
         low, high = self.stimulus.levels
         return min(max(self.stimulus.level_of(self.stimulus.coordinate(self.start) + place * self.step), low), high)
 
     def comparison(self, place: int) -> float:
-        """Return the varied number at a place, in its unit."""
         return self.stimulus.comparison(self.standard, self.level(place))
 
     def reached(self, steps: Iterable[int]) -> int:
@@ -337,7 +333,6 @@ class Constant(Method):
         return self.repetitions
 
     def level(self, track: TrackSetting, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float:
-        """Return the level of comparison ``number``: answers change nothing."""
         levels = self.asked(track.stimulus)
         return shuffle(levels, draws[number // len(levels)])[number % len(levels)]
 
@@ -438,7 +433,6 @@ class QuestPlus(Adaptive):
         return search_of(grid, _coordinates(track), self.learn, design.has_noise)
 
     def _counts(self, track: TrackSetting, heard: Sequence[Heard]) -> tuple[list[int], list[int]]:
-        """Return successes and failures at each level."""
         coordinates = _coordinates(track)
         counts = ([0] * len(coordinates), [0] * len(coordinates))
         for (level, success), number in Counter((one.level, bool(one.success)) for one in heard).items():

@@ -185,7 +185,6 @@ class _Draws:
         return tuple(sorted(order[:count]))
 
     def rounds(self, count: int) -> list[Draw]:
-        """Return the source of each round of levels."""
         return [keyed_stream(self.secret, f"round/{self.track}/{number}").random for number in range(count)]
 
 

@@ -81,7 +81,6 @@ class Clipping:
 
     @property
     def clips_standard(self) -> bool:
-        """Whether the standard itself is clipped."""
         return self.standard is not None and self.standard > self.limit
 
     @property

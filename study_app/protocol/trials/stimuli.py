@@ -84,7 +84,6 @@ class Condition(ExtendedTable):
 
     @property
     def liquid_ids(self) -> tuple[str, ...]:
-        """The liquids of the scene, in order."""
         return self.liquids if self.liquid is None else (self.liquid,)
 
     @property
@@ -164,7 +163,6 @@ class Stimulus(Table):
 
     @property
     def domain(self) -> tuple[float, float]:
-        """The smallest and the largest level, in u."""
         return self.coordinate(self.levels[0]), self.coordinate(self.levels[1])
 
     def spaced(self, count: int) -> tuple[float, ...]:
@@ -180,7 +178,6 @@ class Stimulus(Table):
 
     @property
     def grid(self) -> tuple[float, ...]:
-        """The levels between which an adaptive method chooses."""
         return self.spaced(self.steps)
 
     @model_validator(mode="after")

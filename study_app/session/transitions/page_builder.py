@@ -143,7 +143,6 @@ def _interval(state: SessionState) -> Interval | None:
 
 
 def _answer_page(state: SessionState) -> Page:
-    """Return the one question of a design, or a questionnaire."""
     design = state.design if isinstance(state.step, Trial) else None
     if design is None or design.reply == "rating":
         return _questionnaire_page(state)
@@ -199,7 +198,6 @@ def _label(state: SessionState, trial: Trial) -> str:
 
 
 def _progress(state: SessionState, trial: Trial) -> Progress:
-    """Return where a trial is among its block's."""
     return _among(state, trial, _label(state, trial), trial.index)
 
 
@@ -221,7 +219,6 @@ def _progress_between(state: SessionState) -> Progress | None:
 
 
 def _coming(state: SessionState) -> Trial | None:
-    """Return the next trial after the present step."""
     return next((step for step in state.plan.schedule.steps[state.index + 1 :] if isinstance(step, Trial)), None)
 
 
