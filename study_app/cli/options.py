@@ -21,7 +21,7 @@ GROUPS: Final = {
     "Study": "new edit check design power preregister run resume rehearse studies sessions workspace",
     "Data": "export plot report unblind exclude include withdraw merge verify rebuild reproduce replay",
     "Model": "scene simulate identify estimate figures",
-    "Evidence": "accuracy stability timing soak cfd validate validate-report delay-thresholds screenshots",
+    "Evidence": "accuracy stability timing soak cfd validate validate-report delay-thresholds",
     "Devices": "devices outlets emulate-falcon",
 }
 LONGEST: Final = 150

@@ -7,9 +7,9 @@ import pytest
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
 
-from study_app.app.screenshots import screenshots, session_pictures
 from study_app.errors import StudyError
 from tests.compiled import needs_servo
+from tools.screenshots import screenshots, session_pictures
 
 
 @pytest.mark.slow

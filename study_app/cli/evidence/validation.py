@@ -1,4 +1,4 @@
-"""The commands that validate the analysis by simulated studies, and the one that takes pictures of every window."""
+"""The commands that validate the analysis by simulated studies."""
 
 import os
 import time
@@ -152,17 +152,3 @@ def delay_thresholds(people: int, seed: int, to: Path | None) -> None:
     click.echo(markdown(found), nl=False)
     if to is not None:
         echo_files(write(found, to))
-
-
-@click.command()
-@click.option("--to", type=Target(), required=True, metavar="DIR", help="Folder for the pictures.")
-@click.option(
-    "--only", type=click.Choice(("places", "designer", "session", "single-blind")), help="Only these; default: all."
-)
-def screenshots(to: Path, only: str | None) -> None:
-    """Take pictures of every window of the program in both themes; takes some minutes and needs no display."""
-    os.environ["QT_QPA_PLATFORM"] = "offscreen"  # the same pictures on every machine
-    from study_app.app.screenshots import screenshots as take
-
-    prepare(to)
-    take(to, only=only, progress=click.echo)

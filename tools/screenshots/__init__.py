@@ -4,6 +4,6 @@ Windows are opened without a screen, and sessions are run with the scripted hand
 the user's settings are not changed.
 """
 
-from study_app.app.screenshots.screenshots import screenshots
+from tools.screenshots.screenshots import screenshots
 
 __all__ = ["screenshots"]

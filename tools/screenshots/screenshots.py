@@ -10,16 +10,16 @@ from typing import Final
 
 from PySide6.QtCore import QtMsgType, qInstallMessageHandler
 
-from study_app.app.screenshots.capture import Camera
-from study_app.app.screenshots.designer_pictures import take_designer, write_studies
-from study_app.app.screenshots.example_study import STUDY, quick, rehearsed
-from study_app.app.screenshots.main_views import take_places
-from study_app.app.screenshots.session_pictures import take_session, take_single_blind
 from study_app.app.session.garbage_collection import collecting_here
 from study_app.gui.application import application_here
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.user_folder import FOLDER_VARIABLE
 from study_app.workspace import FOLDER_NAME, WORKSPACE_VARIABLE
+from tools.screenshots.capture import Camera
+from tools.screenshots.designer_pictures import take_designer, write_studies
+from tools.screenshots.example_study import STUDY, quick, rehearsed
+from tools.screenshots.main_views import take_places
+from tools.screenshots.session_pictures import take_session, take_single_blind
 
 GROUPS: Final = ("places", "designer", "session", "single-blind")
 

@@ -6,12 +6,12 @@ from typing import Any, Final
 from PySide6.QtWidgets import QDialog
 
 from study_app.app.main_controller import MainController
-from study_app.app.screenshots.capture import Camera, shown
-from study_app.app.screenshots.example_study import STUDY
 from study_app.devices.registry import discover
 from study_app.gui.settings.display_test import DisplayTest
 from study_app.gui.theme.theme import Theme
 from study_app.viewmodels.home import StudyFacts, study_facts
+from tools.screenshots.capture import Camera, shown
+from tools.screenshots.example_study import STUDY
 
 HOME: Final = (1440, 900)
 WIDE: Final = (1600, 900)

@@ -8,8 +8,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
-from study_app.app.screenshots.capture import Camera, shown
-from study_app.app.screenshots.example_study import SEED
 from study_app.app.session.bridge import SessionBridge
 from study_app.app.session.live_session import LiveSession
 from study_app.gui.preflight import PreflightWindow
@@ -18,6 +16,8 @@ from study_app.gui.theme.themed import apply_theme
 from study_app.protocol.model import Reach
 from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
 from study_app.session.start import NewSession
+from tools.screenshots.capture import Camera, shown
+from tools.screenshots.example_study import SEED
 
 COCKPIT: Final = (1600, 900)
 FULL: Final = (1920, 1080)
