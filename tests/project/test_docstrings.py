@@ -60,6 +60,8 @@ def modules(package: str) -> Iterator[ModuleType]:
 def is_public(name: str, value: Any) -> bool:
     if name.startswith("_"):
         return False  # not looked at: a validator that is not built yet would be built here, in its model's dictionary
+    if isinstance(value, property) and value.fget.__name__ == "<lambda>":
+        return False  # a value of a kind, described in its base class
     value = getattr(value, "py_func", value)  # what numba compiles
     return (
         inspect.isfunction(value) or inspect.isclass(value) or isinstance(value, property | classmethod | staticmethod)
