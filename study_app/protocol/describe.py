@@ -72,7 +72,7 @@ def describe(protocol: Protocol, delay_ticks: int = BELIEVED_TICKS) -> str:
         decided = list(protocol.analysis.described(named))
     sections = (
         _head(protocol, language),
-        *(_titled(_title(one), _session(one.protocol, language)) for one in variants(protocol)),
+        *(_session(one, language) for one in variants(protocol)),
         *(_block(protocol, block, language, delay_ticks) for block in protocol.blocks_in_order),
         _titled("Liquids", _liquids(protocol)),
         ("Effects in each liquid", *(f"  {line}".rstrip() for line in effects[:-1])),
@@ -139,14 +139,11 @@ def spread(numbers: Sequence[int]) -> str:
     return f"{least}" if least == largest else f"{least} to {largest}"
 
 
-def _title(one: Variant) -> str:
-    if not one.name:
-        return "Session"
-    minutes = f"about {expected_duration_s(one.protocol) / 60:.0f} min"
-    return f"{one.name[0].upper()}{one.name[1:]} ({minutes}, {counted(orders_of(one.protocol).answers, 'answer')})"
-
-
-def _session(protocol: Protocol, language: str) -> list[tuple[str, str, str]]:
+def _session(one: Variant, language: str) -> Iterable[str]:
+    protocol, title = one.protocol, "Session"
+    if one.name:
+        minutes = f"about {expected_duration_s(protocol) / 60:.0f} min"
+        title = f"{one.name[0].upper()}{one.name[1:]} ({minutes}, {counted(orders_of(protocol).answers, 'answer')})"
     rows: list[tuple[str, str, str]] = []
     kind: str
     for number, step in enumerate(protocol.steps, start=1):
@@ -159,7 +156,7 @@ def _session(protocol: Protocol, language: str) -> list[tuple[str, str, str]]:
             kind, trials = f"{block.phase} trials", counted(order_of(protocol, block).trials, "trial")
             words = f"{protocol.text(block.title, language)}: {trials}"
         rows.append((f"{number:>2}", kind, words))
-    return rows
+    return _titled(title, rows)
 
 
 def _block(protocol: Protocol, block: Block, language: str, delay_ticks: int) -> Iterable[str]:

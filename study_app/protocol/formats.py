@@ -108,7 +108,9 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
         found.setdefault("conditions", {name: {"liquid": name} for name in liquids})
     if isinstance(blocks := found.get("blocks", {}), dict) and blocks:
         found["blocks"] = _with_numbers(blocks, names(found, "tasks"), _languages(found))
-        if "sequences" not in found and not _own_sequences(found):
+        own = {"sequence", "sequences"}  # of groups, each of which has one, so that the study needs none
+        groups = [isinstance(one, Mapping) and one.keys() & own for _, one in entries(found, "groups.*")]
+        if "sequences" not in found and not (groups and all(groups)):
             found.setdefault("sequence", tuple(blocks))
     return found
 
@@ -129,12 +131,6 @@ def needed_by(scene: Scene) -> int:
         for liquid in scene.liquids
     )
     return 2 if newer or scene.fade_s != FADE_S else scene.format
-
-
-def _own_sequences(document: Mapping[str, Any]) -> bool:
-    """Return whether there are groups, each with a sequence of its own, so that the study needs none."""
-    groups = [group for _, group in entries(document, "groups.*")]
-    return bool(groups) and all(isinstance(one, Mapping) and one.keys() & {"sequence", "sequences"} for one in groups)
 
 
 OMITTED: Final = {

@@ -24,7 +24,10 @@ def scene_text(scene: Scene, *, said: Sequence[str] = (), notes: Mapping[Place, 
     """
     comments = [f"# {line}" for it in said for line in textwrap.wrap(it, _COMMENT_LETTERS)]
     head = [*comments, *([""] if comments else []), f"format = {needed_by(scene)}"]
-    lines = [*head, *_tables(("scene",), _scene(scene), notes or {})]
+    left_out = {"format", "liquids", "link"} | ({"velocity"} if isinstance(scene.velocity, Given) else set())
+    left_out |= {"fade_s"} if scene.fade_s == FADE_S else set()
+    of_scene = scene.model_dump(exclude_none=True, exclude=left_out)
+    lines = [*head, *_tables(("scene",), of_scene, notes or {})]
     for liquid in scene.liquids:
         lines += _tables(("liquids", liquid.id), _liquid(liquid), notes or {})
     return "\n".join(lines) + "\n"
@@ -33,13 +36,6 @@ def scene_text(scene: Scene, *, said: Sequence[str] = (), notes: Mapping[Place, 
 def for_new_file(scene: Scene) -> Scene:
     """Return a scene as the program presents and writes it where no file decides: "kalman" for the usual "ewma"."""
     return scene.model_copy(update={"velocity": Kalman()}) if scene.velocity == Ewma() else scene
-
-
-def _scene(scene: Scene) -> Mapping[str, Any]:
-    """Return what a scene file says of all liquids alike; it cannot say that velocities are given."""
-    given = {"velocity"} if isinstance(scene.velocity, Given) else set()
-    usual = {"fade_s"} if scene.fade_s == FADE_S else set()
-    return scene.model_dump(exclude_none=True, exclude={"format", "liquids", "link", *given, *usual})
 
 
 def _liquid(liquid: Liquid) -> Mapping[str, Any]:

@@ -76,13 +76,7 @@ def language_name(code: str) -> str:
 
 
 def words(language: str) -> Words:
-    """Return the words of a language.
-
-    Raises
-    ------
-    StudyError
-        There are none in this language.
-    """
+    """Return the words of a language (StudyError if there are none in it)."""
     if language not in LANGUAGES:
         raise StudyError(f'no words for the participant\'s pages in "{language}" ({did_you_mean(language, LANGUAGES)})')
     return LANGUAGES[language]
