@@ -17,20 +17,7 @@ from study_app.protocol.streams import draw_secret, group_of
 from study_app.protocol.trials.designs import ORDINALS
 from study_app.protocol.trials.tracks import design_of
 from study_app.protocol.wording.languages import Words, words
-from study_app.session.pages import (
-    ChoicePage,
-    EndPage,
-    FeedbackPage,
-    Interval,
-    NumberPage,
-    Page,
-    PausePage,
-    Progress,
-    QuestionnairePage,
-    TaskPage,
-    TextPage,
-    TroublePage,
-)
+from study_app.session import pages
 from study_app.session.transitions.state import Answer, Phase, Plan, SessionState
 
 PARTICIPANT: Final = "P001"
@@ -39,7 +26,7 @@ SEED: Final = 1
 Kind: TypeAlias = Literal["text", "tank", "questions", "feedback"]
 
 
-def page(state: SessionState) -> Page:
+def page(state: SessionState) -> pages.Page:
     """Return what the participant sees in any phase but the one before the first page."""
     match state.phase:
         case Phase.TASK | Phase.RESTING:
@@ -48,18 +35,18 @@ def page(state: SessionState) -> Page:
         case Phase.ANSWERING:
             return _answer_page(state)
         case Phase.FEEDBACK:
-            return FeedbackPage(right=state.heard[-1].correct is True)
+            return pages.FeedbackPage(right=state.heard[-1].correct is True)
         case Phase.PAUSED:
             paused = _task_page(state, state.step) if isinstance(state.step, Trial) else None
-            return PausePage(force_off=state.force_off, held=state.held, coming=paused)
+            return pages.PausePage(force_off=state.force_off, held=state.held, coming=paused)
         case Phase.STALLED if state.stall is not None and state.over:
             return page(replace(state, phase=state.stall.before, stall=None))
         case Phase.TROUBLE | Phase.STALLED:
-            return TroublePage(_words(state).trouble_title, _words(state).trouble_body)
+            return pages.TroublePage(_words(state).trouble_title, _words(state).trouble_body)
         case Phase.COMPLETE:
-            return EndPage(_words(state).end_title, _words(state).end_body)
+            return pages.EndPage(_words(state).end_title, _words(state).end_body)
         case Phase.ENDED:
-            return EndPage(_words(state).ended_early_title, _words(state).ended_early_body)
+            return pages.EndPage(_words(state).ended_early_title, _words(state).ended_early_body)
         case _:
             return _text_page(state)
 
@@ -72,10 +59,10 @@ def _text(state: SessionState, value: str | dict[str, str]) -> str:
     return state.plan.protocol.text(value, state.plan.language)
 
 
-def _text_page(state: SessionState) -> TextPage:
+def _text_page(state: SessionState) -> pages.TextPage:
     protocol, language = state.plan.protocol, state.plan.language
     text = protocol.pages[state.page_id]
-    return TextPage(
+    return pages.TextPage(
         id=state.page_id,
         kind=text.kind,
         title=_text(state, text.title),
@@ -96,12 +83,12 @@ def consent_hash(state: SessionState, text: PageText) -> str:
     return hashlib.sha256("\n\n".join(shown).encode()).hexdigest()
 
 
-def _task_page(state: SessionState, trial: Trial) -> TaskPage:
+def _task_page(state: SessionState, trial: Trial) -> pages.TaskPage:
     protocol = state.plan.protocol
     block = protocol.blocks[trial.block]
     task, asked = protocol.tasks[block.task], protocol.questionnaire_of(block.id)
     set_by_hand = block.design is not None and design_of(protocol, block).adjusts
-    return TaskPage(
+    return pages.TaskPage(
         trial=trial.number,
         instruction=_words(state).follow_target if task.instruction is None else _text(state, task.instruction),
         task=task,
@@ -119,7 +106,7 @@ def _drawn_condition(state: SessionState, trial: Trial) -> str:
     return protocol.conditions_in(trial.block)[0] if designed else state.plan.condition(trial)
 
 
-def _presenting(state: SessionState, made: TaskPage) -> TaskPage:
+def _presenting(state: SessionState, made: pages.TaskPage) -> pages.TaskPage:
     """Return a page of a task with what is seen in what the trial, or its interval, presents."""
     named = _drawn_condition(state, state.trial)
     if state.due is not None:
@@ -129,7 +116,7 @@ def _presenting(state: SessionState, made: TaskPage) -> TaskPage:
     return replace(made, adjusts=state.adjusts, video=condition.shows_video, overlay=shown)
 
 
-def _interval(state: SessionState) -> Interval | None:
+def _interval(state: SessionState) -> pages.Interval | None:
     """Return where the trial under way is among its intervals; None without a design."""
     design, said = state.design, _words(state)
     if design is None:
@@ -139,24 +126,24 @@ def _interval(state: SessionState) -> Interval | None:
     named = said.interval_begins.format(ordinal=ordinal, of=design.intervals)
     coming = said.once_more if number == 1 and state.invalid else said.interval_coming[number - 1]
     announced = coming if resting else named
-    return Interval(number, design.intervals, resting, announced)
+    return pages.Interval(number, design.intervals, resting, announced)
 
 
-def _answer_page(state: SessionState) -> Page:
+def _answer_page(state: SessionState) -> pages.Page:
     design = state.design if isinstance(state.step, Trial) else None
     if design is None or design.reply == "rating":
         return _questionnaire_page(state)
     view, progress = state.questions[0].view(1, state.context), _progress(state, state.trial)
     if isinstance(view, ChoiceView):
-        return ChoicePage(state.trial.number, view, progress)
+        return pages.ChoicePage(state.trial.number, view, progress)
     assert isinstance(view, NumberView)  # noqa: S101 - the only other reply
     if design.first is not None and state.trial.index == 1:
         named = _words(state).modulus.format(number=f"{design.first.number:g}")
         view = replace(view, text=f"{named} {view.text}")
-    return NumberPage(state.trial.number, view, progress)
+    return pages.NumberPage(state.trial.number, view, progress)
 
 
-def _questionnaire_page(state: SessionState) -> QuestionnairePage:
+def _questionnaire_page(state: SessionState) -> pages.QuestionnairePage:
     questionnaire, step = state.questionnaire, state.step
     trial = step if isinstance(step, Trial) else None
     form = step.form if isinstance(step, FormStep) else None
@@ -174,7 +161,7 @@ def _questionnaire_page(state: SessionState) -> QuestionnairePage:
 
 def questions_page(
     protocol: Protocol, questionnaire: Questionnaire, questions: Sequence[Question], context: Context, label: str
-) -> QuestionnairePage:
+) -> pages.QuestionnairePage:
     """Return the page of some questions of a questionnaire before any answer, outside a session.
 
     ``questions`` are in the order shown; ``label`` is what the page is called where the questionnaire has no title.
@@ -182,7 +169,7 @@ def questions_page(
     statements = len(questionnaire.statements) == len(questionnaire.items)
     scale = protocol.scales[questionnaire.scale or ""] if statements else None
     off_scale = None if scale is None else scale.cannot_judge
-    return QuestionnairePage(
+    return pages.QuestionnairePage(
         trial=None,
         title=label if questionnaire.title is None else protocol.text(questionnaire.title, context.language),
         intro=protocol.text(questionnaire.intro, context.language),
@@ -197,11 +184,11 @@ def _label(state: SessionState, trial: Trial) -> str:
     return trial.label(state.plan.protocol, state.plan.language)
 
 
-def _progress(state: SessionState, trial: Trial) -> Progress:
+def _progress(state: SessionState, trial: Trial) -> pages.Progress:
     return _among(state, trial, _label(state, trial), trial.index)
 
 
-def _progress_between(state: SessionState) -> Progress | None:
+def _progress_between(state: SessionState) -> pages.Progress | None:
     """Return the progress shown on a page to read: before the first trial of its part, or after a number of trials.
 
     None outside the parts, except for a break among trials of intervals, which names the last trial.
@@ -222,11 +209,11 @@ def _coming(state: SessionState) -> Trial | None:
     return next((step for step in state.plan.schedule.steps[state.index + 1 :] if isinstance(step, Trial)), None)
 
 
-def _among(state: SessionState, trial: Trial, label: str, index: int) -> Progress:
+def _among(state: SessionState, trial: Trial, label: str, index: int) -> pages.Progress:
     """Return where trial ``index`` of a trial's block is; a block with a criterion may end early."""
     protocol = state.plan.protocol
     at_most = protocol.blocks[trial.block].until is not None
-    return Progress(trial.part, protocol.parts, label, index, trial.of, at_most)
+    return pages.Progress(trial.part, protocol.parts, label, index, trial.of, at_most)
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,19 +272,19 @@ def moments(shown: Preview, index: int) -> tuple[Moment, ...]:
 
 def previewed_page(
     shown: Preview, index: int, moment: Moment, language: str, answers: Mapping[str, Value] | None = None
-) -> Page:
+) -> pages.Page:
     """Return a page of a step (by its index in the schedule), as a session would show it in one of the languages.
 
     Of ``answers`` that were given before, by item, those that would not be accepted are left out.
     """
     if moment.kind == "feedback":
-        return FeedbackPage(right=True)
+        return pages.FeedbackPage(right=True)
     state = replace(_state(shown, index, language), interval=moment.interval)
     if moment.kind == "tank":
         return page(replace(state, phase=Phase.TASK))
     if moment.kind == "text":
         made = page(replace(state, phase=Phase.READING))
-        return replace(made, coming=None) if isinstance(made, TextPage) else made
+        return replace(made, coming=None) if isinstance(made, pages.TextPage) else made
     asked = {question.id: question for question in state.questions}
     kept = {
         item: Answer(onset_s=0.0, first_s=0.0, last_s=0.0, value=value)
