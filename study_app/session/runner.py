@@ -28,34 +28,7 @@ from study_app.session.device_buttons import DeviceButtons
 from study_app.session.ports import Ports
 from study_app.session.resume import FIRST, Start
 from study_app.session.tasks import Outcome, TaskView
-from study_app.session.transitions.events import (
-    Adjust,
-    Broke,
-    CheckFlushed,
-    Command,
-    EndAsked,
-    Event,
-    FadeIn,
-    Finish,
-    ForceStopped,
-    LeaveTask,
-    PauseAsked,
-    Reconnected,
-    Rest,
-    ShowPage,
-    StartTrial,
-    Stepped,
-    StopForce,
-    StopTrial,
-    TaskDone,
-    TimeUp,
-    Write,
-    WriteCompleted,
-    WriteFailed,
-    WriteRetried,
-    WriteTables,
-    broken,
-)
+from study_app.session.transitions import events
 from study_app.session.transitions.state import FINAL, Phase, SessionState, Stall
 from study_app.session.transitions.table import advance, open_session
 from study_app.session.trial import Recording, RunningTrial, TankView, ball_is_back, resting_view
@@ -89,10 +62,10 @@ class Runner:
         self._measured: dict[str, Any] = {}
         self._buttons = DeviceButtons()
         self._page_since_ns = 0
-        self._waiting: deque[Event] = deque()
+        self._waiting: deque[events.Event] = deque()
         self._busy = False
         self._retry_s = 0.0  # when a disk that took nothing is tried again
-        self._ending: tuple[Finish, float] | None = None
+        self._ending: tuple[events.Finish, float] | None = None
         self._cause = ""
         self._listeners: list[Callable[[SessionState], None]] = []
 
@@ -128,12 +101,12 @@ class Runner:
         """Call ``listener`` with the new state after every event that was taken."""
         self._listeners.append(listener)
 
-    def post(self, event: Event) -> None:
+    def post(self, event: events.Event) -> None:
         """Let something have happened; SessionError says that it cannot happen now, and nothing was changed.
 
         StoreError says that the session was to end while it stalled: its end could not be written, it stays unfinished.
         """
-        if isinstance(event, ForceStopped):
+        if isinstance(event, events.ForceStopped):
             self._ports.servo.stop_force()
         self._waiting.append(event)
         if self._busy:
@@ -164,26 +137,26 @@ class Runner:
         now_s = self._ports.clock()
         if self._state.stall is not None:
             if now_s >= self._retry_s:
-                self.post(WriteRetried(now_s))
+                self.post(events.WriteRetried(now_s))
             return
-        if not self._carry_out_all((CheckFlushed(),), now_s):
+        if not self._carry_out_all((events.CheckFlushed(),), now_s):
             return
         fault = self._ports.servo.fault
         if fault is not None and self._state.phase not in {Phase.TROUBLE, *FINAL}:
-            self.post(Broke(self._ports.clock(), fault, "device"))
+            self.post(events.Broke(self._ports.clock(), fault, "device"))
         if len(samples) and self._state.phase is not Phase.OPENING:
             for event in self._buttons.events(samples, self._page_since_ns, self._ports.clock(), self._where):
                 self.post(event)
             self._follow(samples)
         running = self._running
         if running is not None and running.frozen:
-            self.post(PauseAsked(self._ports.clock(), "program"))
+            self.post(events.PauseAsked(self._ports.clock(), "program"))
         elif running is not None and (outcome := running.outcome()) is not None:
             self.post(self._done(running, outcome))
         elif self._state.phase in {Phase.RESTING, Phase.FEEDBACK} and now_s >= (self._state.until_s or 0.0):
             rest = self.view(self._ports.servo.now_ns())
             if rest is None or ball_is_back(rest, self._state.task):
-                self.post(TimeUp(now_s))
+                self.post(events.TimeUp(now_s))
 
     def _where(self) -> tuple[SessionState, bool]:
         return self._state, self._running is not None and self._running.adjustable
@@ -208,23 +181,23 @@ class Runner:
         except StudyError as error:
             self._fail(error)
 
-    def _take(self, event: Event) -> None:
-        if isinstance(event, Stepped) and not self._where()[1]:
+    def _take(self, event: events.Event) -> None:
+        if isinstance(event, events.Stepped) and not self._where()[1]:
             return  # before its first frame and after its end an interval cannot be adjusted
-        if isinstance(event, WriteRetried | EndAsked) and self._state.stall is not None:
+        if isinstance(event, events.WriteRetried | events.EndAsked) and self._state.stall is not None:
             self._write_again(self._state.stall)
-            if isinstance(event, WriteRetried):
+            if isinstance(event, events.WriteRetried):
                 return
         stall = self._state.stall
         self._state, commands = advance(self._state, event)
-        if isinstance(event, Broke):
+        if isinstance(event, events.Broke):
             self._cause = event.what
-        elif isinstance(event, Reconnected):
+        elif isinstance(event, events.Reconnected):
             self._cause = ""
             self._recording.forget()
         if self._carry_out_all(commands, event.at_s):
             self._tell()
-        if isinstance(event, EndAsked) and stall is not None:
+        if isinstance(event, events.EndAsked) and stall is not None:
             raise StoreError(
                 f"{stall.reason}; the session's end is not written either: resume it later, or end it then"
             )
@@ -232,28 +205,28 @@ class Runner:
     def _write_again(self, stall: Stall) -> None:
         """Carry out what the disk did not take; if it takes it now, go on."""
         waiting = tuple(self._waiting)
-        self._state, commands = advance(self._state, WriteRetried(stall.at_s))
+        self._state, commands = advance(self._state, events.WriteRetried(stall.at_s))
         done = self._carry_out_all(commands, stall.at_s)
-        broke = [event for event in self._waiting if isinstance(event, Broke) and event not in waiting]
+        broke = [event for event in self._waiting if isinstance(event, events.Broke) and event not in waiting]
         self._waiting = deque((*waiting, *broke))  # what a page said that is covered again at once is said again later
         if done:
-            self._take(WriteCompleted(self._ports.clock()))
+            self._take(events.WriteCompleted(self._ports.clock()))
 
     def _tell(self) -> None:
         for listener in self._listeners:
             listener(self._state)
 
-    def _carry_out_all(self, commands: Sequence[Command], at_s: float) -> bool:
+    def _carry_out_all(self, commands: Sequence[events.Command], at_s: float) -> bool:
         """Carry out commands of a moment in order; return whether the disk took them. Other failures are reported."""
         for index, command in enumerate(commands):
-            if isinstance(command, Finish) and not self._ports.settled():
+            if isinstance(command, events.Finish) and not self._ports.settled():
                 self._ending = command, at_s
                 continue
             try:
                 self._carry_out(command, at_s)
             except StoreError as error:
                 self._retry_s = self._ports.clock() + RETRY_S
-                self._take(WriteFailed(at_s, str(error), tuple(commands[index:])))
+                self._take(events.WriteFailed(at_s, str(error), tuple(commands[index:])))
                 return False
             except StudyError as error:
                 self._fail(error)
@@ -262,43 +235,43 @@ class Runner:
 
     def _fail(self, error: StudyError) -> None:
         self._ports.servo.stop_force()
-        self.post(broken(self._ports.clock(), error))
+        self.post(events.broken(self._ports.clock(), error))
 
-    def _carry_out(self, command: Command, at_s: float) -> None:
+    def _carry_out(self, command: events.Command, at_s: float) -> None:
         servo, journal = self._ports.servo, self._ports.journal
         match command:
-            case StopForce():
+            case events.StopForce():
                 servo.stop_force()
-            case LeaveTask():
+            case events.LeaveTask():
                 if self._running is not None:
                     self._running.leave()
-            case StopTrial():
+            case events.StopTrial():
                 self._recording.stop()
                 if self._running is not None:
                     self._measured, self._running = self._running.summary(), None
-            case Rest():
+            case events.Rest():
                 servo.rest()
-            case FadeIn():
+            case events.FadeIn():
                 servo.fade_in()
-            case Write(event, fields, measured, waits):
+            case events.Write(event, fields, measured, waits):
                 journal.append(event, t_s=at_s, waits=waits, **({**self._measured, **fields} if measured else fields))
-            case CheckFlushed():
+            case events.CheckFlushed():
                 journal.check_flushed()
-            case WriteTables():
+            case events.WriteTables():
                 journal.write_tables()
-            case StartTrial():
+            case events.StartTrial():
                 self._running = self._prepared(command)
-            case Adjust(presented, delay_s, fields):
+            case events.Adjust(presented, delay_s, fields):
                 other = None if presented.vary == DELAY else scene_of(self._protocol, presented)
                 scene = None if self._running is None else self._running.adjust(other, delay_s)
                 journal.append("stepped", t_s=at_s, waits=False, **fields, scene=scene)
-            case ShowPage(page):
+            case events.ShowPage(page):
                 self._page_since_ns = servo.now_ns()
                 self._ports.present(page)
-            case Finish(status, reason):
+            case events.Finish(status, reason):
                 journal.finish(status, reason)
 
-    def _prepared(self, command: StartTrial) -> RunningTrial:
+    def _prepared(self, command: events.StartTrial) -> RunningTrial:
         schedule = self._state.plan.schedule
         condition = self._protocol.conditions[command.presented.condition]
         seed = link_seed(schedule.seed, schedule.participant, command.trial, command.attempt, command.interval)
@@ -315,7 +288,7 @@ class Runner:
             videos=any(one.shows_video for one in self._protocol.conditions.values()),
         )
 
-    def _done(self, running: RunningTrial, outcome: Outcome) -> TaskDone:
+    def _done(self, running: RunningTrial, outcome: Outcome) -> events.TaskDone:
         """Return that a task is over; of an interval with what it delivered, and which limits it breaks."""
         summary, limits, command = running.summary(), self._protocol.limits, running.command
         reasons: tuple[str, ...] = ()
@@ -327,14 +300,14 @@ class Runner:
                 *undelivered(limits, *what, found, adjusted=command.adjusts),
                 *broken_limits(summary, limits.model_dump()),
             )
-        return TaskDone(self._ports.clock(), outcome, summary, reasons)
+        return events.TaskDone(self._ports.clock(), outcome, summary, reasons)
 
     def _follow(self, samples: Any) -> None:
         if (running := self._running) is None:
             return
         self._carry_out_all(
             [
-                Write("target_reached", {"trial": running.trial, "target": one.target, "t_task_s": one.t_task_s})
+                events.Write("target_reached", {"trial": running.trial, "target": one.target, "t_task_s": one.t_task_s})
                 for one in running.follow(samples)
             ],
             self._ports.clock(),
