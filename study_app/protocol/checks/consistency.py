@@ -19,17 +19,7 @@ from study_app.haptics.model.bounds import Extremes
 from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.scene import MAX_LIQUIDS, Box, Everywhere, Liquid, MotionBox, Scene
-from study_app.protocol.checks.cross_references import (
-    alike,
-    decisions,
-    groups,
-    items,
-    languages,
-    questions,
-    references,
-    repeats,
-    sequence,
-)
+from study_app.protocol.checks import cross_references as named
 from study_app.protocol.checks.designs import kinds
 from study_app.protocol.model import (
     Block,
@@ -112,7 +102,8 @@ def check(document: Mapping[str, Any], broken: Iterable[Path], valid: Protocol |
 
     ``valid`` is the validated document if nothing is broken, so that its tables are not validated again.
     """
-    for of_names in (references, kinds, sequence, groups, repeats, items, alike, languages, questions, decisions):
+    of_items = (named.items, named.alike, named.languages, named.questions, named.decisions)
+    for of_names in (named.references, kinds, named.sequence, named.groups, named.repeats, *of_items):
         yield from of_names(document)
     parts = draft(document, broken, valid)
     for of_tables in (targets, liquids, unfelt, equal_liquids, equal_conditions, compares, blocks, counted_parts):
