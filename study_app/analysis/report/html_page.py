@@ -8,7 +8,7 @@ from importlib import resources
 from typing import Any, Final, TypeVar
 
 from fontTools.subset import Options, Subsetter, load_font, save_font
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
 from study_app.analysis.figures.page_layout import Picture
@@ -27,9 +27,9 @@ SCALE = 0.4
 
 @cache
 def _environment() -> Environment:
-    """Return the templates; everything in them is escaped, and nothing may be missing."""
+    """Return the templates; everything in those of HTML is escaped, and nothing may be missing."""
     loader = PackageLoader("study_app.analysis.report", "templates")
-    return Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    return Environment(loader=loader, autoescape=select_autoescape(), undefined=StrictUndefined, trim_blocks=True)
 
 
 def render(template: str, **values: Any) -> Markup:

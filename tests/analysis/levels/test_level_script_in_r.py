@@ -13,7 +13,8 @@ import pytest
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.levels.results import LevelsFound
 from study_app.analysis.levels.summaries import sensitivities
-from study_app.analysis.report.number_files import START, level_lines
+from study_app.analysis.report import number_files
+from study_app.analysis.report.number_files import level_lines
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.presentation import arrangement_text
 from tests.analysis.levels.level_studies import ONE, ROVING, block
@@ -91,9 +92,8 @@ def test_r_computes_d_prime_of_every_design(design: str, settings: tuple, tmp_pa
         trial=range(len(frame)), analysed="true", right=frame["right"].map({True: "true", False: "false"})
     )
     table.to_csv(tmp_path / "study-s_description-tracks_data.csv", index=False)
-    same = 'folder <- "."\n' + START[START.index("differing <- 0") : START.index("# Sums of")].replace(
-        "{{", "{"
-    ).replace("}}", "}")
+    template = (Path(number_files.__file__).parent / "templates" / "report.R").read_text(encoding="utf-8")
+    same = 'folder <- "."\n' + template[template.index("differing <- 0") : template.index("# Sums of")]
     (tmp_path / "report.R").write_text("\n".join([same, *lines, 'cat(compared, "numbers,", differing, "differ\\n")']))
     done = run_in_r(tmp_path)
     assert done.stderr == ""
