@@ -13,10 +13,10 @@ import numpy as np
 import pandas as pd
 
 from study_app.analysis.data.blocks import AskedQuestion, AskedScore, Block, Item, Setting, setting_name
-from study_app.analysis.data.measures import AGREEMENT, LEVELS, QUARTILES, Array, by_participant
+from study_app.analysis.data.measures import AGREEMENT, LEVELS, QUARTILES
 from study_app.analysis.data.questions import scored
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.levels.results import ExponentFound, LevelsFound, SettingFound
+from study_app.analysis.levels.results import LevelsFound, SensitivityFound
 from study_app.analysis.levels.summaries import levels_found
 from study_app.analysis.levels.thresholds import OF_INTERVALS, tracks
 from study_app.store.tables.columns import (
@@ -79,9 +79,6 @@ _OF_BLOCK: Final = ("phase", "part", "index", "code")
 _LEVEL_COLUMNS: Final = {column.name: column for column in (*TRIALS_2, *INTERVALS)}
 
 _OF_PERSON: Final = tuple(_LEVEL_COLUMNS[name] for name in ("study", "participant", "simulated", "pilot", "group"))
-_OF_THRESHOLD: Final = (
-    "n", "threshold", "low", "high", "beyond", "width", "lapse", "reversal_mean", "target_percent", "fit_p", "drift",
-)  # fmt: skip
 TYPES: Final = {"text": "string", "number": "Float64", "integer": "Int64", "flag": "boolean"}
 
 TRACKS: Final = (*(_LEVEL_COLUMNS[name] for name in (*_OF_TRIAL, *_OF_BLOCK)), *JUDGED, *OF_TRACKS)
@@ -98,88 +95,57 @@ def level_tables(study: Study) -> Iterator[Delivered]:
         frame = tracks(study).rename(columns={"level": "level_asked"})
         yield delivered("tracks", (*TRACKS, *_of_intervals(study)), frame)
         found = levels_found(study, frame.rename(columns={"level_asked": "level"}))
-        yield delivered("thresholds", (*_OF_PERSON, *THRESHOLDS), _thresholds(study, frame, found))
+        groups = dict(zip(frame["participant"], frame["group"], strict=True))
+        rows: list[tuple[Any, dict[str, Any]]] = [
+            (row, _estimates(one, row))
+            for one in found
+            for row in one.sensitivities
+            if row.participant is not None and row.level is None
+        ]
+        yield _of_people(study, groups, "thresholds", THRESHOLDS, rows)
         if any(block.design.adjusts for block in study.levels):
-            own = [(one.block, setting) for one in found for setting in one.own_settings]
-            yield _of_people(study, frame, "settings", SETTINGS, own)
+            rows = [(row, {"block": one.block}) for one in found for row in one.own_settings]
+            yield _of_people(study, groups, "settings", SETTINGS, rows)
         if any(block.design.reply == "number" for block in study.levels):
-            exponents = [(one.block, exponent) for one in found for exponent in one.own_power_exponents]
-            yield _of_people(study, frame, "exponents", EXPONENTS, exponents)
+            rows = [(row, {"block": one.block, "levels": row.n}) for one in found for row in one.own_power_exponents]
+            yield _of_people(study, groups, "exponents", EXPONENTS, rows)
 
 
 def _of_people(
     study: Study,
-    tracks: pd.DataFrame,
+    groups: Mapping[str, Any],
     name: str,
     columns: tuple[Column, ...],
-    own: Sequence[tuple[str, SettingFound | ExponentFound]],
+    found: Sequence[tuple[Any, Mapping[str, Any]]],
 ) -> Delivered:
-    """Return a table of what was found for each participant in a block, named first."""
+    """Return a table of results, one a participant's: their attributes of the columns' names, and others."""
+    columns = (*_OF_PERSON, *columns)
+    about = {"study": study.name, "simulated": study.simulated, "pilot": study.pilot}
     rows = [
-        _person(study, tracks, one.participant) | {"block": block, "levels": one.n, **_values_of(one, header(columns))}
-        for block, one in own
+        {column.name: getattr(row, column.name, None) for column in columns}
+        | {**about, "group": groups[row.participant], **others}
+        for row, others in found
     ]
-    return delivered(name, (*_OF_PERSON, *columns), _frame(rows, (*_OF_PERSON, *columns)))
+    frame = pd.DataFrame(rows, columns=list(header(columns)))
+    return delivered(name, columns, frame.astype({column.name: TYPES[column.kind] for column in columns}))
 
 
-def _values_of(one: SettingFound | ExponentFound, names: Sequence[str]) -> dict[str, Any]:
-    return {name: getattr(one, name) for name in names if hasattr(one, name)}
-
-
-def _person(study: Study, tracks: pd.DataFrame, participant: str | None) -> dict[str, Any]:
-    """Return what every row about a participant begins with."""
-    groups = dict(zip(tracks["participant"], tracks["group"], strict=True))
-    return {
-        "study": study.name,
-        "participant": participant,
-        "simulated": study.simulated,
-        "pilot": study.pilot,
-        "group": groups[participant],
+def _estimates(found: LevelsFound, one: SensitivityFound) -> dict[str, Any]:
+    """Return a participant's threshold at a standard, or none of a compared condition, and what else it has."""
+    exponents = {exponent.participant: exponent.exponent for exponent in found.exponents}
+    held: dict[str, Any] = {"low": None, "high": None}
+    for threshold in found.own_thresholds:
+        if (threshold.participant, threshold.standard, None) == (one.participant, one.standard, one.comparison):
+            known = {column.name: getattr(threshold, column.name, None) for column in THRESHOLDS}
+            held |= {name: value for name, value in known.items() if value is not None}
+            held |= {"flat_width_threshold": threshold.flat_width, "weber_exponent": exponents.get(one.participant)}
+    return held | {
+        "block": found.block,
+        "condition": one.comparison,
+        "d_prime_model": one.model,
+        "d_prime_other": one.other,
+        "share_first": next(iter(one.shares.values()), None),
     }
-
-
-def _frame(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]) -> pd.DataFrame:
-    frame = pd.DataFrame(rows, columns=list(header(tuple(columns))))
-    return frame.astype({column.name: TYPES[column.kind] for column in columns})
-
-
-def _thresholds(study: Study, tracks: pd.DataFrame, levels: Sequence[LevelsFound]) -> pd.DataFrame:
-    """Return a row per participant and standard, or condition that is compared, of the main blocks."""
-    rows = [
-        _person(study, tracks, participant)
-        | {"block": found.block, "standard": standard, "condition": condition}
-        | _measured(found, participant, standard, condition)
-        for found in levels
-        for participant, standard, condition in _estimated(found)
-    ]
-    return _frame(rows, (*_OF_PERSON, *THRESHOLDS))
-
-
-def _estimated(found: LevelsFound) -> list[tuple[str | None, float | None, str | None]]:
-    """Return participant, standard and compared condition of each row; a block of ratings has none."""
-    return [
-        (one.participant, one.standard, one.comparison)
-        for one in found.sensitivities
-        if one.participant is not None and one.level is None
-    ]
-
-
-def _measured(found: LevelsFound, *which: str | float | None) -> dict[str, Any]:
-    threshold = next((one for one in found.own_thresholds if (one.participant, one.standard, None) == which), None)
-    sensitivity = next(
-        (one for one in found.sensitivities if (one.participant, one.standard, one.comparison) == which), None
-    )
-    held: dict[str, Any] = {}
-    if sensitivity is not None:
-        held = {name: getattr(sensitivity, name) for name in ("n", "d_prime", "criterion")}
-        held |= {"d_prime_model": sensitivity.model, "d_prime_other": sensitivity.other}
-        held["share_first"] = next(iter(sensitivity.shares.values()), None)
-    if threshold is not None:
-        held |= {name: getattr(threshold, name) for name in _OF_THRESHOLD}
-        held["flat_width_threshold"] = threshold.flat_width
-        exponents = {one.participant: one.exponent for one in found.exponents}
-        held["weber_exponent"] = exponents.get(threshold.participant)
-    return held
 
 
 def _of_intervals(study: Study) -> tuple[Column, ...]:
@@ -275,18 +241,12 @@ def _named(study: Study, table: pd.DataFrame) -> pd.DataFrame:
     places = {pair: place for place, pair in enumerate(dict.fromkeys(pairs))}
     which = np.fromiter((places[pair] for pair in pairs), dtype=np.int64, count=len(pairs))
     settings = [OF_A_FORM if pd.isna(pair[0]) else study.settings[pair] for pair in places]
-    delay_ms = _delays_ms(settings)[which]
+    delay_ms = np.array([np.nan if one.delay_ms is None else one.delay_ms for one in settings], np.float64)[which]
     return table.assign(
         condition=pd.array([one.condition for one in settings], dtype="string").take(which),
         liquid=pd.array([one.liquid for one in settings], dtype="string").take(which),
         delay_ms=delay_ms,
         delay_achieved_ms=(table["delay_error_mean_ms"] + delay_ms).round(6),
-    )
-
-
-def _delays_ms(settings: list[Setting]) -> Any:
-    return np.array(
-        [np.nan if setting.delay_ms is None else setting.delay_ms for setting in settings], dtype=np.float64
     )
 
 
@@ -324,10 +284,6 @@ def _aggregate(study: Study) -> pd.DataFrame:
         names = [*header(_aggregate_head()), *header(OPENED), *header(MEASURED)]
         return pd.DataFrame({name: pd.Series(dtype=object) for name in names})
     return pd.concat(frames, ignore_index=True)
-
-
-_PARTICIPANT = next(column for column in RESPONSES if column.name == "participant")
-_SIMULATED = next(column for column in RESPONSES if column.name == "simulated")
 
 
 @dataclass(frozen=True, slots=True)
@@ -371,8 +327,8 @@ def wide(study: Study) -> tuple[Delivered, dict[str, Cells | QuestionCells]]:
     others = _others(study)
     frame = frame.assign(**{name: _question_answers(study, one, people) for name, one in others.items()})
     columns = (
-        _PARTICIPANT,
-        _SIMULATED,
+        _BY_NAME["participant"],
+        _BY_NAME["simulated"],
         *(_column(name, one, frame) for name, one in named.items()),
         *(_question_column(name, one, frame) for name, one in others.items()),
     )
@@ -407,11 +363,14 @@ def _about(answers: pd.DataFrame, cells: QuestionCells) -> pd.DataFrame:
 
 
 def _medians(answers: pd.DataFrame, column: str, people: list[str]) -> pd.api.extensions.ExtensionArray:
-    """Return the median of each participant's numbers."""
-    given_answers = answers[answers[column].notna()].assign(number=lambda rows: rows[column].astype(float))
-    found = given_answers.groupby("participant")["number"].median()
-    values = np.array([found.get(person, np.nan) for person in people], dtype=np.float64)
-    return _numbers(values)
+    """Return the median of each participant's numbers; missing ones without any, whole ones where all are."""
+    numbers = answers[column].dropna().astype(float).groupby(answers["participant"]).median()
+    values = numbers.reindex(people).to_numpy()
+    missing = np.isnan(values)
+    known = np.where(missing, 0, values)
+    if (known == np.floor(known)).all():
+        return pd.arrays.IntegerArray(known.astype(np.int64), missing)
+    return pd.arrays.FloatingArray(known, missing)
 
 
 def _question_column(name: str, cells: QuestionCells, frame: pd.DataFrame) -> Column:
@@ -435,17 +394,9 @@ def _name(cells: Cells) -> str:
 
 def _answers(study: Study, cells: Cells, people: list[str]) -> pd.api.extensions.ExtensionArray:
     answers = study.answers(cells.block)
-    here = answers[(answers["code"] == cells.setting.code) & (answers["item"] == cells.item.id)]
-    return _numbers(by_participant(here, people, {cells.setting.code: 0}, cells.item.id)[:, 0])
-
-
-def _numbers(values: Array) -> pd.api.extensions.ExtensionArray:
-    """Return numbers with missing ones, whole where all are."""
-    missing = np.isnan(values)
-    known = np.where(missing, 0, values)
-    if (known == np.floor(known)).all():
-        return pd.arrays.IntegerArray(known.astype(np.int64), missing)
-    return pd.arrays.FloatingArray(known, missing)
+    return _medians(
+        answers[(answers["code"] == cells.setting.code) & (answers["item"] == cells.item.id)], "response", people
+    )
 
 
 def _column(name: str, cells: Cells, frame: pd.DataFrame) -> Column:
