@@ -6,7 +6,7 @@ each level against the lowest.
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, Final
@@ -19,7 +19,6 @@ from study_app.analysis.data.measures import number_or_none, quartiles_or_none
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.levels.results import (
     CatchAnswers,
-    ExponentFound,
     GroupAnswers,
     LevelAnswers,
     LevelConduct,
@@ -28,10 +27,16 @@ from study_app.analysis.levels.results import (
     SensitivityFound,
     SettingFound,
     Summary,
-    ThresholdFound,
     WithheldForce,
 )
-from study_app.analysis.levels.thresholds import answers_timed, estimated_exponents, thresholds, tracks, weber_exponents
+from study_app.analysis.levels.thresholds import (
+    answers_timed,
+    estimated_exponents,
+    mean_over,
+    thresholds,
+    tracks,
+    weber_exponents,
+)
 from study_app.analysis.statistics.outcome import Array, clopper_pearson, student_interval
 from study_app.analysis.statistics.thresholds import setting_statistics
 from study_app.protocol.quantities import quantity, quantity_words
@@ -74,26 +79,19 @@ def levels_found(study: Study, rows: pd.DataFrame | None = None) -> tuple[Levels
     opened = rows if rows is not None else tracks(study) if study.revealed else None
     opened = None if opened is None else opened[list(READ)]  # groups of few columns are made in less time
     bounds = {one.where.id: one.bounds for one in study.others.questions}
-    return tuple(
-        replace(
-            _levels_of_block(one, timed[timed["block"] == one.id], opened, study.intervals, bounds.get(one.id)),
-            device=study.own_dynamics,
-        )
-        for one in main
-    )
+    return tuple(_levels_of_block(study, block, timed, opened, bounds.get(block.id)) for block in main)
 
 
 def _levels_of_block(
+    study: Study,
     block: LevelBlock,
-    answers: pd.DataFrame,
+    timed: pd.DataFrame,
     opened: pd.DataFrame | None,
-    intervals: pd.DataFrame,
     bounds: tuple[float, float] | None,
 ) -> LevelsFound:
-    counted = answers[answers["counted"] & answers["response"].notna()]
+    counted = timed[(timed["block"] == block.id) & timed["counted"] & timed["response"].notna()]
     stimulus = block.stimulus
-    estimated = () if opened is None else tuple(thresholds(block, opened))
-    return LevelsFound(
+    found = LevelsFound(
         block=block.id,
         title=block.title,
         design=block.design.kind,
@@ -106,32 +104,55 @@ def _levels_of_block(
         ),
         summary=SUMMARIES[block.design.reply],
         counts=block.counts,
-        vary=None if stimulus is None else stimulus.vary,
-        quantity=None if stimulus is None else quantity_words(stimulus.vary),
-        unit=None if stimulus is None else quantity(stimulus.vary).unit,
-        level_kind=None if stimulus is None else stimulus.level_kind,
-        spacing="linear" if stimulus is None else stimulus.spacing,
         guess_rate=block.design.guess_rate if block.has_correct_answer else None,
         bounds=bounds,
         own_units=_chooses_units(block),
-        answers=() if opened is None else tuple(_level_answers(block, opened, bounds)),
-        thresholds=estimated,
-        exponents=() if opened is None else tuple(_exponents(block, opened, estimated)),
-        level_times=() if opened is None else tuple(_level_times(block, opened)),
-        withheld=() if opened is None else tuple(_withheld(block, intervals)),
-        conduct=() if opened is None else tuple(level_conduct(block, opened, intervals)),
-        catches=() if opened is None else tuple(catch_answers(block, opened)),
-        sensitivities=() if opened is None else tuple(sensitivities(block, opened)),
         family=None if block.assumed is None else block.assumed.family,
         adaptive=block.method is not None and block.method.adaptive,
-        settings=() if opened is None else tuple(settings(block, opened)),
         published=tuple(PublishedValue(**one.model_dump(exclude={"block"})) for one in block.published),
+        device=study.own_dynamics,
     )
+    if stimulus is not None:
+        found = replace(
+            found,
+            vary=stimulus.vary,
+            quantity=quantity_words(stimulus.vary),
+            unit=quantity(stimulus.vary).unit,
+            level_kind=stimulus.level_kind,
+            spacing=stimulus.spacing,
+        )
+    if opened is None:
+        return found
+    estimated = tuple(thresholds(block, opened))
+    exponents = () if stimulus is None else weber_exponents(estimated, stimulus.level_kind)
+    return replace(
+        found,
+        answers=tuple(_level_answers(block, opened, bounds)),
+        thresholds=estimated,
+        exponents=(*estimated_exponents(block, opened), *exponents),
+        level_times=tuple(_level_times(block, opened)),
+        withheld=tuple(_withheld(block, study.intervals)),
+        conduct=tuple(level_conduct(block, opened, study.intervals)),
+        catches=tuple(catch_answers(block, opened)),
+        sensitivities=tuple(sensitivities(block, opened)),
+        settings=tuple(settings(block, opened)),
+    )
+
+
+def _time_numbers(answers: pd.DataFrame) -> dict[str, Any]:
+    seconds = answers["response_s"].dropna().to_numpy(dtype=float)
+    low, middle, high = quartiles_or_none(seconds)
+    return {"n": len(seconds), "median": middle, "q1": low, "q3": high}
 
 
 def _chooses_units(block: LevelBlock) -> bool:
     """Return whether each participant chooses the unit of the numbers named: there is no modulus."""
     return block.design.reply == "number" and block.design.first is None
+
+
+def _analysed(block: LevelBlock, opened: pd.DataFrame, answer: str = "response") -> pd.DataFrame:
+    """Return the rows of a block that are analysed, those with this column known."""
+    return opened[(opened["block"] == block.id) & opened["analysed"] & opened[answer].notna()]
 
 
 def _level_answers(
@@ -140,9 +161,10 @@ def _level_answers(
     """Yield the answers at each level, and apart those to catch trials: of all participants, then of each."""
     if block.design.adjusts:
         return
-    rows = opened[(opened["block"] == block.id) & opened["analysed"] & opened["response"].notna()]
+    rows = _analysed(block, opened)
     if block.stimulus is None:
-        rows = rows.assign(comparison=rows["track"], place=rows["track"].map(_places(block)))
+        places = {setting.condition: place for place, setting in enumerate(block.settings)}
+        rows = rows.assign(comparison=rows["track"], place=rows["track"].map(places), catch=False)
         by = ["place"]
     else:
         rows = rows.assign(catch=rows["catch"].fillna(False).astype(bool))
@@ -160,8 +182,7 @@ def _own_units(block: LevelBlock, rows: pd.DataFrame) -> Mapping[str, float]:
     if not _chooses_units(block):
         return {}
     answered = rows.assign(log=np.log(rows["value"].to_numpy(dtype=float)))
-    logs = answered.groupby(["participant", "level"])["log"].mean()
-    own = logs.groupby("participant").mean()
+    own = answered.groupby(["participant", "level"])["log"].mean().groupby("participant").mean()
     return dict(own - own.mean())
 
 
@@ -169,9 +190,8 @@ def _at_level(
     block: LevelBlock, rows: pd.DataFrame, bounds: tuple[float, float] | None, units: Mapping[str, float]
 ) -> Iterator[LevelAnswers]:
     summary = SUMMARIES[block.design.reply]
-    ends = (0.0, 1.0) if summary == "share" else bounds
-    values = rows["success"] if summary == "share" else rows["value"]
-    numbers = values.to_numpy(dtype=float)
+    share = summary == "share"
+    numbers = rows["success" if share else "value"].to_numpy(dtype=float)
     numbers = np.log(numbers) if summary == "geometric mean" else numbers
     first = rows.iloc[0]
     make = partial(
@@ -179,18 +199,17 @@ def _at_level(
         standard=number_or_none(first["standard"]),
         level=number_or_none(first["level"]),
         comparison=first["comparison"] if isinstance(first["comparison"], str) else number_or_none(first["comparison"]),
-        catch=block.stimulus is not None and bool(first["catch"]),
+        catch=bool(first["catch"]),
     )
+    summarised = partial(_summarised, summary, (0.0, 1.0) if share else bounds)
     people = rows["participant"].to_numpy()
     own = {person: numbers[people == person] for person in sorted(set(people))}
-    means = np.array([one.mean() - units.get(person, 0.0) for person, one in own.items()])
-    count = int(numbers.sum()) if summary == "share" else None
-    value, low, high = _summarised(summary, means, ends)
+    value, low, high = summarised(np.array([one.mean() - units.get(person, 0.0) for person, one in own.items()]))
+    count = int(numbers.sum()) if share else None
     yield make(None, n=len(numbers), participants=len(own), count=count, value=value, low=low, high=high)
     for person, one in own.items():
-        value, low, high = _summarised(summary, one, ends)
-        count = None
-        if summary == "share":
+        value, low, high = summarised(one)
+        if share:
             count = int(one.sum())
             exact = clopper_pearson(count, len(one))
             low, high = exact.low, exact.high
@@ -198,7 +217,7 @@ def _at_level(
 
 
 def _summarised(
-    summary: Summary, values: Array, bounds: tuple[float, float] | None
+    summary: Summary, bounds: tuple[float, float] | None, values: Array
 ) -> tuple[float, float | None, float | None]:
     """Return the mean of shares, points or logarithms and its 95 % interval within bounds, as numbers of their kind."""
     low, high = student_interval(values)
@@ -210,54 +229,35 @@ def _summarised(
     return float(values.mean()), low, high
 
 
-def _places(block: LevelBlock) -> dict[str | None, int]:
-    """Return the place of each condition that is compared, in the order of the protocol."""
-    return {setting.condition: place for place, setting in enumerate(block.settings)}
-
-
-def _exponents(block: LevelBlock, opened: pd.DataFrame, estimated: Sequence[ThresholdFound]) -> Iterator[ExponentFound]:
-    """Yield the exponents of a block: of its numbers over levels, or of its thresholds over standards."""
-    if block.stimulus is not None:
-        yield from estimated_exponents(block, opened)
-        yield from weber_exponents(estimated, block.stimulus.level_kind)
+def _by_levels(rows: pd.DataFrame) -> Iterator[tuple[float | None, float, float, pd.DataFrame]]:
+    """Yield standard, lowest and highest level, and their rows: many levels in `MOST_LEVELS` ranges of neighbours."""
+    for standard, at_standard in rows[rows["level"].notna()].groupby("standard", dropna=False, sort=True):
+        level = at_standard["level"].astype(float)
+        levels = np.unique(level.to_numpy())
+        for some in np.array_split(levels, min(len(levels), MOST_LEVELS)):
+            here = at_standard[level.between(some[0], some[-1])]
+            yield number_or_none(standard), float(some[0]), float(some[-1]), here
 
 
 def _level_times(block: LevelBlock, opened: pd.DataFrame) -> Iterator[LevelTimes]:
-    """Yield the times of correct and of other answers by level; many levels in `MOST_LEVELS` ranges of neighbours."""
-    rows = opened[(opened["block"] == block.id) & opened["analysed"] & opened["right"].notna()]
-    rows = rows[rows["level"].notna() & rows["response_s"].notna()]
-    for standard, at_standard in rows.groupby("standard", dropna=False, sort=True):
-        levels = np.unique(at_standard["level"].to_numpy(dtype=float))
-        for some in _ranges(levels):
-            here = at_standard[at_standard["level"].astype(float).between(some[0], some[-1])]
-            seconds, right = here["response_s"].to_numpy(dtype=float), here["right"].to_numpy(dtype=bool)
-            (right_n, right_s), (wrong_n, wrong_s) = _median(seconds[right]), _median(seconds[~right])
-            yield LevelTimes(
-                number_or_none(standard), float(some[0]), float(some[-1]), right_n, right_s, wrong_n, wrong_s
-            )
-
-
-def _ranges(levels: Array) -> list[Array]:
-    """Return ascending levels in at most `MOST_LEVELS` ranges of neighbours."""
-    return np.array_split(levels, min(len(levels), MOST_LEVELS)) if len(levels) else []
-
-
-def _median(seconds: Array) -> tuple[int, float | None]:
-    return len(seconds), float(np.median(seconds)) if len(seconds) else None
+    """Yield the times of correct and of other answers by level."""
+    rows = _analysed(block, opened, "right")
+    for standard, low, high, here in _by_levels(rows[rows["response_s"].notna()]):
+        seconds, right = here["response_s"].to_numpy(dtype=float), here["right"].to_numpy(dtype=bool)
+        (right_n, right_s), (wrong_n, wrong_s) = (
+            (len(some), float(np.median(some)) if len(some) else None) for some in (seconds[right], seconds[~right])
+        )
+        yield LevelTimes(standard, low, high, right_n, right_s, wrong_n, wrong_s)
 
 
 def _withheld(block: LevelBlock, intervals: pd.DataFrame) -> Iterator[WithheldForce]:
-    """Yield what safety withheld of the force in comparisons whose link is varied, by level as `_level_times`."""
+    """Yield what safety withheld of the force in comparisons whose link is varied, by level."""
     if block.stimulus is None or block.stimulus.vary not in OF_LINK:
         return
     rows = intervals[(intervals["block"] == block.id) & (intervals["presented"] == "comparison")]
-    rows = rows[rows["level"].notna() & rows["withheld_share"].notna()]
-    for standard, at_standard in rows.groupby("standard", dropna=False, sort=True):
-        for some in _ranges(np.unique(at_standard["level"].to_numpy(dtype=float))):
-            here = at_standard[at_standard["level"].astype(float).between(some[0], some[-1])]
-            percent = 100 * here["withheld_share"].to_numpy(dtype=float)
-            mean, most = float(percent.mean()), float(percent.max())
-            yield WithheldForce(number_or_none(standard), float(some[0]), float(some[-1]), len(percent), mean, most)
+    for standard, low, high, here in _by_levels(rows[rows["withheld_share"].notna()]):
+        percent = 100 * here["withheld_share"].to_numpy(dtype=float)
+        yield WithheldForce(standard, low, high, len(percent), float(percent.mean()), float(percent.max()))
 
 
 def level_conduct(block: LevelBlock, opened: pd.DataFrame, intervals: pd.DataFrame) -> Iterator[LevelConduct]:
@@ -298,53 +298,30 @@ def catch_answers(block: LevelBlock, opened: pd.DataFrame) -> Iterator[CatchAnsw
 
 def sensitivities(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SensitivityFound]:
     """Yield the group's sensitivity at each standard, to each condition or at each level, then its participants'."""
-    rows = opened[(opened["block"] == block.id) & opened["analysed"] & opened["response"].notna()]
+    rows = _analysed(block, opened)
     match block.design.reply:
         case "choice":
             by = "standard" if block.stimulus is not None else "track"
             for which, some in rows.groupby(by, dropna=False, sort=True):
                 where = {"standard": number_or_none(which)} if by == "standard" else {"comparison": str(which)}
-                yield from _with_group([_of_choices(block, person, one, where) for person, one in _people(some)])
+                people = some.groupby("participant", sort=True)
+                yield from _with_group([_of_choices(block, str(person), one, where) for person, one in people])
         case "rating":
-            levels = sorted(rows["level"].dropna().unique())
-            for level in levels[1:]:
-                own = [_of_ratings(person, one, levels[0], level) for person, one in _people(rows)]
+            lowest, *levels = sorted(rows["level"].dropna().unique()) or [None]
+            for level in levels:
+                people = rows.groupby("participant", sort=True)
+                own = [_of_ratings(str(person), one, lowest, level) for person, one in people]
                 yield from _with_group([one for one in own if one is not None])
         case "number" | "setting":
             return
 
 
 def _with_group(own: Sequence[SensitivityFound]) -> Iterator[SensitivityFound]:
-    """Yield the group's means over participants, d′ with Student's interval, before the participants."""
-    if not own:
-        return
-    d_primes = _known(own, "d_prime")
-    low, high = student_interval(d_primes) if len(d_primes) else (None, None)
-    mean = partial(_mean_of, own)
-    yield SensitivityFound(
-        participant=None,
-        n=len(own),
-        shares={answer: float(np.mean([one.shares[answer] for one in own])) for answer in own[0].shares},
-        standard=own[0].standard,
-        comparison=own[0].comparison,
-        level=own[0].level,
-        d_prime=mean("d_prime"),
-        low=low,
-        high=high,
-        criterion=mean("criterion"),
-        model=own[0].model,
-        other=mean("other"),
-    )
+    """Yield the group's means over participants before the participants."""
+    if own:
+        shares = {answer: float(np.mean([one.shares[answer] for one in own])) for answer in own[0].shares}
+        yield replace(mean_over(own, "d_prime", "criterion", "other"), shares=shares)
     yield from own
-
-
-def _known(own: Sequence[SensitivityFound], name: str) -> Any:
-    return np.array([value for one in own if (value := getattr(one, name)) is not None], float)
-
-
-def _mean_of(own: Sequence[SensitivityFound], name: str) -> float | None:
-    values = _known(own, name)
-    return float(values.mean()) if len(values) else None
 
 
 def _of_ratings(person: str, rows: pd.DataFrame, lowest: float, level: float) -> SensitivityFound | None:
@@ -352,26 +329,6 @@ def _of_ratings(person: str, rows: pd.DataFrame, lowest: float, level: float) ->
     found = rating(noise, signal)
     one = SensitivityFound(participant=person, n=len(noise) + len(signal), shares={}, level=float(level))
     return None if found is None else _measured(one, found)
-
-
-def _measured(one: SensitivityFound, found: Sensitivity | None) -> SensitivityFound:
-    if found is None:
-        return one
-    half = None if found.variance is None else Z_95 * math.sqrt(found.variance)
-    return replace(
-        one,
-        d_prime=found.d_prime,
-        low=None if half is None else found.d_prime - half,
-        high=None if half is None else found.d_prime + half,
-        criterion=found.criterion,
-        model=found.model,
-        other=found.other,
-    )
-
-
-def _people(rows: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
-    for person, own in rows.groupby("participant", sort=True):
-        yield str(person), own
 
 
 def _of_choices(
@@ -382,13 +339,22 @@ def _of_choices(
     counts = Counter((arrangement_of(design, letters), answer) for letters, answer in pairs)
     given = Counter(rows["response"].astype(str))
     found = design.sensitivity(counts, roving=block.standards_rove) if block.has_correct_answer else None
-    one = SensitivityFound(
-        participant=person,
-        n=len(rows),
-        shares={answer: given[answer] / len(rows) for answer in design.answers},
-        **where,  # type: ignore[arg-type]  # standard or comparison
+    shares = {answer: given[answer] / len(rows) for answer in design.answers}
+    one = SensitivityFound(person, len(rows), shares, **where)  # type: ignore[arg-type]  # standard or comparison
+    return one if found is None else _measured(one, found)
+
+
+def _measured(one: SensitivityFound, found: Sensitivity) -> SensitivityFound:
+    half = math.nan if found.variance is None else Z_95 * math.sqrt(found.variance)
+    return replace(
+        one,
+        d_prime=found.d_prime,
+        low=number_or_none(found.d_prime - half),
+        high=number_or_none(found.d_prime + half),
+        criterion=found.criterion,
+        model=found.model,
+        other=found.other,
     )
-    return _measured(one, found)
 
 
 def settings(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SettingFound]:
@@ -396,65 +362,35 @@ def settings(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SettingFound]:
     stimulus = block.stimulus
     if stimulus is None or not block.design.adjusts:
         return
-    rows = opened[(opened["block"] == block.id) & opened["analysed"] & opened["response"].notna()]
-    rows = rows[rows["setting"].notna()]
-    for _, at_standard in rows.groupby("standard", dropna=False, sort=True):
-        known = None if pd.isna(which := at_standard["standard"].iloc[0]) else float(which)
+    rows = _analysed(block, opened)
+    for standard, at_standard in rows[rows["setting"].notna()].groupby("standard", dropna=False, sort=True):
         people = at_standard.groupby("participant", sort=True)
-        own = [_setting_of_person(block, stimulus, str(person), known, some) for person, some in people]
-        yield _group_setting(stimulus, known, own)
+        own = [_setting(block, stimulus, str(person), number_or_none(standard), some) for person, some in people]
+        others = ("jnd", "constant_error", "hysteresis")
+        group = mean_over(own, "pse", *others, coordinate=stimulus.coordinate, level_of=stimulus.level_of)
+        yield replace(group, levels=(), started_high=())
         yield from own
 
 
-def _setting_of_person(
+def _setting(
     block: LevelBlock, stimulus: Stimulus, person: str, standard: float | None, rows: pd.DataFrame
 ) -> SettingFound:
     in_u = np.vectorize(stimulus.coordinate, otypes=[float])
     u, starts = (in_u(rows[name].to_numpy(dtype=float)) for name in ("setting", "level"))
-    found = setting_statistics(u, starts > sum(stimulus.domain) / 2)
+    started_high = starts > sum(stimulus.domain) / 2
+    found = setting_statistics(u, started_high)
     compared = standard is not None and block.design.intervals > 1
+    low, high = (None if end is None else stimulus.level_of(end) for end in (found.low, found.high))
     return SettingFound(
         participant=person,
         standard=standard,
         n=found.n,
         pse=stimulus.level_of(found.pse),
-        low=_setting_level(stimulus, found.low),
-        high=_setting_level(stimulus, found.high),
+        low=low,
+        high=high,
         jnd=found.jnd,
         constant_error=found.pse - stimulus.coordinate(standard) if compared and standard is not None else None,
         hysteresis=found.hysteresis,
         levels=tuple(rows["setting"].to_numpy(dtype=float).tolist()),
-        started_high=tuple((starts > sum(stimulus.domain) / 2).tolist()),
+        started_high=tuple(started_high.tolist()),
     )
-
-
-def _setting_level(stimulus: Stimulus, u: float | None) -> float | None:
-    return None if u is None else stimulus.level_of(u)
-
-
-def _group_setting(stimulus: Stimulus, standard: float | None, own: Sequence[SettingFound]) -> SettingFound:
-    """Return the means over participants, with Student's interval of the PSE."""
-    pse = np.array([stimulus.coordinate(one.pse) for one in own])
-    low, high = student_interval(pse)
-    return SettingFound(
-        participant=None,
-        standard=standard,
-        n=len(own),
-        pse=stimulus.level_of(float(pse.mean())),
-        low=_setting_level(stimulus, low),
-        high=_setting_level(stimulus, high),
-        jnd=_mean_setting(own, lambda one: one.jnd),
-        constant_error=_mean_setting(own, lambda one: one.constant_error),
-        hysteresis=_mean_setting(own, lambda one: one.hysteresis),
-    )
-
-
-def _mean_setting(own: Sequence[SettingFound], value: Callable[[SettingFound], Any]) -> float | None:
-    known = [number for one in own if (number := value(one)) is not None]
-    return float(np.mean(known)) if known else None
-
-
-def _time_numbers(answers: pd.DataFrame) -> dict[str, Any]:
-    seconds = answers["response_s"].dropna().to_numpy(dtype=float)
-    low, middle, high = quartiles_or_none(seconds)
-    return {"n": len(seconds), "median": middle, "q1": low, "q3": high}

@@ -11,9 +11,9 @@ An exponent of 1 is Weber's law, JND ∝ standard; 0 is a constant JND.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from study_app.analysis.data.blocks import LevelBlock, compared_percent
 from study_app.analysis.data.measures import number_or_none
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.levels.results import ExponentFound, LevelsFound, ThresholdFound
+from study_app.analysis.levels.results import ExponentFound, LevelsFound, SensitivityFound, SettingFound, ThresholdFound
 from study_app.analysis.results import SiteThresholds
 from study_app.analysis.statistics.outcome import Array, student_interval
 from study_app.analysis.statistics.rank_tests import groups_differ
@@ -32,6 +32,8 @@ from study_app.protocol.trials.presentation import arrangement_of
 from study_app.protocol.trials.stimuli import DELAY, FORCE_DELAY, Stimulus, analysis_grid
 from study_app.psychophysics.families import CLIP, level_at, success
 from study_app.psychophysics.grid import Grid
+
+R = TypeVar("R", ExponentFound, SensitivityFound, SettingFound)
 
 TRACK: Final = ["participant", "session", "block", "code"]
 """What one track is in the rows of `tracks`."""
@@ -424,14 +426,28 @@ def estimated_exponents(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Exp
         if (count := len(np.unique(levels))) >= 2:
             own.append(ExponentFound(str(person), count, estimate_slope(levels, of_person["value"].astype(float))))
     if own:
-        yield mean_exponent(own)
+        yield mean_over(own, "exponent")
     yield from own
 
 
-def mean_exponent(own: list[ExponentFound]) -> ExponentFound:
-    """Return the group's exponent: the mean over participants, with Student's 95 % interval."""
-    slopes = np.array([one.exponent for one in own])
-    return ExponentFound(None, len(own), float(slopes.mean()), *student_interval(slopes))
+def mean_over(
+    own: Sequence[R],
+    middle: str,
+    *others: str,
+    coordinate: Callable[[float], float] = float,
+    level_of: Callable[[float], float] = float,
+) -> R:
+    """Return the group of these participants: means over those in whom a number is known.
+
+    That of ``middle`` is a mean in the coordinate u with Student's 95 % interval.
+    """
+    known = {name: [value for one in own if (value := getattr(one, name)) is not None] for name in (middle, *others)}
+    means: dict[str, Any] = {name: float(np.mean(values)) if values else None for name, values in known.items()}
+    u = np.array([coordinate(value) for value in known.pop(middle)])
+    ends = student_interval(u) if len(u) else (None, None)
+    low, high = (None if end is None else level_of(end) for end in ends)
+    means[middle] = level_of(float(u.mean())) if len(u) else None
+    return replace(own[0], participant=None, n=len(own), low=low, high=high, **means)
 
 
 def jnd_slope(standards: ArrayLike, jnds: ArrayLike) -> float:
@@ -466,5 +482,5 @@ def weber_exponents(thresholds: Sequence[ThresholdFound], level_kind: str) -> It
         if len(places) >= 2:
             own.append(ExponentFound(person, len(places), jnd_slope(*np.array(places).T)))
     if own:
-        yield mean_exponent(own)
+        yield mean_over(own, "exponent")
     yield from own
