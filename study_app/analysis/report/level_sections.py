@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import takewhile
-from typing import Final, Protocol
+from typing import Any, Final, TypeAlias
 
 from study_app.analysis.figures.level_figures import level_words, mean_words, summary_words, with_unit
 from study_app.analysis.figures.page_layout import Picture
@@ -13,7 +13,6 @@ from study_app.analysis.levels.results import (
     LevelsFound,
     LevelTimes,
     SensitivityFound,
-    SettingFound,
     ThresholdFound,
     WithheldForce,
 )
@@ -63,18 +62,15 @@ EXPLAINED = (
 OWN_UNITS = " The interval leaves out that each participant chose a unit: ln answers less the participant's mean."
 
 
-class _OfPeople(Protocol):
-    @property
-    def participant(self) -> str | None: ...
-    @property
-    def n(self) -> int: ...
+Shown: TypeAlias = tuple[str, Callable[[Any], str]] | None
+"""A column: its heading and what makes a cell of a row; None is one that is left out."""
 
-
-_OF_WHOM: Final[tuple[tuple[str, Callable[[_OfPeople], str]], ...]] = (
+OF_WHOM: Final[tuple[Shown, ...]] = (
     ("Participant", lambda one: one.participant or f"group of {one.n}"),
     ("n", lambda one: "–" if one.participant is None else str(one.n)),
 )
 """The columns that say of whom a row is."""
+INTERVAL: Final[Shown] = ("95 % interval", lambda one: _between(one.low, one.high, _digits))
 
 
 def level_section(found: LevelsFound, pictures: Sequence[Picture], estimator: str | None) -> Iterator[str]:
@@ -97,36 +93,36 @@ def level_section(found: LevelsFound, pictures: Sequence[Picture], estimator: st
         yield paragraph(SEALED)
         return
     if found.settings:
-        yield from settings_part(found, {one.name: one for one in pictures})
+        yield from _settings(found, {one.name: one for one in pictures})
         return
     if not found.answers:
         yield paragraph("No answer counts yet.")
         return
+    drawings = {one.name: one for one in pictures}
     if not found.adaptive:
         yield _of_group(found)
         explained = EXPLAINED.format(mean=mean_words(found).capitalize())
         yield paragraph(explained + (OWN_UNITS if found.own_units else ""), "soft")
-    yield from drawn({one.name: one for one in pictures}, f"levels-{found.block}")
+    yield from drawn(drawings, f"levels-{found.block}")
     if not found.adaptive:
         for standard in sorted({one.standard for one in found.answers}, key=lambda one: one or 0.0):
             yield _of_people(found, standard)
-    yield from thresholds_part(found, {one.name: one for one in pictures})
-    yield from conduct_part(found, estimator)
-    yield from withheld(found)
-
-
-def thresholds_part(found: LevelsFound, pictures: Mapping[str, Picture]) -> Iterator[str]:
-    """Yield thresholds, sensitivity and bias, and times to answer of a block whose key is open."""
     if found.thresholds:
         yield heading(3, "Thresholds")
         yield _thresholds(found)
         yield paragraph(_threshold_words(found), "soft")
         yield from _published(found, exponents=False)
-        yield from drawn(pictures, f"tracks-{found.block}")
-        yield from drawn(pictures, f"weber-{found.block}")
+        yield from drawn(drawings, f"tracks-{found.block}")
+        yield from drawn(drawings, f"weber-{found.block}")
     if found.exponents:
         yield heading(3, found.exponent_name[0].upper() + found.exponent_name[1:])
-        yield _exponents(found)
+        yield table_of(
+            found.exponents,
+            OF_WHOM[0],
+            ("standards" if found.thresholds else "levels", lambda one: "–" if one.participant is None else str(one.n)),
+            ("exponent", lambda one: number(one.exponent)),
+            ("95 % interval", lambda one: _between(one.low, one.high, number)),
+        )
         yield paragraph(EXPONENT if found.thresholds else POWER_LAW, "soft")
         yield from _published(found, exponents=True)
     if found.sensitivities:
@@ -135,34 +131,73 @@ def thresholds_part(found: LevelsFound, pictures: Mapping[str, Picture]) -> Iter
         yield paragraph(_sensitivity_words(found), "soft")
     if found.level_times:
         yield heading(3, "Time to answer by level")
-        yield _answer_times(found)
+        yield _by_standard(
+            found,
+            found.level_times,
+            (level_words(found), _levels),
+            ("n correct", lambda one: str(one.right_n)),
+            ("median, correct [s]", lambda one: number(one.right_s)),
+            ("n incorrect", lambda one: str(one.wrong_n)),
+            ("median, incorrect [s]", lambda one: number(one.wrong_s)),
+        )
+    if found.conduct:
+        yield heading(3, "Delivery of levels")
+        yield _delivery(found)
+        yield paragraph(_conduct_words(found, estimator), "soft")
+    if found.catches:
+        yield heading(3, "Catch trials")
+        yield table_of(
+            found.catches,
+            ("Participant", lambda one: one.participant),
+            ("session", lambda one: str(one.session)),
+            ("n", lambda one: str(one.n)),
+            ("incorrect", lambda one: str(one.wrong)),
+            ("share", lambda one: f"{100 * one.wrong / one.n:.0f} %"),
+            ("rule", lambda one: f"{'excluded: above' if one.excludes else 'kept: at most'} {100 * one.most:g} %"),
+        )
+        yield paragraph("Catch trials present the largest level; they enter the fit of the threshold.", "soft")
+    yield from withheld(found)
+
+
+def _by_standard(found: LevelsFound, rows: Sequence[Any], *columns: Shown, words: int = 0) -> str:
+    """Return a table that has, where rows are at several standards, the standard as its first column."""
+    several = len({one.standard for one in rows}) > 1
+    return table_of(rows, _standard(found) if several else None, *columns, words=0 if several else words)
+
+
+def _standard(found: LevelsFound) -> Shown:
+    return f"Standard{_unit(found)}", lambda one: _digits(one.standard, 4)
 
 
 def _thresholds(found: LevelsFound) -> str:
     """Return a row per standard and participant, the group first."""
-    standards = len({one.standard for one in found.thresholds}) > 1
-    percent, compared = _target_percent(found), found.compared_percent
+    percent, compared, weber = _target_percent(found), found.compared_percent, found.level_kind == "weber"
     with_device = any(found.with_device(one) is not None for one in found.thresholds)
-    weber = found.level_kind == "weber"
-    return table_of(
+
+    def fit(one: ThresholdFound) -> str:
+        return "–" if one.fit_p is None else f"{one.fit_p:.3f}{'' if one.fits else ': the function does not fit'}"
+
+    def drift(one: ThresholdFound) -> str:
+        return "–" if one.drift is None else f"{one.drift:+.2f}{'!' if one.drifts else ''}".replace("-", "−")
+
+    return _by_standard(
+        found,
         found.thresholds,
-        (f"Standard{_unit(found)}", lambda one: _digits(one.standard, 4)) if standards else None,
-        *_OF_WHOM,
-        ("threshold" + (" (Weber fraction)" if weber else _unit(found)), _threshold),
-        ("95 % interval", lambda one: _between(one.low, one.high, _digits)),
+        *OF_WHOM,
+        (
+            "threshold" + (" (Weber fraction)" if weber else _unit(found)),
+            lambda one: f"{BEYOND[one.beyond]}{one.threshold:.3g}",
+        ),
+        INTERVAL,
         None if compared is None else (f"at {compared:g} %", lambda one: _digits(one.compared)),
         ("with device damping", lambda one: _digits(found.with_device(one))) if with_device else None,
         (f"width [{WIDTH_UNITS[found.spacing]}]", lambda one: _digits(one.width, 2)),
         ("flat width prior", lambda one: _digits(one.flat_width)),
         None if percent is None else (f"mean of reversals ({percent:.1f} %)", lambda one: _digits(one.reversal_mean)),
-        ("fit (p)", _fit),
-        ("drift", _drift),
-        words=int(not standards),
+        ("fit (p)", fit),
+        ("drift", drift),
+        words=1,
     )
-
-
-def _threshold(one: ThresholdFound) -> str:
-    return f"{BEYOND[one.beyond]}{one.threshold:.3g}"
 
 
 def _target_percent(found: LevelsFound) -> float | None:
@@ -188,16 +223,6 @@ def _levels(one: LevelTimes | WithheldForce) -> str:
     return _digits(one.low) if one.low == one.high else _between(one.low, one.high, _digits)
 
 
-def _fit(one: ThresholdFound) -> str:
-    if one.fit_p is None:
-        return "–"
-    return f"{one.fit_p:.3f}{'' if one.fits else ': the function does not fit'}"
-
-
-def _drift(one: ThresholdFound) -> str:
-    return "–" if one.drift is None else f"{one.drift:+.2f}{'!' if one.drifts else ''}".replace("-", "−")
-
-
 def _published(found: LevelsFound, *, exponents: bool) -> Iterator[str]:
     """Yield the published values that are exponents, or those that are not."""
     shown = [one.in_words() for one in found.published if (one.measure == "exponent") is exponents]
@@ -205,68 +230,33 @@ def _published(found: LevelsFound, *, exponents: bool) -> Iterator[str]:
         yield paragraph(f"Published: {'; '.join(shown)}.")
 
 
-def _exponents(found: LevelsFound) -> str:
-    return table_of(
-        found.exponents,
-        _OF_WHOM[0],
-        ("standards" if found.thresholds else "levels", _OF_WHOM[1][1]),
-        ("exponent", lambda one: number(one.exponent)),
-        ("95 % interval", lambda one: _between(one.low, one.high, number)),
-    )
-
-
 def _sensitivities(found: LevelsFound) -> str:
     """Return a row per standard, comparison or level and participant, the group first."""
     ones = found.sensitivities
+    first = ones[0]
+    where = "Comparison" if first.level is None else "Level"
     wheres = len({_sensitivity_where(one) for one in ones}) > 1
-    where = (
-        f"Standard{_unit(found)}"
-        if ones[0].standard is not None
-        else "Level"
-        if ones[0].level is not None
-        else "Comparison"
-    )
     measured = any(one.d_prime is not None for one in ones)
     biased = any(one.criterion is not None for one in ones)
-    answers = tuple(ones[0].shares)
-    k_or_c = "k" if found.design == "samedifferent" else "c"
+    answers = tuple(first.shares)
+    shares: list[Shown] = [
+        (f"“{answer.replace('_', ' ')}”", lambda one, answer=answer: f"{100 * one.shares[answer]:.0f} %")  # type: ignore[misc]
+        for answer in (answers[:1] if len(answers) == 2 else answers)
+    ]
     return table_of(
         ones,
-        (where, _sensitivity_where) if wheres else None,
-        *_OF_WHOM,
+        (where if first.standard is None else f"Standard{_unit(found)}", _sensitivity_where) if wheres else None,
+        *OF_WHOM,
         ("d′", lambda one: number(one.d_prime)) if measured else None,
         ("95 % interval", lambda one: _between(one.low, one.high, number)) if measured else None,
-        (k_or_c, lambda one: number(one.criterion)) if biased else None,
-        *map(_share, answers[:1] if len(answers) == 2 else answers),
+        ("k" if found.design == "samedifferent" else "c", lambda one: number(one.criterion)) if biased else None,
+        *shares,
         words=int(not wheres),
     )
 
 
-def _share(answer: str) -> tuple[str, Callable[[SensitivityFound], str]]:
-    """Return the column of an answer's share."""
-    return f"“{answer.replace('_', ' ')}”", lambda one: f"{100 * one.shares[answer]:.0f} %"
-
-
 def _sensitivity_where(one: SensitivityFound) -> str:
-    if one.comparison is not None:
-        return one.comparison.replace("_", " ")
-    value = one.level if one.standard is None else one.standard
-    return "–" if value is None else f"{value:.4g}"
-
-
-def _answer_times(found: LevelsFound) -> str:
-    """Return a row per standard and level, with the median times of correct and of other answers."""
-    standards = len({one.standard for one in found.level_times}) > 1
-    return table_of(
-        found.level_times,
-        (f"Standard{_unit(found)}", lambda one: _digits(one.standard, 4)) if standards else None,
-        (level_words(found), _levels),
-        ("n correct", lambda one: str(one.right_n)),
-        ("median, correct [s]", lambda one: number(one.right_s)),
-        ("n incorrect", lambda one: str(one.wrong_n)),
-        ("median, incorrect [s]", lambda one: number(one.wrong_s)),
-        words=0,
-    )
+    return _plain(one.comparison or (one.level if one.standard is None else one.standard))
 
 
 def _threshold_words(found: LevelsFound) -> str:
@@ -315,38 +305,17 @@ def _sensitivity_words(found: LevelsFound) -> str:
     ).rstrip()
 
 
-def conduct_part(found: LevelsFound, estimator: str | None) -> Iterator[str]:
-    """Yield the delivery of levels and the answers to catch trials; nothing where neither is known."""
-    if found.conduct:
-        yield heading(3, "Delivery of levels")
-        yield _delivery(found)
-        yield paragraph(_conduct_words(found, estimator), "soft")
-    if found.catches:
-        yield heading(3, "Catch trials")
-        yield table_of(
-            found.catches,
-            ("Participant", lambda one: one.participant),
-            ("session", lambda one: str(one.session)),
-            ("n", lambda one: str(one.n)),
-            ("incorrect", lambda one: str(one.wrong)),
-            ("share", lambda one: f"{100 * one.wrong / one.n:.0f} %"),
-            ("rule", lambda one: f"{'excluded: above' if one.excludes else 'kept: at most'} {100 * one.most:g} %"),
-        )
-        yield paragraph("Catch trials present the largest level; they enter the fit of the threshold.", "soft")
-
-
 def _delivery(found: LevelsFound) -> str:
     """Return a row per standard."""
     standards = any(one.standard is not None for one in found.conduct)
-    digits = 4 if found.level_kind == "weber" else 3
-    level = f"level error{'' if found.level_kind == 'weber' else _unit(found)}"
+    digits, unit = (4, "") if found.level_kind == "weber" else (3, _unit(found))
     return table_of(
         found.conduct,
-        (f"Standard{_unit(found)}", lambda one: _digits(one.standard, 4)) if standards else None,
+        _standard(found) if standards else None,
         ("trials", lambda one: str(one.trials)),
         ("repeated attempts", lambda one: str(one.repeated)),
         ("measured", lambda one: str(one.measured)),
-        (f"{level}, mean", lambda one: number(one.error_mean, digits)),
+        (f"level error{unit}, mean", lambda one: number(one.error_mean, digits)),
         ("largest", lambda one: number(one.error_largest, digits)),
         ("hand speed, RMS [m/s]", lambda one: number(one.pace_mps, 3)),
         ("apparent mass [kg]", lambda one: number(one.apparent_mass_kg, 3)),
@@ -355,38 +324,32 @@ def _delivery(found: LevelsFound) -> str:
 
 
 def _conduct_words(found: LevelsFound, estimator: str | None) -> str:
-    reasons: Counter[str] = Counter()
-    for one in found.conduct:
-        reasons.update(one.reasons)
-    repeated = listed([f"{_limit(name)} in {counted(count, 'interval')}" for name, count in reasons.most_common()])
+    reasons = sum((Counter(one.reasons) for one in found.conduct), Counter[str]())
+    named = [
+        f"{name.rpartition('_')[0].replace('_', ' ') or name} in {counted(count, 'interval')}"
+        for name, count in reasons.most_common()
+    ]
     with_estimator = f", with the velocity estimator {estimator}" if estimator else ""
     mass = f" Apparent mass: least-squares fit of F = −b v − m a to the force sent{with_estimator}."
     return (
         "Level error: delivered less requested level, from the recorded samples (delays: from the frames); fits take "
         f"delivered levels.{mass if any(one.apparent_mass_kg is not None for one in found.conduct) else ''} "
-        f"{'Limits that intervals did not keep: ' + repeated + '.' if reasons else 'Every interval kept its limits.'}"
+        f"{f'Limits that intervals did not keep: {listed(named)}.' if reasons else 'Every interval kept its limits.'}"
     )
-
-
-def _limit(name: str) -> str:
-    """Return the name of a limit in words: "pace error"."""
-    return name.rpartition("_")[0].replace("_", " ") or name
 
 
 def withheld(found: LevelsFound) -> Iterator[str]:
     """Yield the section; nothing where the force was prompt."""
     if not found.withheld:
         return
-    standards = len({one.standard for one in found.withheld}) > 1
     yield heading(3, "Force withheld by safety")
-    yield table_of(
+    yield _by_standard(
+        found,
         found.withheld,
-        (f"Standard{_unit(found)}", lambda one: _digits(one.standard, 4)) if standards else None,
         (f"Level{_unit(found)}", _levels),
         ("intervals", lambda one: str(one.n)),
         ("mean", lambda one: f"{one.mean_percent:.1f} %"),
         ("most", lambda one: f"{one.most_percent:.1f} %"),
-        words=0,
     )
     yield paragraph(f"{' '.join(_withheld_words(found))} {WITHHELD_EXPLAINED}", "soft")
 
@@ -402,79 +365,56 @@ def _withheld_words(found: LevelsFound) -> Iterator[str]:
         yield f"At most {WITHHELD_PERCENT:g} % was withheld in every comparison {until}{at}."
 
 
-def settings_part(found: LevelsFound, pictures: Mapping[str, Picture]) -> Iterator[str]:
-    """Yield the settings of a block whose key is open."""
+def _settings(found: LevelsFound, pictures: Mapping[str, Picture]) -> Iterator[str]:
+    """Yield the settings of a block whose key is open: a row per standard and participant, the group first."""
+    compared = any(one.constant_error is not None for one in found.settings)
+    unit = "decades" if found.spacing == "log" else found.unit or "units of the level"
+
+    def signed(value: float | None) -> str:
+        return "–" if value is None else f"{value:+.3g}".replace("-", "−")
+
     yield heading(3, "Settings")
-    yield _settings_table(found)
-    yield paragraph(_settings_words(found), "soft")
+    yield _by_standard(
+        found,
+        found.settings,
+        *OF_WHOM,
+        (f"PSE{_unit(found)}", lambda one: _digits(one.pse)),
+        INTERVAL,
+        (f"JND [{unit}]", lambda one: _digits(one.jnd)),
+        (f"constant error [{unit}]", lambda one: signed(one.constant_error)) if compared else None,
+        (f"hysteresis [{unit}]", lambda one: signed(one.hysteresis)),
+        words=1,
+    )
+    in_u = "logarithm of the level" if found.spacing == "log" else "level"
+    error = " constant error: PSE − standard;" if compared else ""
+    yield paragraph(
+        f"Settings as levels ({level_words(found)}). PSE, the point of subjective equality: mean of the {in_u}, with "
+        f"Student’s 95 % interval; JND, the just-noticeable difference: standard deviation;{error} hysteresis: "
+        "settings that started high − settings that started low. The group has the means over participants, and "
+        "the interval of its PSE is that over participants.",
+        "soft",
+    )
     if found.published:
         yield paragraph(f"Published: {'; '.join(one.in_words() for one in found.published)}.")
     yield from drawn(pictures, f"settings-{found.block}")
 
 
-def _settings_table(found: LevelsFound) -> str:
-    """Return a row per standard and participant, the group first."""
-    standards = len({one.standard for one in found.settings}) > 1
-    compared = any(map(_has_error, found.settings))
-    unit = "decades" if found.spacing == "log" else found.unit or "units of the level"
-    return table_of(
-        found.settings,
-        (f"Standard{_unit(found)}", lambda one: _digits(one.standard, 4)) if standards else None,
-        *_OF_WHOM,
-        (f"PSE{_unit(found)}", lambda one: _digits(one.pse)),
-        ("95 % interval", lambda one: _between(one.low, one.high, _digits)),
-        (f"JND [{unit}]", lambda one: _digits(one.jnd)),
-        (f"constant error [{unit}]", lambda one: _signed(one.constant_error)) if compared else None,
-        (f"hysteresis [{unit}]", lambda one: _signed(one.hysteresis)),
-        words=int(not standards),
-    )
-
-
-def _has_error(one: SettingFound) -> bool:
-    return one.constant_error is not None
-
-
-def _signed(value: float | None) -> str:
-    return "–" if value is None else f"{value:+.3g}".replace("-", "−")
-
-
-def _settings_words(found: LevelsFound) -> str:
-    in_u = "logarithm of the level" if found.spacing == "log" else "level"
-    error = " constant error: PSE − standard;" if any(map(_has_error, found.settings)) else ""
-    return (
-        f"Settings as levels ({level_words(found)}). PSE, the point of subjective equality: mean of the {in_u}, with "
-        f"Student’s 95 % interval; JND, the just-noticeable difference: standard deviation;{error} hysteresis: "
-        "settings that started high − settings that started low. The group has the means over participants, and "
-        "the interval of its PSE is that over participants."
-    )
-
-
 def _of_group(found: LevelsFound) -> str:
+    standards = any(one.standard is not None for one in found.of_group)
+    columns: list[Shown] = [(f"Standard{_unit(found)}", lambda one: _plain(one.standard))] if standards else []
+    if found.level_kind not in {None, "value"}:
+        columns.append((level_words(found), lambda one: _plain(one.level)))
+    alone = found.level_kind == "value" and not standards
+    columns.append((level_words(found) if alone else f"Comparison{_unit(found)}", lambda one: _plain(one.comparison)))
     return table_of(
         found.of_group,
-        *((head, partial(_presented, what)) for head, what in _level_columns(found)),
+        *columns,
         ("participants", lambda one: str(one.participants)),
         ("n", lambda one: str(one.n)),
         (summary_words(found), lambda one: _value(found, one.value)),
         ("95 % interval", lambda one: _between(one.low, one.high, partial(_value, found))),
         words=1 if found.vary is None else 0,
     )
-
-
-def _presented(what: str, one: LevelAnswers) -> str:
-    return _plain(getattr(one, what))
-
-
-def _level_columns(found: LevelsFound) -> Iterator[tuple[str, str]]:
-    """Yield the columns that say what was presented: heading, and field of the answers."""
-    if any(one.standard is not None for one in found.of_group):
-        yield f"Standard{_unit(found)}", "standard"
-    if found.level_kind not in {None, "value"}:
-        yield level_words(found), "level"
-    if found.level_kind == "value" and not any(one.standard is not None for one in found.of_group):
-        yield level_words(found), "comparison"
-    else:
-        yield f"Comparison{_unit(found)}", "comparison"
 
 
 def _value(found: LevelsFound, value: float) -> str:
@@ -495,19 +435,15 @@ def _of_people(found: LevelsFound, standard: float | None) -> str:
         for one in found.answers
         if one.standard == standard and not one.catch
     }
+
+    def cell(person: str, level: LevelAnswers) -> str:
+        one = own.get((person, level.level, level.comparison))
+        if one is None:
+            return "–"
+        return f"{_value(found, one.value)} ({one.n})" if one.count is None else f"{one.count}/{one.n}"
+
     names = [_plain(one.comparison if one.level is None else one.level) for one in shown]
     return table(
         ("Participant" if standard is None else f"Standard {with_unit(found, standard)}", *names),
-        [
-            [person, *(_level_cell(found, own.get((person, one.level, one.comparison))) for one in shown)]
-            for person in found.people
-        ],
+        [[person, *(cell(person, one) for one in shown)] for person in found.people],
     )
-
-
-def _level_cell(found: LevelsFound, one: LevelAnswers | None) -> str:
-    if one is None:
-        return "–"
-    if one.count is not None:
-        return f"{one.count}/{one.n}"
-    return f"{_value(found, one.value)} ({one.n})"
