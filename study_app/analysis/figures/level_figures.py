@@ -1,7 +1,7 @@
 """The figures of blocks of levels: answers over levels, tracks, settings and Weber fractions."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, Final, TypeAlias, cast
 
@@ -35,25 +35,33 @@ LEAST_LEVELS: Final = 3
 """Ticks at 1, 2 and 5 in each decade, as long as so many lie within the axis."""
 
 
-def sheet_of_panels(
-    study: Study, title: str, above: str, panels: int, fonts: Sequence[str], *, foot_pt: float = 28.0
+def panels(
+    study: Study,
+    title: str,
+    above: str,
+    names: Sequence[tuple[str, str]],
+    draw: Callable[[Axes, int, bool], None],
+    below: str,
+    fonts: Sequence[str],
+    *,
+    keys: Sequence[tuple[str, str]] = (),
+    foot_pt: float = 28.0,
 ) -> Sheet:
-    """Return a sheet with room for ``panels``, its heading, and what the vertical axes show."""
-    rows = math.ceil(panels / COLUMNS)
+    """Draw a panel under each name and the words after it.
+
+    ``above`` and ``below`` say what the axes show, ``keys`` are words and their colours. ``draw`` takes the axes, the
+    panel's place, and whether it is the first of its row.
+    """
+    rows = math.ceil(len(names) / COLUMNS)
     height = HEAD_PT + rows * PANEL_PT + (rows - 1) * ROW_GAP_PT + foot_pt + 14
     sheet = Sheet(style.PAGE_WIDTH_PT, height, fonts)
     sheet.heading(title, study_marks(study), (counted(study.n, "participant"),))
     sheet.text(MARGIN_PT, 28, above, size=7, colour=style.TEXT_SOFT)
-    return sheet
-
-
-def draw_panels(
-    sheet: Sheet, names: Sequence[tuple[str, str]], draw: Callable[[Axes, int, bool], None], below: str
-) -> Sheet:
-    """Draw a panel under each name and the words after it, and say below what the horizontal axes show.
-
-    ``draw`` takes the axes, the panel's place, and whether it is the first of its row.
-    """
+    x = sheet.width_pt - MARGIN_PT
+    for words, colour in reversed(keys):
+        x -= sheet.text_width(words, 7)
+        sheet.text(x, 28, words, size=7, colour=colour)
+        x -= 10
     width = (sheet.width_pt - LEFT_PT - MARGIN_PT - (COLUMNS - 1) * GAP_PT) / COLUMNS
     for place, (name, words) in enumerate(names):
         row, column = divmod(place, COLUMNS)
@@ -68,6 +76,22 @@ def draw_panels(
             label.set_fontproperties(sheet.font(6.5))
     sheet.text(LEFT_PT, sheet.height_pt - 10, below, size=7, colour=style.TEXT_SOFT)
     return sheet
+
+
+def _ends(
+    found: LevelsFound, levels: Iterable[float], share: float, least: float, linear: float
+) -> tuple[float, float]:
+    """Return the ends of an axis of levels: with a margin of a share of the span, in decades where these are spaced so.
+
+    ``least`` is the smallest factor of a margin in decades, ``linear`` the share of any other.
+    """
+    known = [level for level in levels if level > 0 or found.spacing != "log"]
+    low, high = float(min(known)), float(max(known))
+    if found.spacing == "log":
+        factor = max((high / low) ** share, least)
+        return low / factor, high * factor
+    margin = linear * ((high - low) or 1.0)
+    return low - margin, high + margin
 
 
 def over_trials(axes: Axes, found: LevelsFound, trials: int, ends: tuple[float, float], *, first: bool) -> None:
@@ -120,8 +144,9 @@ def level_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: 
     files = files_of(partial(_draw_levels, study, found, bands), forms, f"{study.name}: {found.title}")
     own = len(found.people) - MOST_PEOPLE
     left_out = f" {counted(own, 'more participant')} in the table alone." if own > 0 else ""
+    chance = "" if found.guess_rate is None else f" Dashed: chance ({100 * found.guess_rate:.0f} %)."
     caption = (
-        f"{found.title}: {summary_words(found)} at each level. {_panels(found, bool(bands))}{_chance(found)}{left_out} "
+        f"{found.title}: {summary_words(found)} at each level. {_panels(found, bool(bands))}{chance}{left_out} "
         f"{sample_words(study, len(found.people))}"
     )
     return Picture(found.block, name, caption, files)
@@ -177,17 +202,15 @@ def with_unit(found: LevelsFound, value: float) -> str:
     return f"{value:g} {found.unit or ''}".rstrip()
 
 
-def _chance(found: LevelsFound) -> str:
-    return "" if found.guess_rate is None else f" Dashed: chance ({100 * found.guess_rate:.0f} %)."
-
-
 @style.own_settings()
 def _draw_levels(study: Study, found: LevelsFound, bands: Mapping[str, Array], fonts: Sequence[str]) -> Sheet:
     people = found.people[:MOST_PEOPLE]
     words = summary_words(found)
     above = words[:1].upper() + words[1:]
-    sheet = sheet_of_panels(study, found.title, above, 1 + len(people), fonts, foot_pt=FOOT_PT)
-    _keys(sheet, found)
+    standards = _standards(found)
+    keys = [
+        (f"standard {with_unit(found, standard)}", colour) for standard, colour in zip(standards, COLOURS, strict=False)
+    ]
 
     def draw(axes: Axes, place: int, first: bool) -> None:
         person = people[place - 1] if place else None
@@ -196,20 +219,9 @@ def _draw_levels(study: Study, found: LevelsFound, bands: Mapping[str, Array], f
             u, lower, upper = bands[person]
             axes.fill_between(u, lower, upper, color=style.BAND, linewidth=0, zorder=1)
 
-    return draw_panels(sheet, [(name, "") for name in ("All", *people)], draw, level_words(found))
-
-
-def _keys(sheet: Sheet, found: LevelsFound) -> None:
-    """Write which colour is which standard."""
-    standards = _standards(found)
-    if len(standards) < 2:
-        return
-    x = sheet.width_pt - MARGIN_PT
-    for standard, colour in reversed(list(zip(standards, COLOURS, strict=False))):
-        words = f"standard {with_unit(found, standard)}"
-        x -= sheet.text_width(words, 7)
-        sheet.text(x, 28, words, size=7, colour=colour)
-        x -= 10
+    names = [(name, "") for name in ("All", *people)]
+    shown = keys if len(standards) > 1 else ()
+    return panels(study, found.title, above, names, draw, level_words(found), fonts, keys=shown, foot_pt=FOOT_PT)
 
 
 def _standards(found: LevelsFound) -> list[float]:
@@ -392,10 +404,9 @@ def track_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: 
 
 @style.own_settings()
 def _draw_tracks(study: Study, found: LevelsFound, shown: Sequence[TrackCourse], fonts: Sequence[str]) -> Sheet:
-    sheet = sheet_of_panels(study, f"{found.title}: tracks", level_words(found), len(shown), fonts)
     standards = len({one.standard for one in shown}) > 1
     names = [(one.participant, f"standard {one.standard:g}" if standards else "") for one in shown]
-    ends = _ends(found, shown)
+    ends = _ends(found, (level for one in shown for level in (*one.levels, one.low[-1], one.high[-1])), 0.12, 1.1, 0.06)
 
     def draw(axes: Axes, place: int, first: bool) -> None:
         n = len(shown[place].levels)
@@ -403,19 +414,8 @@ def _draw_tracks(study: Study, found: LevelsFound, shown: Sequence[TrackCourse],
         over_trials(axes, found, n, ends, first=first)
         _track_panel(axes, shown[place])
 
-    return draw_panels(sheet, names, draw, "Trial at the standard" if standards else "Trial")
-
-
-def _ends(found: LevelsFound, shown: Sequence[TrackCourse]) -> tuple[float, float]:
-    """Return the ends of the axis: all levels and the last intervals, with a margin."""
-    levels = np.concatenate([(*one.levels, one.low[-1], one.high[-1]) for one in shown])
-    levels = levels[levels > 0] if found.spacing == "log" else levels
-    low, high = float(levels.min()), float(levels.max())
-    if found.spacing == "log":
-        factor = max((high / low) ** 0.12, 1.1)
-        return low / factor, high * factor
-    margin = 0.06 * ((high - low) or 1.0)
-    return low - margin, high + margin
+    below = "Trial at the standard" if standards else "Trial"
+    return panels(study, f"{found.title}: tracks", level_words(found), names, draw, below, fonts)
 
 
 def _track_panel(axes: Axes, course: TrackCourse) -> None:
@@ -450,10 +450,6 @@ def _marks(
     )
 
 
-MARGIN: Final = 0.08
-"""Of the axis beyond the lowest and the highest setting, as a share of the span."""
-
-
 def settings_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
     """Draw the settings of a block whose levels participants set, once the key is open."""
     files = files_of(partial(_draw_settings, study, found), forms, f"{study.name}: {found.title}, settings")
@@ -472,7 +468,6 @@ def settings_picture(study: Study, found: LevelsFound, forms: Sequence[str], nam
 @style.own_settings()
 def _draw_settings(study: Study, found: LevelsFound, fonts: Sequence[str]) -> Sheet:
     shown = found.own_settings[:MOST_PANELS]
-    sheet = sheet_of_panels(study, f"{found.title}: settings", level_words(found), len(shown), fonts)
     standards = len({one.standard for one in shown}) > 1
     names = [
         (
@@ -481,31 +476,20 @@ def _draw_settings(study: Study, found: LevelsFound, fonts: Sequence[str]) -> Sh
         )
         for one in shown
     ]
-    ends = _settings_ends(found, shown)
+    levels = (level for one in shown for level in (*one.levels, one.low, one.high, _compared(one)) if level is not None)
+    ends = _ends(found, levels, 0.08, 1.05, 0.08)
 
     def draw(axes: Axes, place: int, first: bool) -> None:
         axes.set_xlim(0.4, shown[place].n + 0.6)
         over_trials(axes, found, shown[place].n, ends, first=first)
         _settings_panel(axes, shown[place])
 
-    return draw_panels(sheet, names, draw, "Setting")
+    return panels(study, f"{found.title}: settings", level_words(found), names, draw, "Setting", fonts)
 
 
 def _compared(one: SettingFound) -> float | None:
     """Return the standard as a level that can be drawn among the settings; None where none was presented."""
     return one.standard if one.constant_error is not None else None
-
-
-def _settings_ends(found: LevelsFound, shown: Sequence[SettingFound]) -> tuple[float, float]:
-    """Return the ends of the axis: all settings and standards, with a margin."""
-    levels = [level for one in shown for level in (*one.levels, one.low, one.high, _compared(one)) if level is not None]
-    if found.spacing == "log":
-        low, high = min(level for level in levels if level > 0), max(levels)
-        factor = max((high / low) ** MARGIN, 1.05)
-        return low / factor, high * factor
-    low, high = min(levels), max(levels)
-    margin = MARGIN * ((high - low) or 1.0)
-    return low - margin, high + margin
 
 
 def _settings_panel(axes: Axes, one: SettingFound) -> None:
@@ -515,19 +499,10 @@ def _settings_panel(axes: Axes, one: SettingFound) -> None:
     axes.axhline(one.pse, color=style.ACCENT, linewidth=1.0, zorder=2)
     if (standard := _compared(one)) is not None:
         axes.axhline(standard, color=style.AXIS, linewidth=0.8, linestyle=(0, (4, 3)), zorder=2)
-    places, levels = np.arange(1, one.n + 1), np.array(one.levels)
+    places, levels = np.arange(1.0, one.n + 1), np.array(one.levels)
     high = np.array(one.started_high, dtype=bool)
     for which, face in ((high, style.ACCENT), (~high, "white")):
-        axes.scatter(
-            places[which],
-            levels[which],
-            s=MARK_PT2,
-            facecolors=face,
-            edgecolors=style.ACCENT,
-            linewidths=0.6,
-            zorder=4,
-            clip_on=False,
-        )
+        _marks(axes, places, levels, which, face, style.ACCENT)
 
 
 WEBER_LEFT_PT: Final = 34.0
@@ -570,10 +545,12 @@ def _at(found: LevelsFound) -> str:
 
 def weber_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
     """Draw the Weber fractions of a block with thresholds at two standards or more."""
+    listed = "; ".join(one.in_words() for one in found.published)
+    published = f" Open circles and dotted lines: published values, {listed}." if published_fractions(found) else ""
     files = files_of(partial(_draw_fractions, study, found), forms, f"{study.name}: {found.title}, Weber fractions")
     caption = (
         f"{found.title}: Weber fraction of {found.quantity}{_at(found)}, over the standard. Thin: participants; "
-        f"thick: random-effects mean with its 95 % interval.{_published_words(found)} "
+        f"thick: random-effects mean with its 95 % interval.{published} "
         f"{sample_words(study, len(found.people))}"
     )
     return Picture(found.block, name, caption, files)
@@ -596,20 +573,16 @@ def _draw_fractions(study: Study, found: LevelsFound, fonts: Sequence[str]) -> S
         axes.plot(
             [one[0] for one in points], [one[1] for one in points], color=style.PARTICIPANT, linewidth=0.5, alpha=0.7
         )
-    _group(axes, group)
+    xs = [one[0] for one in group]
+    axes.plot(xs, [one[1] for one in group], marker="o", markersize=3.5, color=style.ACCENT, linewidth=1.2, zorder=3)
+    for x, _, low, high in group:
+        if low is not None and high is not None:
+            axes.plot([x, x], [low, high], color=style.ACCENT, linewidth=1.2, zorder=3)
     for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
         label.set_fontproperties(sheet.font(6.5))
     below = f"Standard of {found.quantity}" + (f" [{found.unit}]" if found.unit else "")
     sheet.text(WEBER_LEFT_PT, sheet.height_pt - 8, below, size=7, colour=style.TEXT_SOFT)
     return sheet
-
-
-def _group(axes: Axes, points: Sequence[Point]) -> None:
-    xs = [one[0] for one in points]
-    axes.plot(xs, [one[1] for one in points], marker="o", markersize=3.5, color=style.ACCENT, linewidth=1.2, zorder=3)
-    for x, _, low, high in points:
-        if low is not None and high is not None:
-            axes.plot([x, x], [low, high], color=style.ACCENT, linewidth=1.2, zorder=3)
 
 
 def published_fractions(found: LevelsFound) -> list[tuple[float | None, float]]:
@@ -621,11 +594,6 @@ def published_fractions(found: LevelsFound) -> list[tuple[float | None, float]]:
         elif one.measure == "threshold" and found.level_kind == "difference" and one.standard:
             points.append((one.standard, one.value / one.standard))
     return points
-
-
-def _published_words(found: LevelsFound) -> str:
-    listed = "; ".join(one.in_words() for one in found.published)
-    return f" Open circles and dotted lines: published values, {listed}." if published_fractions(found) else ""
 
 
 def _published(axes: Axes, points: Sequence[tuple[float | None, float]], sheet: Sheet) -> None:
