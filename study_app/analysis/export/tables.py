@@ -20,12 +20,11 @@ from study_app.analysis.levels.results import LevelsFound, SensitivityFound
 from study_app.analysis.levels.summaries import levels_found
 from study_app.analysis.levels.thresholds import OF_INTERVALS, tracks
 from study_app.store.tables.columns import (
-    EXPONENTS,
     INTERVALS,
+    LEVEL_TABLES,
     OF_TRACKS,
     PARTICIPANTS,
     RESPONSES,
-    SETTINGS,
     THRESHOLDS,
     TRIALS_2,
     tables_of,
@@ -102,24 +101,20 @@ def level_tables(study: Study) -> Iterator[Delivered]:
             for row in one.sensitivities
             if row.participant is not None and row.level is None
         ]
-        yield _of_people(study, groups, "thresholds", THRESHOLDS, rows)
+        yield _of_people(study, groups, "thresholds", rows)
         if any(block.design.adjusts for block in study.levels):
             rows = [(row, {"block": one.block}) for one in found for row in one.own_settings]
-            yield _of_people(study, groups, "settings", SETTINGS, rows)
+            yield _of_people(study, groups, "settings", rows)
         if any(block.design.reply == "number" for block in study.levels):
             rows = [(row, {"block": one.block, "levels": row.n}) for one in found for row in one.own_power_exponents]
-            yield _of_people(study, groups, "exponents", EXPONENTS, rows)
+            yield _of_people(study, groups, "exponents", rows)
 
 
 def _of_people(
-    study: Study,
-    groups: Mapping[str, Any],
-    name: str,
-    columns: tuple[Column, ...],
-    found: Sequence[tuple[Any, Mapping[str, Any]]],
+    study: Study, groups: Mapping[str, Any], name: str, found: Sequence[tuple[Any, Mapping[str, Any]]]
 ) -> Delivered:
     """Return a table of results, one a participant's: their attributes of the columns' names, and others."""
-    columns = (*_OF_PERSON, *columns)
+    columns = (*_OF_PERSON, *LEVEL_TABLES[name][1])
     about = {"study": study.name, "simulated": study.simulated, "pilot": study.pilot}
     rows = [
         {column.name: getattr(row, column.name, None) for column in columns}

@@ -10,14 +10,11 @@ from study_app.store.journals.journal_events import EVENTS
 from study_app.store.recordings import FRAMES, SAMPLES
 from study_app.store.tables.columns import (
     EXCLUSIONS,
-    EXPONENTS,
     INTERVALS,
-    OF_TRACKS,
+    LEVEL_TABLES,
     PARTICIPANTS,
     RESPONSES,
     RESPONSES_2,
-    SETTINGS,
-    THRESHOLDS,
     TRIALS,
     TRIALS_2,
 )
@@ -45,29 +42,9 @@ SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
         "what differs in trials if the protocol has format 2; participants have the group, too",
         tuple(column for column in TRIALS_2 if column not in TRIALS),
     ),
-    (
-        "Tracks",
-        "study-…_description-tracks_data.csv",
-        "one row per trial with a design, after unblinding; what it has in addition to the columns of trials",
-        OF_TRACKS,
-    ),
-    (
-        "Thresholds",
-        "study-…_description-thresholds_data.csv",
-        "one row per participant and standard, or condition compared, after unblinding",
-        THRESHOLDS,
-    ),
-    (
-        "Settings",
-        "study-…_description-settings_data.csv",
-        "one row per participant and standard of a block whose levels participants set, after unblinding",
-        SETTINGS,
-    ),
-    (
-        "Exponents",
-        "study-…_description-exponents_data.csv",
-        "one row per participant of a block of magnitude estimation, after unblinding",
-        EXPONENTS,
+    *(
+        (name.capitalize(), f"study-…_description-{name}_data.csv", row, columns)
+        for name, (row, columns) in LEVEL_TABLES.items()
     ),
     ("Exclusions", "exclusions.csv", "one row per excluded session or trial", EXCLUSIONS),
     ("Samples", "recordings/trial-….parquet", "one row per tick of the servo", SAMPLES),

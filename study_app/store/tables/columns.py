@@ -434,7 +434,6 @@ OF_TRACKS: Final[tuple[Column, ...]] = (
     ),
     replace(_BY_NAME["setting"], description="The level that the participant set, from level_asked on."),
 )
-"""What a row of tracks has in addition to the trial it is about."""
 
 SETTINGS: Final[tuple[Column, ...]] = (
     Column("block", "text", "Id of the block."),
@@ -455,7 +454,6 @@ SETTINGS: Final[tuple[Column, ...]] = (
         "hysteresis", "number", "Mean of the settings that started high minus mean of those that started low, in u."
     ),
 )
-"""Of one row per participant and standard of a block whose levels participants set."""
 EXPONENTS: Final[tuple[Column, ...]] = (
     Column("block", "text", "Id of the block."),
     Column("levels", "integer", "Levels with answers that count.", minimum=2),
@@ -465,7 +463,6 @@ EXPONENTS: Final[tuple[Column, ...]] = (
         "Exponent of the power law: the slope of the mean ln answer at each level on ln level, at delivered levels.",
     ),
 )
-"""Of one row per participant of a block of magnitude estimation."""
 THRESHOLDS: Final[tuple[Column, ...]] = (
     Column("block", "text", "Id of the block."),
     optional("standard", "number", "The standard, in the unit of the varied number; n/a where there is none."),
@@ -541,4 +538,17 @@ THRESHOLDS: Final[tuple[Column, ...]] = (
     ),
     optional("drift", "number", "Correlation of trial number and deviance residual.", minimum=-1, maximum=1),
 )
-"""Of one row per participant and standard, or compared condition."""
+
+LEVEL_TABLES: Final = {
+    "tracks": (
+        "one row per trial with a design, after unblinding; what it has in addition to the columns of trials",
+        OF_TRACKS,
+    ),
+    "thresholds": ("one row per participant and standard, or condition compared, after unblinding", THRESHOLDS),
+    "settings": (
+        "one row per participant and standard of a block whose levels participants set, after unblinding",
+        SETTINGS,
+    ),
+    "exponents": ("one row per participant of a block of magnitude estimation, after unblinding", EXPONENTS),
+}
+"""What a row is, and its columns, in each table of the results of a study with designs."""
