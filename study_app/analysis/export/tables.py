@@ -7,7 +7,7 @@ Settings are codes until the key was opened, and the sealed columns are left out
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -78,7 +78,7 @@ _OF_BLOCK: Final = ("phase", "part", "index", "code")
 _LEVEL_COLUMNS: Final = {column.name: column for column in (*TRIALS_2, *INTERVALS)}
 
 _OF_PERSON: Final = tuple(_LEVEL_COLUMNS[name] for name in ("study", "participant", "simulated", "pilot", "group"))
-TYPES: Final = {"text": "string", "number": "Float64", "integer": "Int64", "flag": "boolean"}
+TYPES: Final[dict[Kind, str]] = {"text": "string", "number": "Float64", "integer": "Int64", "flag": "boolean"}
 
 TRACKS: Final = (*(_LEVEL_COLUMNS[name] for name in (*_OF_TRIAL, *_OF_BLOCK)), *JUDGED, *OF_TRACKS)
 
@@ -305,56 +305,72 @@ def wide(study: Study) -> tuple[Delivered, dict[str, Cells | QuestionCells]]:
     give the same name, ``block__item__condition``. A repeated setting gives the median, as in the analysis, of options
     and texts the last one. Questions of forms are ``form__item``, scores ``form__score``.
     """
-    cells = [
-        Cells(block, setting, item) for block in study.blocks for setting in block.settings for item in block.items
-    ]
-    often = Counter(_name(one) for one in cells)
-    named = {_name(one) if often[_name(one)] == 1 else f"{one.block.id}__{_name(one)}": one for one in cells}
-    people = list(study.people)
+    people, cells = list(study.people), _wide_cells(study)
     simulated = dict(zip(study.participants["participant"], study.participants["simulated"], strict=True))
-    frame = pd.DataFrame(
-        {
-            "participant": pd.array(people, dtype="string"),
-            "simulated": pd.array([bool(simulated[person]) for person in people], dtype="boolean"),
-            **{name: _answers(study, one, people) for name, one in named.items()},
-        }
-    )
-    others = _others(study)
-    frame = frame.assign(**{name: _question_answers(study, one, people) for name, one in others.items()})
-    columns = (
-        _BY_NAME["participant"],
-        _BY_NAME["simulated"],
-        *(_column(name, one, frame) for name, one in named.items()),
-        *(_question_column(name, one, frame) for name, one in others.items()),
-    )
-    return with_site(study, Delivered("wide", columns, frame)), {**named, **others}
+    held = {
+        "participant": pd.array(people, dtype="string"),
+        "simulated": pd.array([bool(simulated[person]) for person in people], dtype="boolean"),
+    }
+    columns = [_BY_NAME["participant"], _BY_NAME["simulated"]]
+    for name, one in cells.items():
+        found = _statement(study, one, people) if isinstance(one, Cells) else _question(study, one, people)
+        held[name], description, (least, most) = found
+        kind = next(kind for kind, dtype in TYPES.items() if dtype == held[name].dtype.name)
+        columns.append(optional(name, kind, description, minimum=least, maximum=most))
+    return with_site(study, Delivered("wide", tuple(columns), pd.DataFrame(held))), cells
 
 
-def _others(study: Study) -> dict[str, QuestionCells]:
-    """Return the columns of other questions and of scores, by name."""
-    found: dict[str, QuestionCells] = {}
+def _wide_cells(study: Study) -> dict[str, Cells | QuestionCells]:
+    """Return what each column of the wide table holds, by name: statements, then other questions and scores."""
+    statements = [
+        (f"{item.id}__{setting.condition or setting.code}", Cells(block, setting, item))
+        for block in study.blocks
+        for setting in block.settings
+        for item in block.items
+    ]
+    often = Counter(name for name, _ in statements)
+    found: dict[str, Cells | QuestionCells] = {
+        name if often[name] == 1 else f"{one.block.id}__{name}": one for name, one in statements
+    }
     asked: tuple[AskedQuestion | AskedScore, ...] = (*study.others.questions, *study.others.scores)
     levels = {block.id for block in study.levels}  # their answers are pooled by no track: see the table of tracks
-    for one in (one for one in asked if one.where.id not in levels):
-        called = one.name if isinstance(one, AskedScore) else one.id
-        for setting in one.where.settings or (None,):
-            ending = "" if setting is None else f"__{setting.condition or setting.code}"
-            found[f"{one.where.id}__{called}{ending}"] = QuestionCells(one, setting)
+    for other in (one for one in asked if one.where.id not in levels):
+        called = other.name if isinstance(other, AskedScore) else other.id
+        for about in other.where.settings or (None,):
+            ending = "" if about is None else f"__{about.condition or about.code}"
+            found[f"{other.where.id}__{called}{ending}"] = QuestionCells(other, about)
     return found
 
 
-def _question_answers(study: Study, cells: QuestionCells, people: list[str]) -> pd.api.extensions.ExtensionArray:
-    if isinstance(cells.asked, AskedScore):
-        return _medians(_about(scored(study, cells.asked), cells), "score", people)
-    answers = _about(study.answers_to(cells.asked), cells)
-    if cells.asked.question.value_type != "text":
-        return _medians(answers, "value", people)
-    given_answers = answers.sort_values(["session", "trial"]).groupby("participant")["response"].last()
-    return pd.array([given_answers.get(person, pd.NA) for person in people], dtype="string")
+Answers: TypeAlias = tuple[pd.api.extensions.ExtensionArray, str, tuple[float | None, float | None]]
+"""The cells of a column of the wide table, its description, and the ends of the scale."""
 
 
-def _about(answers: pd.DataFrame, cells: QuestionCells) -> pd.DataFrame:
-    return answers if cells.setting is None else answers[answers["code"] == cells.setting.code]
+def _statement(study: Study, cells: Cells, people: list[str]) -> Answers:
+    block, setting, item = cells.block, cells.setting, cells.item
+    answers = study.answers(block)
+    answers = answers[(answers["code"] == setting.code) & (answers["item"] == item.id)]
+    description = f"{item.text} About {block.name(setting)}, in {block.title}."
+    return _medians(answers, "response", people), description, (1, 7)
+
+
+def _question(study: Study, cells: QuestionCells, people: list[str]) -> Answers:
+    asked, setting = cells.asked, cells.setting
+    answers = scored(study, asked) if isinstance(asked, AskedScore) else study.answers_to(asked)
+    about = ""
+    if setting is not None:
+        answers = answers[answers["code"] == setting.code]
+        about = f" About {setting_name(setting, asked.where.settings)}."
+    if isinstance(asked, AskedScore):
+        of = f" of {asked.instrument}" if asked.instrument else ""
+        description = f"Score {asked.name}{of}, in {asked.where.title}.{about}"
+        return _medians(answers, "score", people), description, (None, None)
+    text = asked.text if asked.text.endswith((".", "?", "!")) else f"{asked.text}."
+    description = f"{text} In {asked.where.title}.{about}"
+    if asked.question.value_type != "text":
+        return _medians(answers, "value", people), description, asked.bounds or (None, None)
+    last = answers.sort_values(["session", "trial"]).groupby("participant")["response"].last()
+    return pd.array([last.get(person, pd.NA) for person in people], dtype="string"), description, (None, None)
 
 
 def _medians(answers: pd.DataFrame, column: str, people: list[str]) -> pd.api.extensions.ExtensionArray:
@@ -366,39 +382,3 @@ def _medians(answers: pd.DataFrame, column: str, people: list[str]) -> pd.api.ex
     if (known == np.floor(known)).all():
         return pd.arrays.IntegerArray(known.astype(np.int64), missing)
     return pd.arrays.FloatingArray(known, missing)
-
-
-def _question_column(name: str, cells: QuestionCells, frame: pd.DataFrame) -> Column:
-    asked, setting = cells.asked, cells.setting
-    kind: Kind = "integer" if pd.api.types.is_integer_dtype(frame[name]) else "number"
-    about = "" if setting is None else f" About {setting_name(setting, asked.where.settings)}."
-    if isinstance(asked, AskedScore):
-        of = f" of {asked.instrument}" if asked.instrument else ""
-        return optional(name, kind, f"Score {asked.name}{of}, in {asked.where.title}.{about}")
-    text = asked.text if asked.text.endswith((".", "?", "!")) else f"{asked.text}."
-    described = f"{text} In {asked.where.title}.{about}"
-    if asked.question.value_type == "text":
-        return optional(name, "text", described)
-    least, most = asked.bounds or (None, None)
-    return optional(name, kind, described, minimum=least, maximum=most)
-
-
-def _name(cells: Cells) -> str:
-    return f"{cells.item.id}__{cells.setting.condition or cells.setting.code}"
-
-
-def _answers(study: Study, cells: Cells, people: list[str]) -> pd.api.extensions.ExtensionArray:
-    answers = study.answers(cells.block)
-    return _medians(
-        answers[(answers["code"] == cells.setting.code) & (answers["item"] == cells.item.id)], "response", people
-    )
-
-
-def _column(name: str, cells: Cells, frame: pd.DataFrame) -> Column:
-    return optional(
-        name,
-        "integer" if pd.api.types.is_integer_dtype(frame[name]) else "number",
-        f"{cells.item.text} About {cells.block.name(cells.setting)}, in {cells.block.title}.",
-        minimum=1,
-        maximum=7,
-    )
