@@ -4,10 +4,9 @@ import os
 from pathlib import Path
 from typing import Final
 
-from platformdirs import user_cache_path, user_config_path, user_data_path
+from platformdirs import user_config_path, user_data_path
 
 FOLDER_VARIABLE: Final = "LIQUID_STUDY_CONFIG"
-CACHE_VARIABLE: Final = "LIQUID_STUDY_CACHE"
 DATA_VARIABLE: Final = "LIQUID_STUDY_DATA"
 SETTINGS_NAME: Final = "machine.json"
 
@@ -17,13 +16,6 @@ def user_folder() -> Path:
     if own := os.environ.get(FOLDER_VARIABLE):
         return Path(own)
     return user_config_path("liquid-study", appauthor=False, roaming=True)
-
-
-def cache_folder() -> Path:
-    """Return where the program keeps what it can compute again; it need not exist yet."""
-    if own := os.environ.get(CACHE_VARIABLE):
-        return Path(own)
-    return user_cache_path("liquid-study", appauthor=False, opinion=False)
 
 
 def data_folder() -> Path:

@@ -25,7 +25,6 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 # No test uses the settings or the workspace of this machine's user: its workspace is its working folder.
 # Set here because fixtures of modules and sessions begin before those of a test.
 os.environ["LIQUID_STUDY_CONFIG"] = str(Path(tempfile.gettempdir(), f"liquid-study-tests-{os.getpid()}", "settings"))
-os.environ["LIQUID_STUDY_CACHE"] = str(Path(tempfile.gettempdir(), f"liquid-study-tests-{os.getpid()}", "cache"))
 os.environ["LIQUID_STUDY_DATA"] = str(Path(tempfile.gettempdir(), f"liquid-study-tests-{os.getpid()}", "data"))
 os.environ["LIQUID_STUDY_WORKSPACE"] = "."
 # The library reads its settings once in a process: those of the first test that uses it hold for all after it.
@@ -143,13 +142,9 @@ _settings = itertools.count()
 
 @pytest.fixture(autouse=True)
 def settings_of_nobody(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let no test meet, or change, the settings of this machine's user; the folder is not there until one is kept.
-
-    The same holds for finished cases of interrupted computations.
-    """
+    """Let no test meet, or change, the settings of this machine's user; the folder is not there until one is kept."""
     settings = tmp_path_factory.getbasetemp() / f"settings-{next(_settings)}"
     monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(settings))
-    monkeypatch.setenv("LIQUID_STUDY_CACHE", str(settings.with_name(f"{settings.name}-cache")))
     monkeypatch.setenv("LIQUID_STUDY_DATA", str(settings.with_name(f"{settings.name}-data")))
 
 

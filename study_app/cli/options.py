@@ -235,22 +235,11 @@ def _not_zero(_context: click.Context, _option: click.Parameter, value: int) -> 
 
 @contextmanager
 def executor_for(workers: Workers) -> "Iterator[Executor]":
-    """Open the executor of a command, which keeps finished cases until all are; Ctrl+C says how many are kept."""
-    from study_app.workers.cases import KeptCases
-
-    computing = open_executor(workers)
-    if computing.workers == 0:
-        click.echo(f"{workers.cluster} has no worker yet: the computation begins when one joins", err=True)
-    kept = KeptCases(computing)
-    try:
-        with kept:
-            yield kept
-    except BaseException:
-        if kept.stored:
-            click.echo(f"finished cases kept: {kept.stored}; the same command continues with them", err=True)
-        raise
-    if kept.reused:
-        click.echo(f"cases finished by an earlier start: {kept.reused}", err=True)
+    """Open the executor of a command; a cluster without workers says so."""
+    with open_executor(workers) as executor:
+        if not getattr(executor, "has_workers", True):
+            click.echo(f"{workers.cluster} has no worker yet: the computation begins when one joins", err=True)
+        yield executor
 
 
 class DeviceName(click.Option):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from study_app.workers.cases import CancellingExecutor
+    from concurrent.futures import Executor
 
 # multiprocessing is loaded where processes are needed: every command imports this module.
 
@@ -24,18 +24,16 @@ class Workers:
     cluster: str | None = None
 
 
-def open_executor(workers: Workers = Workers()) -> CancellingExecutor:
+def open_executor(workers: Workers = Workers()) -> Executor:
     """Return the executor; a ``with`` block that is left by an exception cancels what has not finished.
 
     Raises
     ------
     WorkerError
-        No cluster is at this address. A case of an executor raises it where processes are lost again and again.
+        No cluster is at this address. The ``with`` block raises it where a process, or the cluster, was lost.
     """
+    from study_app.workers.cases import ClusterExecutor, ProcessExecutor  # noqa: PLC0415
+
     if workers.cluster is not None:
-        from study_app.workers.cases import ClusterExecutor  # noqa: PLC0415
-
         return ClusterExecutor(workers.cluster)
-    from study_app.workers.cases import ProcessExecutor  # noqa: PLC0415
-
     return ProcessExecutor(workers.count or os.cpu_count() or 1)

@@ -12,8 +12,7 @@ import pytest
 
 from study_app.cli import main
 from study_app.errors import StudyError, WorkerError
-from study_app.workers import cases as clusters
-from study_app.workers import cases as environments
+from study_app.workers import cases
 from study_app.workers.cases import environment
 from study_app.workers.executors import Workers, open_executor
 from tests.workers.local_cluster import INSTALLED, MISSING, local_cluster
@@ -27,7 +26,6 @@ posix = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @needs_distributed
 def test_results_are_those_of_the_seeds_in_their_order_and_an_error_is_that_of_its_case(dask_cluster: str) -> None:
     with open_executor(Workers(cluster=dask_cluster)) as executor:
-        assert executor.workers == 2
         assert list(executor.map(draw, range(50))) == [draw(seed) for seed in range(50)]
         futures = [executor.submit(refuse, case) for case in range(6)]
         with pytest.raises(StudyError, match="case 3"):
@@ -74,7 +72,7 @@ def test_killed_workers_change_no_result_and_a_lost_scheduler_is_one_line(tmp_pa
 
 
 def test_a_worker_with_another_library_or_program_refuses_its_cases() -> None:
-    compute = clusters._compute
+    compute = cases._compute
     assert compute(environment(), draw, (3,), {}) == draw(3)
     with pytest.raises(WorkerError, match=r"numpy \S+ instead of 1\.0; scipy") as raised:
         compute({**environment(), "numpy": "1.0", "scipy": "0.1"}, draw, (3,), {})
@@ -87,7 +85,7 @@ def test_the_digest_of_a_program_is_of_names_and_contents_of_its_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "protocols").mkdir()
-    monkeypatch.setattr(environments, "_PACKAGE", tmp_path)
+    monkeypatch.setattr(cases, "_PACKAGE", tmp_path)
     found = []
     for name, content in (("a.py", "1"), ("b.py", "1"), ("b.py", "2"), ("b.txt", "2"), ("c.txt", "3")):
         file = tmp_path / name
@@ -120,7 +118,7 @@ def other_program() -> Iterator[str]:
 @pytest.fixture
 def silent_program(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     """Serve a program that waits for its client to speak, as a web server does."""
-    monkeypatch.setattr(clusters, "CONNECT_S", 0.2)
+    monkeypatch.setattr(cases, "CONNECT_S", 0.2)
     with socket.create_server(("127.0.0.1", 0)) as server:
         yield f"tcp://127.0.0.1:{server.getsockname()[1]}"
 

@@ -14,13 +14,6 @@ def draw(seed: int) -> float:
     return random.Random(seed).random()  # noqa: S311 - not for cryptography
 
 
-def counted_draw(folder: Path, seed: int) -> float:
-    """Return the result of a seeded case, and leave a file that says that it was computed, and how often."""
-    with (folder / str(seed)).open("a") as file:
-        file.write("computed\n")
-    return draw(seed)
-
-
 def killed_once(folder: Path, seed: int) -> float:
     """Return the result of a seeded case; the process of every tenth is killed the first time."""
     try:
@@ -58,10 +51,3 @@ def report_and_wait(_case: int) -> None:
     """Print the process's number, and wait for a signal."""
     os.write(sys.stdout.fileno(), f"{os.getpid()}\n".encode())  # whole lines, whichever process is first
     signal.pause()
-
-
-def draw_or_wait(seed: int) -> float:
-    """Return the result of a seeded case, or wait for the end where an environment variable says from which on."""
-    if seed >= int(os.environ.get("WAIT_FROM", "1000000")):
-        signal.pause()
-    return draw(seed)

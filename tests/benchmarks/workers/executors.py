@@ -12,7 +12,6 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import psutil
@@ -20,7 +19,7 @@ import psutil
 from study_app.analysis.planning.simulated_studies import BATCH, Plan, count, plan
 from study_app.protocol.load import load
 from study_app.protocol.simulated_observer import TrialFeatures
-from study_app.workers.cases import KeptCases, environment
+from study_app.workers.cases import environment
 from study_app.workers.executors import Workers, open_executor
 from tests.workers.local_cluster import INSTALLED, local_cluster
 
@@ -201,19 +200,14 @@ def main() -> None:
             began_s = begin_s(executor, study)
             here = parts_of(executor, study)
             print_parts(f"{workers} worker process{'es' if workers > 1 else ''}", here)
-    with TemporaryDirectory() as folder, KeptCases(open_executor(Workers(2)), Path(folder)) as kept:
-        print_parts("2 worker processes, cases stored", parts_of(kept, study))
     print(f"  first case of a new process after {began_s:.1f} s")
     if not INSTALLED:
         print("\nno projection: the extra cluster (distributed) is not installed")
         return
-    with local_cluster() as (address, scheduler):
-        with open_executor(Workers(cluster=address)) as executor:
-            began_s = begin_s(executor, study)
-            print_parts("Dask, 2 workers on this computer", parts_of(executor, study, scheduler))
-        with TemporaryDirectory() as folder, KeptCases(open_executor(Workers(cluster=address)), Path(folder)) as kept:
-            there = parts_of(kept, study, scheduler)
-            print_parts("Dask, 2 workers, cases stored", there)
+    with local_cluster() as (address, scheduler), open_executor(Workers(cluster=address)) as executor:
+        began_s = begin_s(executor, study)
+        there = parts_of(executor, study, scheduler)
+        print_parts("Dask, 2 workers on this computer", there)
     print(f"  first case of a new worker after {began_s:.1f} s")
     print("\nProjection from these parts: seconds, and the share of them in which every worker computes")
     project("power", there, taken_s, began_s)
