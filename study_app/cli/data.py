@@ -286,16 +286,13 @@ def reproduce(session: Path) -> None:
     help="Compare with a copy of fingerprints.txt kept elsewhere: was a session changed, added or removed since?",
 )
 def verify(results: Path, fingerprints: Path | None) -> None:
-    """Check everything in a study's folder: columns, checksums, receipts, journals, key, recordings, Psych-DS."""
-    from study_app.store.verification.verify_study import verify_folder
+    """Check everything in a study's folder: columns, checksums, receipts, journals, key, recordings."""
+    from study_app.store.verification.verify_study import verify as verify_folder
 
     with progress() as show:
         show("checking every file")
         found = verify_folder(results, fingerprints)
-    for kind, findings in (
-        ("error", (*found.errors, *found.psychds.errors)),
-        ("warning", (*found.warnings, *found.psychds.warnings)),
-    ):
+    for kind, findings in (("error", found.errors), ("warning", found.warnings)):
         for finding in findings:
             click.echo(f"{kind}: {finding}")
     running = f", {found.running} running" if found.running else ""

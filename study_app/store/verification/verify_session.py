@@ -2,22 +2,21 @@
 
 Of a session that is open in a program only what that program does not change again is judged: its journal, its receipt
 and its recordings, but neither tables nor checksums, which follow the journal. `verify` checks everything and takes its
-time; `doubts` looks at the few files behind every number of an analysis, each time they are read.
+time; `doubts` checks a session before an analysis reads it, unless its files keep their checksums.
 """
 
 from __future__ import annotations
 
 import contextlib
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from study_app.errors import StoreError
 from study_app.store import receipt
-from study_app.store.atomic import cause, is_there, read_own, read_regular, study_root, temporaries
+from study_app.store.atomic import is_there, read_own, read_regular, study_root, temporaries
 from study_app.store.blinded.blinding import Key, opened, opened_key
 from study_app.store.checksums import files, fingerprint, hashed, read_checksums
 from study_app.store.folders import FINGERPRINTS, SessionFolder
@@ -30,12 +29,10 @@ from study_app.store.sessions.folder_lock import is_open, never_begun
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.sessions.recovery import RESTORE, beyond
 from study_app.store.tables import csv_files
-from study_app.store.tables.csv_files import Column, in_columns_of
+from study_app.store.tables.csv_files import Column
 from study_app.store.tables.session_tables import table_columns
 from study_app.store.tables.study_files import opened_or_none, row_from
 
-AGAIN_S: Final = 0.2
-"""After this time is looked again at errors in files that another program may have been writing."""
 _BEGUN = "but receipt, tables, recordings or checksums show that the session began: restore it from a copy"
 _ROUNDED_S = 1.1e-6
 CHANGED = "has changed since the session ended (its checksum differs)"
@@ -62,7 +59,7 @@ class Gathered:
         self.warnings: list[Finding] = []
         self._folder = folder
 
-    def alike(self) -> Gathered:
+    def apart(self) -> Gathered:
         """Return findings of the same folder, with nothing found."""
         return Gathered(self._folder)
 
@@ -115,28 +112,25 @@ class Checked:
 
 
 def check_session(place: Place, key: Key | None, found: Gathered) -> Checked:
-    """Check one session; a second time where there is an error and a program has it open."""
-    errors = found.alike()
-    checked = _check(place, key, errors)
-    if errors.errors and is_open(place.folder.path):
-        time.sleep(AGAIN_S)
-        errors = found.alike()
-        checked = _check(place, key, errors)
+    """Check one session; again where there is an error and a program has opened it meanwhile."""
+    errors = found.apart()
+    checked = _check(place, key, errors, running=is_open(place.folder.path))
+    if errors.errors and not checked.running and is_open(place.folder.path):
+        errors = found.apart()
+        checked = _check(place, key, errors, running=True)
     found.take(errors)
     return checked
 
 
-def _check(place: Place, key: Key | None, found: Gathered) -> Checked:
-    try:
-        return _check_files(place, key, found)
-    except StoreError as error:
-        found.failure(place.folder.path, error)
-        return Checked(place)
+def _check(place: Place, key: Key | None, found: Gathered, *, running: bool) -> Checked:
+    checked = Checked(place, running=running)
+    with found.reading(place.folder.path):
+        checked = _check_files(place, key, found, running=running)
+    return checked
 
 
-def _check_files(place: Place, key: Key | None, found: Gathered) -> Checked:
+def _check_files(place: Place, key: Key | None, found: Gathered, *, running: bool) -> Checked:
     folder = place.folder
-    running = is_open(folder.path)
     if running:
         found.warning(folder.path, "is open in another program")
     else:
@@ -345,7 +339,7 @@ def _checksums(folder: SessionFolder, hashes: Mapping[str, str], found: Gathered
             elif not hashes[name]:
                 found.error(path, "cannot be read")
             elif hashes[name] != listed[name]:
-                found.error(path, "has changed since the session ended (its checksum differs)")
+                found.error(path, CHANGED)
 
 
 def _recordings(
@@ -422,99 +416,35 @@ class Doubt:
 
 
 def doubts(place: Place) -> tuple[Doubt, ...]:
-    """Return what cannot be trusted of a session's journal, receipt, tables and checksums: one doubt a file at most.
+    """Return what cannot be trusted of a session's journal, receipt, tables and checksums.
 
     Once the session has ended they are compared with their checksums: files that keep these are as they were when the
-    tables were made from the journal. Where one does not, a table is compared with what the journal gives, unless the
-    journal itself is doubtful. A session that is open in a program is not judged: its tables follow.
+    tables were made from the journal. Where one does not, the session is checked as by `check_session`, and the first
+    error of each file is returned, or of the journal alone. A session that is open in a program is not judged: its
+    tables follow.
     """
     folder = place.folder
     if is_open(folder.path):
         return ()
-    again = (Doubt(folder.rebuilt, REBUILT_AFTER, COMPARE),) if is_there(folder.rebuilt) else ()
-    return again if _as_ended(place) else (*again, *_changed_since(place))
-
-
-def _changed_since(place: Place) -> tuple[Doubt, ...]:
-    """Return the doubts of a session whose files are not all as when it had ended, or that has not ended."""
-    folder = place.folder
-    restore = f"restore it from a copy; liquid-study verify {place.study_folder.path} checks everything"
-    if not is_there(folder.journal):
-        return (Doubt(folder.journal, "is missing, so the tables cannot be verified", restore),)
-    try:
-        contents = journal.scan(folder.journal)
-    except StoreError as error:
-        return (Doubt(folder.journal, f"cannot be read ({error})", restore),)
-    if contents.damage is not None:
-        return (Doubt(folder.journal, f"is damaged ({contents.damage.removeprefix(f'{folder.journal}, ')})", restore),)
-    listed, sealed = _listed(place, contents)
-    found = {doubt.path: doubt for doubt in sealed}
-    changed = {path: Doubt(path, CHANGED, restore) for path in _changed(place, listed)}
-    found |= {path: doubt for path, doubt in changed.items() if path in (folder.journal, folder.receipt)}
-    if folder.journal not in found:
-        found |= {doubt.path: doubt for doubt in _table_doubts(place, contents, restore)}
-    return tuple((changed | found).values())
-
-
-def _listed(place: Place, contents: Contents) -> tuple[Mapping[str, str], tuple[Doubt, ...]]:
-    """Return the checksums made when the session had ended, and what is wrong with their list.
-
-    Where there is one the session had ended, even if its journal is incomplete.
-    """
-    ended = bool(contents.lines) and contents.lines[-1]["event"] == "session_ended"
-    if not ended and not is_there(place.folder.checksums):
-        return {}, ()
-    try:
-        return read_checksums(place.folder), ()
-    except StoreError:
-        remedy = f"restore it from a copy, or recreate it from the files with liquid-study rebuild {place.folder.path}"
-        return {}, (Doubt(place.folder.checksums, "is missing or not a list of checksums", remedy),)
+    found = (Doubt(folder.rebuilt, REBUILT_AFTER, COMPARE),) if is_there(folder.rebuilt) else ()
+    if _as_ended(place):
+        return found
+    told = Gathered(folder.path)
+    check_session(place, None, told)
+    first = {error.place: error for error in reversed(told.errors) if not error.place.endswith(".parquet")}
+    if (of_journal := first.get(folder.journal.name)) is not None:
+        first = {of_journal.place: of_journal}
+    remedy = f"liquid-study verify {place.study_folder.path} checks everything"
+    return (*found, *(Doubt(folder.path / error.place, error.message, remedy) for error in first.values()))
 
 
 def _as_ended(place: Place) -> bool:
     """Return whether journal, receipt and tables are what the checksums of the session's end are of."""
-    try:
-        listed = read_checksums(place.folder)
-        return all(listed.get(name) == hashed(place.folder, name) for name in _behind(place))
-    except StoreError:
-        return False
-
-
-def _changed(place: Place, listed: Mapping[str, str]) -> Iterator[Path]:
-    """Yield journal, receipt and tables that are not those the checksums are of; a missing one is said elsewhere."""
-    for name, path in _behind(place).items():
-        if name in listed and is_there(path) and _hash(place.folder, name) != listed[name]:
-            yield path
-
-
-def _behind(place: Place) -> dict[str, Path]:
-    """Return the files behind every number: journal, receipt and tables, by their path in the session's folder."""
     folder = place.folder
     tables = [folder.table(place.study, name) for name in ("responses", "trials", "intervals")]
-    there = [path for path in tables if path != tables[-1] or is_there(path)]  # few studies have intervals
-    return {path.name: path for path in (folder.journal, folder.receipt, *there)}
-
-
-def _table_doubts(place: Place, contents: Contents, restore: str) -> Iterator[Doubt]:
-    """Yield the tables that are not what the journal gives."""
+    tables = [path for path in tables if path != tables[-1] or is_there(path)]  # few studies have intervals
     try:
-        expected = table_files(place, contents.lines, opened_key(place.study_folder))
-    except (StoreError, KeyError) as error:
-        yield Doubt(place.folder.journal, f"gives no tables ({error})", restore)
-        return
-    tables = table_columns(contents.lines, opened=True)
-    again = f"rebuild it from the journal with liquid-study rebuild {place.folder.path}"
-    for (path, whole), name in zip(expected, tables, strict=True):
-        try:
-            there = read_regular(path)
-        except FileNotFoundError:
-            yield Doubt(path, "is missing", again)
-            continue
-        except OSError as error:
-            yield Doubt(path, f"cannot be read ({cause(error)})", restore)
-            continue
-        content, _ = in_columns_of(there, whole, tables[name])
-        if there != content:
-            pairs = zip_longest(there.split(b"\n"), content.split(b"\n"))
-            line = next(number for number, (ours, theirs) in enumerate(pairs, start=1) if ours != theirs)
-            yield Doubt(path, f"differs from the journal, from line {line} on", again)
+        listed = read_checksums(folder)
+        return all(listed.get(it.name) == hashed(folder, it.name) for it in (folder.journal, folder.receipt, *tables))
+    except StoreError:
+        return False

@@ -9,13 +9,12 @@ checked separately, and the data that must agree between them.
 from __future__ import annotations
 
 import contextlib
-import time
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias
 
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
@@ -31,7 +30,7 @@ from study_app.store.journals import journal
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import Place
 from study_app.store.sites.merge import unlisted
-from study_app.store.sites.merged import FOLDER, Merged, Site, read_merged
+from study_app.store.sites.merged import Merged, Site, read_merged
 from study_app.store.tables import csv_files
 from study_app.store.tables.columns import EXCLUSIONS
 from study_app.store.tables.study_files import (
@@ -43,34 +42,30 @@ from study_app.store.tables.study_files import (
     names_sealed,
     table_bytes,
 )
-from study_app.store.verification import psychds
 from study_app.store.verification.leaks import certain_telltales, find_leaks, presented_numbers, recorded_numbers
-from study_app.store.verification.psychds import Issue, PsychDs
-from study_app.store.verification.verify_session import AGAIN_S, Checked, Finding, Gathered, check_session, check_table
+from study_app.store.verification.verify_session import Checked, Finding, Gathered, check_session, check_table
 from study_app.store.withdrawals import Tombstone, describe_session, tombstones
 
 Sessions: TypeAlias = list[Checked]
 Proofs: TypeAlias = Sequence[tuple[str, str]]  # fingerprint and session
-Placed = TypeVar("Placed", Finding, Issue)
 
 
 @dataclass(frozen=True, slots=True)
 class Findings:
-    """What `verify` found in so many sessions; ``psychds`` is what a validator of that format would say."""
+    """What `verify` found in so many sessions."""
 
     errors: tuple[Finding, ...]
     warnings: tuple[Finding, ...]
-    psychds: psychds.PsychDs
     sessions: int
     running: int
 
     @property
     def sound(self) -> bool:
-        """Whether there is no error, nor one of the format's."""
-        return not self.errors and not self.psychds.errors
+        """Whether there is no error."""
+        return not self.errors
 
 
-def verify_folder(folder: Path, fingerprints: Path | None = None) -> Findings:
+def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
     """Check a whole study, merged or not.
 
     Parameters
@@ -78,7 +73,8 @@ def verify_folder(folder: Path, fingerprints: Path | None = None) -> Findings:
     folder : Path
         The study folder.
     fingerprints : Path, optional
-        A copy of the ``fingerprints.txt`` of a study that is not merged (see `verify_study.verify`).
+        A copy of the ``fingerprints.txt`` of a study that is not merged, which was kept elsewhere: every session that
+        ended must be in it, and be the same.
 
     Raises
     ------
@@ -86,59 +82,32 @@ def verify_folder(folder: Path, fingerprints: Path | None = None) -> Findings:
         It is not a study folder, or ``fingerprints`` no copy of fingerprints.
     """
     merged = read_merged(folder)
+    found = Gathered(folder)
     if merged is None:
-        return verify(folder, fingerprints)
-    if fingerprints is not None:
+        copy = None if fingerprints is None else (fingerprints, read_copy(fingerprints))
+        sessions = _verify_study(folder, copy, found)
+    elif fingerprints is None:
+        _between(merged, found)
+        sessions = []
+        for site in filter(Path.is_dir, map(merged.folder, merged.names)):  # `_between` says which are missing
+            with found.reading(site):
+                sessions += _verify_study(site, None, found)
+    else:
         raise StoreError(
             f"{folder} holds several sites: compare each with the copy of its own fingerprints, such as {fingerprints} "
             f"with {merged.folder(merged.names[0])}"
         )
-    found = Gathered(folder)
-    _between(merged, found)
-    each: dict[str, Findings] = {}
-    for name in merged.names:
-        if merged.folder(name).is_dir():  # `_between` says which are missing
-            try:
-                each[name] = verify(merged.folder(name))
-            except StoreError as error:
-                found.failure(merged.folder(name), error)
-    placed = {name: _placed(name, one) for name, one in each.items()}
-    return Findings(
-        (*found.errors, *(error for one in placed.values() for error in one.errors)),
-        (*found.warnings, *(warning for one in placed.values() for warning in one.warnings)),
-        PsychDs(
-            tuple(issue for one in placed.values() for issue in one.psychds.errors),
-            tuple(issue for one in placed.values() for issue in one.psychds.warnings),
-        ),
-        sum(one.sessions for one in each.values()),
-        sum(one.running for one in each.values()),
-    )
+    running = sum(one.running for one in sessions)
+    return Findings(tuple(found.errors), tuple(found.warnings), len(sessions), running)
 
 
-def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
-    """Check the study in ``folder``, all of it.
-
-    Parameters
-    ----------
-    folder : Path
-        The study folder.
-    fingerprints : Path, optional
-        A copy of the study's ``fingerprints.txt`` that was kept elsewhere: every session that ended must be in it, and
-        be the same.
-
-    Raises
-    ------
-    StoreError
-        It is not a study folder, or ``fingerprints`` no copy of fingerprints.
-    """
-    copy = None if fingerprints is None else read_copy(fingerprints)
+def _verify_study(folder: Path, copy: tuple[Path, Proofs] | None, found: Gathered) -> Sessions:
     study = StudyFolder(folder)
     name = described_study(study)
     if name is None:
         raise StoreError(
             f"{folder} is not a study folder (no {study.description.name}): name one such as results/rek2024"
         )
-    found = Gathered(folder)
     key = _key(study, found)
     early = listed(study.fingerprints)
     withdrawn = _withdrawn(study, found)
@@ -148,8 +117,9 @@ def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
         many = "1 journal is" if early_journals == 1 else f"{early_journals} journals are"
         found.warning(study.data, f"{many} of format 1, whose lines cannot show whether an earlier line was changed")
     _fingerprints(study, sessions, early, found)
-    if fingerprints is not None and copy is not None:
-        _copy(study, sessions, [one for one in copy if one not in _erased(study, withdrawn)], fingerprints, found)
+    if copy is not None:
+        path, proofs = copy
+        _copy(study, sessions, [one for one in proofs if one not in _erased(study, withdrawn)], path, found)
     _description(study, found)
     _exclusions(study, sessions, found)
     _reveals(study, key, found)
@@ -157,11 +127,7 @@ def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
     _blinding(study, key, found)
     for path in (*temporaries(folder), *temporaries(study.data)):
         found.warning(path, "is an incomplete file of a program that was ended, or is being written")
-    running = sum(one.running for one in sessions)
-    whole = not is_open(folder)  # else a program writes tables that the rules ask for when it ends
-    rules = psychds.validate(folder)
-    rules = rules if whole else replace(rules, errors=())
-    return Findings(tuple(found.errors), tuple(found.warnings), rules, len(sessions), running)
+    return sessions
 
 
 def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[str], found: Gathered) -> None:
@@ -237,52 +203,38 @@ def _erased(study: StudyFolder, withdrawn: Mapping[str, Tombstone]) -> set[tuple
 def _participants(study: StudyFolder, name: str, sessions: Sessions, found: Gathered) -> None:
     """Check the table of all sessions, where each session's journal could be read.
 
-    Lines of sessions that have not ended may be behind their journals; all lines, where a program has a session open or
-    began one meanwhile.
+    Lines of sessions that have not ended may be behind their journals. The table is not judged where a program writes
+    it when it ends: it has the study open, or has had a session open since the check began.
     """
-    if is_open(study.path) or not all(one.readable for one in sessions):  # a program writes the table when it ends
+    if is_open(study.path) or not all(one.readable for one in sessions):
         return
     rows = [one.row for one in sessions if one.row is not None]
     content, columns = table_bytes(study, rows), columns_of(study, rows)
     late = {number for number, row in enumerate(rows, start=2) if row["status"] == receipt.UNFINISHED}
-    errors = found.alike()
-    check_table(study.participants(name), content, columns, errors, may_differ=late.__contains__)
-    if errors.errors and _written(study, sessions):
-        errors = found.alike()
-        check_table(study.participants(name), content, columns, errors, may_differ=lambda _: True)
-    found.take(errors)
-
-
-def _written(study: StudyFolder, sessions: Sessions) -> bool:
-    """Return whether a program has had a session open since the check began."""
+    told = found.apart()
+    check_table(study.participants(name), content, columns, told, may_differ=late.__contains__)
     now = study.sessions()
-    return len(now) != len(sessions) or any(one.running for one in sessions) or any(is_open(one.path) for one in now)
+    written = len(now) != len(sessions) or any(one.running for one in sessions) or any(is_open(one.path) for one in now)
+    if not (told.errors and written):
+        found.take(told)
 
 
 def _fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, found: Gathered) -> None:
     """Compare the sessions with the study's own list, as it was before they were checked.
 
     A program lists a session once its files are final, just before it lets go of it: a listed one is judged even where
-    it is open. One that ended without being listed then is looked up again: it may have ended meanwhile.
+    it is open.
     """
     path = study.fingerprints
     for number in unreadable(path):
         found.error(path, f"line {number} is not a fingerprint: restore it from a copy")
     _compare(study, sessions, early, path.name, found)
-    ended = [
-        place_of(study, one.place.folder) for one in sessions if one.fingerprint and one.chained and not one.running
-    ]
-    lacking = _lacking(path, ended)
-    if lacking and is_open(study.path):  # by a program that lists a session just after it is there
-        time.sleep(AGAIN_S)
-        lacking = _lacking(path, ended)
-    for place in lacking:
-        found.error(path, f"lacks {place}, which has ended; rebuild adds it")
-
-
-def _lacking(path: Path, ended: Sequence[str]) -> list[str]:
+    if is_open(study.path):  # by a program that lists a session just after it is there
+        return
     known = {place for _, place in listed(path)}
-    return [place for place in ended if place not in known]
+    for one in sessions:
+        if one.fingerprint and one.chained and not one.running and place_of(study, one.place.folder) not in known:
+            found.error(path, f"lacks {place_of(study, one.place.folder)}, which has ended; rebuild adds it")
 
 
 def _copy(study: StudyFolder, sessions: Sessions, copy: Proofs, path: Path, found: Gathered) -> None:
@@ -417,14 +369,3 @@ def _compare_site(merged: Merged, site: Site, found: Gathered) -> None:
         if (there := len(study.sessions())) + erased < site.sessions:
             which = f"{there} of the {site.sessions} sessions that {merged.manifest.name} lists"
             found.error(study.path, f"has {which}: restore the others from a copy")
-
-
-def _placed(site: str, found: Findings) -> Findings:
-    """Return what was found in a site's folder with its place in the merged study's."""
-    below = f"{FOLDER}/{site}"
-
-    def moved(them: Iterable[Placed]) -> tuple[Placed, ...]:
-        return tuple(replace(one, place=below if one.place == "." else f"{below}/{one.place}") for one in them)
-
-    rules = PsychDs(moved(found.psychds.errors), moved(found.psychds.warnings))
-    return replace(found, errors=moved(found.errors), warnings=moved(found.warnings), psychds=rules)

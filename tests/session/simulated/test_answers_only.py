@@ -59,7 +59,7 @@ def test_by_default_it_keeps_apart_from_participants(tmp_path: Path, monkeypatch
 
 def test_the_folder_is_sound_and_every_row_says_simulated(twelve: Path) -> None:
     found = verify(twelve)
-    assert (found.errors, found.warnings, found.psychds.errors, found.sessions) == ((), (), (), 12)
+    assert (found.errors, found.warnings, found.sessions) == ((), (), 12)
     for name, held in tables(twelve).items():
         assert held, name
         assert {row["simulated"] for row in held} == {"true"}, name

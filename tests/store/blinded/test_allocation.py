@@ -219,7 +219,7 @@ def test_a_rehearsal_allocates_from_its_seed_and_reproduces(tmp_path: Path) -> N
     assert not verify(folder).errors
     unblind(folder, "AB", "a test")
     assert not verify(folder).errors
-    assert not verify(folder).psychds.errors
+    assert verify(folder).sound
     table = study.participants("grouped").read_text().splitlines()
     assert table[0].endswith(",group")
     assert Counter(line.rsplit(",", 1)[1] for line in table[1:]) == dict.fromkeys(GROUP_NAMES, 2)

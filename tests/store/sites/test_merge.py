@@ -24,7 +24,7 @@ from study_app.store.sites import merge as merging
 from study_app.store.sites.merge import merge
 from study_app.store.sites.merged import all_exclusions, own_place, read_merged
 from study_app.store.tables.study_files import check_study, participants_of
-from study_app.store.verification.verify_study import verify, verify_folder
+from study_app.store.verification.verify_study import verify
 from study_app.store.withdrawals import withdraw
 from tests.faults.support.killer import die, forked
 from tests.platforms import needs_fork
@@ -46,7 +46,7 @@ def test_sites_are_copied_unchanged_and_sound(labs: dict[str, Path], pooled: Pat
         assert verify(pooled / "sites" / site).sound
         copy = labs[site] / "fingerprints.txt"
         assert verify(pooled / "sites" / site, copy).sound
-    found = verify_folder(pooled)
+    found = verify(pooled)
     assert (found.sound, found.sessions) == (True, 4)
     key = StudyFolder(pooled / "sites/A").key
     assert key.stat().st_mode & 0o777 == StudyFolder(labs["A"]).key.stat().st_mode & 0o777
@@ -61,7 +61,7 @@ def test_a_site_can_be_added_later(labs: dict[str, Path], pooled: Path) -> None:
     assert {name: after[name] for name in before if name != "sites.json"} == {
         name: content for name, content in before.items() if name != "sites.json"
     }
-    assert verify_folder(pooled).sessions == 6
+    assert verify(pooled).sessions == 6
 
 
 def test_equal_ids_of_two_sites_are_two_participants(pooled: Path) -> None:
@@ -159,7 +159,7 @@ def test_a_killed_merge_leaves_the_old_state_or_the_new_one(exists: bool, labs: 
         listed = () if merged is None else merged.names
         states.append(listed)
         if merged is not None:
-            assert verify_folder(to).sound
+            assert verify(to).sound
         if "C" not in listed:
             assert code == -signal.SIGKILL
             held = {} if merged is None else contents(to)
@@ -183,7 +183,7 @@ def test_keys_stay_sealed_and_are_opened_each(labs: dict[str, Path], pooled: Pat
     assert [(one["site"], one["by"]) for one in reveals_of(pooled)] == [("A", "AK"), ("B", "AK"), ("B", "AK")]
     assert {line.split()[1].partition("-")[0] for line in done.output.splitlines()} == {"A", "B"}
     assert reveals(labs["A"]) == ()
-    assert verify_folder(pooled).sound
+    assert verify(pooled).sound
 
 
 def test_no_key_is_opened_where_one_is_missing(pooled: Path) -> None:
@@ -220,7 +220,7 @@ def test_a_withdrawal_reaches_the_merged_copy_of_that_site_alone(
     assert [path.name for path in done.outputs] == ["table.csv"]
     assert list((results / "tables").iterdir()) == []
     assert [row["participant"] for row in participants_of(pooled)] == ["A-P002", "B-P001", "B-P002"]
-    assert verify_folder(pooled).sound
+    assert verify(pooled).sound
 
 
 def test_a_participant_of_a_merged_study_withdraws_from_copy_and_site(
@@ -233,32 +233,32 @@ def test_a_participant_of_a_merged_study_withdraws_from_copy_and_site(
     assert not (pooled / "sites/B/data/sub-P002").exists()
     assert not (lab / "data/sub-P002").exists()
     assert (pooled / "sites/A/data/sub-P002").is_dir()
-    assert verify_folder(pooled).sound
+    assert verify(pooled).sound
     assert run("withdraw", pooled, "--participant", "P002", "--by", "AK", "--reason", "asked").exit_code != 0
 
 
 def test_verify_finds_what_was_changed_after_merging(labs: dict[str, Path], pooled: Path) -> None:
     response = next((pooled / "sites/B").glob("data/sub-P001/ses-01/*responses*"))
     response.write_bytes(response.read_bytes() + b"x")
-    assert any(str(one).startswith("sites/B/data/sub-P001/ses-01/") for one in verify_folder(pooled).errors)
+    assert any(str(one).startswith("sites/B/data/sub-P001/ses-01/") for one in verify(pooled).errors)
     (pooled / "sites/A/dataset_description.json").rename(pooled / "sites/A/aside.json")
-    found = list(map(str, verify_folder(pooled).errors))
+    found = list(map(str, verify(pooled).errors))
     assert any(one.startswith("sites/A: is not a study folder") for one in found)
     assert any(one.startswith("sites/B/data/sub-P001/ses-01/") for one in found)  # the other sites are checked, too
     (pooled / "sites/A/aside.json").rename(pooled / "sites/A/dataset_description.json")
     shutil.rmtree(pooled / "sites/A/data/sub-P001")
-    assert "is missing, but fingerprints.txt lists it" in "\n".join(map(str, verify_folder(pooled).errors))
+    assert "is missing, but fingerprints.txt lists it" in "\n".join(map(str, verify(pooled).errors))
     shutil.rmtree(pooled / "sites/B")
-    assert "sites/B: is missing" in "\n".join(map(str, verify_folder(pooled).errors))
+    assert "sites/B: is missing" in "\n".join(map(str, verify(pooled).errors))
     shutil.copytree(labs["C"], pooled / "sites/B")
-    assert "is not the key that site B was merged with" in "\n".join(map(str, verify_folder(pooled).errors))
+    assert "is not the key that site B was merged with" in "\n".join(map(str, verify(pooled).errors))
 
 
 def test_a_damaged_list_of_sites_is_refused_and_a_changed_one_is_an_error(pooled: Path) -> None:
     path = pooled / "sites.json"
     held = json.loads(path.read_text())
     path.write_text(json.dumps(held | {"study": "another"}))
-    found = list(map(str, verify_folder(pooled).errors))
+    found = list(map(str, verify(pooled).errors))
     assert found == [f"sites/{name}: is of study demo, but sites.json lists sites of another" for name in "AB"]
     for text in ("{", "[]", '{"format": 1}', '{"format": 1, "study": "demo", "protocol_hash": "", "sites": [{}]}'):
         path.write_text(text)
@@ -285,10 +285,10 @@ def test_an_unfinished_session_that_was_deleted_at_a_site_is_missed(labs: dict[s
     unfinished(session)
     assert verify(lab).sound
     pooled = merge({"A": lab, "B": labs["B"]}, results / "pooled").path
-    assert verify_folder(pooled).sound
+    assert verify(pooled).sound
     shutil.rmtree(pooled / "sites/A/data/sub-P002")
     said = "sites/A: has 1 of the 2 sessions that sites.json lists: restore the others from a copy"
-    assert said in list(map(str, verify_folder(pooled).errors))
+    assert said in list(map(str, verify(pooled).errors))
 
 
 def test_a_withdrawal_that_reaches_an_older_copy_after_merging_is_no_error(
@@ -299,7 +299,7 @@ def test_a_withdrawal_that_reaches_an_older_copy_after_merging_is_no_error(
     withdraw(lab, "P001", by="AK", reason="asked", now=datetime.now().astimezone() - timedelta(hours=1))
     pooled = merge({"A": older, "B": labs["B"]}, results / "pooled").path
     assert withdraw(lab, "P001", by="AK", reason="asked", also=[results]).folders == (pooled / "sites/A",)
-    assert verify_folder(pooled).sound
+    assert verify(pooled).sound
 
 
 def unfinished(session: Path) -> None:

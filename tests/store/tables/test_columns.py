@@ -9,14 +9,11 @@ from hypothesis import strategies as st
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.store.blinded.blinding import open_or_draw_key
-from study_app.store.exclusions import exclude
 from study_app.store.folders import StudyFolder
 from study_app.store.tables.column_dictionary import SECTIONS, dictionary_markdown
 from study_app.store.tables.columns import PARTICIPANTS, PARTICIPANTS_2
 from study_app.store.tables.csv_files import guarded, unguarded
 from study_app.store.tables.study_files import check_study, columns_of, write_description
-from study_app.store.verification.psychds import validate
-from tests.store.conftest import Start
 
 
 @pytest.mark.parametrize(
@@ -73,12 +70,6 @@ def test_groups_are_a_column_of_participants_once_the_key_of_a_study_with_groups
         study.reveals.parent.mkdir()
         study.reveals.write_text(json.dumps(reveal) + "\n")
     assert columns_of(study, rows) == (PARTICIPANTS_2 if grouped and opened else PARTICIPANTS)
-
-
-def test_what_else_lies_there_is_known_to_be_no_table(tmp_path: Path, finished: Start) -> None:
-    finished("P001", recordings=True)
-    exclude(tmp_path / "study", "P001", 1, by="AB", reason="tired")
-    assert not [issue for issue in validate(tmp_path / "study").warnings if issue.code == "FILE_NOT_CHECKED"]
 
 
 def test_a_new_version_of_the_study_renews_it(tmp_path: Path, protocol: Protocol) -> None:

@@ -59,7 +59,7 @@ def test_a_table_of_an_earlier_version_is_compared_in_the_columns_it_has(study: 
 def test_what_was_written_is_found_sound_and_not_changed_by_looking(study: Path) -> None:
     before = {path: (path.stat().st_mtime_ns, path.is_file() and path.read_bytes()) for path in study.rglob("*")}
     findings = verify(study)
-    assert (findings.errors, findings.warnings, findings.psychds.errors) == ((), (), ())
+    assert (findings.errors, findings.warnings) == ((), ())
     assert (findings.sound, findings.sessions) == (True, 2)
     after = {path: (path.stat().st_mtime_ns, path.is_file() and path.read_bytes()) for path in study.rglob("*")}
     assert after == before
@@ -157,17 +157,6 @@ def test_what_is_not_as_it_was_is_found_and_named(
     places = {error.place for error in findings.errors}
     assert name in places or f"{SESSION}/receipt.json" in places
     assert str(study) not in told(findings)
-
-
-def test_a_psych_ds_rule_that_is_not_kept_is_an_error_of_its_own(study: Path) -> None:
-    (study / "data" / "extra_data.csv").write_text("mood\nfine\n")
-    findings = verify(study)
-    assert findings.errors == ()
-    assert {issue.code for issue in findings.psychds.errors} == {
-        "FILENAME_KEYWORD_FORMATTING_ERROR",
-        "CSV_COLUMN_MISSING_FROM_METADATA",
-    }
-    assert not findings.sound
 
 
 def test_exclusions_are_checked_against_the_sessions(study: Path) -> None:
@@ -320,7 +309,7 @@ def look_beside(study: Path, *programs: tuple[Callable[..., None], tuple[Any, ..
             running += findings.running > 0
             if running >= ENOUGH:
                 enough.set()
-            errors += [*map(str, findings.errors), *map(str, findings.psychds.errors)]
+            errors += map(str, findings.errors)
     assert [program.exitcode for program in started] == [0] * len(started)
     return looks, running, errors
 
