@@ -134,28 +134,6 @@ def append_line(path: Path, line: bytes, *, waits: bool = True) -> None:
         raise cannot_write(path, error) from error
 
 
-def replace_end(path: Path, start: int, content: bytes) -> None:
-    """Replace everything after the first ``start`` bytes of ``path`` by ``content``, without a flush.
-
-    A program killed meanwhile leaves the first ``start`` bytes and the beginning of ``content``.
-    """
-    try:
-        with path.open("r+b", buffering=0) as file:
-            file.seek(start)
-            old = file.readall()
-            try:
-                file.truncate(start)
-                file.seek(start)
-                write_whole(file, content)
-            except OSError:
-                file.truncate(start)
-                file.seek(start)
-                write_whole(file, old)
-                raise
-    except OSError as error:
-        raise cannot_write(path, error) from error
-
-
 def write_whole(file: BinaryIO, content: bytes) -> None:
     """Write all of ``content`` to an unbuffered ``file``, in as many writes as the system needs."""
     rest = memoryview(content)

@@ -1,18 +1,16 @@
 """Tables from journals: pure functions of the lines alone, so any table can be made again at any time.
 
 A row is a dictionary from column name to value; ``csv_bytes`` writes rows with the columns of ``columns.py``, in their
-order, the same bytes for the same rows on every machine. While a session runs, only changed rows are written at each
-page, independent of the number of rows; a program killed while it writes leaves a table that is the beginning of what
-the journal gives.
+order, the same bytes for the same rows on every machine. While a session runs, only changed rows are formatted at each
+page; each table is replaced in one step.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from itertools import accumulate
 from pathlib import Path
 from typing import Any, Final
 
 from study_app.errors import StoreError
-from study_app.store.atomic import replace_end, write_file
+from study_app.store.atomic import write_file
 from study_app.store.blinded.blinding import Key, opened
 from study_app.store.delivered import within_limits
 from study_app.store.journals.journal import Line
@@ -168,7 +166,7 @@ class GrowingTables:
 
     def __init__(self, path_of: Callable[[str], Path]) -> None:
         self._path_of = path_of
-        self._tables: dict[str, _GrowingTable] = {}
+        self._written: dict[str, list[bytes]] = {}  # the records of each table on the disk
         self._rows: SessionRows | None = None
         self._taken = 0  # lines of the journal
         self._opened = False
@@ -192,57 +190,20 @@ class GrowingTables:
         """
         if whole or self._rows is None or self._opened != (key is not None):
             self._rows, self._taken, self._opened = SessionRows(opened(lines, key)), len(lines), key is not None
-            for table in self._tables.values():
-                table.forget()
+            self._written = {}
         rows = self._rows
         for line in opened([lines[0], *lines[self._taken :]], key)[1:]:
             self._taken += 1
             rows.take(line)
         for name, columns in table_columns(lines, opened=self._opened).items():
-            table = self._tables.setdefault(name, _GrowingTable(self._path_of(name)))
-            first = {"trials": rows.changed, "intervals": rows.changed_intervals}.get(name, table.rows)
-            table.write(columns, rows.table(name), first, waits=whole)
+            written = self._written.pop(name, None)  # None where the table must be written
+            kept = written or []
+            first = min(len(kept), {"trials": rows.changed, "intervals": rows.changed_intervals}.get(name, len(kept)))
+            every = [*kept[:first], *records(columns, rows.table(name)[first:])]
+            if every != written:
+                write_file(self._path_of(name), b"".join([header_bytes(columns), *every]), waits=whole)
+            self._written[name] = every
         rows.changed, rows.changed_intervals = len(rows.trials), len(rows.intervals)
-
-
-class _GrowingTable:
-    """One table, and where each of its records ends in the file."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._ends: list[int] = []  # the header's first; none where the file must be written as a whole
-
-    @property
-    def rows(self) -> int:
-        """How many rows the file holds."""
-        return max(0, len(self._ends) - 1)
-
-    def forget(self) -> None:
-        """Rewrite the whole file next time."""
-        self._ends = []
-
-    def write(self, columns: Sequence[Column], rows: Sequence[Row], first: int, *, waits: bool) -> None:
-        """Write the rows from index ``first`` on; all of them if the file was changed meanwhile."""
-        kept = first + 1 if self._is_as_left() else 0  # records
-        start = self._ends[kept - 1] if kept else 0
-        new = [*([] if kept else [header_bytes(columns)]), *records(columns, rows[max(0, kept - 1) :])]
-        if not new:
-            return
-        ends, self._ends = self._ends, []  # none before it is written
-        if kept:
-            replace_end(self._path, start, b"".join(new))
-        else:
-            write_file(self._path, b"".join(new), waits=waits)
-        ends[kept:] = [*accumulate(map(len, new), initial=start)][1:]
-        self._ends = ends
-
-    def _is_as_left(self) -> bool:
-        if not self._ends:
-            return False
-        try:
-            return self._path.stat().st_size == self._ends[-1]
-        except OSError:
-            return False
 
 
 def responses(lines: Sequence[Line]) -> list[Row]:
