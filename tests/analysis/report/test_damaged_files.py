@@ -1,5 +1,6 @@
 """Files that are not as they were recorded: an analysis goes on, and says so wherever it speaks."""
 
+import csv
 import hashlib
 import json
 import re
@@ -89,6 +90,16 @@ def test_every_damage_behind_the_numbers_is_a_line_of_its_file(
     lines = told(copy)
     assert says in "\n".join(lines)
     assert all("liquid-study verify" in line for line in lines)
+
+
+def test_a_table_that_lacks_a_later_column_is_named_where_it_had_it(copy: StudyFolder) -> None:
+    """Tables of earlier versions lack such columns, and are read without them."""
+    path = copy.sessions()[0].table("rek2024", "trials")
+    rows = list(csv.reader(path.read_text(encoding="utf-8").splitlines()))
+    place = rows[0].index("loop_delay_ticks")
+    path.write_text("".join(f"{','.join(row[:place] + row[place + 1 :])}\n" for row in rows), encoding="utf-8")
+    (line,) = told(copy)
+    assert line.startswith(f"{path} has changed since the session ended")
 
 
 @pytest.mark.slow

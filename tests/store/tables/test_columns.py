@@ -8,10 +8,11 @@ from hypothesis import strategies as st
 
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
+from study_app.protocol.questions import KINDS
 from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.folders import StudyFolder
 from study_app.store.tables.column_dictionary import SECTIONS, dictionary_markdown
-from study_app.store.tables.columns import PARTICIPANTS, PARTICIPANTS_2
+from study_app.store.tables.columns import PARTICIPANTS, PARTICIPANTS_2, RESPONSES_2
 from study_app.store.tables.csv_files import guarded, unguarded
 from study_app.store.tables.study_files import check_study, columns_of, write_description
 
@@ -70,6 +71,11 @@ def test_groups_are_a_column_of_participants_once_the_key_of_a_study_with_groups
         study.reveals.parent.mkdir()
         study.reveals.write_text(json.dumps(reveal) + "\n")
     assert columns_of(study, rows) == (PARTICIPANTS_2 if grouped and opened else PARTICIPANTS)
+
+
+def test_the_column_of_kinds_names_every_kind_of_question() -> None:
+    (kind,) = (column for column in RESPONSES_2 if column.name == "kind")
+    assert set(KINDS) == set(kind.description.rstrip(".").partition(": ")[2].split(", "))
 
 
 def test_a_new_version_of_the_study_renews_it(tmp_path: Path, protocol: Protocol) -> None:
