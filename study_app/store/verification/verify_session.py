@@ -1,8 +1,9 @@
 """One session against its journal, its receipt, its checksums and its recordings.
 
-Of a session that is open in a program only what that program does not change again is judged: its journal, its receipt
-and its recordings, but neither tables nor checksums, which follow the journal. `verify` checks everything and takes its
-time; `doubts` checks a session before an analysis reads it, unless its files keep their checksums.
+Of a session that is open in a program only the journal is judged, which that program does not change again; its other
+files follow the journal. If it is listed as ended, whatever claims that it is open, its fingerprint covers the others.
+`verify` checks everything and takes its time; `doubts` checks a session before an analysis reads it, unless its files
+keep their checksums.
 """
 
 from __future__ import annotations
@@ -140,7 +141,8 @@ def _check_files(place: Place, key: Key | None, found: Gathered, *, running: boo
             found.warning(folder.crash, "shows where the program crashed: send it to the developers")
     contents = _journal(folder, found, running=running)
     lines = contents.lines
-    _receipt(folder, lines, key.hash if key else None, found, running=running)
+    if not running:
+        _receipt(folder, lines, key.hash if key else None, found)
     if not lines:
         return Checked(place, readable=running or never_begun(folder.path), running=running)
     expected = {"participant": folder.participant, "session": folder.number, "study": place.study}
@@ -157,7 +159,7 @@ def _check_files(place: Place, key: Key | None, found: Gathered, *, running: boo
         _tables(place, lines, found, ended=ended)
         if ended:
             _checksums(folder, hashes, found)
-    _recordings(folder, lines, hashes, found, running=running)
+        _recordings(folder, lines, hashes, found, ended=ended)
     if is_there(folder.rebuilt):
         with found.reading(folder.rebuilt):
             for line in read_own(folder.rebuilt, study_root(folder.rebuilt)).decode("utf-8", "replace").splitlines():
@@ -217,7 +219,7 @@ def _journal(folder: SessionFolder, found: Gathered, *, running: bool) -> Conten
     return contents
 
 
-def _receipt(folder: SessionFolder, lines: list[Line], key_hash: str | None, found: Gathered, *, running: bool) -> None:
+def _receipt(folder: SessionFolder, lines: list[Line], key_hash: str | None, found: Gathered) -> None:
     path = folder.receipt
     if not lines and not is_there(path):
         return  # claimed and never begun
@@ -240,7 +242,7 @@ def _receipt(folder: SessionFolder, lines: list[Line], key_hash: str | None, fou
             folder.journal, f"has another format than {path.name} states: it was changed; restore it from a copy"
         )
     last = lines[-1]
-    if last["event"] == "session_ended" and held.get("status") != last["status"] and not running:
+    if last["event"] == "session_ended" and held.get("status") != last["status"]:
         found.error(path, f"its status is {held.get('status')!r}, the journal's {last['status']!r}; rebuild renews it")
 
 
@@ -343,7 +345,7 @@ def _checksums(folder: SessionFolder, hashes: Mapping[str, str], found: Gathered
 
 
 def _recordings(
-    folder: SessionFolder, lines: list[Line], hashes: Mapping[str, str], found: Gathered, *, running: bool
+    folder: SessionFolder, lines: list[Line], hashes: Mapping[str, str], found: Gathered, *, ended: bool
 ) -> None:
     """Check that every recording the journal tells of is there, whole and of this trial, and no other."""
     listed: set[str] = set()
@@ -369,11 +371,8 @@ def _recordings(
             if hashes[name] != digest:
                 found.error(folder.path / name, f"has changed since it was recorded ({which})")
             _facts(folder, line, kind, name, rows, found)
-    if running:  # what is recorded is journalled with the next page
-        return
-    ends = lines[-1]["event"] == "session_ended"
     if lines[0].get("recordings"):
-        for trial, attempt, interval in recordable(lines)[: None if ends else -1]:
+        for trial, attempt, interval in recordable(lines)[: None if ended else -1]:
             if (trial, attempt, interval) not in known:
                 which = named({"trial": trial, "attempt": attempt, "interval": interval})
                 found.warning(folder.recordings, f"{which} has none, and the journal gives no reason")
@@ -386,7 +385,7 @@ def _recordings(
         if name not in of_trials:
             found.error(folder.path / name, "is of a trial that the journal never started")
         else:
-            then = "" if ends else "; resuming the session adds it"
+            then = "" if ended else "; resuming the session adds it"
             found.warning(folder.path / name, f"is in no line of the journal{then}")
 
 
