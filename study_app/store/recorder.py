@@ -13,7 +13,7 @@ import threading
 import time
 from array import array
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -268,15 +268,13 @@ class Recorder:
         """Write one trial's files; the queue is then past the trial's end, even if they were not written."""
         samples_path, frames_path = recording_files(self._folder, *begin.which)
         facts = {**self._facts, **_keys(*begin.which)}
-        coming = _Coming(self._next)
         file: SamplesFile | None = None
         shown: Written | None = None
+        end: _End | None = None
         try:
             self._make_folder()
             file = self._files.SamplesFile(samples_path, facts, begin.rate_hz)
-            for group in coming.groups(file.group_rows):
-                file.write(group)
-            end = coming.end
+            end = self._give_samples(file.write)
             frames = np.frombuffer(end.frames, np.int64).reshape(-1, 5)
             shown = self._files.write_frames(frames_path, frames, facts)
             return Recorded(begin.trial, begin.attempt, file.finish(end.dropped), shown, end.dropped, begin.interval)
@@ -287,9 +285,18 @@ class Recorder:
             with contextlib.suppress(Exception):
                 if shown is not None:
                     shown.path.unlink(missing_ok=True)
-            coming.skip()
+            if end is None:
+                self._give_samples(lambda _: None)
             reason = cause(error) if isinstance(error, OSError) else f"{type(error).__name__}: {error}"
             return Lost(begin.trial, begin.attempt, reason, begin.interval)
+
+    def _give_samples(self, take: Callable[[Any], object]) -> _End:
+        """Give the queued samples of a trial to ``take``; return the trial's end, an empty one without it."""
+        while (thing := self._next()) is not None:
+            if isinstance(thing, _End):
+                return thing
+            take(thing)
+        return _End(array("q"), 0)
 
     def _make_folder(self) -> None:
         """Create the folder if it is missing, and flush it so that it survives a power cut."""
@@ -309,44 +316,6 @@ class Recorder:
                 self._waiting -= len(thing)
                 self.changed.notify_all()
             return thing
-
-
-class _Coming:
-    """The queued samples of the trial being written; ``end`` is its end, once reached."""
-
-    def __init__(self, take: Callable[[], Any]) -> None:
-        self._take = take
-        self._ended = False
-        self.end = _End(array("q"), 0)
-
-    def groups(self, rows: int) -> Iterator[Any]:
-        """Yield the samples ``rows`` at a time, and the rest."""
-        held: list[Any] = []
-        count = 0
-        while (chunk := self._chunk()) is not None:
-            held.append(chunk)
-            count += len(chunk)
-            while count >= rows:
-                together = np.concatenate(held)
-                yield together[:rows]
-                held, count = [together[rows:]], count - rows
-        if count:
-            yield np.concatenate(held)
-
-    def skip(self) -> None:
-        """Skip the rest of a trial that could not be stored."""
-        while self._chunk() is not None:
-            pass
-
-    def _chunk(self) -> Any:
-        """Return the next samples, or None at and after the end."""
-        if self._ended:
-            return None
-        thing = self._take()
-        self._ended = thing is None or isinstance(thing, _End)
-        if isinstance(thing, _End):
-            self.end = thing
-        return None if self._ended else thing
 
 
 def event_of(kept: Kept) -> tuple[str, dict[str, Any]]:

@@ -342,13 +342,23 @@ class SamplesFile:
         self.check_rows = max(1, round(rate_hz))
         self.group_rows = self.check_rows * GROUP_SECONDS
         self.rows = 0
+        self._held: list[Any] = []  # samples of the next group
+        self._count = 0  # of them
         self._facts = {**facts, "rate_hz": rate_hz}
         self._half = _Half(path, SAMPLES)
         self._device: list[int] = []
         self._effect: list[int] = []
 
     def write(self, samples: Any) -> None:
-        """Add a group of samples (array of ``SAMPLE``): ``group_rows`` of them, except the last time."""
+        """Add the next samples (array of ``SAMPLE``); whole groups of them are written."""
+        self._held.append(samples)
+        self._count += len(samples)
+        while self._count >= self.group_rows:
+            together = np.concatenate(self._held)
+            self._write_group(together[: self.group_rows])
+            self._held, self._count = [together[self.group_rows :]], self._count - self.group_rows
+
+    def _write_group(self, samples: Any) -> None:
         if self.rows == 0:
             self._facts["first_device_force_n"] = plain(samples["device_force_n"][:1].ravel())
             self._facts["first_command_n"] = plain(samples["command_n"][:1].ravel())
@@ -359,6 +369,8 @@ class SamplesFile:
 
     def finish(self, dropped: int = 0) -> Written:
         """Close the file and put it in its place; ``dropped`` samples are known to be missing."""
+        if self._count:
+            self._write_group(np.concatenate(self._held))
         checks = {"rows": self.check_rows, "device_force": self._device, "effect_force": self._effect}
         facts = {"format": FORMAT, "kind": "samples", **self._facts, "dropped": dropped, "crc32": checks}
         return self._half.finish(facts, self.rows)
