@@ -18,7 +18,7 @@ from study_app.store.tables.columns import (
     TRIALS,
     TRIALS_2,
 )
-from study_app.store.tables.csv_files import MISSING, Column
+from study_app.store.tables.csv_files import Column
 
 SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
     ("Responses", "subject-…_description-responses_data.csv", "one row per response", RESPONSES),
@@ -52,8 +52,6 @@ SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
 )
 """Title, file, what a row of it is, and its columns."""
 
-_KINDS = {"integer": "whole number", "flag": "true, false", "time": "ISO 8601"}
-
 
 def dictionary_markdown() -> str:
     """Return every file's columns, and the journal's events, as Markdown: a heading and a table for each."""
@@ -61,8 +59,12 @@ def dictionary_markdown() -> str:
 
 
 def _table(title: str, file: str, row: str, columns: Sequence[Column]) -> str:
-    rows = [f"| `{column.name}` | {_kind(column)} | {_meaning(column)} |" for column in columns]
-    return _section(title, file, row, ("| column | kind | meaning |", "| --- | --- | --- |", *rows))
+    rows = [
+        f"| `{column.name}` | {column.permitted}{f' [{column.unit}]' if column.unit else ''} | "
+        f"{column.variable['description']}{' **Sealed until unblinding.**' if column.sealed else ''} |"
+        for column in columns
+    ]
+    return _section(title, file, row, ("| column | a cell is | meaning |", "| --- | --- | --- |", *rows))
 
 
 def _section(title: str, file: str, row: str, lines: Sequence[str]) -> str:
@@ -82,21 +84,6 @@ def _journal() -> str:
         f"| `{event.name}` | {listed} | {event.description} |" for event, listed in zip(EVENTS, fields, strict=True)
     ]
     return _section("Journal", "journal.jsonl", "one line per event", (*head, *rows))
-
-
-def _kind(column: Column) -> str:
-    kind = ", ".join(f"`{level}`" for level, _ in column.levels) or _KINDS.get(column.kind, column.kind)
-    bounds = (column.minimum, column.maximum)
-    if column.maximum is not None:
-        kind += f", {bounds[0]:g} to {bounds[1]:g}"
-    unit = f" [{column.unit}]" if column.unit else ""
-    return f"{kind}{unit}" + (f", or {MISSING}" if column.may_miss else "")
-
-
-def _meaning(column: Column) -> str:
-    levels = "; ".join(f"`{level}`: {meaning}" for level, meaning in column.levels)
-    meaning = f"{column.description} {levels}." if levels else column.description
-    return f"{meaning} **Sealed until unblinding.**" if column.sealed else meaning
 
 
 if __name__ == "__main__":

@@ -20,13 +20,13 @@ from study_app.store.tables.study_files import check_study, columns_of, write_de
 @pytest.mark.parametrize(
     "line",
     [
-        "| `response` | whole number, 1 to 7, or n/a | The answer on the scale, from 1 (completely disagree) to 7 "
+        "| `response` | a whole number from 1 to 7 or n/a | The answer on the scale, from 1 (completely disagree) to 7 "
         "(completely agree). |",
-        "| `simulated` | true, false | true if participant and device were simulated (a rehearsal). |",
-        "| `force_peak_n` | number [N], or n/a | Largest magnitude of the force sent to the device. **Sealed until "
-        "unblinding.** |",
+        "| `simulated` | true or false | true if participant and device were simulated (a rehearsal). |",
+        "| `force_peak_n` | a number of at least 0 or n/a [N] | Largest magnitude of the force sent to the device. "
+        "**Sealed until unblinding.** |",
         "| `page_shown` | `page` | A page of text was shown. |",
-        "| `due_ns` | whole number [ns] | Time when the tick was due; its lateness is time_ns - due_ns. |",
+        "| `due_ns` | a whole number [ns] | Time when the tick was due; its lateness is time_ns - due_ns. |",
     ],
 )
 def test_a_line_says_kind_unit_range_and_meaning(line: str) -> None:
