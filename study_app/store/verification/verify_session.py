@@ -112,25 +112,22 @@ class Checked:
     fingerprint: str = ""
 
 
-def check_session(place: Place, key: Key | None, found: Gathered) -> Checked:
-    """Check one session; again where there is an error and a program has opened it meanwhile."""
+def check_session(place: Place, key: Key | None, found: Gathered, *, recordings: bool = True) -> Checked:
+    """Check one session; again where there is an error and a program has opened it meanwhile.
+
+    Without ``recordings`` these are not read, which takes a while.
+    """
     errors = found.apart()
-    checked = _check(place, key, errors, running=is_open(place.folder.path))
+    checked = Checked(place, running=is_open(place.folder.path))
+    with errors.reading(place.folder.path):
+        checked = _check(place, key, errors, running=checked.running, recordings=recordings)
     if errors.errors and not checked.running and is_open(place.folder.path):
-        errors = found.apart()
-        checked = _check(place, key, errors, running=True)
+        return check_session(place, key, found, recordings=recordings)
     found.take(errors)
     return checked
 
 
-def _check(place: Place, key: Key | None, found: Gathered, *, running: bool) -> Checked:
-    checked = Checked(place, running=running)
-    with found.reading(place.folder.path):
-        checked = _check_files(place, key, found, running=running)
-    return checked
-
-
-def _check_files(place: Place, key: Key | None, found: Gathered, *, running: bool) -> Checked:
+def _check(place: Place, key: Key | None, found: Gathered, *, running: bool, recordings: bool) -> Checked:
     folder = place.folder
     if running:
         found.warning(folder.path, "is open in another program")
@@ -154,12 +151,13 @@ def _check_files(place: Place, key: Key | None, found: Gathered, *, running: boo
     for wrong in wrong_responses(lines):
         found.error(folder.journal, wrong)
     ended = lines[-1]["event"] == "session_ended"
-    hashes = {name: _hash(folder, name) for name in files(folder)}
+    hashes = {name: _hash(folder, name) for name in files(folder) if recordings or not name.endswith(".parquet")}
     if not running:
         _tables(place, lines, found, ended=ended)
         if ended:
             _checksums(folder, hashes, found)
-        _recordings(folder, lines, hashes, found, ended=ended)
+        if recordings:
+            _recordings(folder, lines, hashes, found, ended=ended)
     if is_there(folder.rebuilt):
         with found.reading(folder.rebuilt):
             for line in read_own(folder.rebuilt, study_root(folder.rebuilt)).decode("utf-8", "replace").splitlines():
@@ -429,7 +427,7 @@ def doubts(place: Place) -> tuple[Doubt, ...]:
     if _as_ended(place):
         return found
     told = Gathered(folder.path)
-    check_session(place, None, told)
+    check_session(place, None, told, recordings=False)
     first = {error.place: error for error in reversed(told.errors) if not error.place.endswith(".parquet")}
     if (of_journal := first.get(folder.journal.name)) is not None:
         first = {of_journal.place: of_journal}
