@@ -63,7 +63,10 @@ def write_files(to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, 
             folder.mkdir(exist_ok=True)
         for name, content in files.items():
             if isinstance(content, FileCopy):
-                _copied(content, staged[name])
+                with staged[name].open("xb", buffering=0) as file:
+                    for part in _parts(content):
+                        write_whole(file, part)
+                    os.fsync(file.fileno())
             else:
                 write_through(staged[name], content)
         for name, path in staged.items():
@@ -85,14 +88,6 @@ def write_files(to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, 
     for folder in {path.parent for path in staged.values()}:
         sweep_old(folder)
     return tuple(to / name for name in files)
-
-
-def _copied(copied: FileCopy, to: Path) -> None:
-    """Write a new file ``to``, and flush it to the disk."""
-    with to.open("xb", buffering=0) as file:
-        for part in _parts(copied):
-            write_whole(file, part)
-        os.fsync(file.fileno())
 
 
 def _parts(copied: FileCopy) -> Iterator[bytes]:
@@ -161,7 +156,11 @@ def write_output(study: Path, to: Path, files: Mapping[str, bytes | FileCopy]) -
 def outputs(study: Path) -> tuple[Output, ...]:
     """Return the noted outputs of a study's results, one for each folder and set of files, the newest last."""
     found: dict[tuple[str, tuple[str, ...]], Output] = {}
-    for line in _lines():
+    try:
+        lines = (data_folder() / NAME).read_bytes().splitlines()
+    except OSError:
+        lines = []
+    for line in lines:
         try:
             held = parse_json(line)
             if held["study"] == str(study.resolve()):
@@ -187,10 +186,3 @@ def erase_outputs(study: Path, within: Path) -> tuple[tuple[Path, ...], tuple[Ou
                 raise cannot_write(path, error) from error
             erased.append(path)
     return tuple(erased), tuple(elsewhere)
-
-
-def _lines() -> list[bytes]:
-    try:
-        return (data_folder() / NAME).read_bytes().splitlines()
-    except OSError:
-        return []

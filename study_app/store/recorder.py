@@ -140,7 +140,11 @@ class Recorder:
             self._expected[trial, attempt, interval] = None
             self._queue.append(_Begin(trial, attempt, rate_hz, interval))
             if not self._works():
-                self._begin_work()
+                self.thread = threading.Thread(target=self._work, name="recorder", daemon=True)
+                try:
+                    self.thread.start()
+                except RuntimeError as error:
+                    self._lose_all(f"its thread cannot be started: {error}")
             self.changed.notify_all()
 
     def append(self, samples: Any) -> None:
@@ -220,14 +224,6 @@ class Recorder:
     def _works(self) -> bool:
         return self.thread is not None and self.thread.is_alive()
 
-    def _begin_work(self) -> None:
-        """Start the thread, for the first trial or after it had ended; with the lock held."""
-        self.thread = threading.Thread(target=self._work, name="recorder", daemon=True)
-        try:
-            self.thread.start()
-        except RuntimeError as error:
-            self._lose_all(f"its thread cannot be started: {error}")
-
     def _work(self) -> None:
         """Write all queued data, in the recorder's thread; the next trial restarts it after a failure."""
         try:
@@ -272,7 +268,9 @@ class Recorder:
         shown: Written | None = None
         end: _End | None = None
         try:
-            self._make_folder()
+            if not self._folder.is_dir():
+                self._folder.mkdir()
+                sync_folder(self._folder.parent)  # so that it survives a power cut
             file = self._files.SamplesFile(samples_path, facts, begin.rate_hz)
             end = self._give_samples(file.write)
             frames = np.frombuffer(end.frames, np.int64).reshape(-1, 5)
@@ -297,12 +295,6 @@ class Recorder:
                 return thing
             take(thing)
         return _End(array("q"), 0)
-
-    def _make_folder(self) -> None:
-        """Create the folder if it is missing, and flush it so that it survives a power cut."""
-        if not self._folder.is_dir():
-            self._folder.mkdir()
-            sync_folder(self._folder.parent)
 
     def _next(self) -> Any:
         """Wait for the next thing in the queue; None when it is closed and empty."""

@@ -390,7 +390,10 @@ def _load(folder: Path, *, sealed: bool = False) -> Study:
     last = both.groupby(_TRIAL)["attempt"].max().rename("last_attempt")
     counted = _with_counted(with_excluded(after_trials, listed), last)
     of_forms = with_excluded(responses[responses["trial"].isna()], listed)
-    answered = pd.concat([counted, _of_completed(of_forms)]).sort_index() if len(of_forms) else counted
+    answers_count = (of_forms["session_status"] == COMPLETED) & ~of_forms["excluded"]
+    of_forms = of_forms.assign(counted=answers_count.astype(bool))
+    answered = pd.concat([counted, of_forms]).sort_index() if len(of_forms) else counted
+    participants = with_excluded(pd.DataFrame([session.facts for session in records]), listed)
     return Study(
         folder=place.path,
         name=records[0].study,
@@ -403,7 +406,7 @@ def _load(folder: Path, *, sealed: bool = False) -> Study:
         levels=records[0].levels,
         intervals=_intervals(records, listed, last, opened=key is not None),
         trials=_with_counted(with_excluded(trials, listed), last),
-        participants=_sessions(with_excluded(pd.DataFrame([session.facts for session in records]), listed)),
+        participants=participants.assign(counted=(participants["status"] == COMPLETED) & ~participants["excluded"]),
         exclusions=listed,
         doubts=tuple(doubt for one in records for doubt in doubts(Place(place, one.folder, one.study))),
         others=records[0].others,
@@ -493,22 +496,12 @@ def _with_counted(table: pd.DataFrame, last: pd.Series[int]) -> pd.DataFrame:
     return table.assign(counted=counted.astype(bool))
 
 
-def _of_completed(table: pd.DataFrame) -> pd.DataFrame:
-    """Add what counts of forms: those of completed sessions, unless these are excluded."""
-    return table.assign(counted=((table["session_status"] == COMPLETED) & ~table["excluded"]).astype(bool))
-
-
 def _of_statements(table: pd.DataFrame) -> pd.DataFrame:
     """Return the answers to statements as points of their scale."""
     if "kind" not in table:
         return table
     statements = table[table["kind"] == STATEMENT]
     return statements.assign(response=statements["value"].astype("Int64"))
-
-
-def _sessions(table: pd.DataFrame) -> pd.DataFrame:
-    """Add which sessions count: the completed ones that are not excluded."""
-    return table.assign(counted=(table["status"] == COMPLETED) & ~table["excluded"])
 
 
 By: TypeAlias = Literal["group", "site"]
