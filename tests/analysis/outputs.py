@@ -22,21 +22,14 @@ ELSEWHERE = frozenset({"codebook.json", "methods.txt"})
 
 
 @contextmanager
-def figures_as_lines() -> Iterator[list[str]]:
-    """Let files of figures hold what these show; yield the list that gets the lines of each, once drawn."""
-    drawn: list[str] = []
-
-    def kept(figure: object, *form: object) -> bytes:
-        content = stub_png(figure, *form)
-        drawn.append("\n".join(figure_of(content)))
-        return content
-
+def figures_as_lines() -> Iterator[None]:
+    """Let files of figures hold what these show."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(figure_style, "file_bytes", kept)
+        patched.setattr(figure_style, "file_bytes", stub_png)
         patched.setattr(write_report, "font_faces", str)
         for draw in (pictures, level_pictures, question_pictures):
             patched.setattr(write_report, draw.__name__, partial(draw, forms=("png",)))
-        yield drawn
+        yield
 
 
 def sav_lines(path: Path) -> Iterator[str]:
@@ -52,13 +45,10 @@ def sav_lines(path: Path) -> Iterator[str]:
 
 
 def report_lines(study: Study, without: frozenset[str] = ELSEWHERE) -> Iterator[str]:
-    """Yield the lines of every file of a study's report; the first page's pictures come first."""
-    with figures_as_lines() as first:
+    """Yield the lines of every file of a study's report."""
+    with figures_as_lines():
         files, failed = write_report.report_files(study)
     assert not failed, "; ".join(map(str, failed))
-    of_files = {"\n".join(figure_of(content)) for name, content in files.items() if name.endswith(".png")}
-    for number, lines in enumerate(one for one in first if one not in of_files):
-        yield from (f"##### first page, picture {number + 1}", lines)
     for name, content in sorted(files.items()):
         if name not in without:
             yield f"##### {name}"

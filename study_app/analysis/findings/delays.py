@@ -2,16 +2,16 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Final
 
 from study_app.analysis.data.blocks import Block, Direction
 from study_app.analysis.data.motion import OF_REACHES
 from study_app.analysis.figures import delay_figures
 from study_app.analysis.figures.page_layout import Drawing, Picture
 from study_app.analysis.findings.block_tests import HOLM, MANY, Asked
-from study_app.analysis.findings.finding import FOUND, Absent, Finding, Row
+from study_app.analysis.findings.finding import FOUND, NO_EVIDENCE, Absent, Answer, Finding, Row
 from study_app.analysis.findings.statement_tests import ONE_DELAY, DelayTrend
-from study_app.analysis.report.html_page import heading, paragraph, table_of
+from study_app.analysis.report.html_page import heading, paragraph, table, table_of
 from study_app.analysis.report.test_rows import r_number, r_text, rows_alone, test_row
 from study_app.analysis.results import (
     BlockFound,
@@ -130,31 +130,70 @@ def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
     first = against[0].found
     yield (
         f"Two one-sided t tests with a bound of ±{first.bound:g}, intervals of {percent(1 - 2 * first.alpha)}. "
-        "Equivalent: the t tests, changes of signs, signed ranks and the bootstrap-t (for answers that lean to one "
-        "side) all show that the mean lies within the bound; each comparison stands for itself, so that a single one "
-        "among many is weak. "
-        f"It needs {enough(first.alpha)}. It is about the mean: the table also states how many people differ by more "
-        "than the bound, with a 95 % Clopper-Pearson interval of their share. Different: the larger p of a two-sided "
-        f"t test and of exact signed ranks, Holm-adjusted over the {len(against)} comparisons of this table, is at "
-        f"most {first.alpha:g}. Where "
-        "all differences are equal, signs and ranks decide. Inconclusive: neither. Out of reach: no answers of so "
-        "many participants could have given either. n for 80 %: participants with whom all these tests would show "
-        f"equivalence in 80 % of simulated studies ({STUDIES} for each number, differences about 0 with this spread, "
-        "rounded as these are); a spread estimated from few is itself uncertain."
+        "Equivalent: the t tests, changes of signs, signed ranks and the bootstrap-t all show that the mean lies "
+        f"within the bound, with {enough(first.alpha)}. Different: the larger p of a two-sided t test and of exact "
+        f"signed ranks, Holm-adjusted over the {len(against)} comparisons of this table, is at most {first.alpha:g}. "
+        "Inconclusive: neither. Out of reach: no answers of so many participants could have given either. n for 80 %: "
+        f"participants with whom {STUDIES} simulated studies with this spread show equivalence in 80 %."
     )
-    least = first.smallest_check_p
-    if least is not None:
-        yield f"By signs and ranks the smallest p for equivalence is {p_value(least)}."
     differing = 0.5 ** (first.n - 1) if first.n else 1.0
     if differing * len(against) > first.alpha:
         yield (
-            f"For a difference the signed ranks of {counted(first.n, 'pair')} give {p_value(differing)} at least, so "
-            "that after the correction no comparison here can be called different, however clear it is; a trend over "
-            "all delays can be shown."
+            f"With {counted(first.n, 'pair')} no comparison here can be called different after the correction; a trend "
+            "over all delays can be shown."
         )
     disagree = sum(one.found.checks_agree is False for one in against)
     if disagree:
         yield f"*: p with and without normality decide differently ({disagree}); equivalent is only what all show."
+
+
+VERDICTS: Final = ("equivalent", "different", "inconclusive", "out of reach")
+
+
+def by_delay(found: BlockFound) -> list[list[str]]:
+    """Return a row a delay: in which statements it has each verdict, and what may be said of it in one sentence."""
+    rows = []
+    for delay_ms in dict.fromkeys(one.delay_ms for one in ContrastsWithControl.of(found)):
+        here = [one for one in ContrastsWithControl.of(found) if one.delay_ms == delay_ms]
+        cells = [
+            ", ".join(short(found, one.item) for one in here if one.verdict == verdict) or "–" for verdict in VERDICTS
+        ]
+        rows.append([ms(delay_ms), *cells, _said_of(found, delay_ms, here)])
+    return rows
+
+
+def _said_of(found: BlockFound, delay_ms: float, here: Sequence[ContrastWithControl]) -> str:
+    if all(one.verdict == "equivalent" for one in here):
+        return "Mean answers to these statements stay within the bound; single people may notice the delay."
+    claim = f"“delays up to {ms(delay_ms)} do not matter”"
+    if reasons := evidence_up_to(found, delay_ms):
+        return f"These data speak against {claim}: {'; '.join(reasons)}."
+    return f"These data neither support nor refute {claim}."
+
+
+def evidence_up_to(found: BlockFound, delay_ms: float) -> tuple[str, ...]:
+    """Return what shows that delays up to this one change answers, with the error rate held over all statements.
+
+    That is a trend up to this delay or a shorter one, or else a difference at one of them.
+    """
+    reasons = {
+        one.item: f"“{short(found, one.item)}” follows the delay up to {ms(shown_ms)}"
+        for one in LowestDelay.of(found)
+        if (shown_ms := one.over_all_ms) is not None and shown_ms <= delay_ms
+    }
+    for one in sorted(ContrastsWithControl.of(found), key=lambda one: one.delay_ms):
+        if one.verdict == "different" and one.delay_ms <= delay_ms:
+            away = "" if one.as_expected else ", against the direction stated before the study"
+            difference = f"“{short(found, one.item)}” differs at {ms(one.delay_ms)} by {number(one.found.effect)}{away}"
+            reasons.setdefault(one.item, difference)
+    return tuple(reasons.values())
+
+
+def common_ms(found: BlockFound) -> float | None:
+    """Return the longest delay up to which every statement is equivalent at every delay."""
+    delays = list(equivalent_up_to(ContrastsWithControl.of(found)).values())
+    known = [delay for delay in delays if delay is not None]
+    return min(known) if known and len(known) == len(delays) else None
 
 
 class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
@@ -250,6 +289,8 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
             last=1,
         )
         yield paragraph(" ".join(_about_against(self.value)), "soft")
+        head = ("Delay", *(f"{verdict} in" for verdict in VERDICTS), "what can be said")
+        yield table(head, by_delay(self.found), words=len(head))
 
     def limits(self) -> Iterator[str]:
         against, found = self.value, self.found
@@ -495,6 +536,96 @@ class DetectionThreshold(Finding[Threshold | None]):
                 "interval that is scaled by how far participants differ. It is stated only where a permutation test "
                 "against a flat line shows a rise, and where it lies among the delays that were presented."
             )
+
+
+class NoticedFrom(Finding[None]):
+    """The first page's answer to the delay from which participants notice a difference."""
+
+    key = "noticed from"
+    place = 21
+    kinds = ("delays",)
+    question = "From which delay do participants notice a difference?"
+
+    def answer(self) -> Answer:
+        """Return from which delay a change shows: by primary statements, or else by exploratory ones."""
+        decided, threshold = self.results.decided, DetectionThreshold.of(self.found)
+        fitted = decided.noticed if threshold is not None and threshold.effect is not None else None
+        for primary, verdict in ((True, "shown"), (False, "suggested")):
+            text = self._shortest([item.id for item in self.found.items if decided.is_primary(item.id) == primary])
+            if not text and fitted is not None and decided.is_primary(fitted) == primary:
+                text = "More people notice a difference with longer delays, but no single delay is shown to be noticed."
+            if text:
+                return self.answered(verdict, text, claims=True)
+        return self.answered("not shown", f"No delay was shown to be noticed. {NO_EVIDENCE}")
+
+    def _shortest(self, items: Sequence[str]) -> str:
+        """Return the sentence of the shortest delay that changes one of these statements; empty without any."""
+        lowest = {
+            one.item: one.over_all_ms
+            for one in LowestDelay.of(self.found)
+            if one.over_all_ms is not None and one.item in items
+        }
+        if lowest:
+            at = min(lowest.values())
+            first = [f"“{short(self.found, item)}”" for item, delay in lowest.items() if delay == at]
+            return (
+                f"From {ms(at)} on at the latest {listed(first)} {'changes' if len(first) == 1 else 'change'} with the "
+                "delay; shorter delays may be noticed too."
+            )
+        different = [
+            one for one in ContrastsWithControl.of(self.found) if one.verdict == "different" and one.item in items
+        ]
+        if different:
+            at, control = min(one.delay_ms for one in different), different[0].control_ms
+            return f"No trend is shown, but answers at {ms(at)} differ from those at {ms(control)}."
+        return ""
+
+
+class UnchangedUpTo(Finding[None]):
+    """The first page's answer to the delay up to which answers do not change by a relevant amount."""
+
+    key = "unchanged up to"
+    place = 22
+    kinds = ("delays",)
+    question = "Up to which delay do answers not change by a relevant amount?"
+
+    def answer(self) -> Answer:
+        """Return up to which delay mean answers are equivalent to those at the shortest."""
+        against = ContrastsWithControl.of(self.found)
+        if not against:
+            why = next((one.why for one in self.found.absent if "equivalence" in one.what), "nothing was compared")
+            return self.answered("not tested", f"No answer: {why}.")
+        at, within = common_ms(self.found), _within(against[0])
+        if at is None:
+            text = f"For no delay are mean answers to all statements shown to stay {within}. {NO_EVIDENCE}"
+            return self.answered("not shown", text)
+        statements = all_of(len(equivalent_up_to(against)), "statement")
+        text = f"Up to {ms(at)} mean answers to {statements} stay {within}; single people may notice the delay."
+        return self.answered("shown", text)
+
+    def sentences(self) -> Iterator[str]:
+        against = ContrastsWithControl.of(self.found)
+        if not against:
+            return
+        within, control = _within(against[0]), ms(against[0].control_ms)
+        up_to = [
+            f"“{short(self.found, item)}” up to {ms(delay)}"
+            for item, delay in equivalent_up_to(against).items()
+            if delay is not None
+        ]
+        if up_to:
+            yield f"{lead(self.found)}: mean answers {within} are shown for {listed(up_to)}."
+        elif all(one.found.p is None for one in against):
+            reasons = "; ".join(dict.fromkeys(one.found.note for one in against))
+            yield f"{lead(self.found)}: no delay could be compared with {control} ({reasons})."
+        else:
+            nearest = ms(against[0].delay_ms)
+            yield f"{lead(self.found)}: mean answers {within} are shown in no statement, not even at {nearest}."
+
+
+def _within(against: ContrastWithControl) -> str:
+    bound = against.found.bound
+    return f"within ±{bound:g} {'point' if bound == 1 else 'points'} of those at {ms(against.control_ms)}"
 
 
 MOVES = {

@@ -3,13 +3,12 @@
 The p that decide stand in the sections that follow.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Final, Generic, Literal, TypeAlias, TypeVar, cast
 
-from study_app import figure_style as style
 from study_app.analysis.data.blocks import KINDS, Kind
-from study_app.analysis.figures.page_layout import Drawing, Picture, Sheet
+from study_app.analysis.figures.page_layout import Drawing, Picture
 from study_app.analysis.findings.block_tests import Asked
 from study_app.analysis.report.html_page import drawn
 from study_app.analysis.results import BlockFound, NotTested, Results
@@ -20,41 +19,18 @@ FOUND: Final = ("shown", "suggested")
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """An answer to one question (the key of a finding) about one block (its id).
+    """A row of the first page: the verdict on one question (the key of a finding) about one block (its id), in words.
 
     ``claims`` says whether it claims that settings differ or that a delay is noticed, which would be false in a study
-    where nothing differs; ``exploratory`` whether that was not decided on before the study. ``at_ms`` is the shortest
-    delay that it says is noticed.
+    where nothing differs.
     """
 
     question: str
     block: str
     title: str
+    verdict: str
     text: str
-    sizes: tuple[str, ...]
     claims: bool = False
-    exploratory: bool = False
-    at_ms: float | None = None
-
-
-WIDTH_PT: Final = 264.0
-HEIGHT_PT: Final = 150.0
-FOOT_PT: Final = 24.0
-
-
-@style.own_settings()
-def answer_picture(picture: Callable[[Sheet], str | None]) -> tuple[bytes, str] | None:
-    """Return the picture of an answer as PNG, and what it shows in words; None where there is nothing to show."""
-    sheet = Sheet(WIDTH_PT, HEIGHT_PT, style.fonts_for("png"))
-    words = picture(sheet)
-    return None if words is None else (style.file_bytes(sheet.figure, "png", words), words)
-
-
-def foot(sheet: Sheet, words: str) -> None:
-    """Write the line under a picture."""
-    lines: Sequence[str] = sheet.wrap(words, WIDTH_PT - 8, 8)
-    for number, line in enumerate(reversed(lines)):
-        sheet.text(4, HEIGHT_PT - 4 - 9.5 * number, line, size=8, colour=style.TEXT_SOFT)
 
 
 R = TypeVar("R")
@@ -174,9 +150,9 @@ class Finding(Generic[R]):
         return drawn(self._pictures, self.figure_name)
 
     def answer(self) -> Answer:
-        """Return the answer to its question of the first page."""
+        """Return the answer to its question of the first page, once the key is open."""
         raise NotImplementedError
 
-    def picture(self, sheet: Sheet, answer: Answer) -> str | None:
-        """Draw the picture of the answer and return what it shows in words; None where there is nothing to show."""
-        raise NotImplementedError
+    def answered(self, verdict: str, text: str, *, claims: bool = False) -> Answer:
+        """Return an answer to its question in this block."""
+        return Answer(self.key, self.found.id, self.found.title, verdict, text, claims)

@@ -12,6 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 from markupsafe import Markup
 
 from study_app.analysis.figures.page_layout import Picture
+from study_app.analysis.results import Failure, Failures
 
 T = TypeVar("T")
 
@@ -59,6 +60,14 @@ def paragraph(words: str, kind: str = "") -> Markup:
 def not_there(why: str) -> Markup:
     """Return the text that replaces a part that could not be computed."""
     return box([paragraph(f"Not there: {why}.")], "care")
+
+
+def attempted(
+    failures: Failures, what: str, title: Markup, make: Callable[[], Iterable[str]], *, block: str | None = None
+) -> list[str]:
+    """Return a part of the page; where it fails its title and why it is missing, and the failure is kept."""
+    found = failures.attempt(what, lambda: list(make()), block=block)
+    return [title, not_there(found.why)] if isinstance(found, Failure) else found
 
 
 def bullets(lines: Iterable[str]) -> Markup:

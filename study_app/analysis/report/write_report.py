@@ -7,6 +7,8 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
+from markupsafe import Markup
+
 from study_app import __version__
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
@@ -18,13 +20,12 @@ from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.figures.study_figures import pictures
 from study_app.analysis.planning.preregistration import deviations_section as preregistration_section
 from study_app.analysis.report import number_files, sections, sentences
-from study_app.analysis.report.first_page import first_page
 from study_app.analysis.report.html_page import (
+    attempted,
     box,
     bullets,
     font_faces,
     heading,
-    not_there,
     page,
     paragraph,
     render,
@@ -166,29 +167,21 @@ def _page(
         ("Methods, to paste", lambda: (heading(2, "Methods, to paste"), box([paragraph(str(texts["methods"]))]))),
         ("Reproducing this report", lambda: _again(study, results)),
         ("Licence and citation", lambda: (heading(2, "Licence and citation"), bullets(credit_lines(study)))),
-        ("Answers, counted", lambda: sections.answers(results)),
+        ("Answers, counted", lambda: sections.counts_of_answers(results)),
     ]
-    first = failures.attempt("first page", lambda: first_page(results, texts["limits"], failures))
-    parts: list[dict[str, Any]] = []
-    for title, make in sections_:
-        found = failures.attempt(f"section “{title}”", partial(_made, make))
-        html = [heading(2, title), not_there(found.why)] if isinstance(found, Failure) else found
-        parts += [{"title": title, "html": html}] if html else []
+    first = attempted(failures, "first page", Markup(), lambda: [sections.first_page(results, texts["limits"])])
+    made = [(title, attempted(failures, f"section “{title}”", heading(2, title), make)) for title, make in sections_]
     body = render(
         "body.html",
         title=study.title,
         facts=_facts(study),
         marks=_marks(study),
-        parts=parts,
+        parts=[{"title": title, "html": html} for title, html in made if html],
         failures=[str(one) for one in failures.found],
-        first=not_there(first.why) if isinstance(first, Failure) else first,
+        first=Markup().join(first),
     )
     faces = failures.attempt("typeface", lambda: font_faces("".join(sorted(set(body.unescape())))))
     return page(f"{study.title}: report", body, "" if isinstance(faces, Failure) else faces)
-
-
-def _made(make: Callable[[], Iterable[str]]) -> list[str]:
-    return list(make())
 
 
 def _facts(study: Study) -> str:

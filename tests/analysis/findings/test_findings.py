@@ -14,7 +14,7 @@ import pytest
 from study_app.analysis import findings
 from study_app.analysis.data.study_tables import Study, load_study, pooled
 from study_app.analysis.findings import all_findings
-from study_app.analysis.report.first_page import answers
+from study_app.analysis.report.sections import answers
 from study_app.analysis.report.write_report import report
 from study_app.analysis.study_worker import carry_out
 from study_app.analysis.worker_messages import FigureDrawn, ReadStudy

@@ -1,4 +1,4 @@
-"""The first page: three answers with direction, size and interval, pictures, limits, and how often it is wrong."""
+"""The first page: a table of verdicts with a sentence each, limits, and how often it is wrong."""
 
 from dataclasses import replace
 from typing import Any
@@ -8,13 +8,18 @@ import pytest
 
 from study_app.analysis.data.blocks import Decided
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.findings.delay_answers import common_ms
-from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay, equivalent_up_to
+from study_app.analysis.findings.delays import (
+    ContrastsWithControl,
+    DetectionThreshold,
+    LowestDelay,
+    common_ms,
+    equivalent_up_to,
+)
 from study_app.analysis.findings.finding import Answer
 from study_app.analysis.findings.recognition import LiquidRecognition, RecognitionResult, given, recognised
 from study_app.analysis.findings.statement_tests import OverAll, Pairs
-from study_app.analysis.report.first_page import CLAIMS, STUDIES, answers, empty_studies, first_page
-from study_app.analysis.results import Failures, Results
+from study_app.analysis.report.sections import CLAIMS, STUDIES, answers, empty_studies, first_page
+from study_app.analysis.results import Results
 from study_app.analysis.statistics.recognition import recognition
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
 
@@ -47,21 +52,21 @@ def named(results: Results, question: str) -> Answer:
     return next(one for one in answers(results) if one.question == question)
 
 
-def test_a_delay_that_is_noticed_is_told_with_direction_size_and_interval() -> None:
-    found = named(rising(3), "noticed from")
+def test_a_delay_that_is_noticed_is_told_with_its_verdict() -> None:
+    results = rising(3)
+    found = named(results, "noticed from")
     assert found.claims
-    assert not found.exploratory
-    assert found.text.startswith("From 100 ms on at the latest")
-    assert any("“Different” from 100 ms on at the latest: +" in line and "[" in line for line in found.sizes)
-    assert any("“Harder” from 100 ms on at the latest: −" in line for line in found.sizes)
-    assert not any("p =" in line or "p <" in line for line in (found.text, *found.sizes))
+    assert found.verdict == "shown"
+    assert found.text.startswith("From 100 ms on at the latest “Different” and “Harder” change with the delay; ")
+    assert f'<td>shown</td><td class="long">{found.text}</td>' in first_page(results, ())
 
 
 def test_up_to_which_delay_nothing_changes_needs_every_statement() -> None:
     results = rising(3)
     found = named(results, "unchanged up to")
     assert common_ms(results.blocks[0]) == 50.0
-    assert found.text.startswith("Up to 50 ms: mean answers to both statements stay within ±1 point of those at 0 ms")
+    assert found.verdict == "shown"
+    assert found.text.startswith("Up to 50 ms mean answers to both statements stay within ±1 point of those at 0 ms")
     against = tuple(
         one if one.item == ITEMS[0] else replace(one, found=replace(one.found, verdict="inconclusive"))
         for one in ContrastsWithControl.of(results.blocks[0])
@@ -69,14 +74,15 @@ def test_up_to_which_delay_nothing_changes_needs_every_statement() -> None:
     block = ContrastsWithControl.add_to(results.blocks[0], against)
     assert equivalent_up_to(against) == {ITEMS[0]: 50.0, ITEMS[1]: None}
     assert common_ms(block) is None
-    assert (
-        "For no delay is it shown in all statements" in named(replace(results, blocks=(block,)), "unchanged up to").text
-    )
+    unclear = named(replace(results, blocks=(block,)), "unchanged up to")
+    assert unclear.verdict == "not shown"
+    assert "For no delay are mean answers to all statements shown to stay within" in unclear.text
 
 
 def test_where_nothing_is_shown_it_says_that_this_is_no_evidence() -> None:
     found = named(flat(), "noticed from")
     assert not found.claims
+    assert found.verdict == "not shown"
     assert "No delay was shown to be noticed. That is not evidence" in found.text
 
 
@@ -97,8 +103,7 @@ def test_liquids_are_recognised_by_name_and_the_wrong_name_is_told() -> None:
     )
     told = named(evaluate(right, planning=False), "distinguished")
     assert told.claims
-    assert told.text == "Liquid1 and liquid2 were recognised above chance."
-    assert "liquid1 12 of 12 (74 to 100 %), 33 % by chance" in told.sizes[0]
+    assert told.text.startswith("Liquid1 and liquid2 were recognised above chance. Rated differently: ")
     wrong = named(evaluate(study(settings, list(everybody(settings, 12, answer))), planning=False), "distinguished")
     assert "liquid2 was called liquid1 by 12 of 12" in wrong.text
 
@@ -107,9 +112,9 @@ def test_decisions_that_came_later_are_marked_as_exploratory() -> None:
     results = rising(3)
     made = study(delays(DELAYS), list(everybody(delays(DELAYS), 12, lambda p, s, code, i: 1 + int(code[1:]))))
     later = evaluate(replace(made, decided=replace(DECIDED, changed=True)), planning=False)
-    assert named(later, "noticed from").exploratory
-    assert "exploratory" in first_page(later, (), Failures())
-    assert "exploratory" not in first_page(results, (), Failures())
+    assert named(later, "noticed from").verdict == "suggested"
+    assert "suggested" in first_page(later, ())
+    assert "suggested" not in first_page(results, ())
 
 
 def ordered(people: int, decided: Decided = DECIDED) -> Results:
@@ -126,9 +131,8 @@ def test_liquids_that_differ_are_told_where_too_few_people_can_show_no_pair() ->
         "The liquids were rated differently in “Harder”; which ones cannot be shown with five participants."
     )
     assert told.claims
-    assert not told.exploratory
-    assert any("“Harder”: Kendall's W 1.00" in line for line in told.sizes)
-    assert named(ordered(5, replace(DECIDED, primary=ITEMS[:1])), "distinguished").exploratory
+    assert told.verdict == "shown"
+    assert named(ordered(5, replace(DECIDED, primary=ITEMS[:1])), "distinguished").verdict == "suggested"
     results = ordered(7)
     assert named(results, "distinguished").text.startswith("Rated differently: liquid1 – liquid2")
     unclear = Pairs.add_to(
@@ -146,11 +150,11 @@ def test_pairs_that_only_exploratory_statements_tell_apart_are_marked() -> None:
     first = replace(Pairs.of(block)[0], tested=replace(Pairs.of(block)[0].tested, verdict="suggested"))
     marked = named(replace(results, blocks=(Pairs.add_to(block, (first, *Pairs.of(block)[1:])),)), "distinguished")
     assert marked.text.startswith("Rated differently: liquid1 – liquid2 (exploratory), liquid1 – liquid3 and")
-    assert not marked.exploratory
+    assert marked.verdict == "shown"
     assert "exploratory" not in named(results, "distinguished").text
 
 
-def test_the_headline_is_of_primary_statements_and_exploratory_ones_follow_it_marked() -> None:
+def test_the_verdict_is_of_primary_statements_and_of_exploratory_ones_without_them() -> None:
     """The primary statement changes from 150 ms on, the exploratory one from 50 ms on."""
     settings = delays(DELAYS)
     high = {("D4", "harder"), ("D2", "different"), ("D3", "different"), ("D4", "different")}
@@ -165,13 +169,9 @@ def test_the_headline_is_of_primary_statements_and_exploratory_ones_follow_it_ma
     results = evaluate(made, planning=False)
     found = named(results, "noticed from")
     assert found.text == (
-        "From 150 ms on at the latest: “Harder” changes with the delay up to there. Shorter delays may be noticed too. "
-        "In exploratory statements, from 50 ms on at the latest: “Different” changes with the delay up to there. "
-        "Shorter delays may be noticed too."
+        "From 150 ms on at the latest “Harder” changes with the delay; shorter delays may be noticed too."
     )
-    assert not found.exploratory
-    assert found.at_ms == 150
-    assert [line.startswith("Exploratory: ") for line in found.sizes] == [True, False, True]
+    assert found.verdict == "shown"
     block = LowestDelay.add_to(
         results.blocks[0], tuple(one for one in LowestDelay.of(results.blocks[0]) if one.item != "harder")
     )
@@ -179,24 +179,28 @@ def test_the_headline_is_of_primary_statements_and_exploratory_ones_follow_it_ma
         block, tuple(one for one in ContrastsWithControl.of(block) if one.item != "harder")
     )
     alone = named(replace(results, blocks=(block,)), "noticed from")
-    assert alone.exploratory
-    assert alone.text.startswith("From 50 ms on at the latest: “Different”")
-    assert not any(line.startswith("Exploratory") for line in alone.sizes)
+    assert alone.verdict == "suggested"
+    assert alone.text.startswith("From 50 ms on at the latest “Different”")
 
 
 @pytest.mark.parametrize(
-    ("decided", "exploratory"),
-    [({}, False), ({"changed": True}, True), ({"primary": ITEMS[1:]}, True), ({"primary": ITEMS[:1]}, False)],
+    ("decided", "verdict"),
+    [
+        ({}, "shown"),
+        ({"changed": True}, "suggested"),
+        ({"primary": ITEMS[1:]}, "suggested"),
+        ({"primary": ITEMS[:1]}, "shown"),
+    ],
 )
 def test_a_threshold_alone_is_exploratory_unless_its_statement_is_primary(
-    decided: dict[str, Any], exploratory: bool
+    decided: dict[str, Any], verdict: str
 ) -> None:
     results = rising(3)
     block = ContrastsWithControl.add_to(LowestDelay.add_to(results.blocks[0], ()), ())
     assert DetectionThreshold.of(block) is not None
     assert DetectionThreshold.of(block).effect is not None
     found = named(replace(results, blocks=(block,), decided=replace(results.decided, **decided)), "noticed from")
-    assert (found.claims, found.exploratory) == (True, exploratory)
+    assert (found.claims, found.verdict) == (True, verdict)
 
 
 @pytest.mark.parametrize(("participants", "n"), [(1, 5), (10, 12), (200, 24)])
@@ -222,8 +226,8 @@ def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() 
     assert with_p(0.03, 0.9) == [False, False]
     assert with_p(0.02, 0.04) == [True, True]
     none = replace(results, blocks=(OverAll.add_to(results.blocks[0], None),))
-    assert named(none, "noticed from").text.startswith("Nothing is claimed here")
-    assert named(none, "noticed from").sizes == ()
+    assert named(none, "noticed from").verdict == "not shown"
+    assert named(none, "noticed from").text.startswith("Single tests find something, but the test over all statements")
 
 
 def test_a_liquid_is_recognised_where_its_interval_lies_above_the_share_of_its_name() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.stats import binomtest
 
-from study_app.analysis.figures.page_layout import Drawing, Picture, Sheet
+from study_app.analysis.figures.page_layout import Drawing, Picture
 from study_app.analysis.findings.block_tests import Asked, alone
 from study_app.analysis.findings.finding import Absent, Answer, Finding
 from study_app.analysis.findings.statement_tests import table_of_tests
@@ -80,8 +80,4 @@ class HighestAnswers(Finding[tuple[Tested, ...]]):
     def answer(self) -> Answer:
         most = max(self.value, key=lambda one: one.outcome.effect or 0.0)
         text = f"Most highest answers: {short(self.found, most.item)}."
-        return Answer(self.key, self.found.id, self.found.title, text, ())
-
-    def picture(self, sheet: Sheet, answer: Answer) -> str | None:
-        sheet.text(4, 20, answer.text, size=9)
-        return f"The statement of {self.found.title} with most highest answers"
+        return self.answered("shown", text)
