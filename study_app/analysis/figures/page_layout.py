@@ -3,8 +3,9 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -13,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import FancyBboxPatch
 from matplotlib.text import Text
 from matplotlib.transforms import Affine2D
+from numpy.typing import NDArray
 
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import Block
@@ -20,6 +22,9 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.results import BlockFound, Failure, Failures, Results, counted
 
 MARGIN_PT = 4.0
+
+Style: TypeAlias = dict[str, Any]
+"""How marks of a figure look, as arguments of matplotlib."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +89,11 @@ class Sheet:
             **place,
         )
 
+    def lines(self, x: float, middle: float, lines: Sequence[str], line_pt: float, **look: Any) -> None:
+        """Write ``lines`` below each other, around a baseline at ``middle``."""
+        for number, line in enumerate(lines):
+            self.text(x, middle + line_pt * (number - (len(lines) - 1) / 2), line, **look)
+
     def axes(self, x: float, y: float, width: float, height: float) -> Axes:
         """Return bare axes: no frame, no ticks; ``x, y`` is their upper left corner."""
         place = (x / self.width_pt, 1 - (y + height) / self.height_pt, width / self.width_pt, height / self.height_pt)
@@ -95,6 +105,24 @@ class Sheet:
         axes.set_xticks([])
         axes.set_yticks([])
         return axes
+
+    def scale(
+        self,
+        axes: Axes,
+        side: Literal["x", "y"],
+        places: Sequence[float] | NDArray[np.float64],
+        words: Sequence[object] | None = None,
+        *,
+        size: float = 6.5,
+        lines: bool = False,
+    ) -> None:
+        """Mark places of an axis by words, by default the numbers, empty: by none; and with lines across the plot."""
+        shown = [f"{place:g}" for place in places] if words is None else [str(word) for word in words]
+        if shown:
+            (axes.set_xticks if side == "x" else axes.set_yticks)(places, shown, fontproperties=self.font(size))
+        if lines:
+            for place in places:
+                (axes.axvline if side == "x" else axes.axhline)(place, color=style.GRID, linewidth=0.6, zorder=0)
 
     def box(self, x: float, y: float, width: float, height: float, colour: str, rounding: float = 1.5) -> None:
         """Fill a rounded rectangle with its upper left corner at ``x, y``."""
@@ -131,16 +159,30 @@ class Sheet:
         self.text(right, baseline, words, size=7.5, colour=style.TEXT_SOFT, ha="right")
 
 
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What every figure has: title, marks, what it says about n (the longest wording first), and fonts."""
+
+    title: str
+    marks: Sequence[Mark]
+    counts: Sequence[str]
+    fonts: Sequence[str]
+
+    def sheet(self, height_pt: float, width_pt: float = style.PAGE_WIDTH_PT) -> Sheet:
+        """Return a sheet with its heading."""
+        sheet = Sheet(width_pt, height_pt, self.fonts)
+        sheet.heading(self.title, self.marks, self.counts)
+        return sheet
+
+
 def study_marks(study: Study) -> list[Mark]:
     """Return what must not be overlooked in a figure of a study."""
-    found = []
-    if study.simulated:
-        found.append(Mark("SIMULATED participants", style.WARN, style.WARN_GROUND))
-    if study.pilot:
-        found.append(Mark("PILOT", style.WARN, style.WARN_GROUND))
-    if not study.revealed:
-        found.append(Mark("Blinded: by code", style.SEALED, style.SEALED_GROUND))
-    return found
+    marks = (
+        (study.simulated, Mark("SIMULATED participants", style.WARN, style.WARN_GROUND)),
+        (study.pilot, Mark("PILOT", style.WARN, style.WARN_GROUND)),
+        (not study.revealed, Mark("Blinded: by code", style.SEALED, style.SEALED_GROUND)),
+    )
+    return [mark for applies, mark in marks if applies]
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,13 +196,13 @@ class Picture:
 
 
 def attempted(
-    pictures: Iterable[tuple[str, str, Callable[[str], Picture]]], failures: Failures | None
+    pictures: Iterable[tuple[str, str, Callable[[str], Picture | None]]], failures: Failures | None
 ) -> Iterator[Picture]:
     """Yield figures from block, name and what draws it by that name; one that fails is kept in ``failures`` instead."""
     held = Failures() if failures is None else failures
     for block, name, draw in pictures:
         drawn = held.attempt(f"figure {name}", partial(draw, name), block=block)
-        if not isinstance(drawn, Failure):
+        if drawn is not None and not isinstance(drawn, Failure):
             yield drawn
 
 
@@ -190,10 +232,12 @@ class Drawing:
         """What a caption says of simulated participants."""
         return "SIMULATED participants, no people; " if self.study.simulated else ""
 
-    def picture(self, title: str, caption: str, draw: Callable[..., Figure]) -> Picture:
-        """Return the figure that ``draw`` draws with ``title``, the study's ``marks`` and each form's ``fonts``."""
-        files = {}
-        for form in self.forms:
-            figure = draw(title=title, marks=study_marks(self.study), fonts=style.fonts_for(form))
-            files[form] = style.file_bytes(figure, form, f"{self.study.name}: {title}")
+    def picture(
+        self, title: str, caption: str, draw: Callable[[Look], Sheet], counts: Sequence[str] = ("",)
+    ) -> Picture:
+        """Return the figure that ``draw`` draws in each form."""
+        marks = study_marks(self.study)
+        files = files_of(
+            lambda fonts: draw(Look(title, marks, counts, fonts)), self.forms, f"{self.study.name}: {title}"
+        )
         return Picture(self.block.id, self.name, caption, files)

@@ -14,9 +14,10 @@ from study_app.analysis.data.blocks import AskedQuestion
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.page_layout import (
     MARGIN_PT,
-    Mark,
+    Look,
     Picture,
     Sheet,
+    Style,
     attempted,
     files_of,
     sample_words,
@@ -30,16 +31,6 @@ RIGHT_PT: Final = 40.0
 TOP_PT: Final = 30.0
 FOOT_PT: Final = 34.0
 LINE_PT: Final = 8.5
-
-
-@dataclass(frozen=True, slots=True)
-class Look:
-    """The title of a figure, what must not be overlooked, how many answered, and the fonts."""
-
-    title: str
-    marks: Sequence[Mark]
-    counts: Sequence[str]
-    fonts: Sequence[str]
 
 
 Draw: TypeAlias = Callable[[AskedQuestion, QuestionFound, Look], Sheet]
@@ -56,19 +47,26 @@ class QuestionFigure:
 
 def rows(names: Sequence[str], ns: Sequence[int], look: Look, *, row_pt: float) -> tuple[Sheet, Axes]:
     """Return a sheet and its axes, in which row k lies around y = k, the first at the top."""
-    height = TOP_PT + row_pt * len(names) + FOOT_PT
-    sheet = Sheet(style.PAGE_WIDTH_PT, height, look.fonts)
-    sheet.heading(look.title, look.marks, look.counts)
+    sheet = look.sheet(TOP_PT + row_pt * len(names) + FOOT_PT)
     axes = sheet.axes(LEFT_PT, TOP_PT, sheet.width_pt - LEFT_PT - RIGHT_PT, row_pt * len(names))
     axes.set_ylim(len(names) - 0.5, -0.5)
     for place, (name, n) in enumerate(zip(names, ns, strict=True)):
-        lines = sheet.wrap(name, LEFT_PT - MARGIN_PT - 8, 7)
-        middle = TOP_PT + row_pt * (place + 0.5)
-        for number, line in enumerate(lines):
-            y = middle + LINE_PT * (number - (len(lines) - 1) / 2) + 2.5
-            sheet.text(LEFT_PT - 8, y, line, size=7, ha="right")
-        sheet.text(sheet.width_pt - MARGIN_PT, middle + 2.5, f"n = {n}", size=6.5, colour=style.TEXT_SOFT, ha="right")
+        middle = TOP_PT + row_pt * (place + 0.5) + 2.5
+        sheet.lines(LEFT_PT - 8, middle, sheet.wrap(name, LEFT_PT - MARGIN_PT - 8, 7), LINE_PT, size=7, ha="right")
+        sheet.text(sheet.width_pt - MARGIN_PT, middle, f"n = {n}", size=6.5, colour=style.TEXT_SOFT, ha="right")
     return sheet, axes
+
+
+def _rows_of_groups(found: QuestionFound, look: Look, row_pt: float) -> tuple[Sheet, Axes]:
+    return rows(
+        [one.name for one in found.groups], [int(one.numbers["n"]) for one in found.groups], look, row_pt=row_pt
+    )
+
+
+def _ends(sheet: Sheet, y: float, low: str, high: str) -> None:
+    """Write what the ends of the axis mean."""
+    sheet.text(LEFT_PT, y, low, size=6.5, colour=style.TEXT_SOFT)
+    sheet.text(sheet.width_pt - RIGHT_PT, y, high, size=6.5, colour=style.TEXT_SOFT, ha="right")
 
 
 ROW_PT: Final = 30.0
@@ -80,9 +78,7 @@ PILE: Final = 0.07  # from one of equal answers to the next
 def draw_distribution(asked: AskedQuestion, found: QuestionFound, look: Look) -> Sheet:
     """Draw the answers."""
     groups = found.groups
-    sheet, axes = rows(
-        [group.name for group in groups], [int(group.numbers["n"]) for group in groups], look, row_pt=ROW_PT
-    )
+    sheet, axes = _rows_of_groups(found, look, ROW_PT)
     values = [value for group in groups for value in group.numbers["values"]]
     low, high = asked.bounds or (min(values, default=0.0), max(values, default=1.0))
     span = (high - low) or 1.0
@@ -97,11 +93,9 @@ def draw_distribution(asked: AskedQuestion, found: QuestionFound, look: Look) ->
         for value, many in sorted(Counter(numbers["values"]).items()):
             ys = [place + PILE * (number - (many - 1) / 2) for number in range(many)]
             axes.plot([value] * many, ys, "o", markersize=2.6, color=style.PARTICIPANT, gid=f"{group.code}")
-    y = sheet.height_pt - FOOT_PT + 12
     view = asked.question.view(0, asked.context)
     ends = (f"{low:g} {getattr(view, 'low', '')}".strip(), f"{high:g} {getattr(view, 'high', '')}".strip())
-    sheet.text(LEFT_PT, y, ends[0], size=6.5, colour=style.TEXT_SOFT)
-    sheet.text(sheet.width_pt - RIGHT_PT, y, ends[1], size=6.5, colour=style.TEXT_SOFT, ha="right")
+    _ends(sheet, sheet.height_pt - FOOT_PT + 12, *ends)
     return sheet
 
 
@@ -158,9 +152,7 @@ def _ink(colour: str) -> str:
 def draw_ratings(asked: AskedQuestion, found: QuestionFound, look: Look) -> Sheet:
     """Draw the counts of all points."""
     groups = found.groups
-    sheet, axes = rows(
-        [group.name for group in groups], [int(group.numbers["n"]) for group in groups], look, row_pt=RATING_PT
-    )
+    sheet, axes = _rows_of_groups(found, look, RATING_PT)
     axes.set_xlim(0, 1)
     inks = colours(len(asked.levels))
     for place, group in enumerate(groups):
@@ -170,10 +162,8 @@ def draw_ratings(asked: AskedQuestion, found: QuestionFound, look: Look) -> Shee
             share = count / total
             axes.barh(place, share, left=left, height=2 * HALF, color=colour, gid=f"{group.code}")
             if share > NARROW:
-                axes.text(
-                    left + share / 2, place, str(count), ha="center", va="center", color=_ink(colour),
-                    fontproperties=sheet.font(6.5),
-                )  # fmt: skip
+                look_of_count: Style = {"ha": "center", "va": "center", "color": _ink(colour)}
+                axes.text(left + share / 2, place, str(count), fontproperties=sheet.font(6.5), **look_of_count)
             left += share
     _legend(sheet, list(asked.levels.values()), inks)
     return sheet
@@ -181,10 +171,9 @@ def draw_ratings(asked: AskedQuestion, found: QuestionFound, look: Look) -> Shee
 
 def _legend(sheet: Sheet, names: list[str], inks: list[str]) -> None:
     """Write the ends of the scale, and between them the points in their colours."""
-    y, right = sheet.height_pt - 12, sheet.width_pt - RIGHT_PT
-    sheet.text(LEFT_PT, y, names[0], size=6.5, colour=style.TEXT_SOFT)
-    sheet.text(right, y, names[-1], size=6.5, colour=style.TEXT_SOFT, ha="right")
-    x = (LEFT_PT + right - SWATCH_PT * len(inks)) / 2
+    y = sheet.height_pt - 12
+    _ends(sheet, y, names[0], names[-1])
+    x = (LEFT_PT + sheet.width_pt - RIGHT_PT - SWATCH_PT * len(inks)) / 2
     for point, ink in enumerate(inks, start=1):
         sheet.box(x, y - 8.5, SWATCH_PT, 11, ink, rounding=0.5)
         sheet.text(x + SWATCH_PT / 2, y, str(point), size=6.5, colour=_ink(ink), ha="center")
@@ -208,17 +197,12 @@ def question_pictures(
 
     A figure that fails is left out, and kept in ``failures``; levels that participants set have a figure of their own.
     """
-    both = zip(study.others.questions, answered, strict=True)
     set_by_hand = {block.id for block in study.levels if block.design.adjusts}
-    shown = [
-        (asked, found)
-        for asked, found in both
-        if found.figure is not None and found.n and found.where not in set_by_hand
-    ]
     yield from attempted(
         (
             (found.where, f"question-{found.where}-{found.item}", partial(_picture, study, asked, found, forms))
-            for asked, found in shown
+            for asked, found in zip(study.others.questions, answered, strict=True)
+            if found.figure is not None and found.n and found.where not in set_by_hand
         ),
         failures,
     )

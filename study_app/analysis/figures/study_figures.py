@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import chain
 from pathlib import Path
 
 from study_app import figure_style as style
@@ -13,12 +12,12 @@ from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.answer_figures import render
 from study_app.analysis.figures.level_figures import level_pictures
-from study_app.analysis.figures.page_layout import Drawing, Picture
+from study_app.analysis.figures.page_layout import Drawing, Picture, attempted
 from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.delays import LowestDelay
 from study_app.analysis.levels.summaries import levels_found
-from study_app.analysis.results import Failure, Failures, Results
+from study_app.analysis.results import Failures, Results
 from study_app.errors import AnalysisError
 from study_app.store.output_files import write_output
 
@@ -30,17 +29,24 @@ def pictures(
 
     A figure that fails is left out, and kept in ``failures``.
     """
-    held = Failures() if failures is None else failures
-    for block, found in zip(study.blocks, results.blocks, strict=True):
-        if not found.n:
-            continue
-        several = len(study.blocks_of(block.kind)) > 1
-        drawing = Drawing(study, block, found, results, block.kind, forms)
-        for what, draw in _of_block(drawing):
-            name = f"{what}-{block.id}" if several else what
-            drawn = held.attempt(f"figure {name}", partial(draw, replace(drawing, name=name)), block=block.id)
-            if drawn is not None and not isinstance(drawn, Failure):
-                yield drawn
+    yield from attempted(
+        (
+            (
+                block.id,
+                f"{what}-{block.id}" if len(study.blocks_of(block.kind)) > 1 else what,
+                partial(_named, draw, one),
+            )
+            for block, found in zip(study.blocks, results.blocks, strict=True)
+            if found.n
+            for one in [Drawing(study, block, found, results, block.kind, forms)]
+            for what, draw in _of_block(one)
+        ),
+        failures,
+    )
+
+
+def _named(draw: Callable[[Drawing], Picture | None], drawing: Drawing, name: str) -> Picture | None:
+    return draw(replace(drawing, name=name))
 
 
 def _of_block(drawing: Drawing) -> Iterator[tuple[str, Callable[[Drawing], Picture | None]]]:
@@ -81,9 +87,13 @@ def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None)
     if not study.blocks and not study.others.questions:
         raise AnalysisError(f"{folder}: the study {study.name!r} asks nothing, so there is nothing to draw")
     files: dict[str, bytes] = {}
-    for picture in chain(_of_statements(study), _of_others(study)):
+    failures = Failures()
+    questions = question_pictures(study, questions_found(study), failures=failures)
+    for picture in (*_of_statements(study), *questions, *level_pictures(study, levels_found(study), failures=failures)):
         files |= {f"{picture.name}.{form}": content for form, content in picture.files.items()}
         files[f"{picture.name}.txt"] = f"{picture.caption}\n".encode()
+    if failures.found:
+        raise AnalysisError(f"a figure cannot be drawn: {failures.found[0]}")
     if not files:
         raise AnalysisError(f"{folder}: no completed session with answers yet: there is nothing to draw")
     written = write_output(study.folder, Path(to), files)
@@ -98,11 +108,3 @@ def _of_statements(study: Study) -> Iterator[Picture]:
             name = kind if len(blocks) == 1 else f"{kind}-{block.id}"
             files = {form: render(study, block, form) for form in style.FORMATS}
             yield Picture(block.id, name, answer_figures.caption(study, block), files)
-
-
-def _of_others(study: Study) -> Iterator[Picture]:
-    failures = Failures()
-    yield from question_pictures(study, questions_found(study), failures=failures)
-    yield from level_pictures(study, levels_found(study), failures=failures)
-    if failures.found:
-        raise AnalysisError(f"a figure cannot be drawn: {failures.found[0]}")

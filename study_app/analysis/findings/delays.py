@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Final
 
 from study_app.analysis.data.blocks import Block, Direction
@@ -514,9 +515,7 @@ class DetectionThreshold(Finding[Threshold | None]):
             f"{curve}{dashed}"
         )
         return drawing.picture(
-            self.figure_title,
-            caption,
-            lambda **own: delay_figures.draw_threshold(threshold, lowest, counts=("",), **own).figure,
+            self.figure_title, caption, lambda look: delay_figures.draw_threshold(threshold, lowest, look)
         )
 
     def sentences(self) -> Iterator[str]:
@@ -662,11 +661,9 @@ class Movement(Finding[None]):
         if not drawing.found.delays_ms or measured is None or not measured.recorded_in(block.id):
             return None
         people = sorted({trial.participant for trial in measured.reached if trial.block == block.id})
-        plots = [
-            delay_figures.Measured(MOVES[measure], measured.by_participant(people, block, measure))
-            for measure in OF_REACHES
-        ]
+        plots = [(MOVES[measure], measured.by_participant(people, block, measure)) for measure in OF_REACHES]
         n = f"n = {len(people)} participant" + ("" if len(people) == 1 else "s")
+        foot = "Added delay, ms. A participant's point: the median of a trial's reaches, the first left out."
         caption = (
             f"How participants reached, over the delay that was asked for ({drawing.simulated}{n} with recordings). "
             f"Thin lines: {delay_figures.line_words(len(people))}; thick line: median; band: the middle half. "
@@ -676,13 +673,6 @@ class Movement(Finding[None]):
         return drawing.picture(
             self.figure_title,
             caption,
-            lambda **own: (
-                delay_figures.draw_movement(
-                    plots,
-                    [setting.delay_ms or 0.0 for setting in block.settings],
-                    counts=[f"{n} with recordings", n],
-                    foot="Added delay, ms. A participant's point: the median of a trial's reaches, the first left out.",
-                    **own,
-                ).figure
-            ),
+            partial(delay_figures.draw_movement, plots, [setting.delay_ms or 0.0 for setting in block.settings], foot),
+            (f"{n} with recordings", n),
         )

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
 
 import numpy as np
@@ -130,17 +131,14 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         return drawing.picture(
             self.figure_title,
             caption,
-            lambda **own: (
-                answer_figures.draw_recognition(
-                    named.found.table,
-                    self.found.names,
-                    [shorts[label] for label in named.labels],
-                    right,
-                    counts=answer_figures.counts(study, block),
-                    foot="Counts, with the share of the row. Framed: the name that is right.",
-                    **own,
-                ).figure
+            partial(
+                answer_figures.draw_recognition,
+                named.found.table,
+                self.found.names,
+                [shorts[label] for label in named.labels],
+                right,
             ),
+            answer_figures.counts(study, block),
         )
 
     def sentences(self) -> Iterator[str]:

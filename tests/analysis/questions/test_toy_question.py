@@ -12,8 +12,8 @@ from PySide6.QtWidgets import QApplication, QPushButton, QWidget
 from study_app.analysis.data import questions as measured
 from study_app.analysis.data.questions import Measure, counts_of_missing
 from study_app.analysis.figures import question_figures
-from study_app.analysis.figures.page_layout import Sheet
-from study_app.analysis.figures.question_figures import Look, QuestionFigure, rows
+from study_app.analysis.figures.page_layout import Look, Sheet
+from study_app.analysis.figures.question_figures import QuestionFigure, rows
 from study_app.analysis.levels.results import QuestionFound
 from study_app.analysis.report.write_report import report
 from study_app.gui.participant.forms import fields

@@ -4,10 +4,9 @@ from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
-from matplotlib.figure import Figure
 from scipy.stats import binomtest
 
-from study_app.analysis.figures.page_layout import Drawing, Picture
+from study_app.analysis.figures.page_layout import Drawing, Look, Picture, Sheet
 from study_app.analysis.findings.block_tests import Asked, alone
 from study_app.analysis.findings.finding import Absent, Answer, Finding
 from study_app.analysis.findings.statement_tests import table_of_tests
@@ -60,10 +59,10 @@ class HighestAnswers(Finding[tuple[Tested, ...]]):
         yield from self.drawn()
 
     def figure(self, drawing: Drawing) -> Picture | None:
-        def figure(**_own: object) -> Figure:
-            drawn = Figure(figsize=(3, 2))
-            drawn.add_subplot().bar(range(len(self.value)), [one.outcome.effect for one in self.value])
-            return drawn
+        def figure(look: Look) -> Sheet:
+            sheet = look.sheet(150)
+            sheet.axes(40, 40, 200, 80).bar(range(len(self.value)), [one.outcome.effect or 0.0 for one in self.value])
+            return sheet
 
         return drawing.picture(self.figure_title, f"{self.figure_title}, as shares.", figure)
 
