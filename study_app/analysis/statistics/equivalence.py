@@ -45,18 +45,9 @@ resample without spread is not infinitely far away."""
 
 
 def p_within(differences: Array, bound: float, seed: int, resamples: int = RESAMPLES) -> Array:
-    """Return the larger of both one-sided p that the means lie above −``bound`` and below ``bound``.
+    """Return the larger of both one-sided p that the mean is above −``bound`` and that it is below ``bound``.
 
-    Parameters
-    ----------
-    differences : (studies, participants) array
-        Paired differences, in points of the scale.
-    bound : float
-        In points of the scale.
-    seed : int
-        Of the resamples.
-    resamples : int
-        How many are drawn.
+    ``differences`` are (studies, participants), ``bound`` is in the same points of the scale.
     """
     n = differences.shape[1]
     shares = _shares(n, seed, resamples)
@@ -176,14 +167,14 @@ def tost(
     checks: bool = True,
     verdict_only: bool = False,
 ) -> Equivalence:
-    """Test whether the mean of paired differences lies within ± ``bound``.
+    """Test whether the mean of paired differences lies within ± ``bound``, set before the study.
 
     Parameters
     ----------
     differences : (participants,) array
         NaN where an answer is missing: dropped.
     bound : float
-        In points of the scale, set before the study.
+        In points of the scale.
     alpha : float
         Level of each one-sided test.
     seed : int
@@ -193,11 +184,6 @@ def tost(
     verdict_only : bool
         Whether to leave out those of these tests that cannot change the verdict: those for equivalence where the t
         tests or ``p_unseen`` do not show it, and the one of a difference where the t test does not.
-
-    Raises
-    ------
-    AnalysisError
-        The bound is not above 0.
     """
     if not (bound > 0.0 and math.isfinite(bound)):
         raise AnalysisError(f"a bound of equivalence of {bound} means nothing; give one above 0 in points of the scale")
@@ -228,30 +214,41 @@ def _compared(
     """Return the comparison of ascending ``differences``: answers in whole points repeat."""
     kept = np.array(differences)
     found = _described(kept, bound, alpha)
-    if not len(kept):
+    if found.n < 2:
         return found
     if found.sd is not None and found.sd > SAME:
         found = replace(found, no_interval="", **_by_t(kept, found.sd, bound, alpha))
         if checks:
-            found = replace(found, **_without_normality(kept, found, seed, verdict_only))
-    elif len(kept) > 1:
-        found = replace(found, **_without_spread(kept, bound, seed))
+            found = replace(found, smallest_check_p=_smallest(found.n))
+            if found.equal or not verdict_only:
+                p_bootstrap = float(p_within(kept[None], bound, seed, resamples_for(alpha))[0])
+                found = replace(found, **_by_signs(kept, bound, seed), p_bootstrap=p_bootstrap)
+            if (found.p_different or 0.0) <= alpha or not verdict_only:
+                found = replace(found, p_different_ranks=_ranks(kept, "two-sided"))
+    else:
+        by_signs = _by_signs(kept, bound, seed)
+        found = replace(
+            found,
+            **by_signs,
+            p=max(by_signs.values()),
+            method=f"signs and signed ranks, bound ±{bound:g} points: all differences are equal",
+            p_different_ranks=_ranks(kept, "two-sided"),
+            p_unseen=p_unseen(found.n, equal=True),
+        )
+    asked = (found.p_permutation, found.p_ranks, found.p_bootstrap)
     if found.p_ranks is not None and found.t is not None:
-        asked = (found.p_permutation, found.p_ranks, found.p_bootstrap)
         by_t = found.p is not None and found.p <= alpha
         found = replace(found, checks_agree=all((p is None or p <= alpha) == by_t for p in asked))
     found = found.judged(found.p_difference, 1)
-    return replace(found, note=_note(found)) if found.p is not None else found
+    return replace(found, note=_note(found))
 
 
 def _described(kept: Array, bound: float, alpha: float) -> Equivalence:
     """Return what can be said before any test."""
     n = len(kept)
-    reason = (
-        f"all {n} differences are equal: no spread for an interval"
-        if n > 1
-        else f"{counted(n, 'participant')}: no spread"
-    )
+    people = f"{counted(n, 'participant')}: no spread"
+    reason = f"all {n} differences are equal: no spread for an interval" if n > 1 else people
+    count = int((np.abs(kept) > bound + SAME).sum())
     return Equivalence(
         test="equivalence, two one-sided t tests",
         n=n,
@@ -266,13 +263,8 @@ def _described(kept: Array, bound: float, alpha: float) -> Equivalence:
         verdict="out of reach",
         smallest_check_p=_smallest(n) if n else None,
         sd=float(kept.std(ddof=1)) if n > 1 else None,
-        beyond=_beyond(kept, bound) if n else None,
+        beyond=Beyond(count=count, n=n, share=count / n, interval=clopper_pearson(count, n)) if n else None,
     )
-
-
-def _beyond(kept: Array, bound: float) -> Beyond:
-    count, n = int((np.abs(kept) > bound + SAME).sum()), len(kept)
-    return Beyond(count=count, n=n, share=count / n, interval=clopper_pearson(count, n))
 
 
 def _by_t(kept: Array, sd: float, bound: float, alpha: float) -> dict[str, Any]:
@@ -297,30 +289,10 @@ def _by_t(kept: Array, sd: float, bound: float, alpha: float) -> dict[str, Any]:
     }
 
 
-def _without_normality(kept: Array, found: Equivalence, seed: int, verdict_only: bool) -> dict[str, Any]:
-    """Return what changing signs, signed ranks and the bootstrap say to the questions that the t tests answered."""
-    bound, alpha, asked = found.bound, found.alpha, dict[str, Any](smallest_check_p=_smallest(len(kept)))
-    if found.equal or not verdict_only:
-        asked["p_permutation"] = max(_signs(kept + bound, seed), _signs(bound - kept, seed))
-        asked["p_ranks"] = max(_ranks(kept + bound), _ranks(bound - kept))
-        asked["p_bootstrap"] = float(p_within(kept[None], bound, seed, resamples_for(alpha))[0])
-    if (found.p_different or 0.0) <= alpha or not verdict_only:
-        asked["p_different_ranks"] = _ranks(kept, "two-sided")
-    return asked
-
-
-def _without_spread(kept: Array, bound: float, seed: int) -> dict[str, Any]:
-    """Return what the tests that need no spread say where all differences are equal."""
-    permuted = max(_signs(kept + bound, seed), _signs(bound - kept, seed))
-    ranked = max(_ranks(kept + bound), _ranks(bound - kept))
-    return {
-        "p": max(permuted, ranked),
-        "method": f"signs and signed ranks, bound ±{bound:g} points: all differences are equal",
-        "p_permutation": permuted,
-        "p_ranks": ranked,
-        "p_different_ranks": _ranks(kept, "two-sided"),
-        "p_unseen": p_unseen(len(kept), equal=True),
-    }
+def _by_signs(kept: Array, bound: float, seed: int) -> dict[str, Any]:
+    """Return what changes of signs and signed ranks say of equivalence."""
+    shifted = (kept + bound, bound - kept)
+    return {"p_permutation": max(_signs(one, seed) for one in shifted), "p_ranks": max(map(_ranks, shifted))}
 
 
 def _note(found: Equivalence) -> str:
@@ -388,18 +360,7 @@ def equivalent(
 ) -> NDArray[np.bool_]:
     """Return whether each study shows equivalence within ± ``bound`` as ``tost`` does: by every one of its tests.
 
-    Parameters
-    ----------
-    differences : (studies, participants) array
-        Paired differences, in points of the scale.
-    bound : float
-        In points of the scale.
-    alpha : float
-        Level of each one-sided test.
-    rng : Generator
-        Draws the resamples.
-    draws : int
-        How many are drawn.
+    ``differences`` are (studies, participants); ``draws`` resamples are drawn by ``rng``.
     """
     n = differences.shape[1]
     spread = differences.std(axis=1, ddof=1) if n > 1 else np.zeros(len(differences))

@@ -7,7 +7,7 @@ Single missing answers are allowed. Settings are tested by the likelihood ratio;
 curvature of the quadrature, not from Laplace's approximation, whose are too small.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
@@ -310,11 +310,6 @@ def ordinal(
     intercepts : bool
         Whether each participant has an intercept of his or her own. Without, answers are taken as independent, which
         shrinks the effects: for comparison only.
-
-    Raises
-    ------
-    AnalysisError
-        The columns do not fit the settings.
     """
     array = np.asarray(values, dtype=np.float64)
     array = checked(array[..., None] if array.ndim == 2 else array, "participants, settings, presentations")
@@ -326,14 +321,14 @@ def ordinal(
     if reason:
         return _outcome(rows, used, levels, design.shape[1], intercepts, None, 0.0, reason)
     answers = _answers(rows, levels, design, intercepts)
-    of_sessions = _factor(None if sessions is None else np.asarray(sessions).reshape(array.shape)[used], rows, answers)
     site = None if sites is None else np.unique(list(sites), return_inverse=True)[1].astype(np.float64)[used]
-    of_sites = _factor(None if site is None else np.broadcast_to(site[:, None, None], rows.shape), rows, answers)
-    factor = _independent(answers.design, of_sessions, of_sites)
-    factors = [
-        *(["sessions"] if of_sessions.shape[1] else []),
-        *(["sites"] if factor.shape[1] > of_sessions.shape[1] else []),
-    ]
+    given = {
+        "sessions": None if sessions is None else np.asarray(sessions).reshape(array.shape)[used],
+        "sites": None if site is None else np.broadcast_to(site[:, None, None], rows.shape),
+    }
+    factor, factors = _factors(
+        answers.design, {name: values[~np.isnan(rows)] for name, values in given.items() if values is not None}
+    )
     whole = fit(Answers(answers.level, np.hstack([answers.design, factor]), answers.starts))
     without = fit(Answers(answers.level, factor, answers.starts))
     ratio = max(0.0, 2 * (whole.log_likelihood - without.log_likelihood))
@@ -376,19 +371,19 @@ def _answers(rows: Array, levels: Array, design: Array, intercepts: bool) -> Ans
     return Answers(level, design[settings], starts)
 
 
-def _factor(sessions: Array | None, rows: Array, answers: Answers) -> Array:
-    """Return a column (answers, sessions − 1) for each session but the first, none where they add nothing."""
-    given = np.zeros(len(answers.level)) if sessions is None else sessions[~np.isnan(rows)]
-    found = np.asarray(given[:, None] == np.unique(given)[1:], dtype=np.float64)
-    together = np.column_stack([np.ones(len(given)), answers.design, found])
-    return found if np.linalg.matrix_rank(together) == together.shape[1] else found[:, :0]
+def _factors(design: Array, given: Mapping[str, Array]) -> tuple[Array, list[str]]:
+    """Return a column for each level but the first of each factor, and which factors have any.
 
-
-def _independent(design: Array, first: Array, second: Array) -> Array:
-    """Return the columns of two factors; without the second where it adds nothing to the first and the settings."""
-    both = np.hstack([first, second])
-    together = np.column_stack([np.ones(len(design)), design, both])
-    return both if np.linalg.matrix_rank(together) == together.shape[1] else first
+    A factor that adds nothing to the settings and to those before it is left out.
+    """
+    held, names = design[:, :0], []
+    for name, levels in given.items():
+        both = np.hstack([held, np.asarray(levels[:, None] == np.unique(levels)[1:], dtype=np.float64)])
+        together = np.column_stack([np.ones(len(design)), design, both])
+        if both.shape[1] > held.shape[1] and np.linalg.matrix_rank(together) == together.shape[1]:
+            held = both
+            names.append(name)
+    return held, names
 
 
 def _outcome(
@@ -404,7 +399,7 @@ def _outcome(
     factors: Sequence[str] = (),
 ) -> Ordinal:
     found = None if note else model
-    coefficients = () if found is None else _coefficients(found)[:columns]
+    coefficients = () if found is None else tuple(_coefficients(found))[:columns]
     single = coefficients[0] if len(coefficients) == 1 else None
     parameters = columns + of_factors + max(0, len(levels) - 1) + intercepts
     errors = None if found is None else found.errors
@@ -437,17 +432,10 @@ def _outcome(
     )
 
 
-def _coefficients(model: Model) -> tuple[Coefficient, ...]:
-    if model.errors is None:
-        return tuple(Coefficient(place, float(value), None, None) for place, value in enumerate(model.effects))
-    errors = model.errors[len(model.thresholds) :]
+def _coefficients(model: Model) -> Iterator[Coefficient]:
     reach = float(norm.ppf((1 + SURE) / 2))
-    return tuple(
-        Coefficient(
-            place,
-            float(value),
-            float(error),
-            Interval(float(value - reach * error), float(value + reach * error), SURE, "Wald"),
-        )
-        for place, (value, error) in enumerate(zip(model.effects, errors, strict=False))
-    )
+    errors = model.errors
+    for place, value in enumerate(model.effects.tolist()):
+        error = None if errors is None else float(errors[len(model.thresholds) + place])
+        ends = None if error is None else Interval(value - reach * error, value + reach * error, SURE, "Wald")
+        yield Coefficient(place, value, error, ends)

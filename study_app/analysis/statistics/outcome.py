@@ -6,9 +6,9 @@ A result never holds NaN: what cannot be computed is None, and ``note`` or ``no_
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -81,14 +81,7 @@ class Outcome:
 
 
 def checked(values: ArrayLike, axes: str) -> Array:
-    """Return ``values`` as floats, NaN where an answer is missing.
-
-    Parameters
-    ----------
-    values : array
-        One axis for each word in ``axes``.
-    axes : str
-        Names of the axes ("participants, settings").
+    """Return ``values`` as floats, NaN where an answer is missing; ``axes`` names them ("participants, settings").
 
     Raises
     ------
@@ -131,25 +124,44 @@ def clopper_pearson(count: int, n: int) -> Interval:
     return Interval(float(ends.low), float(ends.high), 0.95, "Clopper-Pearson")
 
 
-def resamples(n: int, seed: int) -> Iterator[Whole]:
-    """Yield ``SAMPLES`` draws of n of n participants with replacement, in tables (draws, n) of bounded size."""
+def bootstrap(n: int, seed: int | None, sampled: Callable[[Whole], Array], alike: str) -> tuple[Interval | None, str]:
+    """Return the 95 % percentile interval of a statistic over ``n`` participants drawn anew, or why there is none.
+
+    Parameters
+    ----------
+    n : int
+        How many participants there are.
+    seed : int, optional
+        Of the draws; None: no interval.
+    sampled : callable
+        Returns the statistic (draws,) of participants given by their places (draws, n), NaN where there is none.
+    alike : str
+        Why there is no interval where all draws give the same.
+    """
+    if seed is None:
+        return None, "no interval: none was asked for"
+    if n < FEW:
+        return None, TOO_FEW
     rng = np.random.default_rng(seed)
     rows = max(1, 1_000_000 // n)
-    for done in range(0, SAMPLES, rows):
-        yield rng.integers(0, n, (min(rows, SAMPLES - done), n))
-
-
-def percentiles(samples: Array) -> Interval:
-    """Return the 95 % percentile interval of bootstrapped values."""
+    tables = (rng.integers(0, n, (min(rows, SAMPLES - done), n)) for done in range(0, SAMPLES, rows))
+    samples = np.concatenate([sampled(table) for table in tables])
+    samples = samples[~np.isnan(samples)]
+    if np.ptp(samples) == 0.0:
+        return None, alike
     low, high = np.quantile(samples, [0.025, 0.975])
-    return Interval(float(low), float(high), 0.95, f"percentile bootstrap over participants, {SAMPLES} samples")
+    method = f"percentile bootstrap over participants, {SAMPLES} samples"
+    return Interval(float(low), float(high), 0.95, method), ""
 
 
-COMPARED: Final = 20_000
-"""Up to so many pairs of values ranks are counted, which is quicker than sorting."""
+def drawn_p(reached: NDArray[np.bool_], seed: int, least: float, of: str = "") -> tuple[float, float, str]:
+    """Return p, the smallest it could have been (``least`` if all were gone through), and how it was found.
 
-SPARSE: Final = 8
-"""Up to so many values a convolution is quicker as so many shifted sums."""
+    ``reached`` says of each random rearrangement, ``of`` participants or of settings, whether it is as extreme.
+    """
+    draws = len(reached)
+    method = f"Monte Carlo permutation{of}, {draws} draws, seed {seed}"
+    return (1 + int(reached.sum())) / (1 + draws), max(least, 1 / (1 + draws)), method
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,14 +173,7 @@ class Lattice:
 
     def plus(self, other: Lattice) -> Lattice:
         """Return the distribution of the sum of this and an independent ``other``."""
-        held = np.flatnonzero(other.probabilities)
-        if len(held) > SPARSE:
-            summed = np.convolve(self.probabilities, other.probabilities)
-        else:
-            summed = np.zeros(len(self.probabilities) + len(other.probabilities) - 1)
-            for shift in held:
-                summed[shift : shift + len(self.probabilities)] += other.probabilities[shift] * self.probabilities
-        return Lattice(self.start + other.start, summed)
+        return Lattice(self.start + other.start, np.convolve(self.probabilities, other.probabilities))
 
     def at_least(self, value: int) -> float:
         """Return the probability of ``value`` or more."""
@@ -184,23 +189,10 @@ class Lattice:
         """The expected value."""
         return float(np.average(self.start + np.arange(len(self.probabilities)), weights=self.probabilities))
 
-    @property
-    def variance(self) -> float:
-        """The variance."""
-        values = self.start + np.arange(len(self.probabilities))
-        return float(np.average((values - self.mean) ** 2, weights=self.probabilities))
-
-
-NOTHING: Final = Lattice(0, np.ones(1))
-"""The sum of no number."""
-
 
 def total(parts: Iterable[Lattice]) -> Lattice:
-    """Return the distribution of the sum of independent ``parts``."""
-    summed = NOTHING
-    for part in parts:
-        summed = summed.plus(part)
-    return summed
+    """Return the distribution of the sum of independent ``parts``; of an empty sum that of 0."""
+    return reduce(Lattice.plus, parts, Lattice(0, np.ones(1)))
 
 
 def of_values(values: Iterable[int]) -> Lattice:
@@ -214,9 +206,6 @@ def doubled_ranks(values: Array) -> Whole:
     """Return twice the ranks (n, k) within each row of ``values`` (n, k): whole numbers, with mid-ranks for ties."""
     if not values.size:
         return np.zeros(values.shape, dtype=np.int64)
-    if values.shape[0] * values.shape[1] ** 2 <= COMPARED:
-        below, equal = (compare(values[:, None], values[:, :, None]).sum(axis=2) for compare in (np.less, np.equal))
-        return np.asarray(2 * below + equal + 1)
     ranks: Whole = np.rint(2 * rankdata(values, axis=1)).astype(np.int64)
     return ranks
 
@@ -238,11 +227,6 @@ def holm(ps: Sequence[float | None]) -> tuple[float | None, ...]:
     """Return Holm's adjusted p of each test of a family (Holm 1979, Scand. J. Stat. 6, 65–70).
 
     None, a test that gave no p, stays None and counts as a member: it was asked.
-
-    Raises
-    ------
-    AnalysisError
-        A p is not between 0 and 1.
     """
     known = _known(ps)
     adjusted: list[float | None] = [None] * len(ps)
@@ -257,11 +241,6 @@ def false_discovery(ps: Sequence[float | None]) -> tuple[float | None, ...]:
     """Return the p adjusted for the rate of false discoveries (Benjamini & Hochberg 1995), for exploratory blocks.
 
     None stays None and counts as a test with p = 1.
-
-    Raises
-    ------
-    AnalysisError
-        A p is not between 0 and 1.
     """
     known = _known(ps)
     if not known:

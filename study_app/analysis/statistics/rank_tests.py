@@ -21,7 +21,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations, permutations
-from typing import Final, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,6 +40,7 @@ from study_app.analysis.statistics.outcome import (
     checked,
     complete,
     doubled_ranks,
+    drawn_p,
 )
 from study_app.errors import AnalysisError
 
@@ -66,19 +67,10 @@ class Paired(Outcome):
 
 
 def paired(x: ArrayLike, y: ArrayLike, *, alpha: float = 0.05) -> Paired:
-    """Compare answers of the same participants under two settings; equal pairs are left out, as by R and JASP.
+    """Compare answers (participants,) of the same participants under two settings; equal pairs are left out.
 
-    Parameters
-    ----------
-    x, y : (participants,) arrays
-        NaN where an answer is missing: that pair is dropped.
-    alpha : float
-        What p is compared with: the note says where so few pairs cannot reach it.
-
-    Raises
-    ------
-    AnalysisError
-        ``x`` and ``y`` differ in length.
+    So do R and JASP. Pairs with NaN, a missing answer, are dropped. The note says where so few pairs cannot reach p
+    of ``alpha``.
     """
     first, second = checked(x, "participants"), checked(y, "participants")
     if len(first) != len(second):
@@ -180,9 +172,6 @@ cannot fall below 1 / (1 + draws)."""
 
 APPROXIMATE: Final = f"chi-square approximation, corrected for ties, as always above {DRAWN_UP_TO} participants"
 
-DENSE: Final = 50_000
-"""Up to so many codes of rank sums are counted in a table, which is quicker than sorting them."""
-
 TABLED: Final = 7
 """Up to so many settings all their orders fit into a table."""
 
@@ -208,19 +197,9 @@ class Friedman(Outcome):
 
 
 def friedman(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> Friedman:
-    """Test whether settings are answered alike.
+    """Test whether settings are answered alike: values (participants, settings), NaN where an answer is missing.
 
-    Parameters
-    ----------
-    values : (participants, settings) array
-        NaN where an answer is missing; such participants are dropped.
-    draws, seed : int
-        For a drawn p, where the exact distribution would take too long.
-
-    Raises
-    ------
-    AnalysisError
-        There are fewer than three settings.
+    ``draws`` and ``seed`` are of a drawn p, where the exact distribution would take too long.
     """
     rows, dropped = complete(values, at_least=3, why=" for Friedman's test; compare two by the signed ranks of pairs")
     n, k = rows.shape
@@ -284,9 +263,8 @@ def _p(ranks: Whole, squares: int, draws: int, seed: int) -> tuple[float | None,
     if n > DRAWN_UP_TO:
         return None, None, APPROXIMATE
     least = math.exp((1 - n) * math.lgamma(k + 1))
-    drawn = _squares(drawn_sums(ranks, draws, seed), n)
-    p = (1 + int((drawn >= squares).sum())) / (1 + draws)
-    return p, max(least, 1 / (1 + draws)), f"Monte Carlo permutation, {draws} draws, seed {seed}"
+    (sums,) = shuffled_sums(ranks[None], np.ones(ranks.shape, dtype=np.bool_), draws, seed)
+    return drawn_p(_squares(sums, n) >= squares, seed, least)
 
 
 @lru_cache(maxsize=1024)
@@ -300,7 +278,6 @@ def distribution(patterns: tuple[tuple[int, ...], ...]) -> tuple[Whole, Array] |
     if k > TABLED or base**k >= 2**62:
         return None
     powers = base ** np.arange(k, dtype=np.int64)
-    dense = base ** (k - 1) <= DENSE
     states = np.zeros((1, k), dtype=np.int64)
     weights: Array = np.ones(1)
     work = 0
@@ -310,16 +287,8 @@ def distribution(patterns: tuple[tuple[int, ...], ...]) -> tuple[Whole, Array] |
         if work > WORK:
             return None
         sums = np.sort((states[:, None, :] + orders[None, :, :]).reshape(-1, k), axis=1)
-        given = np.repeat(weights / len(orders), len(orders))
-        if dense:  # the last sum follows from the others: without it the codes are few enough to be counted
-            counted = np.bincount(sums[:, :-1] @ powers[:-1], given)
-            codes = np.flatnonzero(counted)
-            weights = counted[codes].astype(np.float64)
-            states = codes[:, None] // powers[:-1] % base
-            states = np.column_stack([states, sums[0].sum() - states.sum(axis=1)])
-            continue
         codes, place = np.unique(sums @ powers, return_inverse=True)
-        weights = np.bincount(place.ravel(), given).astype(np.float64)
+        weights = np.bincount(place.ravel(), np.repeat(weights / len(orders), len(orders))).astype(np.float64)
         states = codes[:, None] // powers % base
     support, place = np.unique(_squares(states, n), return_inverse=True)
     chances = np.bincount(place.ravel(), weights=weights)
@@ -341,12 +310,18 @@ def shuffles(rng: np.random.Generator, draws: int, k: int) -> Whole:
     return table[(rng.random(draws) * len(table)).astype(np.int64)]
 
 
-def drawn_sums(ranks: Whole, draws: int, seed: int) -> Whole:
-    """Return rank sums (draws, k) after shuffling each participant's ``ranks`` (n, k) at random."""
+def shuffled_sums(scores: NDArray[Any], there: NDArray[np.bool_], draws: int, seed: int) -> NDArray[Any]:
+    """Return the sums over participants (items, draws, settings) after shuffling each one's scores at random.
+
+    ``scores`` (items, participants, settings) move together; those that are not ``there`` (participants, settings)
+    stay where they are.
+    """
+    items, _, k = scores.shape
     rng = np.random.default_rng(seed)
-    sums = np.zeros((draws, ranks.shape[1]), dtype=np.int64)
-    for row in ranks:
-        sums += row[shuffles(rng, draws, ranks.shape[1])]
+    sums = np.zeros((items, draws, k), dtype=scores.dtype)
+    for own, given in zip(scores.transpose(1, 0, 2), there, strict=True):
+        places = np.flatnonzero(given)
+        sums[:, :, places] += own[:, places][:, shuffles(rng, draws, len(places))]
     return sums
 
 
@@ -367,19 +342,7 @@ class SkillingsMack(Outcome):
 def skillings_mack(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> SkillingsMack:
     """Test whether settings are answered alike, using participants that miss some.
 
-    Parameters
-    ----------
-    values : (participants, settings) array
-        NaN where an answer is missing.
-    draws : int
-        Rearrangements drawn where not all can be listed.
-    seed : int
-        Of the rearrangements.
-
-    Raises
-    ------
-    AnalysisError
-        There are fewer than three settings.
+    Values are (participants, settings), NaN where an answer is missing; ``draws`` and ``seed`` are of the drawn p.
     """
     array = checked(values, "participants, settings")
     k = array.shape[1]
@@ -388,7 +351,7 @@ def skillings_mack(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> S
     used = (~np.isnan(array)).sum(axis=1) >= 2
     rows = array[used]
     scores = _scores(rows)
-    inverse: Array = np.linalg.pinv(_covariance(~np.isnan(rows))).astype(np.float64)
+    inverse: Array = np.linalg.pinv(_covariance((~np.isnan(rows)).astype(np.float64))).astype(np.float64)
     sums = scores.sum(axis=0)
     statistic = float(sums @ inverse @ sums)
     df = int(np.linalg.matrix_rank(inverse)) if len(rows) else 0
@@ -426,24 +389,12 @@ def _scores(rows: Array) -> Array:
     return scores
 
 
-def _covariance(there: Array) -> Array:
-    """Return the covariance (k, k) of the adjusted sums: −(how many participants answered both), rows sum to 0."""
-    counts = there.astype(np.float64)
-    covariance: Array = -(counts.T @ counts)
-    np.fill_diagonal(covariance, 0.0)
-    np.fill_diagonal(covariance, -covariance.sum(axis=1))
-    return covariance
+def _covariance(weights: Array) -> Array:
+    """Return the covariance (k, k) of the adjusted sums: of settings minus their common weights, rows sum to 0.
 
-
-def _tied_covariance(scores: Array, there: NDArray[np.bool_]) -> Array:
-    """Return the covariance (k, k) of the adjusted sums when each participant's own ``scores`` change places.
-
-    Without ties it is ``_covariance``.
+    Without ties the ``weights`` (n, k) are 1 where there is an answer and 0 elsewhere.
     """
-    counts = there.sum(axis=1)
-    spread = (scores**2).sum(axis=1) / (counts - 1) / counts
-    weighted: Array = there * np.sqrt(spread)[:, None]
-    covariance: Array = -(weighted.T @ weighted)
+    covariance: Array = -(weights.T @ weights)
     np.fill_diagonal(covariance, 0.0)
     np.fill_diagonal(covariance, -covariance.sum(axis=1))
     return covariance
@@ -451,20 +402,17 @@ def _tied_covariance(scores: Array, there: NDArray[np.bool_]) -> Array:
 
 def _p_with_gaps(scores: Array, rows: Array, inverse: Array, draws: int, seed: int) -> tuple[float, float | None, str]:
     """Return p by shuffling each participant's given answers, the smallest it could have been, and the method."""
-    sums = scores.sum(axis=0)
+    sums, there = scores.sum(axis=0), ~np.isnan(rows)
     if len(rows) > DRAWN_UP_TO:
-        covariance = _tied_covariance(scores, ~np.isnan(rows))
+        counts = there.sum(axis=1)
+        spread = (scores**2).sum(axis=1) / (counts - 1) / counts  # of each participant's scores changing places
+        covariance = _covariance(there * np.sqrt(spread)[:, None])
         reached = float(sums @ np.linalg.pinv(covariance) @ sums)
         return float(chi_square.sf(reached, np.linalg.matrix_rank(covariance))), None, APPROXIMATE
     found = float(sums @ inverse @ sums)
-    rng = np.random.default_rng(seed)
-    drawn = np.zeros((draws, rows.shape[1]))
-    for score, values in zip(scores, rows, strict=True):
-        there = np.flatnonzero(~np.isnan(values))
-        drawn[:, there] += score[there][shuffles(rng, draws, len(there))]
+    (drawn,) = shuffled_sums(scores[None], there, draws, seed)
     statistics = np.einsum("dk,kl,dl->d", drawn, inverse, drawn)
-    p = (1 + int((statistics >= found - 1e-9 * abs(found)).sum())) / (1 + draws)
-    return p, 1 / (1 + draws), f"Monte Carlo permutation, {draws} draws, seed {seed}"
+    return drawn_p(statistics >= found - 1e-9 * abs(found), seed, 0.0)
 
 
 EXACT_OVER_ALL: Final = 50_000
@@ -487,21 +435,10 @@ class GlobalPermutation(Outcome):
 
 
 def global_permutation(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> GlobalPermutation:
-    """Test whether settings are answered alike in all statements.
+    """Test whether settings are answered alike in all statements: values (items, participants, settings).
 
-    Parameters
-    ----------
-    values : (items, participants, settings) array
-        NaN where an answer is missing: that participant's row of that statement is left out.
-    draws : int
-        Rearrangements drawn where not all can be listed.
-    seed : int
-        Of the rearrangements.
-
-    Raises
-    ------
-    AnalysisError
-        There are fewer than two settings.
+    NaN where an answer is missing: that participant's row of that statement is left out. ``draws`` and ``seed`` are of
+    a drawn p, where not all rearrangements can be gone through.
     """
     array = checked(values, "items, participants, settings")
     k = array.shape[2]
@@ -513,22 +450,22 @@ def global_permutation(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) 
     scores, n = _scores_over_all(array, whole), array.shape[1]
     varying = scores.any(axis=(1, 2))
     scores = scores[varying]
-    found = _statistic(scores.sum(axis=1)[None])[0] if len(scores) else None
-    p, smallest, method = (None, None, "none") if found is None else _p_over_all(scores, float(found), draws, seed)
-    rows = whole.sum(axis=1)[varying]
-    mean_w = None if found is None else _mean_w(scores, rows)
+    chi2 = (scores.sum(axis=1) ** 2).sum(axis=1)
+    found = float(chi2.sum()) if len(scores) else None
+    p, smallest, method = (None, None, "none") if found is None else _p_over_all(scores, found, draws, seed)
+    mean_w = None if found is None else float((chi2 / (whole.sum(axis=1)[varying] * (k - 1))).mean())
     return GlobalPermutation(
         test="global permutation over all statements",
         n=n,
         dropped=int((~used).sum()),
         statistic_name="sum of chi2",
-        statistic=None if found is None else float(found),
+        statistic=found,
         p=p,
         smallest_p=smallest,
         method=method,
         effect_name="mean Kendall's W",
         effect=mean_w,
-        no_interval="no interval for W: it cannot be negative, so that intervals for it cover less than they claim",
+        no_interval=NO_INTERVAL,
         note="" if found is not None else "no participant completed a statement" if n == 0 else NO_VARIATION,
         items=int(varying.sum()),
         incomplete=int((~whole).sum()),
@@ -547,44 +484,21 @@ def _scores_over_all(array: Array, whole: NDArray[np.bool_]) -> Array:
     return scores
 
 
-def _statistic(sums: Array) -> Array:
-    """Return the sums of chi-squares (…) of column sums (…, items, k)."""
-    squares: Array = (sums**2).sum(axis=(-2, -1))
-    return squares
-
-
-def _mean_w(scores: Array, rows: Whole) -> float:
-    chi2 = (scores.sum(axis=1) ** 2).sum(axis=1)
-    return float((chi2 / (rows * (scores.shape[2] - 1))).mean())
-
-
 def _p_over_all(scores: Array, found: float, draws: int, seed: int) -> tuple[float, float, str]:
     """Return p, the smallest it could have been, and how it was found."""
-    items, n, k = scores.shape
-    people = scores.transpose(1, 0, 2)
+    _, n, k = scores.shape
     orders = math.factorial(k)
     if (n - 1) * math.log(orders) <= math.log(EXACT_OVER_ALL):
-        reached = _all(people)
-        highest = reached.max()
+        people = scores.transpose(1, 0, 2)
+        sums = people[:1]  # the first participant may stay as he or she is
+        every = np.array(list(permutations(range(k))))
+        for person in people[1:]:
+            sums = (sums[:, None] + person[:, every].transpose(1, 0, 2)[None]).reshape(-1, *person.shape)
+        reached = (sums**2).sum(axis=(1, 2))
         p = float((reached >= found * (1 - ROUNDING)).mean())
-        return p, float((reached >= highest * (1 - ROUNDING)).mean()), "exact permutation"
-    rng = np.random.default_rng(seed)
-    sums = np.zeros((items, draws, k))
-    for person in people:
-        sums += person[:, shuffles(rng, draws, k)]
-    p = (1 + int((_statistic(sums.transpose(1, 0, 2)) >= found * (1 - ROUNDING)).sum())) / (1 + draws)
-    least = max(1 / (1 + draws), math.exp((1 - n) * math.log(orders)))
-    return p, least, f"Monte Carlo permutation, {draws} draws, seed {seed}"
-
-
-def _all(people: Array) -> Array:
-    """Return the statistic of every rearrangement of people (n, items, k); the first may stay as it is."""
-    sums = people[:1]
-    orders = np.array(list(permutations(range(people.shape[2]))))
-    for person in people[1:]:
-        moved = person[:, orders].transpose(1, 0, 2)
-        sums = (sums[:, None] + moved[None]).reshape(-1, *person.shape)
-    return _statistic(sums)
+        return p, float((reached >= reached.max() * (1 - ROUNDING)).mean()), "exact permutation"
+    drawn = (shuffled_sums(scores, np.ones((n, k), dtype=np.bool_), draws, seed) ** 2).sum(axis=(0, 2))
+    return drawn_p(drawn >= found * (1 - ROUNDING), seed, math.exp((1 - n) * math.log(orders)))
 
 
 EXACT_GROUPS: Final = 50_000
@@ -626,11 +540,6 @@ def groups_differ(
         What the test is called.
     draws, seed : int
         For a drawn p, where going through all allocations would take too long.
-
-    Raises
-    ------
-    AnalysisError
-        There are more or fewer groups than participants.
     """
     array = checked(values, "participants, values")
     if len(groups) != len(array):
@@ -697,12 +606,11 @@ def _p_of_groups(
         p = float((reached >= reached_by).mean())
         return p, float((reached >= reached.max() * (1 - ROUNDING)).mean()), "exact permutation of participants"
     rng = np.random.default_rng(seed)
-    above = 0
+    above = []
     for done in range(0, draws, AT_ONCE):
         drawn = rng.permuted(np.tile(labels, (min(AT_ONCE, draws - done), 1)), axis=1)
-        above += int((_between(centred, drawn, len(sizes)) >= reached_by).sum())
-    least = max(1 / (1 + draws), math.exp(-log_ways))
-    return (1 + above) / (1 + draws), least, f"Monte Carlo permutation of participants, {draws} draws, seed {seed}"
+        above.append(_between(centred, drawn, len(sizes)) >= reached_by)
+    return drawn_p(np.concatenate(above), seed, math.exp(-log_ways), " of participants")
 
 
 def _allocations(sizes: tuple[int, ...], n: int) -> Iterator[Whole]:

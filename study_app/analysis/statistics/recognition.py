@@ -1,7 +1,6 @@
 """Whether participants recognise which liquid they felt, and how far two ways of naming agree.
 
-Cohen (1960), Educ. Psychol. Meas. 20, 37–46; its standard error: Fleiss, Cohen & Everitt (1969), Psychol. Bull. 72,
-323–327.
+Cohen (1960), Educ. Psychol. Meas. 20, 37–46.
 
 What a participant names is the single label rated highest ("this liquid behaves like …"); equal highest ratings are
 undecided. Chance is what remains when the settings are exchanged within each participant.
@@ -16,81 +15,34 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import norm
 
 from study_app.analysis.statistics.outcome import (
-    FEW,
-    TOO_FEW,
     Array,
     Interval,
     Lattice,
     Outcome,
     Whole,
+    bootstrap,
     checked,
     clopper_pearson,
     of_values,
-    percentiles,
-    resamples,
     total,
 )
 from study_app.errors import AnalysisError
 
-SURE: Final = 0.95
 
+def kappa(tables: ArrayLike) -> Array:
+    """Return Cohen's kappa (…) of tables (…, labels, labels) of counts; NaN where nothing or always one name was given.
 
-@dataclass(frozen=True, slots=True)
-class Kappa:
-    """Cohen's kappa of ``n`` pairs of names; None with ``note`` where it does not exist.
-
-    ``interval`` takes the pairs to be independent.
+    The counts are of right and given names.
     """
-
-    n: int
-    kappa: float | None
-    agreement: float | None
-    expected: float | None
-    interval: Interval | None
-    note: str
-
-
-def kappa(table: ArrayLike) -> Kappa:
-    """Return Cohen's kappa of a square table of counts.
-
-    Raises
-    ------
-    AnalysisError
-        The table is not square or holds something else than counts.
-    """
-    counts = checked(table, "categories of one, categories of the other")
-    if counts.shape[0] != counts.shape[1] or not (counts >= 0).all():
-        raise AnalysisError(
-            f"a table of shape {counts.shape} is not a square table of counts: give one row and one column per category"
-        )
-    n = int(counts.sum())
-    if n == 0:
-        return Kappa(0, None, None, None, None, "nothing was named")
-    shares = counts / n
-    agreed = float(np.trace(shares))
-    rows, columns = shares.sum(axis=1), shares.sum(axis=0)
-    expected = float(rows @ columns)
-    if expected == 1.0:
-        return Kappa(n, None, agreed, expected, None, "no variation: always the same name for the same thing")
-    found = (agreed - expected) / (1 - expected)
-    error = _kappa_error(shares, rows, columns, agreed, expected, n)
-    reach = float(norm.ppf((1 + SURE) / 2)) * error
-    interval = Interval(found - reach, min(1.0, found + reach), SURE, "normal, answers taken as independent")
-    return Kappa(n, found, agreed, expected, interval if error > 0.0 else None, "")
-
-
-def _kappa_error(shares: Array, rows: Array, columns: Array, agreed: float, expected: float, n: int) -> float:
-    """Return the standard error of kappa (Fleiss, Cohen & Everitt 1969, eq. 13)."""
-    found = (agreed - expected) / (1 - expected)
-    ends = columns[:, None] + rows[None, :]
-    off = shares * ends**2
-    np.fill_diagonal(off, 0.0)
-    diagonal = np.diag(shares) * (1 - (rows + columns) * (1 - found)) ** 2
-    variance = diagonal.sum() + (1 - found) ** 2 * off.sum() - (found - expected * (1 - found)) ** 2
-    return math.sqrt(max(0.0, float(variance))) / ((1 - expected) * math.sqrt(n))
+    counts = np.asarray(tables, dtype=np.float64)
+    n = counts.sum(axis=(-2, -1), keepdims=True)
+    shares = np.divide(counts, n, out=np.zeros_like(counts), where=n > 0)
+    agreed = np.trace(shares, axis1=-2, axis2=-1)
+    expected = (shares.sum(axis=-2) * shares.sum(axis=-1)).sum(axis=-1)
+    exists = (n[..., 0, 0] > 0) & (expected < 1.0)
+    return np.where(exists, (agreed - expected) / np.where(exists, 1 - expected, 1.0), np.nan)
 
 
 UNDECIDED: Final = -1
@@ -159,11 +111,6 @@ def recognition(names: ArrayLike, truth: Sequence[int | None], labels: int, *, s
         How many labels there were to choose from.
     seed : int, optional
         For the bootstrap interval of kappa, from ten participants; None: no interval.
-
-    Raises
-    ------
-    AnalysisError
-        Names and truth do not fit together.
     """
     given = _names(names, truth, labels)
     used = (given != UNANSWERED).any(axis=1)
@@ -228,29 +175,16 @@ def _kappa(given: Whole, right: Whole, labels: int, seed: int | None) -> tuple[f
     people, settings = np.nonzero(used)
     np.add.at(tables, (people, right[settings], given[people, settings]), 1)
     tables = tables[used.any(axis=1)]
-    whole = kappa(tables.sum(axis=0))
-    if whole.kappa is None:
-        return None, None, f"no interval: {whole.note}"
-    if seed is None:
-        return whole.kappa, None, "no interval: none was asked for"
-    if len(tables) < FEW:
-        return whole.kappa, None, TOO_FEW
-    samples = np.concatenate([_kappas(tables, rows) for rows in resamples(len(tables), seed)])
-    samples = samples[~np.isnan(samples)]
-    if np.ptp(samples) == 0.0:
-        return whole.kappa, None, "no interval: all participants gave the same names"
-    return whole.kappa, percentiles(samples), ""
+    whole = float(kappa(tables.sum(axis=0)))
+    if math.isnan(whole):
+        why = "no variation: always the same name for the same thing" if used.any() else "nothing was named"
+        return None, None, f"no interval: {why}"
 
+    def resampled(people: Whole) -> Array:
+        times = np.array([np.bincount(row, minlength=len(tables)) for row in people])
+        return kappa(np.tensordot(times, tables, axes=1))
 
-def _kappas(tables: Array, rows: Whole) -> Array:
-    """Return kappa (draws,) of the summed ``tables`` (n, labels, labels) of resampled participants (draws, n)."""
-    times = np.array([np.bincount(row, minlength=len(tables)) for row in rows])
-    shares = np.tensordot(times, tables, axes=1)
-    shares /= shares.sum(axis=(1, 2), keepdims=True)
-    agreed = np.trace(shares, axis1=1, axis2=2)
-    expected = (shares.sum(axis=1) * shares.sum(axis=2)).sum(axis=1)
-    values: Array = np.where(expected < 1.0, (agreed - expected) / np.where(expected < 1.0, 1 - expected, 1.0), np.nan)
-    return values
+    return whole, *bootstrap(len(tables), seed, resampled, "no interval: all participants gave the same names")
 
 
 def _rate(given: Whole, setting: int, label: int) -> HitRate:

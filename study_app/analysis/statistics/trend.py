@@ -18,19 +18,14 @@ from numpy.typing import ArrayLike
 from scipy.stats import norm
 
 from study_app.analysis.statistics.outcome import (
-    FEW,
     NO_VARIATION,
-    TOO_FEW,
-    Array,
-    Interval,
     Lattice,
     Outcome,
     Whole,
+    bootstrap,
     checked,
     complete,
     doubled_ranks,
-    percentiles,
-    resamples,
     total,
 )
 from study_app.errors import AnalysisError
@@ -80,21 +75,10 @@ class StepDown:
 
 
 def page(values: ArrayLike, direction: Direction = "increasing", *, seed: int | None = 1) -> Page:
-    """Test whether answers follow the order of the settings.
+    """Test whether answers (participants, settings) follow the order of the settings, in the direction stated before.
 
-    Parameters
-    ----------
-    values : (participants, settings) array
-        Settings in their order; NaN where an answer is missing: such participants are dropped.
-    direction : "increasing" | "decreasing"
-        Where answers go as the settings go up, stated before the study.
-    seed : int, optional
-        For the bootstrap interval of the effect, from ten participants; None: no interval.
-
-    Raises
-    ------
-    AnalysisError
-        There are fewer than two settings.
+    NaN where an answer is missing: such participants are dropped. ``seed`` is of the bootstrap interval of the effect,
+    from ten participants; None: no interval.
     """
     rows, dropped = complete(values, at_least=2, why=" for a trend")
     ranks = doubled_ranks(rows if direction == "increasing" else -rows)
@@ -105,7 +89,10 @@ def page(values: ArrayLike, direction: Direction = "increasing", *, seed: int | 
     correlations = (scores - middle) / (k * (k * k - 1) / 6)
     p, smallest, method = _p(ranks, int(scores.sum())) if varies else (None, None, "none")
     note = "" if varies else "no participant answered under all settings" if n == 0 else NO_VARIATION
-    interval, reason = (None, note) if note else _interval(correlations, seed)
+    interval, reason = None, note
+    if not note:
+        alike = "no interval: all participants have the same correlation"
+        interval, reason = bootstrap(n, seed, lambda people: correlations[people].mean(axis=1), alike)
     return Page(
         test="Page's trend",
         n=n,
@@ -124,18 +111,6 @@ def page(values: ArrayLike, direction: Direction = "increasing", *, seed: int | 
         # Without ties L is whole: half a rank is cut off, as in R and scipy.
         p_untied=_p(np.tile(2 * np.arange(1, k + 1), (n, 1)), int(scores.sum()) // 2 * 2)[0] if varies else None,
     )
-
-
-def _interval(correlations: Array, seed: int | None) -> tuple[Interval | None, str]:
-    if seed is None:
-        return None, "no interval: none was asked for"
-    if len(correlations) < FEW:
-        return None, TOO_FEW
-    if np.ptp(correlations) == 0.0:
-        return None, "no interval: all participants have the same correlation"
-    return percentiles(
-        np.concatenate([correlations[rows].mean(axis=1) for rows in resamples(len(correlations), seed)])
-    ), ""
 
 
 def step_down(
@@ -157,11 +132,6 @@ def step_down(
         Where answers go as the delay grows.
     alpha : float
         Level of every step.
-
-    Raises
-    ------
-    AnalysisError
-        The delays do not ascend or are not as many as the columns.
     """
     array = checked(values, "participants, delays")
     if len(delays_ms) != array.shape[1] or any(a >= b for a, b in pairwise(delays_ms)):

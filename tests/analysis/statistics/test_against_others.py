@@ -50,11 +50,7 @@ def test_statsmodels() -> None:
     assert holm(ps) == pytest.approx(multiple.multipletests(ps, method="holm")[1])
     assert false_discovery(ps) == pytest.approx(multiple.multipletests(ps, method="fdr_bh")[1])
     table = [[12, 3, 1], [2, 9, 4], [0, 5, 11]]
-    theirs, ours = vendor("statsmodels.stats.inter_rater").cohens_kappa(table), kappa(table)
-    assert ours.interval is not None
-    assert (theirs.kappa, theirs.kappa_low, theirs.kappa_upp) == pytest.approx(
-        (ours.kappa, ours.interval.low, ours.interval.high)
-    )
+    assert vendor("statsmodels.stats.inter_rater").cohens_kappa(table).kappa == pytest.approx(float(kappa(table)))
     values = answers(14, 3, seed=2)
     p, (t_lower, p_lower, _), (t_upper, p_upper, _) = vendor("statsmodels.stats.weightstats").ttost_paired(
         values[:, 1], values[:, 0], -1.0, 1.0
