@@ -1,6 +1,5 @@
 """From a study to all that can be said about it: the one place that decides which tests apply to which block."""
 
-from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Final
@@ -68,45 +67,40 @@ def _ending(progress: Progress, what: str, share: float) -> None:
 
 
 def _evaluated(study: Study, failures: Failures, progress: Progress, *, planning: bool) -> Results:
-    blocks = []
-    for number, block in enumerate(study.blocks):
-        each = partial(_testing, progress, 0.5 * number / len(study.blocks))
-        found = failures.attempt(
-            "all tests", partial(_block, study, block, each, failures, planning=planning), block=block.id
+    def tested(number: int, block: Block) -> BlockFound:
+        def each(what: str) -> None:
+            progress(f"testing: {what}", 0.5 * number / len(study.blocks))
+
+        def test() -> BlockFound:
+            return found_in(study, asked(study, block, SEED, each, failures, planning=planning))
+
+        found = failures.attempt("all tests", test, block=block.id)
+        return untested(block, NotTested(found.what, found.why)) if isinstance(found, Failure) else found
+
+    def moved() -> Performance | None:
+        """Measure motion and force; None while sealed, since a thick liquid is known by its force."""
+        if not study.revealed:
+            return None
+        return performance(
+            study, lambda done, total: progress(f"reading recordings: {done} of {total}", 0.5 + 0.3 * done / total)
         )
-        blocks.append(untested(block, NotTested(found.what, found.why)) if isinstance(found, Failure) else found)
-    shown = failures.attempt("the delays as they were shown", lambda: delivered(study))
-    run = failures.attempt("the orders as run", lambda: orders(study))
-    asked_ = failures.attempt("the answers to other questions", lambda: questions_found(study))
-    scores = failures.attempt("scores of questionnaires", lambda: scores_found(study))
-    levels = failures.attempt("the answers at each level", lambda: levels_found(study))
-    known = () if isinstance(levels, Failure) else levels
-    of_sites = failures.attempt("thresholds by site", lambda: tuple(site_thresholds(study, known, SEED)))
-    moved = failures.attempt("motion and force", lambda: _performance(study, progress))
+
+    blocks = tuple(tested(number, block) for number, block in enumerate(study.blocks))
+    levels = failures.value("the answers at each level", lambda: levels_found(study), ())
     return Results(
         decided=study.decided,
         people=study.people,
-        blocks=tuple(blocks),
-        delivered=() if isinstance(shown, Failure) else shown,
-        orders={} if isinstance(run, Failure) else run,
-        performance=None if isinstance(moved, Failure) else moved,
+        blocks=blocks,
+        delivered=failures.value("the delays as they were shown", lambda: delivered(study), ()),
+        orders=failures.value("the orders as run", lambda: orders(study), {}),
         seed=SEED,
+        questions=failures.value("the answers to other questions", lambda: questions_found(study), ()),
+        scores=failures.value("scores of questionnaires", lambda: scores_found(study), ()),
+        levels=levels,
+        site_thresholds=failures.value("thresholds by site", lambda: tuple(site_thresholds(study, levels, SEED)), ()),
+        performance=failures.value("motion and force", moved, None),
         failures=tuple(failures.found),
-        questions=() if isinstance(asked_, Failure) else asked_,
-        scores=() if isinstance(scores, Failure) else scores,
-        levels=known,
-        site_thresholds=() if isinstance(of_sites, Failure) else of_sites,
     )
-
-
-def _testing(progress: Progress, share: float, what: str) -> None:
-    progress(f"testing: {what}", share)
-
-
-def _block(
-    study: Study, block: Block, each: Callable[[str], object], failures: Failures, *, planning: bool
-) -> BlockFound:
-    return found_in(study, asked(study, block, SEED, each, failures, planning=planning))
 
 
 def found_in(study: Study | None, answers: Asked) -> BlockFound:
@@ -134,30 +128,23 @@ def found_in(study: Study | None, answers: Asked) -> BlockFound:
     return replace(found, absent=(*found.absent, *settings, *not_tested))
 
 
-def _performance(study: Study, progress: Progress) -> Performance | None:
-    """Measure motion and force; None while sealed, since a thick liquid is known by its force."""
-    if not study.revealed:
-        return None
-    return performance(
-        study, lambda done, total: progress(f"reading recordings: {done} of {total}", 0.5 + 0.3 * done / total)
-    )
-
-
 def delivered(study: Study) -> tuple[Delivered, ...]:
     """Return the check of the manipulation: by setting, or over all settings of a block while they are sealed.
 
     Errors by code would tell little, and delays nothing may tell before the key is opened.
     """
-    return tuple(one for block in study.blocks for one in _delivered(study, block))
-
-
-def _delivered(study: Study, block: Block) -> Iterator[Delivered]:
-    rows = study.trials[study.trials["counted"] & (study.trials["block"] == block.id)]
-    if not block.revealed:
-        yield _measured(block, None, None, rows)
-        return
-    for setting in block.settings:
-        yield _measured(block, setting.code, setting.delay_ms, rows[rows["code"] == setting.code])
+    counted = study.trials[study.trials["counted"]]
+    found = []
+    for block in study.blocks:
+        rows = counted[counted["block"] == block.id]
+        if not block.revealed:
+            found.append(_measured(block, None, None, rows))
+            continue
+        found += [
+            _measured(block, setting.code, setting.delay_ms, rows[rows["code"] == setting.code])
+            for setting in block.settings
+        ]
+    return tuple(found)
 
 
 def _measured(block: Block, code: str | None, delay_ms: float | None, rows: pd.DataFrame) -> Delivered:

@@ -63,6 +63,7 @@ class SiteThresholds:
 
 
 T = TypeVar("T")
+U = TypeVar("U")
 Progress: TypeAlias = Callable[[str, float], object]
 """Receives what is being done, and which share of all is done (0 to 1); what it raises ends the evaluation."""
 
@@ -114,6 +115,11 @@ class Failures:
             )
             self.found.append(failure)
             return failure
+
+    def value(self, what: str, compute: Callable[[], T], empty: U) -> T | U:
+        """Return what ``compute`` returns, or ``empty`` where it fails."""
+        found = self.attempt(what, compute)
+        return empty if isinstance(found, Failure) else found
 
 
 Verdict: TypeAlias = Literal["shown", "suggested", "not shown", "out of reach", "not tested"]

@@ -36,7 +36,6 @@ from study_app.store.tables.study_files import participants_of, study_folders
 from study_app.workers.server import Stopped
 
 if TYPE_CHECKING:
-    from study_app.analysis.data.blocks import Block
     from study_app.analysis.data.study_tables import Study
 
 # The libraries of an evaluation are loaded where they are needed: sessions are listed before.
@@ -56,10 +55,8 @@ def carry_out(order: Order, send: Send, stop: Callable[[], bool]) -> Done:
             _read(order.folder, send, stop)
         case LeaveOut():
             place = own_place(order.folder, order.participant)
-            exclude(*place, order.session, trial=order.trial, by=order.by, reason=order.reason)
-        case TakeBack():
-            place = own_place(order.folder, order.participant)
-            include(*place, order.session, trial=order.trial, by=order.by, reason=order.reason)
+            change = include if isinstance(order, TakeBack) else exclude
+            change(*place, order.session, trial=order.trial, by=order.by, reason=order.reason)
         case OpenKey():
             opened = unblind_folder(order.folder, by=order.by, reason=order.reason)
             return Done(warnings=tuple(line for site in opened.values() for line in site.left))
@@ -85,14 +82,11 @@ def _studies(results: Path) -> Iterator[StudyAt]:
         if sessions:
             with contextlib.suppress(StoreError):  # said when the study is read
                 first = receipt.read(sessions[0].receipt)
-        begun = [_changed(session.path) for session in sessions]
-        yield StudyAt(folder, bool(first.get("simulated")), bool(first.get("pilot")), max(begun, default=0.0))
-
-
-def _changed(path: Path) -> float:
-    with contextlib.suppress(OSError):
-        return path.stat().st_mtime
-    return 0.0
+        newest = 0.0
+        for session in sessions:
+            with contextlib.suppress(OSError):
+                newest = max(newest, session.path.stat().st_mtime)
+        yield StudyAt(folder, bool(first.get("simulated")), bool(first.get("pilot")), newest)
 
 
 def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
@@ -108,20 +102,14 @@ def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
     send(_study_found(study))
     _go_on(stop)
     from study_app.analysis.figures import answer_figures  # noqa: PLC0415
+    from study_app.analysis.figures.study_figures import block_name  # noqa: PLC0415
 
     for number, block in enumerate(study.blocks):
         send(Progress("drawing", 0.3 + 0.7 * number / len(study.blocks)))
+        words, svg = "No completed session has answers here yet.", b""
         if len(study.answers(block)):
-            svg = answer_figures.render(study, block, "svg")
-            send(
-                FigureDrawn(_name(study, block), answer_figures.title(block), answer_figures.caption(study, block), svg)
-            )
-        else:
-            send(
-                FigureDrawn(
-                    _name(study, block), answer_figures.title(block), "No completed session has answers here yet."
-                )
-            )
+            words, svg = answer_figures.caption(study, block), answer_figures.render(study, block, "svg")
+        send(FigureDrawn(block_name(study, block), answer_figures.title(block), words, svg))
         _go_on(stop)
     _draw_questions(study, send, stop)
     if study.revealed and study.n:
@@ -180,29 +168,20 @@ def _study_found(study: Study) -> StudyFound:
 def _evaluate(study: Study, send: Send, stop: Callable[[], bool]) -> None:
     """Test everything, then draw again what that adds to, and what only then can be drawn."""
     from study_app.analysis.evaluate import evaluate  # noqa: PLC0415
-    from study_app.analysis.figures.study_figures import pictures  # noqa: PLC0415
+    from study_app.analysis.figures import answer_figures  # noqa: PLC0415
+    from study_app.analysis.figures.study_figures import block_name, pictures  # noqa: PLC0415
+    from study_app.analysis.findings import all_findings  # noqa: PLC0415
 
     going = partial(_going, send, stop)
     going("testing", 0.0)
     results = evaluate(study, progress=lambda what, share: going(what, EVALUATION * share), planning=False)
-    for drawn, picture in enumerate(pictures(study, results, ("svg",)), start=1):
-        title = _title(study, picture.name)
-        send(FigureDrawn(picture.name, title, picture.caption, picture.files["svg"]))
-        going("drawing", EVALUATION + (1 - EVALUATION) * min(1.0, drawn / 4))
-
-
-def _title(study: Study, name: str) -> str:
-    from study_app.analysis.figures import answer_figures  # noqa: PLC0415
-    from study_app.analysis.findings import all_findings  # noqa: PLC0415
-
-    titles = {_name(study, block): answer_figures.title(block) for block in study.blocks}
+    titles = {block_name(study, block): answer_figures.title(block) for block in study.blocks}
     titles |= {one.figure_name: one.figure_title for one in all_findings() if one.figure_name}
-    return titles.get(name) or titles.get(name.partition("-")[0], name.capitalize())
-
-
-def _name(study: Study, block: Block) -> str:
-    """Return the name of a block's figure of answers, as a report's files have it."""
-    return f"{block.kind}-{block.id}" if len(study.blocks_of(block.kind)) > 1 else block.kind
+    for drawn, picture in enumerate(pictures(study, results, ("svg",)), start=1):
+        name = picture.name
+        title = titles.get(name) or titles.get(name.partition("-")[0], name.capitalize())
+        send(FigureDrawn(name, title, picture.caption, picture.files["svg"]))
+        going("drawing", EVALUATION + (1 - EVALUATION) * min(1.0, drawn / 4))
 
 
 def _write(order: WriteTables | WriteReport, send: Send, stop: Callable[[], bool]) -> Done:

@@ -39,15 +39,8 @@ class LeaveOut:
 
 
 @dataclass(frozen=True, slots=True)
-class TakeBack:
+class TakeBack(LeaveOut):
     """Take back that a session or a trial is left out (see ``store.exclusions.include``)."""
-
-    folder: Path
-    participant: str
-    session: int
-    trial: int | None
-    by: str
-    reason: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from study_app import figure_style as style
-from study_app.analysis.data.blocks import KINDS
+from study_app.analysis.data.blocks import KINDS, Block
 from study_app.analysis.data.questions import questions_found
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.figures import answer_figures
@@ -43,6 +43,12 @@ def pictures(
         ),
         failures,
     )
+
+
+def block_name(study: Study, block: Block, what: str = "") -> str:
+    """Return the name of a figure as a file, by default of the block's answers."""
+    name = what or block.kind
+    return f"{name}-{block.id}" if len(study.blocks_of(block.kind)) > 1 else name
 
 
 def _named(draw: Callable[[Drawing], Picture | None], drawing: Drawing, name: str) -> Picture | None:
@@ -103,8 +109,6 @@ def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None)
 
 def _of_statements(study: Study) -> Iterator[Picture]:
     for kind in KINDS:
-        blocks = study.blocks_of(kind)
-        for block in blocks:
-            name = kind if len(blocks) == 1 else f"{kind}-{block.id}"
+        for block in study.blocks_of(kind):
             files = {form: render(study, block, form) for form in style.FORMATS}
-            yield Picture(block.id, name, answer_figures.caption(study, block), files)
+            yield Picture(block.id, block_name(study, block), answer_figures.caption(study, block), files)

@@ -3,7 +3,6 @@
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -91,36 +90,25 @@ def asks(study: Study) -> bool:
 
 
 def report_files(study: Study, progress: Progress = silent) -> tuple[dict[str, bytes], tuple[Failure, ...]]:
-    """Return the files of a study's report by their names, ``report.html`` first, and the sections that failed."""
+    """Return the files of a study's report by their names, ``report.html`` first, and the sections that failed.
+
+    report.json is made last, since it holds the failures of the others.
+    """
     results = evaluate(study, progress=lambda what, share: progress(what, 0.1 + 0.6 * share))
     failures = Failures(results.failures)
-    drawn = list(_drawn(study, results, progress, failures))
-    return _files(study, results, drawn, failures), tuple(failures.found)
+    drawn = []
+    for one in _drawn(study, results, failures):
+        drawn.append(one)
+        progress(f"drawing: {one.name}", 0.7 + 0.2 * min(1.0, len(drawn) / 4))
 
+    def told(what: str, make: Callable[[], tuple[str, ...]]) -> tuple[str, ...]:
+        found = failures.attempt(f"texts: {what}", make)
+        return (f"Not there: {found.why}.",) if isinstance(found, Failure) else found
 
-def _drawn(study: Study, results: Results, progress: Progress, failures: Failures) -> Iterator[Picture]:
-    drawn = chain(pictures(study, results, failures=failures), _of_questions(study, results, failures))
-    for number, picture in enumerate(drawn, start=1):
-        progress(f"drawing: {picture.name}", 0.7 + 0.2 * min(1.0, number / 4))
-        yield picture
-
-
-def _of_questions(study: Study, results: Results, failures: Failures) -> Iterator[Picture]:
-    if results.questions:
-        yield from question_pictures(study, results.questions, failures=failures)
-    if results.levels:
-        yield from level_pictures(study, results.levels, failures=failures)
-
-
-def _files(study: Study, results: Results, drawn: Sequence[Picture], failures: Failures) -> dict[str, bytes]:
-    """Return every file that can be made; report.json comes last, since it holds the failures of the others."""
-    texts = {
-        what: _or_why(failures, f"texts: {what}", make, one_line=what == "methods")
-        for what, make in (
-            ("findings", lambda: sentences.findings(results)),
-            ("limits", lambda: sentences.limits(study, results)),
-            ("methods", lambda: methods(study, results)),
-        )
+    texts: dict[str, Any] = {
+        "findings": told("findings", lambda: sentences.findings(results)),
+        "limits": told("limits", lambda: sentences.limits(study, results)),
+        "methods": told("methods", lambda: (methods(study, results),))[0],
     }
     files: dict[str, bytes] = {}
     for name, make in (
@@ -129,23 +117,23 @@ def _files(study: Study, results: Results, drawn: Sequence[Picture], failures: F
         ("tests.csv", lambda: number_files.tests_csv(results)),
         ("motion.csv", lambda: number_files.motion_csv(results)),
     ):
-        content = failures.attempt(name, make)
-        files |= {} if isinstance(content, Failure) else {name: content}
+        content = failures.value(name, make, None)
+        files |= {} if content is None else {name: content}
     for one in drawn:
         files |= {f"{one.name}.{form}": content for form, content in one.files.items()}
         files[f"{one.name}.txt"] = f"{one.caption}\n".encode()
-    exported = failures.attempt("exported tables", lambda: table_files(study, deliver(study)))
-    files |= {} if isinstance(exported, Failure) else exported
+    files |= failures.value("exported tables", lambda: table_files(study, deliver(study)), {})
     page_ = _page(study, results, drawn, texts, failures).encode()
-    return {"report.html": page_, "report.json": number_files.document(study, results, texts, failures), **files}
+    numbers = number_files.document(study, results, texts, failures)
+    return {"report.html": page_, "report.json": numbers, **files}, tuple(failures.found)
 
 
-def _or_why(failures: Failures, what: str, make: Callable[[], Any], *, one_line: bool) -> Any:
-    """Return what ``make`` returns, or why it is not there: a sentence, or a tuple of one."""
-    found = failures.attempt(what, make)
-    if not isinstance(found, Failure):
-        return found
-    return f"Not there: {found.why}." if one_line else (f"Not there: {found.why}.",)
+def _drawn(study: Study, results: Results, failures: Failures) -> Iterator[Picture]:
+    yield from pictures(study, results, failures=failures)
+    if results.questions:
+        yield from question_pictures(study, results.questions, failures=failures)
+    if results.levels:
+        yield from level_pictures(study, results.levels, failures=failures)
 
 
 def _page(
@@ -180,13 +168,19 @@ def _page(
         failures=[str(one) for one in failures.found],
         first=Markup().join(first),
     )
-    faces = failures.attempt("typeface", lambda: font_faces("".join(sorted(set(body.unescape())))))
-    return page(f"{study.title}: report", body, "" if isinstance(faces, Failure) else faces)
+    faces = failures.value("typeface", lambda: font_faces("".join(sorted(set(body.unescape())))), "")
+    return page(f"{study.title}: report", body, faces)
 
 
 def _facts(study: Study) -> str:
+    """Say which study it is, how many took part, and on which days the sessions that count began."""
     people = counted(study.n, "participant")
-    return f"Study {study.name}, {version_words(study)}. {people[:1].upper()}{people[1:]}. {_days(study)}"
+    rows = study.participants
+    days = sorted({str(at)[:10] for at in rows.loc[rows["counted"], "started_at"]})
+    when = (
+        "" if not days else f"Sessions on {days[0]}." if len(days) == 1 else f"Sessions from {days[0]} to {days[-1]}."
+    )
+    return f"Study {study.name}, {version_words(study)}. {people[:1].upper()}{people[1:]}. {when}"
 
 
 def _marks(study: Study) -> list[tuple[str, str]]:
@@ -194,15 +188,6 @@ def _marks(study: Study) -> list[tuple[str, str]]:
     marks = [("mark", "SIMULATED participants, no people")] if study.simulated else []
     marks += [("mark", "PILOT")] if study.pilot else []
     return marks if study.revealed else [*marks, ("sealed", "Blinded: by code")]
-
-
-def _days(study: Study) -> str:
-    """Say on which days the sessions that count began."""
-    here = study.participants
-    days = sorted({str(at)[:10] for at in here.loc[here["counted"], "started_at"]})
-    if not days:
-        return ""
-    return f"Sessions on {days[0]}." if len(days) == 1 else f"Sessions from {days[0]} to {days[-1]}."
 
 
 def _short(texts: Mapping[str, Any], results: Results) -> Iterator[str]:
