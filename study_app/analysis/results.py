@@ -367,9 +367,3 @@ def missing(found: BlockFound) -> tuple[str, ...]:
     for one in found.absent:
         reasons.setdefault(one.why, []).append(one.what)
     return tuple(f"no {listed(what)}: {why}." for why, what in reasons.items())
-
-
-def signed_difference(tested: Equivalence) -> str:
-    """Return the difference of two mean answers with its sign and interval."""
-    effect, ends = tested.effect or 0.0, tested.interval
-    return f"{'+' if effect > 0 else ''}{number(effect)} {'(no interval)' if ends is None else interval(ends)} points"

@@ -2,14 +2,20 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import partial
 from typing import Any, Final
 
 from markupsafe import Markup
 
-from study_app.analysis.data.motion import OF_REACHES, OF_TRIALS, REACH_DEFINITIONS, TRIAL_DEFINITIONS, Performance
+from study_app.analysis.data.motion import (
+    OF_REACHES,
+    OF_TRIALS,
+    REACH_DEFINITIONS,
+    TRIAL_DEFINITIONS,
+    Moved,
+    Performance,
+)
 from study_app.analysis.data.questions import MEASURES
-from study_app.analysis.data.study_tables import By, Study, group_counts, group_means
+from study_app.analysis.data.study_tables import By, GroupMean, Study, group_counts, group_means
 from study_app.analysis.figures.page_layout import Picture
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.finding import NO_EVIDENCE, Answer, Finding
@@ -17,17 +23,7 @@ from study_app.analysis.findings.statement_tests import OverAll
 from study_app.analysis.levels.results import QuestionFound, ScoreFound
 from study_app.analysis.planning.power_curves import interval as share_interval
 from study_app.analysis.report import level_sections
-from study_app.analysis.report.html_page import (
-    attempted,
-    bullets,
-    drawn,
-    heading,
-    paragraph,
-    picture,
-    render,
-    table,
-    table_of,
-)
+from study_app.analysis.report.html_page import attempted, bullets, drawn, heading, paragraph, render, table, table_of
 from study_app.analysis.report.sentences import none_found, of_levels
 from study_app.analysis.results import (
     VERDICTS_MEAN,
@@ -35,6 +31,7 @@ from study_app.analysis.results import (
     Delivered,
     Failures,
     Results,
+    SiteThresholds,
     counted,
     lead,
     listed,
@@ -129,14 +126,12 @@ def block(
     yield heading(2, lead(found))
     if not found.n:
         untested = any(one.block == found.id for one in results.failures)
-        yield (
-            bullets(missing(found))
-            if untested
-            else paragraph("No answers count yet: there is nothing to test or to plot.")
-        )
+        none = paragraph("No answers count yet: there is nothing to test or to plot.")
+        yield bullets(missing(found)) if untested else none
         return
     held = Failures() if failures is None else failures
-    for what, make in _parts(found, results, {one.name.split("-")[0]: one for one in drawn if one.block == found.id}):
+    pictures = {one.name.split("-")[0]: one for one in drawn if one.block == found.id}
+    for what, make in _parts(found, results, pictures):
         yield from attempted(held, what, heading(3, what.capitalize()), make, block=found.id)
 
 
@@ -144,24 +139,14 @@ def _parts(
     found: BlockFound, results: Results, pictures: Mapping[str, Picture]
 ) -> Iterator[tuple[str, Callable[[], Iterable[str]]]]:
     """Yield what the parts of a block's section are, and how each is made."""
-    yield "presentations", lambda: _presentations(found)
+    if said := said_of_presentations(found):
+        yield "presentations", lambda: [paragraph(" ".join(said))]
     yield "figure of answers", lambda: drawn(pictures, found.kind)
     for finding in all_findings():
         yield finding.part, finding(found, results, pictures).section
-    yield "what is not here", lambda: _absent(found)
-
-
-def _presentations(found: BlockFound) -> Iterator[str]:
-    """Say what one answer stands for, where it is more than one presentation."""
-    lines = said_of_presentations(found)
-    if lines:
-        yield paragraph(" ".join(lines))
-
-
-def _absent(found: BlockFound) -> Iterator[str]:
     if found.absent:
-        yield heading(3, "What is not here, and why")
-        yield bullets(f"{line[:1].upper()}{line[1:]}" for line in missing(found))
+        lines = [f"{line[:1].upper()}{line[1:]}" for line in missing(found)]
+        yield "what is not here", lambda: (heading(3, "What is not here, and why"), bullets(lines))
 
 
 def verdicts_mean(results: Results) -> Iterator[str]:
@@ -184,13 +169,12 @@ def counts_of_answers(results: Results) -> Iterator[str]:
 
 
 def _measures(found: BlockFound) -> str:
-    levels = [str(level) for level in range(1, 8)]
     order = [item.id for item in found.items]
     return table_of(
         sorted(found.measures, key=lambda row: order.index(str(row["item"]))),
         ("Statement", lambda row: short(found, str(row["item"]))),
         (settings_noun(found).capitalize(), lambda row: name(found, str(row["code"]))),
-        *((str(level), partial(_count_of, level)) for level in levels),
+        *((str(level), lambda row, level=level: str(row[f"count_{level}"])) for level in range(1, 8)),
         ("n", lambda row: str(row["n"])),
         ("missing", lambda row: str(row["missing"] + row["cannot_judge"])),
         ("median", lambda row: number(row["median"], 1)),
@@ -198,10 +182,6 @@ def _measures(found: BlockFound) -> str:
         ("agree %", lambda row: number(row["agree_percent"], 0)),
         words=2,
     )
-
-
-def _count_of(level: str, row: Mapping[str, Any]) -> str:
-    return str(row[f"count_{level}"])
 
 
 def places(results: Results) -> dict[str, str]:
@@ -214,76 +194,58 @@ def places(results: Results) -> dict[str, str]:
     return {one.where: f"{one.title}: {kind(one)}" for one in results.questions}
 
 
-def question_section(where: str, study: Study, results: Results, drawn: Sequence[Picture]) -> Iterator[str]:
+def question_section(where: str, study: Study, results: Results, drawn_: Sequence[Picture]) -> Iterator[str]:
     """Yield the section of a form, or of a block's other questions."""
     yield heading(2, places(results)[where])
-    pictures = {one.name: one for one in drawn}
     asked = {(one.where.id, one.id): one for one in study.others.questions}
+    levels = [one for one in results.levels if one.block == where]
     yield from _scores([one for one in results.scores if one.where == where])
-    steps = {one.block for one in results.levels if one.summary == "settings"}  # each from another start
     for found in results.questions:
-        if found.where == where:
-            yield heading(3, "Answers" if where in {one.block for one in results.levels} else found.short)
-            yield paragraph(found.text)
-            if where in steps:
-                continue
-            if not found.n:
-                yield paragraph("No answers count yet.")
-                continue
-            measure = MEASURES[found.measure]
-            if measure.cells is None:
-                yield from _texts(found)
-                continue
-            question = asked[found.where, found.item]
-            rows = [(group.name, measure.cells(question, group.numbers)) for group in found.groups]
-            yield _table(rows)
-            name = f"question-{found.where}-{found.item}"
-            if name in pictures:
-                yield picture(pictures[name].files["png"], pictures[name].caption)
-    for levels in results.levels:
-        if levels.block == where:
-            yield from level_sections.level_section(levels, drawn, study.estimator)
-
-
-def _table(rows: Sequence[tuple[str, Mapping[str, str]]]) -> str:
-    head = ("Answers", *rows[0][1])
-    return table(head, [[name, *cells.values()] for name, cells in rows])
-
-
-def _texts(found: QuestionFound) -> Iterator[str]:
-    """List the texts, by participant."""
-    for group in found.groups:
-        if len(found.groups) > 1:
-            yield paragraph(f"{group.name}:")
-        yield bullets(group.numbers["texts"])
+        if found.where != where:
+            continue
+        yield heading(3, "Answers" if levels else found.short)
+        yield paragraph(found.text)
+        if any(one.summary == "settings" for one in levels):
+            continue  # each from another start
+        if not found.n:
+            yield paragraph("No answers count yet.")
+            continue
+        measure = MEASURES[found.measure]
+        if measure.cells is None:
+            for group in found.groups:
+                if len(found.groups) > 1:
+                    yield paragraph(f"{group.name}:")
+                yield bullets(group.numbers["texts"])
+            continue
+        rows = [(group.name, measure.cells(asked[where, found.item], group.numbers)) for group in found.groups]
+        yield table(("Answers", *rows[0][1]), [[name, *cells.values()] for name, cells in rows])
+        yield from drawn({one.name: one for one in drawn_}, f"question-{where}-{found.item}")
+    for one in levels:
+        yield from level_sections.level_section(one, drawn_, study.estimator)
 
 
 def _scores(scores: Sequence[ScoreFound]) -> Iterator[str]:
     if not scores:
         return
     yield heading(3, "Scores")
-    yield table(
-        ("Score", "Setting", "n", "mean", "SD", "range"),
-        [
-            [
-                one.name,
-                group.name,
-                str(group.numbers["n"]),
-                number(group.numbers["mean"], 1),
-                number(group.numbers["sd"], 1),
-                "–"
-                if group.numbers["smallest"] is None
-                else f"{number(group.numbers['smallest'], 1)} – {number(group.numbers['largest'], 1)}",
-            ]
-            for one in scores
-            for group in one.groups
-        ],
+
+    def ends(numbers: Mapping[str, Any]) -> str:
+        low, high = numbers["smallest"], numbers["largest"]
+        return "–" if low is None else f"{number(low, 1)} – {number(high, 1)}"
+
+    yield table_of(
+        [(score.name, group.name, group.numbers) for score in scores for group in score.groups],
+        ("Score", lambda one: one[0]),
+        ("Setting", lambda one: one[1]),
+        ("n", lambda one: str(one[2]["n"])),
+        ("mean", lambda one: number(one[2]["mean"], 1)),
+        ("SD", lambda one: number(one[2]["sd"], 1)),
+        ("range", lambda one: ends(one[2])),
         words=2,
     )
     yield from (paragraph(source, "soft") for source in dict.fromkeys(one.source for one in scores) if source)
 
 
-TESTED_BY_BLOCK: Final = "Sites are compared in the section of each block."
 UNITS: Final = {"s": "s", "m": "m", "mm": "mm", "n": "N", "percent": "%"}
 SHOWN: Final = 20
 """So many exclusions and doubts are listed; all of them stand in report.json."""
@@ -331,30 +293,34 @@ def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
     yield table((by.capitalize(), "participants"), [[group, str(count)] for group, count in counts.items()])
     means = list(group_means(study, by))
     for found in results.blocks:
-        rows = [
-            [
-                short(found, one.item),
-                name(found, one.code),
-                one.group,
-                str(one.n),
-                number(one.mean, 2),
-                "–" if one.sd is None else number(one.sd, 2),
-            ]
-            for one in means
-            if one.block == found.id
-        ]
-        if rows:
+        if rows := [one for one in means if one.block == found.id]:
             yield heading(3, found.title)
-            head = ("Statement", settings_noun(found).capitalize(), by.capitalize(), "n", "mean", "SD")
-            yield table(head, rows, words=3)
+            yield _means(found, rows, by)
     if by == "site":
         yield from _site_thresholds(results)
     if not results.blocks:
         return
     yield paragraph(
         "Mean and standard deviation over participants, each with the mean of their answers. "
-        + ("Differences between groups are described, not tested." if by == "group" else TESTED_BY_BLOCK),
+        + (
+            "Differences between groups are described, not tested."
+            if by == "group"
+            else "Sites are compared in the section of each block."
+        ),
         "soft",
+    )
+
+
+def _means(found: BlockFound, rows: Sequence[GroupMean], by: By) -> str:
+    return table_of(
+        rows,
+        ("Statement", lambda one: short(found, one.item)),
+        (settings_noun(found).capitalize(), lambda one: name(found, one.code)),
+        (by.capitalize(), lambda one: one.group),
+        ("n", lambda one: str(one.n)),
+        ("mean", lambda one: number(one.mean, 2)),
+        ("SD", lambda one: number(one.sd, 2)),
+        words=3,
     )
 
 
@@ -363,16 +329,22 @@ def _site_thresholds(results: Results) -> Iterator[str]:
     if not results.site_thresholds:
         return
     yield heading(3, "Thresholds")
-    rows = []
-    for one in results.site_thresholds:
-        each = [
-            f"{site}: {median:.3g} (n = {size})"
-            for site, median, size in zip(one.sites, one.medians, map(one.of_sites.count, one.sites), strict=True)
-        ]
-        where = "–" if one.standard is None else f"{one.standard:g}"
-        tested = one.outcome
-        rows.append([one.title, "; ".join(each), where, statistic(tested), p_value(tested.p), number(tested.effect)])
-    yield table(("Block", "Median by site", "Standard", "Statistic", "p", "Share between sites"), rows, words=2)
+
+    def medians(one: SiteThresholds) -> str:
+        sizes = map(one.of_sites.count, one.sites)
+        each = zip(one.sites, one.medians, sizes, strict=True)
+        return "; ".join(f"{site}: {median:.3g} (n = {size})" for site, median, size in each)
+
+    yield table_of(
+        results.site_thresholds,
+        ("Block", lambda one: one.title),
+        ("Median by site", medians),
+        ("Standard", lambda one: "–" if one.standard is None else f"{one.standard:g}"),
+        ("Statistic", lambda one: statistic(one.outcome)),
+        ("p", lambda one: p_value(one.outcome.p)),
+        ("Share between sites", lambda one: number(one.outcome.effect)),
+        words=2,
+    )
     methods = dict.fromkeys(one.outcome.method for one in results.site_thresholds if one.outcome.p is not None)
     yield paragraph(
         f"Median of the participants' thresholds; {test_name(results.site_thresholds[0].outcome)} "
@@ -391,18 +363,24 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
         return
     yield heading(3, "Were delays displayed as specified?")
     blocks = {found.id: found for found in results.blocks}
-    yield table(
-        ("Block", "Setting", "asked", "achieved", "mean error", "worst trial", "trials", "within limits"),
-        [
-            [
-                blocks[one.block].title,
-                "all" if one.code is None else name(blocks[one.block], one.code),
-                *(_delays(one) if study.revealed else ["sealed"] * 4),
-                _trials(one) if study.revealed else str(one.trials),
-                _within(one),
-            ]
-            for one in results.delivered
-        ],
+
+    def shown(cell: Callable[[Delivered], str]) -> Callable[[Delivered], str]:
+        return cell if study.revealed else lambda _one: "sealed"
+
+    def trials(one: Delivered) -> str:
+        whole = one.measured == one.trials or not study.revealed
+        return str(one.trials) if whole else f"{one.trials}, {one.measured} measured"
+
+    yield table_of(
+        results.delivered,
+        ("Block", lambda one: blocks[one.block].title),
+        ("Setting", lambda one: "all" if one.code is None else name(blocks[one.block], one.code)),
+        ("asked", shown(lambda one: "–" if one.delay_ms is None else ms(one.delay_ms))),
+        ("achieved", shown(lambda one: "–" if one.achieved_ms is None else f"{number(one.achieved_ms, 1)} ms")),
+        ("mean error", shown(lambda one: _signed_ms(one.error_mean_ms))),
+        ("worst trial", shown(lambda one: _signed_ms(one.error_worst_ms))),
+        ("trials", trials),
+        ("within limits", _within),
         words=2,
     )
     limits = study.protocol.get("limits", {})
@@ -416,69 +394,42 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
     )
 
 
-def _delays(one: Delivered) -> list[str]:
-    """Return the cells on the delay asked for, the one achieved and the errors."""
-    return [
-        "–" if one.delay_ms is None else ms(one.delay_ms),
-        "–" if one.achieved_ms is None else f"{number(one.achieved_ms, 1)} ms",
-        _ms(one.error_mean_ms),
-        _ms(one.error_worst_ms),
-    ]
-
-
 def _limit(what: str, limit: float) -> str:
     """Return a limit in words: "frame gap at most 250 ms"."""
-    name, _, unit = what.rpartition("_")
-    if not name:
-        return f"at most {limit:g} {unit}"
-    return f"{name.replace('_', ' ')} at most {limit:g} {'%' if unit == 'percent' else unit}"
+    words, _, unit = what.rpartition("_")
+    most = f"at most {limit:g} {'%' if words and unit == 'percent' else unit}"
+    return f"{words.replace('_', ' ')} {most}" if words else most
 
 
 def _within(one: Delivered) -> str:
     return f"{one.valid} of {one.judged}" if one.judged else "not measured"
 
 
-def _ms(value: float | None) -> str:
+def _signed_ms(value: float | None) -> str:
     return "–" if value is None else f"{'+' if value > 0 else ''}{number(value, 1)} ms"
 
 
-def _trials(one: Delivered) -> str:
-    return str(one.trials) if one.measured == one.trials else f"{one.trials}, {one.measured} measured"
-
-
 def _orders(results: Results) -> Iterator[str]:
-    several = [
-        (found, counts)
-        for found in results.blocks
-        if (counts := results.orders.get(found.id)) is not None and counts.orders and len(counts.codes) >= 2
-    ]
+    several = [(found, counts) for found in results.blocks if (counts := results.orders.get(found.id)) is not None]
+    several = [(found, counts) for found, counts in several if counts.orders and len(counts.codes) >= 2]
     if not several:
         return
     yield heading(3, "Orders as run")
     for found, counts in several:
-        names = {code: name(found, code) if found.revealed else code for code in counts.codes}
+        names = [name(found, code) if found.revealed else code for code in counts.codes]
         yield paragraph(f"{found.title}, {counted(counts.orders, 'order')}: {_evenness(counts)}")
-        yield table(
-            ("Place", *names.values()),
-            [[str(place), *(str(count) for count in line)] for place, line in enumerate(counts.positions, start=1)],
-        )
+        lines = enumerate(counts.positions, start=1)
+        yield table(("Place", *names), [[str(place), *map(str, line)] for place, line in lines])
     yield paragraph("How often each setting came at each place of its block.", "soft")
 
 
 def _evenness(counts: Evenness) -> str:
-    cells = [count for line in counts.positions for count in line]
-    after = counts.after_another
-    places = (
-        f"each came at each place {counted(cells[0], 'time')}"
-        if counts.positions_even
-        else f"a setting came at a place {min(cells)} to {max(cells)} times, so that settings and places mix unevenly"
-    )
-    follows = (
-        "each followed each other one equally often"
-        if counts.follows_even
-        else f"one followed another {min(after)} to {max(after)} times"
-    )
-    return f"{places}; {follows}."
+    cells, after = [count for line in counts.positions for count in line], counts.after_another
+    places = f"a setting came at a place {min(cells)} to {max(cells)} times, so that settings and places mix unevenly"
+    if counts.positions_even:
+        places = f"each came at each place {counted(cells[0], 'time')}"
+    follows = f"one followed another {min(after)} to {max(after)} times" if not counts.follows_even else ""
+    return f"{places}; {follows or 'each followed each other one equally often'}."
 
 
 def motion(results: Results) -> Iterator[str]:
@@ -491,11 +442,12 @@ def motion(results: Results) -> Iterator[str]:
         yield paragraph("After unblinding: a thick liquid is known by its force, and a delay by the motion.")
         return
     for found in results.blocks:
-        rows = _motion_rows(found, measured, results.delivered)
+        measures = [one for one in (*OF_TRIALS, *OF_REACHES) if any(_of(measured, found, measure=one))]
+        rows = _motion_rows(found, measured, measures, results.delivered)
         if rows:
             yield heading(3, found.title)
-            measures = (*(_label(one) for one in _motion_measures(found, measured)), "trials within limits")
-            yield table((settings_noun(found).capitalize(), "n", *measures), rows)
+            head = (settings_noun(found).capitalize(), "n", *map(_label, measures), "trials within limits")
+            yield table(head, rows)
             if found.id not in measured.reaching:
                 yield paragraph(
                     "No reaching task in this block: movement time, overshoot and submovements do not exist here.",
@@ -515,28 +467,30 @@ def motion(results: Results) -> Iterator[str]:
     )
 
 
-def _motion_rows(found: BlockFound, measured: Performance, delivered: Sequence[Delivered]) -> list[list[str]]:
-    kept = {one.code: _within(one) for one in delivered if one.block == found.id}
-    cells: dict[str, dict[str, str]] = {}
-    people: dict[str, int] = {}
+def _of(measured: Performance, found: BlockFound, **wanted: str) -> Iterator[Moved]:
+    """Yield the measures of a block, by code or by name."""
     for one in measured.moved:
-        if one.block == found.id and one.n:
-            digits = 2 if one.measure.endswith(("_s", "_n", "_m", "percent")) else 1
-            cells.setdefault(one.code, {})[one.measure] = (
-                f"{number(one.median, digits)} ({number(one.q1, digits)}–{number(one.q3, digits)})"
-            )
-            people[one.code] = max(people.get(one.code, 0), one.n)
-    measures = _motion_measures(found, measured)
-    return [
-        [name(found, code), str(people[code]), *(cells[code].get(measure, "–") for measure in measures), kept[code]]
-        for code in [setting.code for setting in found.settings]
-        if code in cells
-    ]
+        if one.block == found.id and all(getattr(one, field) == value for field, value in wanted.items()):
+            yield one
 
 
-def _motion_measures(found: BlockFound, measured: Performance) -> list[str]:
-    there = {one.measure for one in measured.moved if one.block == found.id}
-    return [measure for measure in (*OF_TRIALS, *OF_REACHES) if measure in there]
+def _motion_rows(
+    found: BlockFound, measured: Performance, measures: Sequence[str], delivered: Sequence[Delivered]
+) -> list[list[str]]:
+    kept = {one.code: _within(one) for one in delivered if one.block == found.id}
+    rows = []
+    for setting in found.settings:
+        here = {one.measure: one for one in _of(measured, found, code=setting.code) if one.n}
+        if here:
+            n = max(one.n for one in here.values())
+            cells = [_quartiles(here[measure]) if measure in here else "–" for measure in measures]
+            rows.append([name(found, setting.code), str(n), *cells, kept[setting.code]])
+    return rows
+
+
+def _quartiles(one: Moved) -> str:
+    digits = 2 if one.measure.endswith(("_s", "_n", "_m", "percent")) else 1
+    return f"{number(one.median, digits)} ({number(one.q1, digits)}–{number(one.q3, digits)})"
 
 
 def _label(measure: str) -> str:
@@ -554,10 +508,8 @@ def _recordings(measured: Performance) -> str:
         text += f"; of the others: {'; '.join(measured.unread)}"
     if not measured.judged:
         return f"{text}. Whether trials kept to the protocol's limits of timing was not measured."
-    invalid = (
-        f" {counted(measured.invalid, 'trial').capitalize()} exceeded the protocol's limits of timing and "
-        f"{'is' if measured.invalid == 1 else 'are'} in these numbers."
-        if measured.invalid
-        else " No trial that counts exceeded the protocol's limits of timing."
-    )
-    return f"{text}.{invalid}"
+    if not measured.invalid:
+        return f"{text}. No trial that counts exceeded the protocol's limits of timing."
+    verb = "is" if measured.invalid == 1 else "are"
+    invalid = f"{counted(measured.invalid, 'trial').capitalize()} exceeded the protocol's limits of timing and {verb}"
+    return f"{text}. {invalid} in these numbers."
