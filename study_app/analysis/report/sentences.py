@@ -14,7 +14,6 @@ from study_app.analysis.levels.results import ExponentFound, LevelsFound, Thresh
 from study_app.analysis.results import (
     BlockFound,
     Results,
-    Tested,
     counted,
     lead,
     listed,
@@ -38,13 +37,18 @@ MOST_NAMED: Final = 6
 
 def level_limits(found: LevelsFound) -> Iterator[str]:
     """Yield the limits of a block's thresholds; none where it has no threshold."""
-    own = found.own_thresholds
+    own, motors = found.own_thresholds, "motors are audible and were not masked: participants may have used their sound"
     if found.own_settings:
         yield from _of_settings(found)
+        yield f"{found.title}: {motors}."
     if not own:
         return
+
+    def shifted(one: ThresholdFound) -> bool:
+        return one.flat_width is not None and abs(one.flat_width - one.threshold) > SHIFT * abs(one.threshold)
+
     kinds: tuple[tuple[Callable[[ThresholdFound], bool], str], ...] = (
-        (_shifted, f"the prior of the width shifts a threshold by more than {100 * SHIFT:.0f} %: too few answers"),
+        (shifted, f"the prior of the width shifts a threshold by more than {100 * SHIFT:.0f} %: too few answers"),
         (lambda one: one.beyond == "above", "a threshold lies above the highest level presented; how far is not known"),
         (lambda one: one.beyond == "below", "a threshold lies below the lowest level presented; how far is not known"),
         (lambda one: not one.fits, "the function does not fit the answers, so that a threshold may be biased"),
@@ -62,7 +66,7 @@ def level_limits(found: LevelsFound) -> Iterator[str]:
         )
     if found.level_kind == "weber":
         yield _of_device(found)
-    yield f"{found.title}: motors are audible and were not masked: participants may have used their sound."
+    yield f"{found.title}: {motors}."
 
 
 def _of_device(found: LevelsFound) -> str:
@@ -97,11 +101,6 @@ def _of_settings(found: LevelsFound) -> Iterator[str]:
     if few := [one for one in found.own_settings if one.hysteresis is None]:
         words = "settings started near one end alone, so that hysteresis is not known"
         yield f"{found.title}: {words} ({listed([str(one.participant) for one in few[:MOST_NAMED]])})."
-    yield f"{found.title}: motors are audible and were not masked: participants may have used their sound."
-
-
-def _shifted(one: ThresholdFound) -> bool:
-    return one.flat_width is not None and abs(one.flat_width - one.threshold) > SHIFT * abs(one.threshold)
 
 
 def _named_people(found: LevelsFound, some: Sequence[ThresholdFound]) -> str:
@@ -144,13 +143,18 @@ def limits(study: Study, results: Results) -> tuple[str, ...]:
             lines.append(f"{lead(found)}: no answers count yet, so that nothing can be said.")
             continue
         lines += [f"{lead(found)}: {sentence}" for sentence in missing(found)]
-        out = [f"“{short(found, one.item)}”" for one in _decisive(found) if one.verdict == "out of reach"]
+        decisive = [one for finding in all_findings() if finding.statements for one in finding.of(found)]
+        out = [f"“{short(found, one.item)}”" for one in decisive if one.verdict == "out of reach"]
         if out:
             lines.append(
                 f"{lead(found)}: so few participants, with the ties in their answers and the other p of the family as "
                 f"they came out, could not have shown anything in {listed(out)}, even had they all agreed."
             )
-        lines += _untested(found)
+        untested: dict[str, list[str]] = {}
+        for one in decisive:
+            if one.verdict == "not tested":
+                untested.setdefault(one.outcome.note, []).append(f"“{short(found, one.item)}”")
+        lines += [f"{lead(found)}: {listed(items)} could not be tested: {why}." for why, items in untested.items()]
         lines += _mixed_up(found, results)
         lines += [sentence for finding in all_findings() for sentence in finding(found, results).limits()]
     lines += [sentence for found in results.levels for sentence in level_limits(found)]
@@ -191,21 +195,6 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
             f"{people[:1].upper()}{people[1:]}: below {FEW} no bootstrap interval and no mixed model is given, since "
             "they do not hold there. An effect that is not shown here may well exist."
         )
-
-
-def _decisive(found: BlockFound) -> list[Tested]:
-    """Return the tests of statements whose verdicts count."""
-    return [one for finding in all_findings() if finding.statements for one in finding.of(found)]
-
-
-def _untested(found: BlockFound) -> Iterator[str]:
-    """Name the statements that gave nothing to test, with the reason."""
-    reasons: dict[str, list[str]] = {}
-    for one in _decisive(found):
-        if one.verdict == "not tested":
-            reasons.setdefault(one.outcome.note, []).append(f"“{short(found, one.item)}”")
-    for reason, items in reasons.items():
-        yield f"{lead(found)}: {listed(items)} could not be tested: {reason}."
 
 
 def _mixed_up(found: BlockFound, results: Results) -> Iterator[str]:
@@ -336,10 +325,13 @@ def _sentences(study: Study, results: Results) -> Iterator[str]:
     blocks = [found for found in results.blocks if found.n]
     yield _sample(study)
     yield from level_methods(study.levels, results.levels)
-    if not blocks:
-        if results.levels:
-            yield _program()
-        return
+    if blocks:
+        yield from _of_statements(study, results, blocks)
+    if blocks or results.levels:
+        yield f"Sessions and analysis: liquid-study {__version__}."
+
+
+def _of_statements(study: Study, results: Results, blocks: list[BlockFound]) -> Iterator[str]:
     yield _presented(study, results)
     quartiles = QUARTILES.replace(" (", ", ").rstrip(")")
     yield (
@@ -351,11 +343,6 @@ def _sentences(study: Study, results: Results) -> Iterator[str]:
         for finding in all_findings():
             yield from finding(found, results).methods()
     yield from _common(results, blocks)
-    yield _program()
-
-
-def _program() -> str:
-    return f"Sessions and analysis: liquid-study {__version__}."
 
 
 def _sample(study: Study) -> str:
@@ -363,9 +350,14 @@ def _sample(study: Study) -> str:
     kind = " (SIMULATED, no people)" if study.simulated else ""
     out = study.left_out + len(study.excluded_sessions)
     gone = f"; {counted(out, 'further session')} {'was' if out == 1 else 'were'} left out" if out else ""
+    under = ""
+    if study.blocks:
+        whole = all(set(people_a_setting(study, block).values()) == {study.n} for block in study.blocks)
+        some = ", some of them under fewer than all settings, single trials being left out"
+        under = ", each under all settings" if whole else some
     return (
         f"{people[:1].upper()}{people[1:]}{kind} took part in “{study.title}” (protocol {study.name}, "
-        f"{version_words(study)}){gone}{_under(study)}."
+        f"{version_words(study)}){gone}{under}."
     )
 
 
@@ -373,14 +365,6 @@ def version_words(study: Study) -> str:
     """Return the versions of the protocol whose sessions are pooled."""
     versions = study.versions
     return f"version {versions[0]}" if len(versions) == 1 else f"versions {listed(versions)}, pooled"
-
-
-def _under(study: Study) -> str:
-    if not study.blocks:
-        return ""
-    if all(set(people_a_setting(study, block).values()) == {study.n} for block in study.blocks):
-        return ", each under all settings"
-    return ", some of them under fewer than all settings, single trials being left out"
 
 
 def _presented(study: Study, results: Results) -> str:

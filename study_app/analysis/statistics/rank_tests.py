@@ -20,7 +20,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import combinations, permutations
+from itertools import permutations
 from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
@@ -599,7 +599,7 @@ def _p_of_groups(
     log_ways = math.lgamma(len(labels) + 1) - sum(math.lgamma(size + 1) for size in sizes)
     reached_by = found * (1 - ROUNDING)
     if log_ways <= math.log(EXACT_GROUPS):
-        every = np.array(list(_allocations(tuple(sizes.tolist()), len(labels))), dtype=np.intp)
+        every = _allocations(tuple(sizes.tolist()))
         reached = np.concatenate(
             [_between(centred, every[at : at + AT_ONCE], len(sizes)) for at in range(0, len(every), AT_ONCE)]
         )
@@ -613,17 +613,16 @@ def _p_of_groups(
     return drawn_p(np.concatenate(above), seed, math.exp(-log_ways), " of participants")
 
 
-def _allocations(sizes: tuple[int, ...], n: int) -> Iterator[Whole]:
-    """Yield every allocation of n participants to groups of these sizes, as the group of each."""
-    labels = np.full(n, len(sizes) - 1, dtype=np.int64)
+@lru_cache(maxsize=4)
+def _allocations(sizes: tuple[int, ...]) -> Whole:
+    """Return every allocation of participants to groups of these sizes (allocations, participants), as their groups."""
 
-    def fill(group: int, free: tuple[int, ...]) -> Iterator[Whole]:
-        if group == len(sizes) - 1:
-            yield labels.copy()
-            return
-        for chosen in combinations(free, sizes[group]):
-            labels[list(chosen)] = group
-            yield from fill(group + 1, tuple(one for one in free if one not in chosen))
-            labels[list(chosen)] = len(sizes) - 1
+    def every(left: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
+        if not any(left):
+            yield ()
+        for group, free in enumerate(left):
+            if free:
+                for others in every((*left[:group], free - 1, *left[group + 1 :])):
+                    yield (group, *others)
 
-    yield from fill(0, tuple(range(n)))
+    return np.array(list(every(sizes)), dtype=np.int64)
