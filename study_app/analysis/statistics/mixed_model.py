@@ -7,13 +7,13 @@ Single missing answers are allowed. Settings are tested by the likelihood ratio;
 curvature of the quadrature, not from Laplace's approximation, whose are too small.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 from scipy.special import expit, logsumexp
 from scipy.stats import chi2 as chi_square
@@ -247,12 +247,12 @@ SEPARATED: Final = "the settings separate the answers, or there are too few of t
 
 @dataclass(frozen=True, slots=True)
 class Coefficient:
-    """A column's effect in log odds of a higher answer, its standard error, Wald's z interval; None without any."""
+    """A column's effect in log odds of a higher answer, its standard error, and Wald's z interval."""
 
     column: int
     estimate: float
-    error: float | None
-    interval: Interval | None
+    error: float
+    interval: Interval
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -310,27 +310,67 @@ def ordinal(
     used = np.asarray(~np.isnan(array).all(axis=(1, 2)))
     rows = array[used]
     levels = np.unique(rows[~np.isnan(rows)])
-    reason = _impossible(rows, levels, intercepts)
-    if reason:
-        return _outcome(rows, used, levels, design.shape[1], intercepts, None, 0.0, reason)
+    method = f"random intercepts, adaptive Gauss-Hermite quadrature, {NODES} nodes" if intercepts else "no intercepts"
+    untested = Ordinal(
+        test="cumulative logit" + (" mixed model" if intercepts else " model"),
+        n=len(rows),
+        dropped=int((~used).sum()),
+        statistic_name="likelihood ratio",
+        method=method,
+        effect_name="log odds of a higher answer",
+        df=design.shape[1],
+        coefficients=(),
+        thresholds=(),
+        threshold_errors=(),
+        sd=None,
+        log_likelihood=None,
+        aic=None,
+        levels=tuple(levels.tolist()),
+        answers=int((~np.isnan(rows)).sum()),
+        missing=int(np.isnan(rows).all(axis=2).sum()),
+    )
+    if reason := _impossible(rows, levels, intercepts):
+        return replace(untested, no_interval=reason, note=reason)
     people, settings, _ = np.nonzero(~np.isnan(rows))  # levels that were not chosen are left out
     level: Whole = np.searchsorted(levels, rows[~np.isnan(rows)]).astype(np.int64)
     starts = np.flatnonzero(np.diff(people, prepend=-1)) if intercepts else None
-    answers = Answers(level, design[settings], starts)
     site = None if sites is None else np.unique(list(sites), return_inverse=True)[1].astype(np.float64)[used]
     given = {
         "sessions": None if sessions is None else np.asarray(sessions).reshape(array.shape)[used],
         "sites": None if site is None else np.broadcast_to(site[:, None, None], rows.shape),
     }
     factor, factors = _factors(
-        answers.design, {name: values[~np.isnan(rows)] for name, values in given.items() if values is not None}
+        design[settings], {name: values[~np.isnan(rows)] for name, values in given.items() if values is not None}
     )
-    whole = fit(Answers(answers.level, np.hstack([answers.design, factor]), answers.starts))
-    without = fit(Answers(answers.level, factor, answers.starts))
-    ratio = max(0.0, 2 * (whole.log_likelihood - without.log_likelihood))
-    bad = whole.errors is None or bool((np.abs(whole.effects) > FAR).any() or (whole.errors > FAR).any())
-    note = SEPARATED if bad else ""
-    return _outcome(rows, used, levels, design.shape[1], intercepts, whole, ratio, note, factor.shape[1], factors)
+    if intercepts:
+        untested = replace(untested, method=method + "".join(f"; {factor} as a factor" for factor in factors))
+    whole = fit(Answers(level, np.hstack([design[settings], factor]), starts))
+    errors = whole.errors
+    if errors is None or (np.abs(whole.effects) > FAR).any() or (errors > FAR).any():
+        return replace(untested, no_interval=SEPARATED, note=SEPARATED)
+    ratio = max(0.0, 2 * (whole.log_likelihood - fit(Answers(level, factor, starts)).log_likelihood))
+    cuts, reach = len(whole.thresholds), float(norm.ppf((1 + SURE) / 2))
+    coefficients = tuple(
+        Coefficient(place, value, error, Interval(value - reach * error, value + reach * error, SURE, "Wald"))
+        for place, (value, error) in enumerate(
+            zip(whole.effects[: untested.df].tolist(), errors[cuts : cuts + untested.df].tolist(), strict=True)
+        )
+    )
+    single = coefficients[0] if len(coefficients) == 1 else None
+    return replace(
+        untested,
+        statistic=ratio,
+        p=float(chi_square.sf(ratio, untested.df)),
+        effect=None if single is None else single.estimate,
+        interval=None if single is None else single.interval,
+        no_interval="" if single else "no single effect: one coefficient for each setting",
+        coefficients=coefficients,
+        thresholds=tuple(whole.thresholds.tolist()),
+        threshold_errors=tuple(errors[:cuts].tolist()),
+        sd=whole.sd if intercepts else None,
+        log_likelihood=whole.log_likelihood,
+        aic=2 * (untested.df + factor.shape[1] + cuts + intercepts) - 2 * whole.log_likelihood,
+    )
 
 
 def _design(settings: int, columns: ArrayLike | None) -> Array:
@@ -371,58 +411,3 @@ def _factors(design: Array, given: Mapping[str, Array]) -> tuple[Array, list[str
             held = both
             names.append(name)
     return held, names
-
-
-def _outcome(
-    rows: Array,
-    used: NDArray[np.bool_],
-    levels: Array,
-    columns: int,
-    intercepts: bool,
-    model: Model | None,
-    ratio: float,
-    note: str,
-    of_factors: int = 0,
-    factors: Sequence[str] = (),
-) -> Ordinal:
-    found = None if note else model
-    coefficients = () if found is None else tuple(_coefficients(found))[:columns]
-    single = coefficients[0] if len(coefficients) == 1 else None
-    parameters = columns + of_factors + max(0, len(levels) - 1) + intercepts
-    errors = None if found is None else found.errors
-    return Ordinal(
-        test="cumulative logit" + (" mixed model" if intercepts else " model"),
-        n=len(rows),
-        dropped=int((~used).sum()),
-        statistic_name="likelihood ratio",
-        statistic=None if found is None else ratio,
-        p=None if found is None else float(chi_square.sf(ratio, columns)),
-        method=f"random intercepts, adaptive Gauss-Hermite quadrature, {NODES} nodes"
-        + "".join(f"; {factor} as a factor" for factor in factors)
-        if intercepts
-        else "no intercepts",
-        effect_name="log odds of a higher answer",
-        effect=None if single is None else single.estimate,
-        interval=None if single is None else single.interval,
-        no_interval=note or ("" if single else "no single effect: one coefficient for each setting"),
-        note=note,
-        df=columns,
-        coefficients=coefficients,
-        thresholds=() if found is None else tuple(float(value) for value in found.thresholds),
-        threshold_errors=() if errors is None else tuple(float(value) for value in errors[: len(levels) - 1]),
-        sd=None if found is None or not intercepts else found.sd,
-        log_likelihood=None if found is None else found.log_likelihood,
-        aic=None if found is None else 2 * parameters - 2 * found.log_likelihood,
-        levels=tuple(float(level) for level in levels),
-        answers=int((~np.isnan(rows)).sum()),
-        missing=int(np.isnan(rows).all(axis=2).sum()),
-    )
-
-
-def _coefficients(model: Model) -> Iterator[Coefficient]:
-    reach = float(norm.ppf((1 + SURE) / 2))
-    errors = model.errors
-    for place, value in enumerate(model.effects.tolist()):
-        error = None if errors is None else float(errors[len(model.thresholds) + place])
-        ends = None if error is None else Interval(value - reach * error, value + reach * error, SURE, "Wald")
-        yield Coefficient(place, value, error, ends)
