@@ -1,4 +1,4 @@
-"""The posterior of a psychometric function's parameters over a grid, from counts of answers per level.
+"""The fit of a psychometric function: the posterior of its parameters over a grid, from counts of answers per level.
 
 It has no state and does not depend on the order of the answers. Sums use `numpy.einsum`, not BLAS, whose threads
 stall on busy cores; only `simulated_tracks`, which background processes of one thread compute, uses matrix products.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Final
 
 import numpy as np
@@ -76,31 +76,98 @@ class Grid:
         )  # fmt: skip
         return np.clip(np.broadcast_to(found, (u.shape[0], *self.shape)), CLIP, 1.0 - CLIP)
 
-    def posterior(self, levels: ArrayLike, successes: ArrayLike, failures: ArrayLike) -> NDArray[np.float64]:
-        """Return the posterior weight of each cell, of the grid's shape; they sum to one.
 
-        Parameters
-        ----------
-        levels : (k,) array
-            The levels, in the coordinate u.
-        successes, failures : (k,) array
-            Numbers of answers with and without success at each level.
-        """
-        psi = self.success(levels)
-        return self.weighted(np.log(psi), np.log1p(-psi), successes, failures)
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """What the answers of one observer say about a psychometric function.
 
-    def weighted(
-        self,
-        log_success: NDArray[np.float64],
-        log_failure: NDArray[np.float64],
-        successes: ArrayLike,
-        failures: ArrayLike,
-    ) -> NDArray[np.float64]:
-        """Return the posterior from log ψ and log(1 − ψ), each of shape (k, …), and counts of shape (k,)."""
-        log_likelihood = np.einsum("k,kabcd->abcd", np.asarray(successes, float), log_success)
-        log_likelihood += np.einsum("k,kabcd->abcd", np.asarray(failures, float), log_failure)
-        weights = self.prior * np.exp(log_likelihood - log_likelihood.max())
-        return np.asarray(weights / weights.sum(), float)
+    Attributes
+    ----------
+    grid : Grid
+        The cells and their prior.
+    weights : (thresholds, widths, lapses, guesses) array
+        The weight of each cell; they sum to one.
+    """
+
+    grid: Grid
+    weights: NDArray[np.float64]
+
+    @cached_property
+    def marginal(self) -> NDArray[np.float64]:
+        """The weight of each threshold."""
+        return np.asarray(np.einsum("abcd->a", self.weights), float)
+
+    def quantile(self, share: float) -> float:
+        """Return a quantile of the threshold [u]."""
+        return quantile(self.grid.thresholds, self.marginal, share)
+
+    @property
+    def threshold(self) -> float:
+        """The median of the threshold [u]: the estimate."""
+        return self.quantile(0.5)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The ends of the threshold's equal-tailed 95 % interval [u]."""
+        return self.quantile(0.025), self.quantile(0.975)
+
+    @property
+    def variance(self) -> float:
+        """The variance of the threshold [u²]."""
+        thresholds = np.array(self.grid.thresholds)
+        return float(self.marginal @ (thresholds - float(self.marginal @ thresholds)) ** 2)
+
+    @property
+    def others(self) -> tuple[float, float, float]:
+        """The medians of width, guess rate and lapse rate, as `families.success` takes them."""
+        width = _median(self.grid.widths, np.einsum("abcd->b", self.weights))
+        lapse = _median(self.grid.lapses, np.einsum("abcd->c", self.weights))
+        guesses = self.grid.guesses
+        return width, lapse if guesses is None else _median(guesses, np.einsum("abcd->d", self.weights)), lapse
+
+    def success(self, levels: ArrayLike) -> NDArray[np.float64]:
+        """Return ψ at ``levels`` [u] of the function through all medians, clipped."""
+        found = success(self.grid.family, levels, self.threshold, *self.others)
+        return np.asarray(np.clip(found, CLIP, 1.0 - CLIP), float)
+
+    def band(self, levels: ArrayLike) -> NDArray[np.float64]:
+        """Return the ends of the pointwise 95 % band of ψ at ``levels`` [u], shape (2, levels)."""
+        weights, ends = self.weights.ravel(), []
+        for row in self.grid.success(levels).reshape(np.size(levels), -1):
+            order = np.argsort(row)
+            ends.append(np.interp((0.025, 0.975), np.cumsum(weights[order]), row[order]))
+        return np.asarray(ends, float).T
+
+
+def fit(levels: ArrayLike, successes: ArrayLike, failures: ArrayLike, grid: Grid) -> Posterior:
+    """Return the posterior of a psychometric function from counts of answers.
+
+    Parameters
+    ----------
+    levels : (k,) array
+        The levels, in the coordinate u; −∞ for a level of zero on log spacing.
+    successes, failures : (k,) array
+        Numbers of answers with and without success at each level; they need not be whole.
+    grid : Grid
+        The cells and their prior.
+    """
+    _, log_success, log_failure = tables(grid, tuple(np.asarray(levels, float).tolist()))
+    log_likelihood = np.einsum("k,kabcd->abcd", np.asarray(successes, float), log_success)
+    log_likelihood += np.einsum("k,kabcd->abcd", np.asarray(failures, float), log_failure)
+    weights = grid.prior * np.exp(log_likelihood - log_likelihood.max())
+    return Posterior(grid, np.asarray(weights / weights.sum(), float))
+
+
+@lru_cache(maxsize=8)
+def tables(grid: Grid, levels: Values) -> tuple[NDArray[np.float64], ...]:
+    """Return ψ, log ψ and log(1 − ψ) at each level in each cell, each of shape (levels, …)."""
+    psi = grid.success(levels)
+    return psi, np.log(psi), np.log1p(-psi)
+
+
+def _median(values: Values, weights: NDArray[np.float64]) -> float:
+    """Return the median of a distribution over few values, interpolated between them."""
+    return values[0] if len(values) == 1 else float(np.interp(0.5, np.cumsum(weights) - weights / 2, values))
 
 
 def quantile(centres: ArrayLike, weights: ArrayLike, share: float) -> float:

@@ -1,4 +1,4 @@
-"""Precision of a threshold: posteriors of many observers at once, and the interval of a group's mean."""
+"""The expected precision of a threshold: one participant's interval, and that of a group's mean."""
 
 from __future__ import annotations
 
@@ -6,64 +6,27 @@ import math
 from bisect import bisect_left
 from dataclasses import dataclass
 from functools import cache
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from study_app.psychophysics.families import Floats
-from study_app.psychophysics.grid import Grid, quantile
 
 BETWEEN_PEOPLE: Final = 1.2
 """Factor (one standard deviation of the logarithm) between the thresholds of people. [choice]"""
 ESTIMATE_NOISE: Final = 0.25
 """Standard deviation of the logarithm of a simulated magnitude estimate. [choice]"""
-AT_ONCE: Final = 100
-"""Number of posteriors computed together."""
 _COVERED: Final = 0.95
 _Z: Final = 1.959964
 
 
-@dataclass(frozen=True, eq=False)
-class Estimates:
-    """Thresholds of many observers, in u: posterior medians, ends of their 95 % intervals, posterior variances.
-
-    Each is an (observers,) array.
-    """
+class Estimates(NamedTuple):
+    """Thresholds of many observers, (observers,) arrays [u]: medians, ends of 95 % intervals, variances."""
 
     medians: Floats
     lows: Floats
     highs: Floats
     variances: Floats
-
-
-def estimated(grid: Grid, levels: ArrayLike, successes: Floats, failures: Floats) -> Estimates:
-    """Return the thresholds of many observers from counts of answers.
-
-    Parameters
-    ----------
-    grid : Grid
-        The cells and their prior.
-    levels : (k,) array
-        In u; −∞ for a level of zero on log spacing.
-    successes, failures : (observers, k) array
-        Numbers of answers with and without success at each level.
-    """
-    psi = grid.success(levels).reshape(successes.shape[1], -1)
-    log_success, log_failure, prior = np.log(psi), np.log1p(-psi), grid.prior.ravel()
-    thresholds = np.array(grid.thresholds)
-    found = []
-    for first in range(0, len(successes), AT_ONCE):
-        some = slice(first, first + AT_ONCE)
-        log_likelihood = np.einsum("tk,kc->tc", successes[some], log_success)
-        log_likelihood += np.einsum("tk,kc->tc", failures[some], log_failure)
-        weights = prior * np.exp(log_likelihood - log_likelihood.max(axis=1, keepdims=True))
-        marginals = weights.reshape(len(weights), len(thresholds), -1).sum(axis=2)
-        for marginal in marginals / marginals.sum(axis=1, keepdims=True):
-            mean = float((marginal * thresholds).sum())
-            variance = float((marginal * (thresholds - mean) ** 2).sum())
-            found.append([*(quantile(thresholds, marginal, share) for share in (0.5, 0.025, 0.975)), variance])
-    return Estimates(*np.asarray(found, float).T)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,13 +7,12 @@ that levels are not spent on the width or the lapse rate; that is the default he
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
 from typing import Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from study_app.psychophysics.grid import Grid, Values, quantile
+from study_app.psychophysics.grid import Grid, Values, fit, tables
 
 Learn: TypeAlias = Literal["threshold", "all"]
 
@@ -42,19 +41,10 @@ class Search:
     learn: Learn = "threshold"
     noise: bool = False
 
-    @cached_property
+    @property
     def psi(self) -> NDArray[np.float64]:
         """The probability of success at each level of each cell, of shape (levels, …)."""
-        return self.grid.success(self.levels)
-
-    @cached_property
-    def logarithms(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The logarithms of ψ and of 1 − ψ, of shape (levels, …)."""
-        return np.log(self.psi), np.log1p(-self.psi)
-
-    def posterior(self, successes: ArrayLike, failures: ArrayLike) -> NDArray[np.float64]:
-        """Return the posterior of the grid's cells from counts per level, each of shape (levels,)."""
-        return self.grid.weighted(*self.logarithms, successes, failures)
+        return tables(self.grid, self.levels)[0]
 
     def expected_entropy(self, posterior: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the entropy [nat] expected after an answer to each level, of shape (levels,)."""
@@ -69,20 +59,8 @@ class Search:
     def next(self, successes: ArrayLike, failures: ArrayLike) -> int:
         """Return the index of the next level to present: the lowest of equal ones."""
         first = int(self.noise)
-        entropy = self.expected_entropy(self.posterior(successes, failures))[first:]
+        entropy = self.expected_entropy(fit(self.levels, successes, failures, self.grid).weights)[first:]
         return first + int(np.flatnonzero(entropy <= entropy.min() + TIE_NATS)[0])
-
-    def interval(self, successes: ArrayLike, failures: ArrayLike) -> tuple[float, float]:
-        """Return the ends of the threshold's equal-tailed 95 % interval, in the coordinate u."""
-        marginal = np.einsum("abcd->a", self.posterior(successes, failures))
-        low, high = (quantile(self.grid.thresholds, marginal, share) for share in (0.025, 0.975))
-        return low, high
-
-
-@lru_cache(maxsize=8)
-def search_of(grid: Grid, levels: Values, learn: Learn, noise: bool = False) -> Search:
-    """Return the search among levels; its tables are computed once and kept."""
-    return Search(grid, levels, learn, noise)
 
 
 def _weighted_entropy(joint: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,10 +8,9 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import t as student
 
-from study_app.analysis.statistics.thresholds import fitted
 from study_app.psychophysics.families import CLIP, KAPPA, level_at, position, rise, success
-from study_app.psychophysics.grid import FREE_GUESSES, Grid, evenly, geometric, quantile
-from study_app.psychophysics.precision import AT_ONCE, Expected, estimated, student_975
+from study_app.psychophysics.grid import FREE_GUESSES, Grid, evenly, fit, geometric, quantile
+from study_app.psychophysics.precision import Expected, student_975
 from study_app.psychophysics.updown import RATIOS, Staircase, converges_to
 
 LEVELS = evenly(-1.5, 0.0, 6)
@@ -53,23 +52,23 @@ def test_the_posterior_is_the_product_of_prior_and_likelihood_of_each_cell(guess
             p = success("weibull", level, one.thresholds[t], one.widths[w], *rates).clip(CLIP, 1 - CLIP)
             likelihood *= p**yes * (1 - p) ** no
         by_hand[t, w, lapse, g] = likelihood * one.prior[t, w, lapse, g]
-    assert one.posterior(LEVELS, successes, failures) == pytest.approx(by_hand / by_hand.sum(), rel=1e-9)
+    assert fit(LEVELS, successes, failures, one).weights == pytest.approx(by_hand / by_hand.sum(), rel=1e-9)
 
 
 def test_many_answers_find_the_planted_function():
     one = grid(thresholds=evenly(-1.5, 0.0, 61), widths=geometric(0.5, 4.0, 9))
     levels = evenly(-1.5, 0.0, 15)
     p = success("weibull", levels, -0.7, one.widths[4], 0.5, 0.02)
-    weights = one.posterior(levels, 1e4 * p, 1e4 * (1 - p))
-    marginal = weights.sum(axis=(1, 2, 3))
-    assert quantile(one.thresholds, marginal, 0.5) == pytest.approx(-0.7, abs=0.01)
+    found = fit(levels, 1e4 * p, 1e4 * (1 - p), one)
+    weights = found.weights
+    assert found.threshold == pytest.approx(-0.7, abs=0.01)
     assert weights.sum(axis=(0, 2, 3)).argmax() == 4
     assert weights.sum(axis=(0, 1, 3)).argmax() == 1
 
 
 def test_one_answer_excludes_no_cell():
     certain = grid(guesses=(0.0,), lapses=(0.0,), lapse_prior=(1.0,), widths=(0.01, 0.02))
-    weights = certain.posterior((-5.0, 5.0), (1, 0), (0, 1))
+    weights = fit((-5.0, 5.0), (1, 0), (0, 1), certain).weights
     assert np.isfinite(weights).all()
     assert weights.sum() == pytest.approx(1.0)
 
@@ -138,19 +137,19 @@ def test_forward_and_inverse_agree_to_rounding_and_are_those_of_scipy(family):
     assert theirs[family] == pytest.approx(shares, abs=1e-12)
 
 
-GRID = Grid("weibull", evenly(-1.9, 0.0, 41), geometric(0.4, 4.0, 7), (1.4, 1.5), (0.0, 0.02), (0.5, 0.5), (0.5,))
+# Beetles killed by carbon disulphide (Bliss 1935), and the threshold of maximum likelihood.
+DOSES = (1.6907, 1.7242, 1.7552, 1.7842, 1.8113, 1.8369, 1.8610, 1.8839)
+BEETLES = np.array([59, 60, 62, 56, 63, 59, 62, 60])
+KILLED = np.array([6, 13, 18, 28, 52, 53, 61, 60])
 
 
-def test_estimates_of_many_observers_are_those_of_each():
-    levels, rng = evenly(-1.7, -0.2, 7), np.random.default_rng(1)
-    counts = rng.integers(0, 9, (2, AT_ONCE + 5, 7)).astype(float)
-    found = estimated(GRID, levels, *counts)
-    for row in (0, 7, AT_ONCE, AT_ONCE + 4):
-        one = fitted(levels, counts[0, row], counts[1, row], GRID)
-        assert found.medians[row] == pytest.approx(one.threshold, abs=1e-12)
-        assert found.lows[row] == pytest.approx(one.low, abs=1e-12)
-        assert found.highs[row] == pytest.approx(one.high, abs=1e-12)
-        assert found.variances[row] == pytest.approx(one.variance, rel=1e-9)
+def test_the_published_threshold_of_beetles():
+    plain = Grid("logistic", evenly(1.7, 1.85, 301), geometric(0.02, 1.0, 40), None, (0.0,), (1.0,), (0.0,))
+    found = fit(DOSES, KILLED, BEETLES - KILLED, plain)
+    assert found.threshold == pytest.approx(1.77172, abs=3e-4)
+    assert 2 * math.log(19) / found.others[0] == pytest.approx(34.2703, rel=0.03)
+    low, high = found.interval
+    assert high - low == pytest.approx(0.0152, rel=0.05)  # Wald's, from the published errors
 
 
 @pytest.mark.parametrize("freedom", [1, 2, 3, 9, 19, 99, 2000, 2001, 50_000])

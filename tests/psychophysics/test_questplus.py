@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from study_app.psychophysics.families import Z_95
-from study_app.psychophysics.grid import Grid, evenly, geometric, quantile
-from study_app.psychophysics.questplus import Search, search_of
+from study_app.psychophysics.grid import Grid, evenly, fit, geometric
+from study_app.psychophysics.questplus import Search
 
 LOW, HIGH = math.log10(0.02), math.log10(0.6)
 LEVELS = evenly(LOW, HIGH, 31)
@@ -35,14 +35,14 @@ def test_the_expected_entropy_is_that_of_both_posteriors_weighted_by_their_proba
     search = Search(RUNNING, LEVELS, learn)
     successes, failures = np.zeros(31), np.zeros(31)
     successes[[10, 20]], failures[[10, 5]] = 3, 2
-    before = search.posterior(successes, failures)
+    before = fit(LEVELS, successes, failures, RUNNING).weights
     found = search.expected_entropy(before)
     for level in (0, 7, 16, 30):
         probability = float((RUNNING.success([LEVELS[level]])[0] * before).sum())
         expected = 0.0
         for counts, share in ((successes, probability), (failures, 1 - probability)):
             counts[level] += 1
-            after = search.posterior(successes, failures)
+            after = fit(LEVELS, successes, failures, RUNNING).weights
             counts[level] -= 1
             expected += share * entropy(after.sum(axis=(1, 2, 3)) if learn == "threshold" else after)
         assert found[level] == pytest.approx(expected, abs=1e-10)
@@ -51,7 +51,7 @@ def test_the_expected_entropy_is_that_of_both_posteriors_weighted_by_their_proba
 def test_of_levels_that_promise_the_same_the_lowest_is_taken():
     flat = Grid("normal", (-1.0, -0.5), (1e-3,), None, (0.0,), (1.0,), (0.0,))
     between = (-0.9, -0.8, -0.7, -0.6)
-    assert search_of(flat, between, "threshold").next((0, 0, 0, 0), (0, 0, 0, 0)) == 0
+    assert Search(flat, between, "threshold").next((0, 0, 0, 0), (0, 0, 0, 0)) == 0
 
 
 def test_entropies_that_differ_by_rounding_are_equal(monkeypatch):
@@ -67,7 +67,7 @@ def test_the_level_of_noise_trials_is_never_chosen():
 
 
 def test_the_interval_holds_95_percent():
-    low, high = Search(RUNNING, LEVELS).interval(np.zeros(31), np.zeros(31))
+    low, high = fit(LEVELS, np.zeros(31), np.zeros(31), RUNNING).interval
     span = (HIGH - LOW) * 41 / 40  # the prior is flat over cells, of which half a one lies beyond each end
     assert (high - low) / span == pytest.approx(0.95)
     assert low + high == pytest.approx(LOW + HIGH)
@@ -94,7 +94,7 @@ def test_posterior_and_levels_are_those_of_the_questplus_package():
         stim_selection_method="min_entropy",
         param_estimation_method="mean",
     )
-    ours = search_of(Grid("normal", thresholds, widths, None, lapses, (1, 1, 1), (0.5,)), levels, "all")
+    ours = Search(Grid("normal", thresholds, widths, None, lapses, (1, 1, 1), (0.5,)), levels, "all")
     successes, failures = np.zeros(16), np.zeros(16)
     draw = np.random.default_rng(3)
     for _ in range(40):
@@ -104,7 +104,7 @@ def test_posterior_and_levels_are_those_of_the_questplus_package():
         (successes if right else failures)[level] += 1
         theirs.update(stim={"intensity": levels[level]}, outcome={"response": "yes" if right else "no"})
         posterior = theirs.posterior.transpose("mean", "sd", "lapse_rate", "lower_asymptote").to_numpy()
-        assert ours.posterior(successes, failures) == pytest.approx(posterior, abs=1e-9)
+        assert fit(levels, successes, failures, ours.grid).weights == pytest.approx(posterior, abs=1e-9)
 
 
 @pytest.mark.slow
@@ -120,7 +120,7 @@ def test_a_linear_observer_is_recovered_as_the_prototype_measured(trials, bias, 
     """Percent, ± 3 points and what 400 observers leave to chance (two standard errors)."""
     observers, w75 = 400, 0.2
     draw = np.random.default_rng(trials)
-    search = search_of(RUNNING, LEVELS, "threshold")
+    search = Search(RUNNING, LEVELS, "threshold")
     noise = math.log1p(w75) / 0.6744897501960817
     correct = [0.5 * math.erfc(-math.log1p(10.0**u) / noise / math.sqrt(2)) for u in LEVELS]
     estimates, inside = [], 0
@@ -130,10 +130,10 @@ def test_a_linear_observer_is_recovered_as_the_prototype_measured(trials, bias, 
             level = search.next(successes, failures)
             right = draw.random() < 0.01 + 0.98 * correct[level]
             (successes if right else failures)[level] += 1
-        marginal = ANALYSIS.posterior(LEVELS, successes, failures).sum(axis=(1, 2, 3))
-        low, median, high = (10.0 ** quantile(ANALYSIS.thresholds, marginal, share) for share in (0.025, 0.5, 0.975))
-        estimates.append(median)
-        inside += low <= w75 <= high
+        found = fit(LEVELS, successes, failures, ANALYSIS)
+        low, high = found.interval
+        estimates.append(10.0**found.threshold)
+        inside += low <= math.log10(w75) <= high
     ratios = np.array(estimates) / w75
     chance = 2 * 100 * ratios.std() / math.sqrt(observers)
     assert 100 * (math.exp(np.log(ratios).mean()) - 1) == pytest.approx(bias, abs=3 + chance)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from study_app.psychophysics.grid import FREE_GUESSES, Grid, evenly, geometric
+from study_app.psychophysics.grid import FREE_GUESSES, Grid, evenly, fit, geometric
 from study_app.psychophysics.questplus import Search
 from study_app.psychophysics.simulated_tracks import (
     Answers,
@@ -68,7 +68,7 @@ def test_search_tracks_end_when_the_interval_is_narrow_enough():
             counts = np.zeros((2, len(LEVELS)))
             for level, success in list(zip(found.levels[track], found.successes[track], strict=True))[:stop]:
                 counts[0 if success else 1, LEVELS.index(level)] += 1
-            low, high = one.interval(*counts)
+            low, high = fit(one.levels, *counts, one.grid).interval
             assert (high - low <= most) == (stop == length)
     assert not found.successes[np.isnan(found.levels)].any()
 

@@ -41,18 +41,18 @@ def lines() -> Iterator[str]:
         yield f"  {told([families.level_at(family, percent, -1, 0.5, 0.5, 0.02) for percent in (50, 75, 98, 99)])}"
     yield f"grid {SMALL.shape} {told(SMALL.prior)} {told(SMALL.success(LEVELS))}"
     for right, wrong in ((RIGHT, WRONG), ((0,) * 4, (0,) * 4), (WRONG, RIGHT)):
-        posterior = SMALL.posterior(LEVELS, right, wrong)
-        weights = posterior.reshape(9, -1).sum(axis=1)
-        quantiles = [grid.quantile(SMALL.thresholds, weights, q) for q in (0.025, 0.5, 0.975)]
-        yield f"{right}: {told(weights)} {told(quantiles)} {told(FREE.posterior(LEVELS, right, wrong)[::3, 1, 1])}"
-        estimates = precision.estimated(SMALL, LEVELS, np.array([right, wrong], float), np.array([wrong, right], float))
-        yield f"  {told(estimates)}"
+        found, free = (grid.fit(LEVELS, right, wrong, one) for one in (SMALL, FREE))
+        ends = [found.threshold, *found.interval]
+        yield f"{right}: {told(found.marginal)} {told(ends)} {told(free.weights[::3, 1, 1])}"
+        for one in (found, free):
+            yield f"  {told(one.others)} {one.variance:.7g} {told(one.success(LEVELS))} {told(one.band(LEVELS))}"
         for learn, noise in product(("threshold", "all"), (False, True)):
-            search = questplus.search_of(SMALL, LEVELS, learn, noise)
+            search = questplus.Search(SMALL, LEVELS, learn, noise)
             counts = [(*one, 0) if noise else one for one in (right, wrong)]
             try:
-                told_ = told([search.next(*counts), search.interval(*counts)])
-                told_ += f" {told(search.expected_entropy(search.posterior(*counts)))}"
+                told_ = (
+                    f"{search.next(*counts)} {told(search.expected_entropy(grid.fit(LEVELS, *counts, SMALL).weights))}"
+                )
             except ValueError as error:
                 told_ = str(error)
             yield f"  {learn} {noise}: {told_}"
@@ -69,7 +69,7 @@ def lines() -> Iterator[str]:
             yield f"  {rule.reversals_at(given)} {told(rule.reversals(given))} {told(means)} {rule.next(given):.7g}"
         yield f"  {told(simulated_tracks.staircase_tracks(rule, observers, draws, (4, 6)))} {rule.next([])}"
     yield told(simulated_tracks.constant_tracks(LEVELS, 3, observers, draws))
-    search = questplus.search_of(SMALL, LEVELS, "threshold")
+    search = questplus.Search(SMALL, LEVELS, "threshold")
     for more in ({}, {"begin": 2}, {"stop": (0.9, 5)}):
         yield f"search {more}: {told(simulated_tracks.search_tracks(search, observers, draws, **more))}"
     yield from of_delivery()

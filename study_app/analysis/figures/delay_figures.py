@@ -10,7 +10,8 @@ from matplotlib.ticker import MaxNLocator
 from study_app import figure_style as style
 from study_app.analysis.data.measures import LEVELS, Array, quartiles
 from study_app.analysis.figures.page_layout import MARGIN_PT, Look, Sheet, Style
-from study_app.analysis.statistics.psychometrics import Curve, Threshold, share
+from study_app.analysis.statistics.thresholds import Threshold
+from study_app.psychophysics.families import success
 
 PLOTS_A_ROW: Final = 5
 ANSWERS_PT: Final = 112.0
@@ -214,10 +215,10 @@ def draw_threshold(found: Threshold, lowest_ms: float | None, look: Look) -> She
     if lowest_ms is not None:
         axes.axvline(lowest_ms, color=style.TEXT_SOFT, linewidth=0.8, dashes=(3, 2), gid="lowest")
     if found.effect is not None and found.width is not None and found.guess is not None and found.lapse is not None:
-        fitted = Curve(found.effect, found.width, found.guess, found.lapse, 0.0)
         xs = np.linspace(levels.min(), levels.max(), 200)
-        axes.plot(xs, share(xs, fitted, found.shape), color=style.ACCENT, linewidth=1.4, gid="curve")
-        half = float(share(np.array([found.effect]), fitted, found.shape)[0])
+        shares = success("logistic", xs, found.effect, found.width, found.guess, found.lapse)
+        axes.plot(xs, shares, color=style.ACCENT, linewidth=1.4, gid="curve")
+        half = (1 + found.guess - found.lapse) / 2
         if found.interval is not None:
             ends = [found.interval.low, found.interval.high]
             axes.plot(ends, [half, half], color=style.BAND, linewidth=4, solid_capstyle="butt", gid="interval")

@@ -42,7 +42,7 @@ from study_app.analysis.statistics.equivalence import (
 )
 from study_app.analysis.statistics.equivalence import Verdict as Nearness
 from study_app.analysis.statistics.outcome import holm
-from study_app.analysis.statistics.psychometrics import Threshold, noticed
+from study_app.analysis.statistics.thresholds import Threshold, noticed
 from study_app.analysis.statistics.trend import StepDown, step_down
 
 
@@ -530,8 +530,8 @@ class DetectionThreshold(Finding[Threshold | None]):
     def methods(self) -> Iterator[str]:
         if self.value is not None:
             yield (
-                "The detection threshold is the 50 % point between guesses and lapses of a logistic function fitted by "
-                "maximum likelihood to agreement (5 to 7) in single answers, all participants pooled, with a profile "
+                "The detection threshold is the 50 % point between guesses and lapses of a logistic function: the "
+                "posterior median from agreement (5 to 7) in single answers, all participants pooled, with a 95 % "
                 "interval that is scaled by how far participants differ. It is stated only where a permutation test "
                 "against a flat line shows a rise, and where it lies among the delays that were presented."
             )

@@ -26,12 +26,12 @@ from study_app.analysis.levels.results import ExponentFound, LevelsFound, Sensit
 from study_app.analysis.results import SiteThresholds
 from study_app.analysis.statistics.outcome import Array, student_interval
 from study_app.analysis.statistics.rank_tests import groups_differ
-from study_app.analysis.statistics.thresholds import band, drift, fitted, group_mean, narrowing, p_of_fit
+from study_app.analysis.statistics.thresholds import drift, group_mean, p_of_fit
 from study_app.protocol.trials.methods import Answer, TrackSetting
 from study_app.protocol.trials.presentation import arrangement_of
 from study_app.protocol.trials.stimuli import DELAY, FORCE_DELAY, Stimulus, analysis_grid
-from study_app.psychophysics.families import CLIP, level_at, success
-from study_app.psychophysics.grid import Grid
+from study_app.psychophysics.families import level_at
+from study_app.psychophysics.grid import Grid, fit
 
 R = TypeVar("R", ExponentFound, SensitivityFound, SettingFound)
 
@@ -230,25 +230,26 @@ def _own(
     """Return a participant's threshold; of the rows those that are analysed enter the fit."""
     rows = heard[heard["analysed"]]
     counts = counts_of(stimulus, rows)
-    found = fitted(counts.levels, counts.successes, counts.failures, grid)
-    level_of = stimulus.level_of
-    psi = success(grid.family, counts.levels, found.threshold, found.width, found.guess, found.lapse)
-    psi = np.clip(psi, CLIP, 1 - CLIP)
+    answers = counts.levels, counts.successes, counts.failures
+    found, flat = fit(*answers, grid), fit(*answers, replace(grid, width_prior=None))
+    level_of, threshold, (low, high) = stimulus.level_of, found.threshold, found.interval
+    width, guess, lapse = found.others
+    psi, shown = found.success(counts.levels), counts.levels[np.isfinite(counts.levels)]
     percent, compared = compared_percent(block.published), math.nan
     if percent is not None:
-        compared = level_at(grid.family, percent, found.threshold, found.width, found.guess, found.lapse)
+        compared = level_at(grid.family, percent, threshold, *found.others)
     return ThresholdFound(
         participant=str(person),
         standard=number_or_none(standard),
-        n=found.n,
-        threshold=level_of(found.threshold),
-        low=level_of(found.low),
-        high=level_of(found.high),
-        width=found.width,
-        lapse=found.lapse,
-        guess=found.guess,
-        flat_width=level_of(found.flat),
-        beyond=found.beyond,
+        n=len(rows),
+        threshold=level_of(threshold),
+        low=level_of(low),
+        high=level_of(high),
+        width=width,
+        lapse=lapse,
+        guess=guess,
+        flat_width=level_of(flat.threshold),
+        beyond="above" if threshold > shown.max() else "below" if threshold < shown.min() else None,
         variance=found.variance,
         fit_p=p_of_fit(counts.successes, counts.successes + counts.failures, psi),
         drift=drift(rows["success"].to_numpy(dtype=bool), psi[counts.places]),
@@ -311,8 +312,8 @@ def psychometric_bands(
     found = {}
     for person, own in rows[rows["participant"].isin(people)].groupby("participant"):
         counts = counts_of(stimulus, own)
-        _, low, high = band(counts.levels, counts.successes, counts.failures, grid, u)
-        found[str(person)] = np.array([u, low, high])
+        posterior = fit(counts.levels, counts.successes, counts.failures, grid)
+        found[str(person)] = np.array([u, *posterior.band(u)])
     return found
 
 
@@ -353,23 +354,24 @@ def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[Trac
             return
         standard = own["standard"].iloc[0]
         counts = counts_of(stimulus, own)
-        low, high = narrowing(counts.levels, counts.places, own["success"].to_numpy(dtype=bool), grid)
+        successes, ends = own["success"].to_numpy(dtype=bool), []
+        so_far = np.zeros((2, len(counts.levels)))
+        for place, right in zip(counts.places, successes, strict=True):
+            so_far[0 if right else 1, place] += 1
+            ends.append([stimulus.level_of(end) for end in fit(counts.levels, so_far[0], so_far[1], grid).interval])
+        low, high = np.array(ends).T
         yield TrackCourse(
             participant=str(own["participant"].iloc[0]),
             standard=None if pd.isna(standard) else float(standard),
             tracks=np.array([int(name.rpartition("/")[2]) for name in own["track"]], np.int64),
             levels=own["level"].to_numpy(dtype=float),
-            successes=own["success"].to_numpy(dtype=bool),
+            successes=successes,
             reversals=own["reversal"].fillna(False).to_numpy(dtype=bool),
             catches=own["catch"].fillna(False).to_numpy(dtype=bool),
             noises=~own["arrangement"].str.contains("C").to_numpy(dtype=bool),
-            low=_levels(stimulus.level_of, low),
-            high=_levels(stimulus.level_of, high),
+            low=low,
+            high=high,
         )
-
-
-def _levels(level_of: Any, values: Array) -> Array:
-    return np.array([level_of(float(value)) for value in values])
 
 
 def site_thresholds(study: Study, levels: Sequence[LevelsFound], seed: int) -> Iterator[SiteThresholds]:

@@ -1,15 +1,23 @@
-"""Thresholds of single participants: posterior, goodness of fit, adjusted settings, and the mean of a group.
+"""Detection thresholds of pooled answers; goodness of fit, adjusted settings and group means of single thresholds.
 
 Wichmann & Hill 2001, Percept. Psychophys. 63, 1293–1313: deviance (eq. 4), its residuals (eq. 6), and their
-correlation with the order of the trials.
+correlation with the order of the trials. Between-person variance by Paule & Mandel 1982, interval by Hartung & Knapp
+2001 with Student's t.
 
-Between-person variance by Paule & Mandel 1982, interval by Hartung & Knapp 2001 with Student's t.
+The detection threshold is that of the answers of all participants together: the posterior median, with the rates of
+guesses and lapses free. Its interval ends where its density has fallen as a normal one does, scaled by how far
+participants differ. A number is given only where noticing rises with the level and the levels presented hold it.
+
+The width and the place of a curve mean nothing where it is flat, so that the ratio of likelihoods has no chi-square
+distribution. Here each participant's answers change places among the levels presented to him or her, which holds the
+error rate however participants differ from each other.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Final, Literal, TypeAlias
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,112 +25,272 @@ from scipy.optimize import brentq
 from scipy.special import xlogy
 from scipy.stats import t as student
 
-from study_app.analysis.statistics.outcome import Array, student_interval
-from study_app.psychophysics.grid import Grid, quantile
+from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked, draws_for, student_interval
+from study_app.psychophysics.grid import Grid, Posterior, Values, evenly, fit, geometric, tables
 
-Beyond: TypeAlias = Literal["above", "below"]
+NOTICED_FROM: Final = 5.0
+"""Agreement from "somewhat agree" on counts as having noticed."""
+
+NO_RISE: Final = "noticing is not shown to rise with the level (likelihood ratio against a flat line, p = {p:.3f})"
+
+SURE: Final = 0.95
+Z: Final = 1.959964
+
+RATES: Final[Values] = (0.0, 0.02, 0.06, 0.12, 0.2, 0.3, 0.4, 0.5)
+"""Rates of guesses and of lapses. People who never agree are lapses of the pooled answers, and may be many of them."""
+
+PLACES: Final = 121
+"""Thresholds of the grid, from one span below the lowest level to one span above the highest."""
+
+WIDTHS: Final = (1 / 40, 3.0, 12)
+"""The smallest and the largest width of the grid [spans], and their number."""
+
+WIDTH_PRIOR: Final = (0.3, 2.5)
+"""Median [spans] and factor."""
+
+RISE_DRAWS: Final = 999
+CELLS: Final = 2_000_000
+"""So many answers are rearranged, and fewer times than ``RISE_DRAWS`` where there are many participants."""
+
+AT_ONCE: Final = 20_000
+"""So many rearrangements are compared with all curves together: more take more memory."""
+
+RISE_PLACES: Final = 11
+RISE_WIDTHS: Final = (0.05, 0.2, 0.5, 1.2, 3.0)
+RISE_RATES: Final[Values] = (0.0, 0.1, 0.35)
 
 
-@dataclass(frozen=True, slots=True)
-class PosteriorThreshold:
-    """Posterior medians, in the coordinate u, and the threshold's equal-tailed 95 % interval.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Threshold(Outcome):
+    """The detection threshold (``effect``, in ms): half-way between ``guess`` and 1 − ``lapse``.
 
-    ``flat`` is the threshold's median under a flat prior on the width; ``variance`` is the threshold's posterior
-    variance; ``beyond`` says that the threshold lies beyond the levels that were presented.
+    ``statistic`` is the deviance; ``p`` is that of a rise against a flat line, by the likelihood ratio. ``yes`` of
+    ``asked`` answers noticed something at each of ``levels``, where the curve expects ``expected``. ``effect`` and all
+    that belongs to the curve are None where no threshold can be stated; ``note`` then says why in one sentence, and
+    otherwise what must be said with the number. ``lower`` and ``upper`` are the ends of the interval that exist: where
+    one is None there is no interval, and ``no_interval`` says which end is open. ``dispersion`` is how many times more
+    than independent answers the participants' answers vary (1: no more, or not known).
     """
 
-    n: int
-    threshold: float
-    low: float
-    high: float
-    variance: float
-    width: float
-    lapse: float
-    guess: float
-    flat: float
-    beyond: Beyond | None
+    levels: tuple[float, ...]
+    yes: tuple[int, ...]
+    asked: tuple[int, ...]
+    expected: tuple[float, ...] = ()
+    width: float | None = None
+    guess: float | None = None
+    lapse: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    dispersion: float | None = None
 
 
-def fitted(levels: ArrayLike, successes: ArrayLike, failures: ArrayLike, grid: Grid) -> PosteriorThreshold:
-    """Return the threshold from counts of answers.
+def noticed(values: ArrayLike, levels: Sequence[float], *, alpha: float = 0.05, seed: int = 1) -> Threshold:
+    """Return the threshold of raw answers: `NOTICED_FROM` or more means noticed, NaN is missing.
 
     Parameters
     ----------
-    levels : (k,) array
-        The levels, in u; −∞ for a level of zero on log spacing.
-    successes, failures : (k,) array
-        Counts.
-    grid : Grid
-        The cells and their prior.
+    values : (participants, levels) or (participants, levels, presentations) array
+        Answers in points of the scale.
+    levels : sequence of float
+        What was presented; equal levels are replicates of one.
+    alpha : float
+        No threshold is stated where p of a rise is above it.
+    seed : int
+        Of the rearrangements.
     """
-    posterior = grid.posterior(levels, successes, failures)
-    marginal = posterior.sum(axis=(1, 2, 3))
-    thresholds = np.array(grid.thresholds)
-    low, middle, high = (quantile(thresholds, marginal, share) for share in (0.025, 0.5, 0.975))
-    mean = float(marginal @ thresholds)
-    flat = replace(grid, width_prior=None).posterior(levels, successes, failures).sum(axis=(1, 2, 3))
-    lapse = _median(grid.lapses, posterior.sum(axis=(0, 1, 3)))
-    shown = np.asarray(levels, float)
-    shown = shown[np.isfinite(shown)]
-    return PosteriorThreshold(
-        n=int(np.sum(successes) + np.sum(failures)),
-        threshold=middle,
-        low=low,
-        high=high,
-        variance=float(marginal @ (thresholds - mean) ** 2),
-        width=_median(grid.widths, posterior.sum(axis=(0, 2, 3))),
-        lapse=lapse,
-        guess=lapse if grid.guesses is None else _median(grid.guesses, posterior.sum(axis=(0, 1, 2))),
-        flat=quantile(thresholds, flat, 0.5),
-        beyond="above" if middle > shown.max() else "below" if middle < shown.min() else None,
+    array = np.asarray(values, float)
+    array = checked(array[..., None] if array.ndim == 2 else array, "participants, levels, presentations")
+    there, presented = ~np.isnan(array), np.asarray(levels, float)
+    used = there.any(axis=(1, 2))
+    order = np.unique(presented[there.any(axis=(0, 2))])
+    same = np.asarray(presented[:, None] == order, float)
+    yes, asked = (one[used].sum(axis=2) @ same for one in (there & (array >= NOTICED_FROM), there))
+    of_yes, of_asked = yes.sum(axis=0), asked.sum(axis=0)
+    found: dict[str, Any] = {}
+    p, note = None, _impossible(order, of_yes, of_asked)
+    if not note:
+        p = p_of_rise(yes, asked, order, seed, alpha)
+        note = NO_RISE.format(p=p) if p > alpha else ""
+    if not note:
+        curve, dispersion, (lower, upper) = _pooled(order, yes, asked)
+        note = _outside(order, curve.threshold, lower, upper)
+    if not note:
+        width, guess, lapse = curve.others
+        expected = curve.success(order)
+        interval = None
+        if lower is not None and upper is not None:
+            interval = Interval(lower, upper, SURE, "posterior density, scaled for participants who differ")
+        note = "; ".join(_remarks(order, lower, upper, len(yes), dispersion))
+        found = {
+            "statistic": float(deviances(of_yes, of_asked, expected).sum()),
+            "effect": curve.threshold,
+            "interval": interval,
+            "no_interval": "" if interval else _open(lower, upper),
+            "expected": tuple(expected.tolist()),
+            "width": width,
+            "guess": guess,
+            "lapse": lapse,
+            "lower": lower,
+            "upper": upper,
+            "dispersion": dispersion,
+        }
+    return Threshold(
+        test="detection threshold",
+        n=int(used.sum()),
+        dropped=int((~used).sum()),
+        statistic_name="deviance",
+        p=p,
+        method="posterior median, logistic function of level",
+        effect_name="detection threshold",
+        note=note,
+        levels=tuple(order.tolist()),
+        yes=tuple(int(count) for count in of_yes),
+        asked=tuple(int(count) for count in of_asked),
+        **{"no_interval": note, **found},
     )
 
 
-def band(
-    levels: ArrayLike, successes: ArrayLike, failures: ArrayLike, grid: Grid, at: ArrayLike
-) -> NDArray[np.float64]:
-    """Return the median and the ends of the pointwise 95 % band of ψ at the levels ``at``, shape (3, len(at))."""
-    weights = grid.posterior(levels, successes, failures).ravel()
-    psi = grid.success(at).reshape(len(np.atleast_1d(np.asarray(at, float))), -1)
-    found = []
-    for row in psi:
-        order = np.argsort(row)
-        shares = np.cumsum(weights[order])
-        found.append(np.interp((0.5, 0.025, 0.975), shares, row[order]))
-    return np.asarray(found, float).T
+def _impossible(levels: Array, yes: Array, asked: Array) -> str:
+    """Return why the answers show no threshold whatever the curve; else nothing."""
+    if len(levels) < 3:
+        return "fewer than three levels were answered"
+    if not yes.any():
+        return f"no participant noticed anything up to {levels.max():g}: the threshold lies above, or there is none"
+    return "everybody noticed something at every level" if (yes == asked).all() else ""
 
 
-def narrowing(
-    levels: ArrayLike, places: ArrayLike, successes: ArrayLike, grid: Grid
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the ends of the threshold's 95 % interval after each answer, shape (n,) each.
+def _pooled(levels: Array, yes: Array, asked: Array) -> tuple[Posterior, float, tuple[float | None, float | None]]:
+    """Return the posterior of all answers, the dispersion, and the ends of the interval that exist.
+
+    The interval is scaled by the dispersion times the square of t over the normal quantile (pooled answers that belong
+    to clusters: Chandler & Bate 2007, Biometrika 94, 167–183).
+    """
+    low, span, people = float(levels[0]), float(np.ptp(levels)), len(yes)
+    least, most, count = WIDTHS
+    equal = (1 / len(RATES),) * len(RATES)
+    median, factor = WIDTH_PRIOR
+    widths = geometric(least * span, most * span, count)
+    grid = Grid(
+        "logistic", evenly(low - span, low + 2 * span, PLACES), widths, (median * span, factor), RATES, equal, RATES
+    )
+    found = fit(levels, yes.sum(axis=0), (asked - yes).sum(axis=0), grid)
+    if people < 2:
+        return found, 1.0, _ends(found, 1.0)
+    dispersion = _dispersion(found, levels, yes, asked)
+    return found, dispersion, _ends(found, dispersion * float(student.ppf((1 + SURE) / 2, people - 1) / Z) ** 2)
+
+
+def _dispersion(found: Posterior, levels: Array, yes: Array, asked: Array) -> float:
+    """Return the variance of the participants' scores over the information that independent answers would have.
+
+    A score is the difference of a participant's log-likelihood between the best curves at the ends of the interval of
+    independent answers, over their distance: it exists for a curve that is as steep as the grid allows.
+    """
+    _, log_yes, log_no = tables(found.grid, tuple(levels.tolist()))
+    thresholds = found.grid.thresholds
+    first, last = (int(np.searchsorted(np.cumsum(found.marginal), share)) for share in (0.025, 0.975))
+    first = min(first, len(thresholds) - 2)
+    last = min(max(last, first + 1), len(thresholds) - 1)
+    at_ends = []
+    for place in (first, last):
+        best = (slice(None), place, *np.unravel_index(found.weights[place].argmax(), found.grid.shape[1:]))
+        at_ends.append(yes @ log_yes[best] + (asked - yes) @ log_no[best])
+    scores = (at_ends[1] - at_ends[0]) / (thresholds[last] - thresholds[first])
+    low, high = found.interval
+    return max(1.0, float(scores.var(ddof=1)) * len(scores) * ((high - low) / (2 * Z)) ** 2)
+
+
+def _ends(found: Posterior, scale: float) -> tuple[float | None, float | None]:
+    """Return the ends of the interval; None where the threshold may lie beyond that end of the grid.
+
+    The density of the threshold there is exp(−scale z²/2) of the highest, as that of a normal distribution whose
+    variance is ``scale`` times larger.
+    """
+    thresholds = np.array(found.grid.thresholds)
+    heights = np.log(np.maximum(found.marginal, 1e-300)) - float(np.log(found.marginal.max()))
+    cut = -scale * Z**2 / 2
+    inside = np.flatnonzero(heights >= cut)
+    ends: list[float | None] = []
+    for within, beyond in ((inside[0], inside[0] - 1), (inside[-1], inside[-1] + 1)):
+        if 0 <= beyond < len(heights):
+            pair = [beyond, within]
+            ends.append(float(np.interp(cut, heights[pair], thresholds[pair])))
+        else:
+            ends.append(None)
+    return ends[0], ends[1]
+
+
+def _outside(levels: Array, threshold: float, lower: float | None, upper: float | None) -> str:
+    """Return why a curve gives no threshold: the levels that were presented do not hold it; else nothing."""
+    low, high = float(levels[0]), float(levels[-1])
+    if not low <= threshold <= high:
+        return f"the fitted threshold lies outside the levels that were presented ({low:g} to {high:g})"
+    if not any(end is not None and low <= end <= high for end in (lower, upper)):
+        return f"no end of the interval of the threshold lies among the levels presented ({low:g} to {high:g})"
+    return ""
+
+
+def _remarks(levels: Array, lower: float | None, upper: float | None, people: int, dispersion: float) -> Iterator[str]:
+    """Yield what must be said with a threshold."""
+    if any(end is not None and not levels[0] <= end <= levels[-1] for end in (lower, upper)):
+        yield "the interval reaches beyond the levels that were presented, where the function's shape alone gives it"
+    if people == 1:
+        yield "the answers of one participant: the interval is about this person alone"
+    else:
+        yield (
+            "answers of all participants are pooled, and the interval includes how far participants differ (they vary "
+            f"{dispersion:.1f} times as much as independent answers)"
+        )
+
+
+def _open(lower: float | None, upper: float | None) -> str:
+    side = "on both sides" if lower is None and upper is None else "below" if lower is None else "above"
+    return f"no interval: the answers leave it open {side}"
+
+
+def p_of_rise(yes: Array, asked: Array, levels: Array, seed: int, alpha: float) -> float:
+    """Return p that the share of yes answers rises with the level.
 
     Parameters
     ----------
-    levels : (k,) array
-        The levels, in u.
-    places, successes : (n,) array
-        Which level each answer was given to, and whether it was a success, in the order of the trials.
-    grid : Grid
-        The cells and their prior.
+    yes, asked : (participants, levels) arrays
+        Counts; one row where answers are independent.
+    levels : (levels,) array
+        Ascending.
+    seed : int
+        Of the rearrangements.
+    alpha : float
+        So many rearrangements are drawn that their number does not decide whether p reaches it.
     """
-    psi = grid.success(levels)
-    log_success, log_failure = np.log(psi), np.log1p(-psi)
-    log_likelihood = np.zeros(grid.shape)
-    thresholds, ends = np.array(grid.thresholds), []
-    for place, right in zip(np.asarray(places, int), np.asarray(successes, bool), strict=True):
-        log_likelihood += (log_success if right else log_failure)[place]
-        weights = grid.prior * np.exp(log_likelihood - log_likelihood.max())
-        marginal = weights.sum(axis=(1, 2, 3)) / weights.sum()
-        ends.append([quantile(thresholds, marginal, share) for share in (0.025, 0.975)])
-    low, high = np.asarray(ends, float).reshape(-1, 2).T
-    return low, high
+    slope, no = _curves(tuple(levels.tolist()))
+    flat = no @ asked.sum(axis=0)
+    found = float((slope @ yes.sum(axis=0) + flat).max())
+    drawn = _rearranged(yes, asked, seed, alpha)
+    different, times = np.unique(drawn, axis=0, return_counts=True)
+    parts = (different[first : first + AT_ONCE] for first in range(0, len(different), AT_ONCE))
+    highest = np.concatenate([(part @ slope.T + flat).max(axis=1) for part in parts])
+    reached = highest >= found - 1e-9 * abs(found)
+    return (1 + int(times[reached].sum())) / (1 + len(drawn))
 
 
-def _median(values: ArrayLike, weights: NDArray[np.float64]) -> float:
-    """Return the median of a distribution over few values, interpolated between them."""
-    values = np.asarray(values, float)
-    return float(values[0]) if len(values) == 1 else float(np.interp(0.5, np.cumsum(weights) - weights / 2, values))
+@lru_cache(maxsize=8)
+def _curves(levels: Values) -> tuple[Array, Array]:
+    """Return the log odds of yes, and the log of the share of no, of all curves (curves, levels)."""
+    widths = tuple(width * (levels[-1] - levels[0]) for width in RISE_WIDTHS)
+    places = evenly(levels[0], levels[-1], RISE_PLACES)
+    psi = Grid("logistic", places, widths, None, RISE_RATES, RISE_RATES, RISE_RATES).success(levels)
+    no = np.log1p(-psi).reshape(len(levels), -1).T
+    return np.log(psi).reshape(len(levels), -1).T - no, no
+
+
+def _rearranged(yes: Array, asked: Array, seed: int, alpha: float) -> Array:
+    """Return the yes counts (draws, levels) after each participant's answers changed places."""
+    rng = np.random.default_rng(seed)
+    draws = draws_for(alpha, min(RISE_DRAWS, CELLS // max(1, int(asked.sum()))))
+    drawn = np.zeros((draws, asked.shape[1]))
+    for said, presented in zip(yes.astype(np.int64), asked.astype(np.int64), strict=True):
+        drawn += rng.multivariate_hypergeometric(presented, int(said.sum()), size=draws, method="marginals")
+    return drawn
 
 
 SETS: Final = 999

@@ -380,7 +380,8 @@ class ThresholdPlan:
         """Return what the analysis estimates from answers, of each track the first ``most`` if that is given."""
         import numpy as np  # noqa: PLC0415
 
-        from study_app.psychophysics.precision import estimated  # noqa: PLC0415
+        from study_app.psychophysics.grid import fit  # noqa: PLC0415
+        from study_app.psychophysics.precision import Estimates  # noqa: PLC0415
 
         stimulus, design = self.stimulus, self.design
         tracks = [one if most is None else one.first(most) for one in answered.tracks]
@@ -396,7 +397,9 @@ class ThresholdPlan:
             counts = np.concatenate((answered.noise[:, :, None], counts), axis=2)
             places = np.append(stimulus.coordinate(0.0), places)
         assumed = self.method.assumed(stimulus, design)
-        return estimated(analysis_grid(stimulus, design, assumed), places, counts[0], counts[1])
+        grid = analysis_grid(stimulus, design, assumed)
+        fits = (fit(places, right, wrong, grid) for right, wrong in counts.transpose(1, 0, 2))
+        return Estimates(*np.array([(one.threshold, *one.interval, one.variance) for one in fits]).T)
 
     def simulate(self, thresholds: Floats, random: Generator) -> Estimates | None:
         """Return what the analysis estimates of observers with these thresholds [u]; None: tracks are not simulated."""

@@ -398,8 +398,11 @@ class QuestPlus(Adaptive):
     def ended(self, track: TrackSetting, heard: Sequence[Heard]) -> bool:
         if self.stop is None or sum(not one.noise for one in heard) < self.stop.after:
             return False
+        from study_app.psychophysics.grid import fit  # noqa: PLC0415 - loads numpy
+
         search, counts = self._search(track), self._counts(track, heard)
-        return ratio_in_u(track.stimulus, *search.interval(*counts)) <= self.stop.ratio
+        interval = fit(search.levels, *counts, search.grid).interval
+        return ratio_in_u(track.stimulus, *interval) <= self.stop.ratio
 
     def after(self, track: TrackSetting, heard: Sequence[Heard]) -> float:
         """Return the level after these answers: their order does not matter."""
@@ -426,11 +429,11 @@ class QuestPlus(Adaptive):
         )
 
     def _search(self, track: TrackSetting) -> Search:
-        from study_app.psychophysics.questplus import search_of  # noqa: PLC0415 - loads numpy
+        from study_app.psychophysics.questplus import Search  # noqa: PLC0415 - loads numpy
 
         stimulus, design = track.stimulus, track.design
         grid = running_grid(stimulus, design, self.assumed(stimulus, design), self.lapses)
-        return search_of(grid, _coordinates(track), self.learn, design.has_noise)
+        return Search(grid, _coordinates(track), self.learn, design.has_noise)
 
     def _counts(self, track: TrackSetting, heard: Sequence[Heard]) -> tuple[list[int], list[int]]:
         coordinates = _coordinates(track)

@@ -9,7 +9,7 @@ from scipy.special import expit
 
 from study_app.analysis.data.measures import Array
 from study_app.analysis.statistics.equivalence import participants_needed, tost
-from study_app.analysis.statistics.psychometrics import noticed
+from study_app.analysis.statistics.thresholds import noticed
 from study_app.validation.report_rates.rates import Limit, Rate
 
 Case: TypeAlias = tuple[str, int]

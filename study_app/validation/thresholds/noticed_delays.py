@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from study_app.analysis.statistics.psychometrics import Threshold, noticed
+from study_app.analysis.statistics.thresholds import Threshold, noticed
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.simulated_observer import NO_FEATURES, Draw, Rater, rate, rater

@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 
 from study_app import figure_style as style
 from study_app.analysis.figures.page_layout import MARGIN_PT, Mark, Sheet
-from study_app.analysis.statistics.psychometrics import Curve, share
 from study_app.protocol.trials.stimuli import LINEAR_OBSERVER
 from study_app.psychophysics.families import success
 from study_app.store.output_files import write_files
@@ -81,8 +80,7 @@ def _shares(sheet: Sheet, axes: Axes, found: Compared, rated: Sequence[Rated]) -
         axes.plot(test.levels, np.array(test.yes) / asked, "o", markersize=3, color=colour, clip_on=False)
         if test.effect is None or test.width is None or test.guess is None or test.lapse is None:
             continue
-        curve = Curve(test.effect, test.width, test.guess, test.lapse, 0.0)
-        agree = share(delays, curve, test.shape)
+        agree = success("logistic", delays, test.effect, test.width, test.guess, test.lapse)
         axes.plot(delays, agree, color=colour, linewidth=1.2, gid=f"rated-{1000 * one.criterion_s:.0f}")
         label = f"{1000 * one.criterion_s:.0f}"
         below = min(float(agree[-1]), below - LABEL_SHARE)

@@ -3,25 +3,8 @@
 import pandas as pd
 import pytest
 
-from study_app.analysis.levels.thresholds import counts_of, courses, thresholds
-from study_app.analysis.statistics.thresholds import fitted, narrowing
-from study_app.protocol.trials.designs import default_design
-from study_app.protocol.trials.stimuli import analysis_grid, assumed_for
-from tests.analysis.levels.level_studies import STIMULUS, block, rows
-
-
-def test_the_interval_after_the_last_answer_is_that_of_all_answers() -> None:
-    grid = analysis_grid(STIMULUS, default_design("2ifc"), assumed_for(STIMULUS, default_design("2ifc")))
-    own = rows({"P001": 0.2}, trials=60)
-    counts, right = counts_of(STIMULUS, own), own["success"].to_numpy(dtype=bool)
-    low, high = narrowing(counts.levels, counts.places, right, grid)
-    whole = fitted(counts.levels, counts.successes, counts.failures, grid)
-    assert (low[-1], high[-1]) == pytest.approx((whole.low, whole.high))
-    half = own.iloc[:30]
-    fewer = counts_of(STIMULUS, half)
-    first = fitted(fewer.levels, fewer.successes, fewer.failures, grid)
-    assert (low[29], high[29]) == pytest.approx((first.low, first.high))
-    assert (high - low)[-1] < 0.7 * (high - low)[0]
+from study_app.analysis.levels.thresholds import courses, thresholds
+from tests.analysis.levels.level_studies import block, rows
 
 
 def test_courses_are_in_the_order_of_the_trials_and_end_at_the_threshold() -> None:
@@ -37,4 +20,6 @@ def test_courses_are_in_the_order_of_the_trials_and_end_at_the_threshold() -> No
     assert not one.reversals.any()
     _, estimated, _ = thresholds(block(), frame)
     assert (one.low[-1], one.high[-1]) == pytest.approx((estimated.low, estimated.high))
+    _, first, _ = thresholds(block(), frame[frame["trial"] <= own["trial"].iloc[19]])
+    assert (one.low[19], one.high[19]) == pytest.approx((first.low, first.high))
     assert len(list(courses(block(), frame, most=1))) == 1

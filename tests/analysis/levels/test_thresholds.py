@@ -8,12 +8,13 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.levels.thresholds import counts_of, thresholds
-from study_app.analysis.statistics.thresholds import band, fitted, group_mean, p_of_fit
+from study_app.analysis.statistics.thresholds import group_mean, p_of_fit
 from study_app.protocol.model import Published
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.methods import Heard, QuestPlus, TrackSetting, UpDown
 from study_app.protocol.trials.stimuli import Stimulus, analysis_grid, assumed_for
 from study_app.psychophysics.families import success
+from study_app.psychophysics.grid import fit
 from tests.analysis.levels.level_studies import LEVELS, NAMES, STIMULUS, block, rows
 
 
@@ -146,15 +147,14 @@ def test_the_band_holds_the_function_and_is_narrow_with_many_answers() -> None:
     u = [math.log10(level) for level in LEVELS]
     psi = success("weibull", u, -0.7, 1.4, 0.5, 0.02)
     for n, widest in ((20, 0.5), (2000, 0.05)):
-        middle, low, high = band(u, n * psi, n * (1 - psi), grid, u)
-        assert (low <= middle).all()
-        assert (middle <= high).all()
+        low, high = fit(u, n * psi, n * (1 - psi), grid).band(u)
+        assert (low <= high).all()
         assert (low - 0.01 <= psi).all()
         assert (psi <= high + 0.01).all()
         assert (high - low).max() <= widest
-    many = fitted(u, 1e4 * psi, 1e4 * (1 - psi), grid)
+    many, flat = (fit(u, 1e4 * psi, 1e4 * (1 - psi), one) for one in (grid, replace(grid, width_prior=None)))
     assert many.threshold == pytest.approx(-0.7, abs=0.03)  # widths are few
-    assert many.flat == pytest.approx(many.threshold, abs=0.03)
+    assert flat.threshold == pytest.approx(many.threshold, abs=0.03)
 
 
 def test_a_function_that_does_not_fit_and_answers_that_drift_are_said_to() -> None:

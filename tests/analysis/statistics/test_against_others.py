@@ -9,7 +9,6 @@ import pytest
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.mixed_model import ordinal
 from study_app.analysis.statistics.outcome import false_discovery, holm
-from study_app.analysis.statistics.psychometrics import threshold
 from study_app.analysis.statistics.rank_tests import friedman, paired
 from study_app.analysis.statistics.recognition import kappa
 from study_app.analysis.statistics.thresholds import group_mean
@@ -70,12 +69,6 @@ def test_statsmodels_models() -> None:
     assert ours.log_likelihood == pytest.approx(theirs.llf, abs=1e-7)
     assert [one.estimate for one in ours.coefficients] == pytest.approx(theirs.params[:2], abs=1e-5)
     assert [one.error for one in ours.coefficients] == pytest.approx(theirs.bse[:2], rel=1e-4)
-    api = vendor("statsmodels.api")
-    delays, yes = np.array([0.0, 50, 100, 150, 200, 300]), np.array([1, 2, 5, 9, 15, 19])
-    binomial = api.GLM(np.c_[yes, 20 - yes], np.c_[np.ones(6), delays], family=api.families.Binomial()).fit()
-    fitted = threshold(delays, yes, np.full(6, 20), guess=0.0, lapse=0.0)
-    assert fitted.effect == pytest.approx(-binomial.params[0] / binomial.params[1], rel=1e-5)
-    assert fitted.statistic == pytest.approx(binomial.deviance, rel=1e-6)
 
 
 def test_scipy_page_is_our_untied_p() -> None:

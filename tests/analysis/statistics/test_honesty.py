@@ -14,9 +14,9 @@ from scipy.stats import binom
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.mixed_model import ordinal
 from study_app.analysis.statistics.outcome import Outcome
-from study_app.analysis.statistics.psychometrics import noticed
 from study_app.analysis.statistics.rank_tests import friedman, global_permutation, paired, skillings_mack
 from study_app.analysis.statistics.recognition import UNANSWERED, UNDECIDED, Recognition, named, recognition
+from study_app.analysis.statistics.thresholds import noticed
 from study_app.analysis.statistics.trend import page, step_down
 from study_app.errors import AnalysisError
 

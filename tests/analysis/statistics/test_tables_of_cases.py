@@ -7,16 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.analysis.statistics import (
-    equivalence,
-    mixed_model,
-    outcome,
-    psychometrics,
-    rank_tests,
-    recognition,
-    thresholds,
-    trend,
-)
+from study_app.analysis.statistics import equivalence, mixed_model, outcome, rank_tests, recognition, thresholds, trend
 from study_app.errors import AnalysisError
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.stimuli import analysis_grid, assumed_for
@@ -140,16 +131,7 @@ def of_thresholds() -> Iterator[str]:
         name: (one, LEVELS[: one.shape[1]]) for name, one in SAMPLES.items()
         if name in ("none", "one", "ties", "few", "rise", "fall", "missing", "all missing", "ends", "one setting")
     }  # fmt: skip
-    yield from results(psychometrics.noticed, rising)
-    for successes, failures in COUNTS:
-        case = {f"{successes} {failures}": (U, successes, failures, GRID)}
-        yield from results(thresholds.fitted, case)
-        yield from results(
-            thresholds.band, {name: (*given, np.linspace(-1.7, -0.2, 4)) for name, given in case.items()}
-        )
-    yield from results(
-        thresholds.narrowing, {"": (U, [0, 1, 2, 3, 2, 1], [False, True, True, True, False, True], GRID)}
-    )
+    yield from results(thresholds.noticed, rising)
     expected = np.array([0.55, 0.7, 0.9])
     for right in ([1, 4, 9], [5, 7, 10], [0, 0, 10]):
         yield from results(thresholds.deviances, {str(right): (right, [10] * 3, expected)})

@@ -12,10 +12,10 @@ from statistics import NormalDist
 
 import numpy as np
 
-from study_app.analysis.statistics.thresholds import fitted
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.stimuli import LAPSES, Stimulus, analysis_grid, assumed_for, running_grid
-from study_app.psychophysics.questplus import search_of
+from study_app.psychophysics.grid import fit
+from study_app.psychophysics.questplus import Search
 
 TRIALS = (40, 80, 160)
 STIMULUS = Stimulus(vary="damping_nspm", levels=(0.02, 0.6), standards=(8.0,))
@@ -42,7 +42,7 @@ def main(observers: str = "1000", seed: str = "1") -> int:
     analysis = analysis_grid(STIMULUS, DESIGN, assumed)
     levels = STIMULUS.grid
     coordinates = tuple(STIMULUS.coordinate(level) for level in levels)
-    search = search_of(running, coordinates, "threshold")
+    search = Search(running, coordinates, "threshold")
     planted = MEDIAN_75 * BETWEEN ** draw.normal(size=int(observers))
     found: dict[int, list[tuple[float, float, float]]] = {trials: [] for trials in TRIALS}
     began = time.process_time()
@@ -55,9 +55,9 @@ def main(observers: str = "1000", seed: str = "1") -> int:
             counts[0 if draw.random() < shares[at] else 1][at] += 1
             if trial in TRIALS:
                 start = time.process_time()
-                one = fitted(coordinates, *counts, analysis)
+                one = fit(coordinates, *counts, analysis)
                 fits_s += time.process_time() - start
-                found[trial].append((one.threshold, one.low, one.high))
+                found[trial].append((one.threshold, *one.interval))
     truth = np.log10(planted)
     print(f"{len(planted)} observers, 2IFC, 75 % at {MEDIAN_75} (factor {BETWEEN}), QUEST+, seed {seed}")
     print("trials  coverage %   mean error %   SD of one %")

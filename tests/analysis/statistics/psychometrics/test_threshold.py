@@ -2,13 +2,11 @@ import math
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
-from scipy.special import expit, ndtri
+from scipy.special import expit
 from scipy.stats import binom, ttest_1samp
 
-from study_app.analysis.statistics.psychometrics import DROP, Counts, Curve, fit, noticed, share, threshold
-from study_app.analysis.statistics.thresholds import deviances, drift, drifts, p_of_fit, setting_statistics
-from study_app.errors import AnalysisError
+from study_app.analysis.statistics.thresholds import deviances, drift, drifts, noticed, p_of_fit, setting_statistics
+from study_app.psychophysics.families import success
 
 pytestmark = pytest.mark.slow
 
@@ -17,110 +15,19 @@ DELAYS = (0, 50, 100, 125, 150, 200, 300)
 POOLED = [0, 0, 1, 2, 4, 5, 5]
 STUDY = (0, 50, 75, 100, 125, 150, 200)
 
-# psignifit's tests, made with its MATLAB version: guess rate, shape, right answers of ten, threshold, width, tolerance.
-LEVELS = [0.25, 0.41666667, 0.58333333, 0.75, 0.91666667, 1.08333333, 1.25, 1.41666667, 1.58333333, 1.75]
-PSIGNIFIT = [
-    (0.5, "normal", [4, 6, 3, 8, 7, 5, 8, 9, 9, 10], 1.19233664, 1.13590185, 0.01),
-    (0.0, "normal", [0, 2, 2, 3, 7, 7, 8, 8, 9, 10], 0.897273717, 1.43410261, 0.01),
-    (0.5, "logistic", [5, 5, 5, 6, 5, 7, 9, 9, 8, 10], 1.18954146, 1.34590649, 0.01),
-    (0.0, "logistic", [1, 1, 4, 6, 5, 6, 7, 9, 7, 10], 0.879924438, 2.05631136, 0.03),
-]
-FINE = [0.001, 0.0015, 0.002, 0.0025, 0.003, 0.0035, 0.004, 0.0045, 0.005, 0.006, 0.007, 0.008, 0.010]
-FINE_RIGHT = [45, 50, 44, 44, 52, 53, 62, 64, 76, 79, 88, 90, 90]
 
-# Beetles killed by carbon disulphide (Bliss 1935).
-DOSES = [1.6907, 1.7242, 1.7552, 1.7842, 1.8113, 1.8369, 1.8610, 1.8839]
-BEETLES = [59, 60, 62, 56, 63, 59, 62, 60]
-KILLED = [6, 13, 18, 28, 52, 53, 61, 60]
-
-
-@pytest.mark.parametrize(("guess", "shape", "right", "place", "width", "tolerance"), PSIGNIFIT)
-def test_published_fits_of_ten_trials(guess, shape, right, place, width, tolerance) -> None:  # type: ignore[no-untyped-def]
-    result = threshold(LEVELS, right, [10] * 10, shape=shape, guess=guess, lapse=0.0)
-    assert result.effect == pytest.approx(place, rel=tolerance)
-    assert result.width == pytest.approx(width, rel=tolerance)
-
-
-def test_published_fit_of_ninety_trials() -> None:
-    result = threshold(FINE, FINE_RIGHT, [90] * 13, shape="normal", guess=0.5)
-    assert result.effect == pytest.approx(0.00464485, abs=1e-4)
-    assert result.width == pytest.approx(0.00468384, abs=1e-4)
-    assert result.lapse == pytest.approx(0.0, abs=1e-3)
-    at = Curve(result.effect, result.width, 0.5, 0.0, 0.0)  # type: ignore[arg-type]
-    assert float(share(np.array([0.005839]), at, "normal")[0]) == pytest.approx(0.5 + 0.5 * 0.8, abs=0.005)
-
-
-def test_published_beetles() -> None:
-    logit = threshold(DOSES, KILLED, BEETLES, guess=0.0, lapse=0.0)
-    assert (logit.effect, logit.statistic) == pytest.approx((1.77172, 11.2322), rel=1e-5)
-    assert logit.width is not None
-    slope = 2 * np.log(19) / logit.width
-    assert slope == pytest.approx(34.2703, abs=1e-4)
-    assert -slope * (logit.effect or 0.0) == pytest.approx(-60.7175, abs=1e-4)
-    probit = threshold(DOSES, KILLED, BEETLES, shape="normal", guess=0.0, lapse=0.0)
-    assert (probit.effect, probit.statistic) == pytest.approx((1.77085, 10.1198), rel=1e-5)
-    assert probit.width is not None
-    slope = 2 * ndtri(0.95) / probit.width
-    assert (-slope * (probit.effect or 0.0), slope) == pytest.approx((-34.9353, 19.7279), abs=5e-4)
-    # 20 published digits less: Wald's interval from the published errors of the coefficients is about as wide.
-    assert logit.interval is not None
-    assert logit.interval.high - logit.interval.low == pytest.approx(0.0152, rel=0.05)
-
-
-def highest_at(place: float, counts: Counts) -> float:
-    """Return the highest log-likelihood at a threshold, by another minimiser from many starts."""
-
-    def value(values: np.ndarray) -> float:
-        curve = Curve(place, float(np.exp(values[0])), *expit(values[1:]) / 2, 0.0)
-        expected = np.clip(share(counts.levels, curve, "logistic"), 1e-12, 1 - 1e-12)
-        return -float((counts.yes * np.log(expected) + (counts.asked - counts.yes) * np.log(1 - expected)).sum())
-
-    starts = [(np.log(width), guess, lapse) for width in (20, 120) for guess in (-6, -1) for lapse in (-6, -1)]
-    return -min(minimize(value, start, method="Nelder-Mead", options={"maxiter": 400}).fun for start in starts)
-
-
-def test_the_profile_ends_where_the_likelihood_has_dropped() -> None:
-    result = threshold(DELAYS, POOLED, [5] * 7)
-    counts = Counts(np.array(DELAYS, dtype=float), np.array(POOLED, dtype=float), np.full(7, 5.0))
-    for end in (result.lower, result.upper):
-        assert end is not None
-        assert result.log_likelihood is not None
-        assert result.log_likelihood - highest_at(end, counts) == pytest.approx(DROP, abs=0.02)
-
-
-def test_counts_at_which_a_local_search_failed_are_fitted() -> None:
-    # The first raised ValueError; of the second a lower maximum was found, at 128.8 ms.
-    raised = threshold((0, 50, 75, 100, 125, 150, 200), [0, 0, 2, 0, 2, 2, 5], [5] * 7)
-    assert raised.effect == pytest.approx(151.4, abs=0.5)
-    counts = Counts(np.array([0.0, 50, 75, 100, 125, 150, 200]), np.array([0.0, 4, 2, 2, 4, 10, 10]), np.full(7, 12.0))
-    capped = fit(counts, "logistic", (0.0, 0.5), (0.0, 0.06))
-    assert (capped.threshold, capped.log_likelihood) == pytest.approx((135.3, -40.914), abs=0.05)
-    assert fit(counts, "logistic", (0.0, 0.5), (0.0, 0.5)).log_likelihood > capped.log_likelihood
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(3))
-def test_no_counts_raise_and_no_other_search_finds_a_higher_likelihood(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    levels = np.cumsum(rng.integers(1, 100, rng.integers(3, 9))).astype(float)
-    asked = rng.integers(1, 21, len(levels))
-    yes = rng.binomial(asked, np.sort(rng.random(len(levels))))
-    threshold(levels, yes, asked)
-    counts = Counts(levels, yes.astype(float), asked.astype(float))
-    best = fit(counts, "logistic", (0.0, 0.5), (0.0, 0.5))
-    for place in np.linspace(levels[0], levels[-1], 4):
-        assert highest_at(float(place), counts) < best.log_likelihood + 1e-3
+def pooled(yes: list[int], people: int) -> np.ndarray:
+    """Return answers (people, levels) of which so many noticed something at each level."""
+    return np.where(np.arange(people)[:, None] < np.array(yes), 6.0, 2.0)
 
 
 def test_guesses_without_any_delay_raise_the_lower_end_and_not_the_threshold() -> None:
-    truth = Curve(130.0, 80.0, 0.3, 0.0, 0.0)
-    asked = np.full(7, 400)
-    yes = np.rint(asked * share(np.array(DELAYS, dtype=float), truth, "logistic"))
-    result = threshold(DELAYS, yes, asked)
-    assert (result.effect, result.width) == pytest.approx((130, 80), rel=0.03)
-    assert result.guess == pytest.approx(0.3, abs=0.01)
-    ignored = threshold(DELAYS, yes, asked, guess=0.0)
-    assert (ignored.effect or 0.0) < 115
+    rng = np.random.default_rng(5)
+    chance = success("logistic", DELAYS, 130.0, 80.0, 0.3, 0.0)
+    result = noticed(np.where(rng.random((400, 7)) < chance, 6.0, 2.0), DELAYS)
+    assert (result.effect, result.width) == pytest.approx((130, 80), rel=0.2)
+    assert result.guess == pytest.approx(0.3, abs=0.05)
+    assert result.statistic == pytest.approx(deviances(result.yes, result.asked, result.expected).sum())
 
 
 def people_who_notice(rng: np.random.Generator, n: int, spread_ms: float, never: float) -> np.ndarray:
@@ -212,30 +119,20 @@ def test_agreement_from_five_on_is_noticing_and_missing_answers_do_not_count() -
     ],
 )
 def test_answers_without_a_threshold_are_told(yes: list[int], note: str) -> None:
-    result = threshold(DELAYS, yes, [5] * 7)
+    result = noticed(pooled(yes, 5), DELAYS)
     assert (result.effect, result.interval, result.statistic) == (None, None, None)
     assert note in result.note
     assert note in result.no_interval
 
 
-def test_rates_and_widths_at_the_end_of_the_fit_are_told() -> None:
-    # Three of twenty miss what everybody else notices: the fit holds so many lapses.
-    lapsing = threshold(DELAYS, [0, 0, 1, 4, 14, 17, 17], [20] * 7)
-    assert lapsing.lapse == pytest.approx(0.15, abs=0.02)
-    assert lapsing.note == ""
-    guessing = threshold(DELAYS, [13, 12, 13, 14, 15, 19, 20], [20] * 7)
-    assert "guesses are at the most that the fit allows (0.5)" in guessing.note
-    step = threshold(DELAYS, [0, 0, 0, 20, 20, 20, 20], [20] * 7)
-    assert "as steep as the fit allows" in step.note
-    far = threshold(DELAYS, [0, 0, 0, 1, 0, 2, 3], [5] * 7, lapse=0.0)
-    assert far.upper is not None
-    assert far.upper > 300
-    assert "the interval reaches beyond the levels that were presented" in far.note
-    assert threshold(DELAYS, [0, 0, 1, 4, 14, 17, 17], [20] * 7, lapse=0.06).note == ""  # fixed, not found
+def test_people_who_never_agree_are_lapses() -> None:
+    lapsing = noticed(pooled([0, 0, 1, 4, 14, 17, 17], 20), DELAYS)  # three of twenty
+    assert lapsing.lapse == pytest.approx(0.15, abs=0.03)
+    assert lapsing.effect == pytest.approx(138, abs=8)
 
 
 def test_a_threshold_that_the_levels_do_not_hold_is_not_stated() -> None:
-    above = threshold(DELAYS, [0, 0, 0, 0, 0, 1, 6], [20] * 7, lapse=0.0)
+    above = noticed(pooled([0, 0, 0, 0, 0, 1, 6], 20), DELAYS)
     assert (above.effect, above.width, above.lower, above.expected) == (None, None, None, ())
     assert above.p is not None
     assert above.p < 0.05
@@ -243,26 +140,23 @@ def test_a_threshold_that_the_levels_do_not_hold_is_not_stated() -> None:
 
 
 def test_an_open_interval_says_which_end_is_open() -> None:
-    result = threshold(DELAYS, [0, 0, 0, 0, 0, 1, 1], [5] * 7)
+    result = noticed(pooled([0, 0, 0, 0, 0, 3, 4], 12), DELAYS)
     assert result.effect is not None
     assert result.interval is None
     assert result.lower is not None
     assert result.upper is None
     assert result.no_interval == "no interval: the answers leave it open above"
+    far = noticed(pooled([0, 0, 0, 0, 1, 2, 8], 20), DELAYS)
+    assert far.upper is not None
+    assert far.upper > 300
+    assert "the interval reaches beyond the levels that were presented" in far.note
 
 
-def test_two_levels_are_too_few_and_unasked_levels_do_not_count() -> None:
-    assert threshold([0, 100], [0, 5], [5, 5]).note == "fewer than three levels were answered"
-    assert threshold([*DELAYS, 400], [*POOLED, 0], [*[5] * 7, 0]).effect == threshold(DELAYS, POOLED, [5] * 7).effect
-
-
-@pytest.mark.parametrize(
-    ("yes", "asked"),
-    [([0, 6, 5], [5, 5, 5]), ([0, -1, 5], [5, 5, 5]), ([0, 1], [5, 5, 5]), ([0, np.nan, 5], [5, 5, 5])],
-)
-def test_counts_that_cannot_be_are_refused(yes: list[float], asked: list[float]) -> None:
-    with pytest.raises(AnalysisError, match=r"cannot be|do not fit"):
-        threshold([0, 50, 100], yes, asked)
+def test_two_levels_are_too_few_and_levels_without_answers_do_not_count() -> None:
+    assert noticed(pooled([0, 5], 5), (0, 100)).note == "fewer than three levels were answered"
+    answers = pooled(POOLED, 5)
+    more = noticed(np.column_stack([answers, np.full(5, np.nan)]), (*DELAYS, 400))
+    assert more == noticed(answers, DELAYS)
 
 
 PSI = np.array([0.55, 0.7, 0.85, 0.95])
