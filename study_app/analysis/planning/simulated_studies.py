@@ -21,6 +21,7 @@ from study_app.analysis.data.blocks import Decided, Item, Kind, read_decided, sp
 from study_app.analysis.data.measures import Array
 from study_app.analysis.statistics.equivalence import equivalent as shows_equivalence
 from study_app.analysis.statistics.equivalence import sizes
+from study_app.analysis.statistics.outcome import false_discovery, holm
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block
 from study_app.protocol.groups import groups_with
@@ -283,30 +284,6 @@ def equivalent(differences: Array, bound: float, alpha: float, rng: np.random.Ge
     return np.asarray(shown.reshape(rows.shape[:-1]))
 
 
-def holm(ps: Array, alpha: float) -> NDArray[np.bool_]:
-    """Return which tests of families (…, members) Holm's procedure rejects."""
-    return _rejected(ps, alpha / np.arange(ps.shape[-1], 0, -1), stops=True)
-
-
-def false_discovery(ps: Array, alpha: float) -> NDArray[np.bool_]:
-    """Return which tests of families (…, members) Benjamini and Hochberg's procedure rejects."""
-    members = ps.shape[-1]
-    return _rejected(ps, alpha * np.arange(1, members + 1) / members, stops=False)
-
-
-def _rejected(ps: Array, limits: Array, *, stops: bool) -> NDArray[np.bool_]:
-    """Return the tests whose sorted p keep the ``limits``: up to the first that does not, or to the last that does."""
-    order = ps.argsort(axis=-1)
-    kept = np.take_along_axis(ps, order, axis=-1) <= limits + 1e-12
-    if stops:
-        found = np.logical_and.accumulate(kept, axis=-1)
-    else:
-        found = np.logical_or.accumulate(kept[..., ::-1], axis=-1)[..., ::-1]
-    back = np.empty(ps.shape, dtype=bool)
-    np.put_along_axis(back, order, found, axis=-1)
-    return back
-
-
 EFFECTS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.75, 1.0, 1.5, 2.0, 4.0, 8.0)
 """How many times the effects of the answer model; at 0 every finding is a false alarm."""
 
@@ -421,10 +398,10 @@ def _family(block: Planned, decided: Decided, ps: Array, places: Sequence[int]) 
     """
     primary = np.array([not decided.made or decided.is_primary(block.items[place].id) for place in places])
     found = np.zeros(ps.shape, dtype=bool)
-    if primary.any():
-        found[:, primary] = holm(ps[:, primary], decided.alpha)
-    if not primary.all():
-        found[:, ~primary] = false_discovery(ps[:, ~primary], decided.alpha)
+    for members, adjusted in ((primary, holm), (~primary, false_discovery)):
+        if members.any():
+            of_studies = [adjusted(of_study) for of_study in ps[:, members].tolist()]
+            found[:, members] = np.array(of_studies, float) <= decided.alpha + 1e-12
     return found
 
 
