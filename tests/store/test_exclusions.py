@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from study_app.errors import StoreError
+from study_app.store.blinded import unblinding
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import Exclusion, exclude, exclusions, include, reversals
 from study_app.store.sessions.folder_lock import is_open
@@ -72,6 +73,15 @@ def test_what_is_left_out_already_is_refused(folder: Path) -> None:
     with pytest.raises(StoreError, match=r"trial 3 is already excluded.*\(all of it\)"):
         exclude(folder, "P007", 1, trial=3, by="CD", reason="again")
     assert len(exclusions(folder)) == 2
+
+
+def test_a_rule_excludes_no_session_that_a_person_included_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(unblinding, "_missed", lambda *_: ["3 of 4 catch trials", "2 of 2 catch trials"])
+    found = unblinding.exclude_inattentive(folder)
+    assert [(row.participant, row.rule_or_person) for row in found] == [("P007", "catch"), ("P008", "catch")]
+    assert {row.reason for row in found} == {"3 of 4 catch trials; 2 of 2 catch trials"}
+    include(folder, "P007", 1, by="AB", reason="the task was understood late")
+    assert unblinding.exclude_inattentive(folder) == ()
 
 
 def test_a_full_disk_leaves_the_list_as_it_was(folder: Path, files_up_to: FullDisk) -> None:

@@ -43,6 +43,8 @@ def test_an_interval_presents_its_link() -> None:
     varied = scene_of(one, Stimulated("damper", "force_delay_ms", 80.0), 7)
     assert varied.link == ForceLink(delay_s=0.08, seed=7)
     assert varied.liquids == one.scene_for("damper").liquids
+    jittered = study(("force_delay_ms = 10", "force_delay_ms = 12\nforce_jitter_ms = 3\nforce_loss = 0.1"))
+    assert scene_of(jittered, Stimulated("water"), 7).link == ForceLink(delay_s=0.012, jitter_s=0.003, loss=0.1, seed=7)
     damping = scene_of(one, Stimulated("water", "wake.scaling", 2000.0), 7)
     assert damping.link.delay_s == 0.01
     assert damping.liquids[0].wake is not None
