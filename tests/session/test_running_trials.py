@@ -123,6 +123,20 @@ class Recorded:
         """Do nothing."""
 
 
+@pytest.mark.parametrize(("blocks", "kept"), [(2, range(500)), (4, range(400, 1000)), (5, range(650, 1250))])
+def test_a_recording_begins_with_the_samples_of_its_lead_and_no_earlier_ones(blocks: int, kept: range) -> None:
+    class Appended(Recorded):
+        def append(self, samples: Any) -> None:
+            self.frames += samples
+
+    recorder = Appended()
+    recording = Recording(recorder, 1000.0)
+    for block in range(blocks):
+        recording.take(range(250 * block, 250 * block + 250))
+    recording.start(1, 1)
+    assert recorder.frames == [*kept]
+
+
 def test_the_video_is_as_late_as_the_ball_and_both_are_recorded() -> None:
     video, recorder = FakeVideo(), Recorded()
     trial, servo = begun(TASK, recorder, video=video, videos=True)

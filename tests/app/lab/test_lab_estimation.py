@@ -100,9 +100,13 @@ def test_a_preset_is_on_the_disk_before_the_program_ends(
 ) -> None:
     ended = threading.Event()
 
+    written = []
+
     def slowly(path: Path, text: str) -> None:
-        ended.wait(30.0)
+        if path.name == "one.toml":
+            ended.wait(30.0)
         save(path, text)
+        written.append(path.name)
 
     monkeypatch.setattr("study_app.app.lab.preset_saving.save", slowly)
     for name in ("one.toml", "two.toml"):
@@ -110,5 +114,6 @@ def test_a_preset_is_on_the_disk_before_the_program_ends(
     assert not list(tmp_path.iterdir())
     threading.Timer(0.05, ended.set).start()
     visit.end(Patience(20.0))
+    assert written == ["one.toml", "two.toml"], "in the order in which they were saved"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["one.toml", "two.toml"]
     assert str(tmp_path / "two.toml") in [it.source for it in visit.liquids]

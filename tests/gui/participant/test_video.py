@@ -44,6 +44,17 @@ def test_another_frame_is_painted_and_the_same_one_is_not(made: Make, monkeypatc
     assert all(area.height() < tank.video.place.height() / 2 for area in painted)
 
 
+@pytest.mark.parametrize("size", [(400, 40), (40, 400)])
+def test_a_frame_of_another_ratio_is_in_the_middle_and_as_large_as_its_place(made: Make, size: tuple[int, int]) -> None:
+    tank = filmed(made, overlay=False)
+    at = np.argwhere((seen(tank, frame(0, GREEN, size)) == GREEN).all(axis=2))
+    place, (top, left), (bottom, right) = tank.video.place, at.min(axis=0), at.max(axis=0) + 1
+    assert (left + right) / 2 == pytest.approx(place.center().x(), abs=1)
+    assert (top + bottom) / 2 == pytest.approx(place.center().y(), abs=1)
+    assert max((right - left) / place.width(), (bottom - top) / place.height()) == pytest.approx(1, abs=0.01)
+    assert (right - left) / (bottom - top) == pytest.approx(size[0] / size[1], rel=0.05)
+
+
 def test_without_a_frame_there_is_neither_tank_nor_an_earlier_picture(made: Make) -> None:
     tank = filmed(made, overlay=False)
     middle = (tank.height() // 2, tank.width() // 4)
