@@ -38,7 +38,10 @@ def test_the_patch_toggles_when_its_time_has_come_and_is_painted(test_page, cloc
     clock.now += 1
     test_page.frame()
     assert (test_page.lit, corner(test_page)) == (True, WHITE)
-    clock.now += round(1e6 * FIRST_MS)
+    clock.now += round(1e6 * FIRST_MS) - 1
+    test_page.frame()
+    assert test_page.toggles == 1, "the interval begins anew with each toggle"
+    clock.now += 1
     test_page.frame()
     assert (test_page.toggles, corner(test_page)) == (2, BLACK)
 
