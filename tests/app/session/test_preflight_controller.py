@@ -157,8 +157,12 @@ def test_a_session_on_two_screens_asks_about_the_participants(machine: Any, monk
     live._ask(Ready(machine, FACTS))
     assert live.preflight is not None
     said = [one.text() for one in live.preflight.window.findChildren(QLabel)]
-    live.preflight.close()
     assert "75.0 Hz, 150 %" in said
+    asked = live.preflight
+    live.end_by_signal(15)
+    assert not asked.window.isVisible(), "no question stays without its session"
+    assert isinstance(asked.appraisal.appraiser, Answering)
+    assert not asked.appraisal.appraiser.works
 
 
 class ConnectedLater:
