@@ -79,6 +79,10 @@ def test_the_chip_of_warnings_opens_a_list_of_them(qtbot: Any, designer: Any) ->
     problems.limit.chosen.emit(True)
     designer.editing.select(("pages", "welcome"))
     assert not problems.lines
+    problems.limit.chosen.emit(False)
+    assert [line.row.message.lower() for line in problems.lines] == [one.lower() for one in warned]
+    problems.limit.chosen.emit(True)
+    assert not problems.lines
     designer.editing.undo()
     qtbot.waitUntil(lambda: not problems.isVisible())
 

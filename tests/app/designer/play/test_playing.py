@@ -237,6 +237,10 @@ def test_another_device_is_asked_for_and_a_fault_ahead_is_named(
     qtbot.keyClick(header.strip.buttons["close"], Qt.Key.Key_Escape)
     assert not header.strip.isVisible()
     press_f5(qtbot, likert)
+    likert.open("rek2024")
+    assert not header.strip.isVisible(), "what was asked of one study is not asked of another"
+    likert.open()
+    press_f5(qtbot, likert)
     qtbot.keyClick(header.strip.buttons["play"], Qt.Key.Key_Return)
     qtbot.waitUntil(lambda: bool(opened))
     assert (opened[0].device, opened[0].pilot, opened[0].windowed) == ("mouse", True, True)
