@@ -14,7 +14,14 @@ HEAVY = ("matplotlib", "numba", "pandas", "pyarrow", "pyqtgraph", "scipy", "toml
 PROGRAM = """
 import gc, json, sys, threading
 from pathlib import Path
+from study_app.gui.display import display_check
+
+def collections():
+    return sum(generation["collections"] for generation in gc.get_stats())
+
+before = collections()
 from study_app import app
+collected = collections() - before, gc.isenabled(), gc.get_freeze_count() > 0
 from PySide6.QtCore import QObject
 
 for_all = [name for name in ("main_controller", "devices_controller") if f"study_app.app.{name}" in sys.modules]
@@ -57,7 +64,7 @@ windows = {"study_app.app.session.preflight_controller", "study_app.app.session.
 objects = [one for one in gc.get_objects() if isinstance(one, QObject)]
 assert application in objects
 elsewhere = [repr(one) for one in objects if one.thread() != application.thread()]
-print(json.dumps([for_all, at_home, at_note, sorted(windows - set(sys.modules)), elsewhere]))
+print(json.dumps([collected, for_all, at_home, at_note, sorted(windows - set(sys.modules)), elsewhere]))
 """
 
 
@@ -71,7 +78,8 @@ def test_home_and_the_note_before_a_session_stand_before_anything_heavy_is_loade
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    for_all, at_home, at_note, not_loaded, elsewhere = json.loads(done.stdout.splitlines()[-1])
+    collected, for_all, at_home, at_note, not_loaded, elsewhere = json.loads(done.stdout.splitlines()[-1])
+    assert collected == [0, True, True], "garbage is collected before and after the import, not in it"
     assert for_all == [], "a session by command loads neither the main window nor the devices"
     for loaded in (at_home, at_note):
         assert "PySide6" in loaded

@@ -42,6 +42,7 @@ def test_adaptation_moves_the_rating_and_no_forced_choice(found: Compared) -> No
     before, after = (rated(people, MEAN_CRITERION_S, adapted, 2).found.effect for adapted in (0.0, 0.03))
     assert before is not None
     assert after is not None
+    assert before == pytest.approx(1000 * MEAN_CRITERION_S, abs=8)
     assert after - before == pytest.approx(30, abs=12)
     attended, design = Comparison(delays=True, smallest=False, observer=OBSERVER), default_design("2ifc")
     for seed in range(50):
