@@ -96,8 +96,6 @@ def side_of(path: Path) -> Side | None:
 
 
 def _index(shown: Preview, path: Path) -> int | None:
-    if path[0] in {"sequence", "sequences"} or len(path) < 2:
-        return None
     index = first_step(shown, path)
     return index if index or _is_first(shown, path) else None
 

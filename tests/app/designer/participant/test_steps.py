@@ -38,6 +38,11 @@ def test_a_step_that_is_gone_is_not_found_and_a_shorter_block_keeps_its_last_tri
     assert last.shown.schedule.steps[last.index].index == 4  # type: ignore[union-attr]
 
 
+@pytest.mark.parametrize("path", [("study",), ("device", "force_limit_n"), ("sequence", 0), ("sequences", "thin")])
+def test_an_element_that_no_step_is_about_is_shown_nowhere(path: tuple[str | int, ...]) -> None:
+    assert showing(grouped(), path) is None
+
+
 def test_a_page_that_is_in_no_session_is_shown_on_its_own() -> None:
     study = grouped()
     page = study.pages["hello"].model_copy()
