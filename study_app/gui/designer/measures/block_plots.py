@@ -75,9 +75,7 @@ class MeasurePlot(Plot):
         """Fill the space between two curves."""
         colour = QColor(self.theme.ctl if anew else self.theme.accent)
         colour.setAlphaF(opacity)
-        curves = [pg.PlotCurveItem(x, one, pen=QPen(Qt.PenStyle.NoPen)) for one in (low, high)]
-        for curve in curves:
-            self.add(curve, -6)
+        curves = (pg.PlotCurveItem(x, one) for one in (low, high))
         self.add(pg.FillBetweenItem(*curves, brush=QBrush(colour)), -5)
 
     def curve(self, x: object, y: object, colour: str, width: float = 2.0, *, dashed: bool = False) -> None:
