@@ -596,7 +596,10 @@ class UnchangedUpTo(Finding[None]):
             return self.answered("not tested", f"No answer: {why}.")
         at, within = common_ms(self.found), _within(against[0])
         if at is None:
-            text = f"For no delay are mean answers to all statements shown to stay {within}. {NO_EVIDENCE}"
+            text = (
+                f"For no delay are mean answers to all statements shown to stay {within}. That is not evidence that "
+                "they change."
+            )
             return self.answered("not shown", text)
         statements = all_of(len(equivalent_up_to(against)), "statement")
         text = f"Up to {ms(at)} mean answers to {statements} stay {within}; single people may notice the delay."
