@@ -53,7 +53,7 @@ class Mood(Question):
     kind: Literal["toy_mood"] = "toy_mood"
 
     def view(self, number: int, context: Context) -> ItemView:
-        return MoodView(*self._shown(number, context))
+        return self._shown(MoodView, number, context)
 
     def problem(self, answer: Value, context: Context) -> str | None:
         return None if answer in ("sunny", "grey") else "choose sunny or grey"
