@@ -24,6 +24,7 @@ from study_app.store.blinded.blinding import (
 )
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.verification.verify_study import verify
+from tests.protocol.trials.level_studies import study
 from tests.store.conftest import Start, Tables
 
 
@@ -162,6 +163,14 @@ def test_a_protocol_with_other_conditions_is_refused_without_naming_them(
     assert str(early.value) == str(refusal.value)
     message = str(refusal.value).replace(str(tmp_path), "")  # whose name holds any number
     assert not any(word in message for word in ("mildew", "tardy", "139", "1200"))
+
+
+def test_a_block_with_another_of_the_studys_methods_has_other_conditions(tmp_path: Path) -> None:
+    many = '\n[methods.many]\nkind = "constant"\nlevels = [0.1, 0.8]\nrepetitions = 8\n'
+    open_or_draw_key(tmp_path, study(more=many))
+    check_conditions(tmp_path, study(more=many))
+    with pytest.raises(StoreError, match="was sealed for other conditions"):
+        check_conditions(tmp_path, study(('method = "few"', 'method = "many"'), more=many))
 
 
 def test_an_unreadable_key_and_one_of_a_later_format_are_errors(tmp_path: Path, protocol: Protocol) -> None:
