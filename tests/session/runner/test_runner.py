@@ -332,6 +332,19 @@ def test_a_choice_that_met_a_full_disk_is_there_after_the_pause() -> None:
     assert [line["value"] for line in world.journal.of("choice")] == [6]
 
 
+def test_what_a_page_says_that_is_covered_again_at_once_is_not_taken() -> None:
+    world = at_block("feeling")
+    world.run(3.2)
+    for item in world.state.trial.items:
+        world.runner.post(Chosen(9.0, item, 2))
+    stall(world)
+    world.runner.post(Submitted(9.5))
+    world.on_page = lambda page: world.runner.post(Note(10.0, "mark", type(page).__name__))
+    wait_for_the_disk(world)
+    assert [type(page) for page in world.pages[-2:]] == [TaskPage, PausePage]
+    assert [line["text"] for line in world.journal.of("note")] == ["PausePage"]
+
+
 def test_every_target_of_a_look_is_kept_however_long_the_disk_was_full() -> None:
     world = at_block("seeing")
     before = len(world.journal.of("target_reached"))
