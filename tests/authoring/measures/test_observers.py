@@ -9,11 +9,13 @@ import pytest
 from study_app.analysis.planning.threshold_studies import Case, study_batch
 from study_app.app.designer.measures.measures_worker import Measuring
 from study_app.app.designer.measures.wanted import wanted_of
+from study_app.authoring.edited_study import read
 from study_app.authoring.measures import observers
 from study_app.authoring.measures.observers import OBSERVERS, PLANTED, GivenUp, measurable, observe
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
 from study_app.protocol.checks.expected_precision import ThresholdPlan, expected, threshold_plan
+from study_app.protocol.source.files import shipped_file
 from study_app.protocol.trials.presented_levels import LevelLimits, clipping
 from study_app.viewmodels.designer.measures.measures_view import Controls, focus_of
 
@@ -113,6 +115,12 @@ def test_no_clipped_level_is_a_threshold_that_can_be_measured() -> None:
     found = measurable(plan_of(4, *CLIPPED), 0.02, 0.02, most=0.03)
     assert found is not None
     assert [one.threshold for one in found.planted] == pytest.approx([0.02], rel=0.01)
+
+
+def test_no_level_of_a_late_force_is_clipped_though_a_limit_clips_the_force() -> None:
+    protocol = read(shipped_file("forcedelay").read_bytes()).edited(Set(("device", "force_limit_n"), 0.1))[0].formed
+    assert protocol is not None
+    assert clipping(protocol, protocol.blocks["delay"]) is None
 
 
 @pytest.mark.slow

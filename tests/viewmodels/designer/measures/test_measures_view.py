@@ -66,6 +66,16 @@ def test_cards_say_which_levels_are_clipped_and_whether_that_is_simulated() -> N
         assert people.more == f"80 % are enough; with 107 trials: 100 %{group}"
 
 
+@pytest.mark.parametrize(
+    ("study", "block", "words"),
+    [("viscosityjnd", "viscosity", "simulated JND"), ("forcedelay", "delay", "simulated threshold")],
+)
+def test_what_is_simulated_is_called_a_threshold_where_the_standard_is_nothing(
+    study: str, block: str, words: str
+) -> None:
+    assert view(study_of(study), ("blocks", block)).controls.threshold_words == words
+
+
 CLIPPED = "levels are clipped"
 
 
