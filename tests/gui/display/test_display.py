@@ -80,7 +80,7 @@ def test_frames_follow_the_swaps_of_a_surface(screen):
         screen.now_ns = swap_ns
         screen.frames.swapped()
         swap_ns += period_ns
-    assert screen.frames.locked
+    assert (screen.frames.locked, screen.frames.paced) == (True, "locked to the screen's swaps")
     lead_ns = min(LEAD_NS, period_ns // 2)
     ahead_ns = [(swap_ns - drawn_ns) % period_ns for drawn_ns in screen.drawn_ns[-20:]]
     assert ahead_ns == pytest.approx([lead_ns] * 20, abs=2)
@@ -91,7 +91,7 @@ def test_without_swaps_the_clock_goes_on(screen):
     screen.frames.swapped()
     assert screen.frames.locked
     screen.run(2 * STALE_REFRESHES * screen.frames.period_ns * 1e-9)
-    assert not screen.frames.locked
+    assert (screen.frames.locked, screen.frames.paced) == (False, "by the clock")
     assert len(screen.drawn_ns) >= 2 * STALE_REFRESHES - 1
 
 

@@ -89,6 +89,14 @@ def test_what_changed_lies_inside_the_region_painted_anew(made: Make, page: Any,
     assert len(differs) > 0
 
 
+def test_the_count_of_reached_targets_is_drawn_where_it_is_kept(tank: TankWidget) -> None:
+    tank.show_view(view(reached=5))
+    before, count = shown(tank), tank.things["count"]
+    tank.show_view(view(reached=6))
+    differs = np.argwhere((before != shown(tank)).any(axis=2))
+    assert any(count.place.contains(QPoint(int(x), int(y))) for y, x in differs)
+
+
 def test_painted_comes_once_a_view_before_anything_else_is_done(tank: TankWidget, qtbot: Any) -> None:
     qtbot.waitExposed(tank)
     told: list[int] = []

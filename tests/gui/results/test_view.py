@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QLabel
 
 from study_app.gui.results.view import ResultsPlace
@@ -86,6 +86,10 @@ def test_leaving_out_wants_a_name_and_a_reason(place, qtbot):
     dialog.trial.setCurrentIndex(2)
     asked = decided(qtbot, place.leave_out_asked, dialog, "AK", "phone rang")
     assert asked == [("P001", 1, 3, "AK", "phone rang")]
+
+
+def test_a_figure_asks_for_the_width_at_which_it_is_read_and_the_height_of_its_proportion(place):
+    assert place.figures.cards[0].drawing.sizeHint() == QSize(900, 450)
 
 
 def test_unblinding_warns_of_sessions_that_go_on(place, qtbot):
