@@ -275,6 +275,7 @@ def test_changes_lists_what_differs_and_reverts_single_differences(ran: Any, qtb
     click(qtbot, card.list.lines[0].revert)
     assert rows(ran) == ['pages.welcome.title: "A first look" before, "Hello" now']
     assert "Revert Liquids, Repetitions" in ran.place.header.undo.accessibleName()
+    assert [button.text() for button in card.how.buttons] == ["Sentences", "Side by side"]
     click(qtbot, card.how.buttons[1])
     assert card.sides.place.text() == "1 of 1"
     sides = (card.sides.before, card.sides.after)
