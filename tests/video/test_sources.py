@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
 from pathlib import Path
 from types import SimpleNamespace
@@ -71,6 +72,18 @@ def camera_study(tmp_path: Path) -> Path:
     file = tmp_path / "demo.toml"
     file.write_bytes(with_camera())
     return file
+
+
+def test_a_camera_that_fails_before_its_first_frame_is_refused_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: Any, **__: Any) -> None:
+        time.sleep(0.02)  # who opens it waits by now
+        raise OSError("device is busy")
+
+    monkeypatch.setattr(sources, "open_video", refuse)
+    began = time.monotonic()
+    with pytest.raises(VideoError, match="v4l2:/dev/video9 cannot be used: device is busy"):
+        Camera("v4l2:/dev/video9", time.monotonic_ns, 0.5)
+    assert time.monotonic() - began < sources.OPENS_S / 2
 
 
 def videos(study: Protocol, camera: str = "v4l2:/dev/video0") -> Videos:
