@@ -67,6 +67,9 @@ def test_tracks_have_a_row_per_trial_with_what_it_presented(opened_levels: Path,
     export(opened_levels, tmp_path)
     tracks, key = rows(tmp_path, "tracks"), read_key(opened_levels)
     assert len(tracks) == 3 * 54
+    people = sorted({row["participant"] for row in tracks})
+    estimated = [(row["block"], row["participant"]) for row in rows(tmp_path, "exponents")]
+    assert sorted(estimated) == [("number", one) for one in people]
     of_trial = {(row["participant"], row["trial"]): row for row in tracks}
     for block in BLOCKS:
         for one in answered(opened_levels, block):
