@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QWidget
 
 from study_app.authoring.kept_settings import kept_participants
 from tests.app.designer.measures.conftest import Worker, jnd, shown
@@ -70,3 +71,15 @@ def test_a_row_opens_the_measures_of_a_block_that_uses_an_element(qtbot: Any, de
     click(part.buttons[1])
     assert designer.editing.selected == ("blocks", "viscosity")
     qtbot.waitUntil(lambda: not page.blocks.isVisible())
+
+
+def test_a_screen_reader_hears_each_count_of_the_balance(qtbot: Any, designer: Any, worker: Worker) -> None:
+    designer.open()
+    designer.editing.select(("blocks", "liquids"))
+    designer.place.pane.show_tab("measures")
+
+    def heard() -> bool:
+        names = [part.accessibleName() for part in designer.place.measures.findChildren(QWidget)]
+        return any("1, position 1: " in name and name.endswith(" times") for name in names)
+
+    qtbot.waitUntil(heard)
