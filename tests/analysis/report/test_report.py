@@ -29,6 +29,10 @@ def test_the_typeface_is_in_the_page_with_every_sign(of_twelve: Path) -> None:
         assert signs <= {chr(code) for code in TTFont(io.BytesIO(base64.b64decode(data))).getBestCmap()}
 
 
+def test_the_caption_of_delays_says_what_is_dashed(of_twelve: Path) -> None:
+    assert "Dashed: lowest delay at which stepping down still shows a trend" in read(of_twelve)
+
+
 def test_while_sealed_nothing_is_told_that_blinding_hides(small: Results, tmp_path: Path) -> None:
     for number_ in range(1, 8):
         small.add(f"P{number_:03d}", lambda condition, _item: 6 if condition == "heavyzembla" else 2)
