@@ -135,7 +135,7 @@ def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
         f"within the bound, with {enough(first.alpha)}. Different: the larger p of a two-sided t test and of exact "
         f"signed ranks, Holm-adjusted over the {len(against)} comparisons of this table, is at most {first.alpha:g}. "
         "Inconclusive: neither. Out of reach: no answers of so many participants could have given either. n for 80 %: "
-        f"participants with whom {STUDIES} simulated studies with this spread show equivalence in 80 %."
+        f"the number of participants with whom 80 % of {STUDIES} simulated studies with this spread show equivalence."
     )
     differing = 0.5 ** (first.n - 1) if first.n else 1.0
     if differing * len(against) > first.alpha:
@@ -177,8 +177,10 @@ def evidence_up_to(found: BlockFound, delay_ms: float) -> tuple[str, ...]:
 
     That is a trend up to this delay or a shorter one, or else a difference at one of them.
     """
+    exploratory = {trend.item for trend in DelayTrend.of(found) if not trend.primary}
     reasons = {
         one.item: f"“{short(found, one.item)}” follows the delay up to {ms(shown_ms)}"
+        + (" (exploratory)" if one.item in exploratory else "")
         for one in LowestDelay.of(found)
         if (shown_ms := one.over_all_ms) is not None and shown_ms <= delay_ms
     }
