@@ -1,7 +1,8 @@
 """One session against its journal, its receipt, its checksums and its recordings.
 
 Of a session that is open in a program only the journal is judged, which that program does not change again; its other
-files follow the journal. If it is listed as ended, whatever claims that it is open, its fingerprint covers the others.
+files follow the journal. If `fingerprints.txt` lists it as ended, its fingerprint is compared even if a lock says that
+it is open.
 `verify` checks everything and takes its time; `doubts` checks a session before an analysis reads it, unless its files
 keep their checksums.
 """
@@ -151,11 +152,13 @@ def _check(place: Place, key: Key | None, found: Gathered, *, running: bool, rec
     for wrong in wrong_responses(lines):
         found.error(folder.journal, wrong)
     ended = lines[-1]["event"] == "session_ended"
-    hashes = {name: _hash(folder, name) for name in files(folder) if recordings or not name.endswith(".parquet")}
+    hashes = {}
+    if ended or not running:
+        hashes = {name: _hash(folder, name) for name in files(folder) if recordings or not name.endswith(".parquet")}
     if not running:
         _tables(place, lines, found, ended=ended)
         if ended:
-            _checksums(folder, hashes, found)
+            _checksums(folder, hashes, found, recordings=recordings)
         if recordings:
             _recordings(folder, lines, hashes, found, ended=ended)
     if is_there(folder.rebuilt):
@@ -169,7 +172,7 @@ def _check(place: Place, key: Key | None, found: Gathered, *, running: bool, rec
         chained="previous" in lines[-1],
         row=row_from(folder, contents, opened_or_none(place.study_folder)),
         trials=frozenset(progress_of(lines).presented),
-        fingerprint=fingerprint(hashes) if ended else "",
+        fingerprint=fingerprint(hashes) if ended and recordings else "",
     )
 
 
@@ -309,7 +312,7 @@ def check_table(
     if differing:
         report = found.warning if follows else found.error
         report(path, f"differs from the journal, from line {differing[0]} on; rebuild renews it")
-    if not (differing and follows):  # else a row may be half written
+    if not (differing and follows):  # else a row may be half written: earlier versions wrote in place
         for problem in csv_files.problems(content, columns):
             found.error(path, problem)
 
@@ -322,7 +325,7 @@ def _hash(folder: SessionFolder, name: str) -> str:
         return ""
 
 
-def _checksums(folder: SessionFolder, hashes: Mapping[str, str], found: Gathered) -> None:
+def _checksums(folder: SessionFolder, hashes: Mapping[str, str], found: Gathered, *, recordings: bool) -> None:
     if not is_there(folder.checksums):
         found.error(
             folder.checksums, "is missing: was the program killed at the end of the session? rebuild creates it"
@@ -331,6 +334,8 @@ def _checksums(folder: SessionFolder, hashes: Mapping[str, str], found: Gathered
     with found.reading(folder.checksums):
         listed = read_checksums(folder)
         for name in sorted(listed.keys() | hashes.keys()):
+            if name.endswith(".parquet") and not recordings:
+                continue
             path = folder.path / name
             if name not in hashes:
                 found.error(path, "is missing")
@@ -428,7 +433,9 @@ def doubts(place: Place) -> tuple[Doubt, ...]:
         return found
     told = Gathered(folder.path)
     check_session(place, None, told, recordings=False)
-    first = {error.place: error for error in reversed(told.errors) if not error.place.endswith(".parquet")}
+    first: dict[str, Finding] = {}
+    for one in (*told.errors, *(warning for warning in told.warnings if warning.place.endswith(".csv"))):
+        first.setdefault(one.place, one)
     if (of_journal := first.get(folder.journal.name)) is not None:
         first = {of_journal.place: of_journal}
     remedy = f"liquid-study verify {place.study_folder.path} checks everything"

@@ -102,7 +102,7 @@ def test_tables_of_a_session_that_has_not_ended_may_be_behind_its_journal(
 def test_a_changed_table_of_a_session_that_has_not_ended_is_a_warning(
     study: Path, start: Start, summary: dict[str, Any], name: str, old: str, new: str
 ) -> None:
-    """Even where it is no CSV; it cannot be told from one that a program was writing when it was killed."""
+    """Even where it is no CSV; earlier versions could be killed while they wrote one in place."""
     told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
     with start("P000") as store:
         store.append("trial_started", trial=1, attempt=1, **told_of)
