@@ -22,6 +22,7 @@ from study_app.errors import StoreError
 
 OLD_S = 3600.0  # longer than from the last write of a temporary file to its renaming
 _NO_FLUSH = (errno.EINVAL, errno.EBADF, errno.ENOTSUP)  # of a folder that cannot be flushed
+_REPLACE_AGAIN_S = (0.01, 0.05, 0.2)
 _MOST_LEVELS = 64  # of JSON, so that code may process a value recursively
 _TEMPORARY = re.compile(r"\.[^.].*\.[0-9a-f]{8}\.tmp")  # without those of hidden files: markers are created and removed
 
@@ -43,9 +44,19 @@ def write_file(path: Path, content: bytes, *, waits: bool = True, changed_ns: in
         write_through(half, content, waits=waits)
         if changed_ns is not None:
             os.utime(half, ns=(changed_ns, changed_ns))
-        half.replace(path)
+        _replace(half, path)
         if waits:
             sync_folder(path.parent)
+
+
+def _replace(half: Path, path: Path) -> None:
+    """Rename over the old file, which a viewer or a virus scanner may hold for a moment on Windows."""
+    for pause_s in _REPLACE_AGAIN_S:
+        with contextlib.suppress(PermissionError):
+            half.replace(path)
+            return
+        time.sleep(pause_s)
+    half.replace(path)
 
 
 @contextlib.contextmanager
