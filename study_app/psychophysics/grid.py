@@ -7,7 +7,7 @@ stall on busy cores; only `simulated_tracks`, which background processes of one 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Final
 
@@ -151,7 +151,7 @@ def fit(levels: ArrayLike, successes: ArrayLike, failures: ArrayLike, grid: Grid
     grid : Grid
         The cells and their prior.
     """
-    _, log_success, log_failure = tables(grid, tuple(np.asarray(levels, float).tolist()))
+    _, log_success, log_failure = tables(replace(grid, width_prior=None), tuple(np.asarray(levels, float).tolist()))
     log_likelihood = np.einsum("k,kabcd->abcd", np.asarray(successes, float), log_success)
     log_likelihood += np.einsum("k,kabcd->abcd", np.asarray(failures, float), log_failure)
     weights = grid.prior * np.exp(log_likelihood - log_likelihood.max())
