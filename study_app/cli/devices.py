@@ -122,7 +122,7 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
     if found.residual_n > calibration.MOST_RESIDUAL_N:
         unexplained = f"More than {calibration.MOST_RESIDUAL_N} N is unexplained"
         click.echo(f"{unexplained}, so nothing was saved. Repeat the calibration.")
-        end_if(found)
+        end_if(True)
     if name.startswith("falcon-socket"):
         click.echo("A device at a socket is not calibrated permanently: nothing was saved.")
     else:
@@ -191,7 +191,7 @@ def _keep_bench(found: Found, folder: Path, *, simulated: bool) -> None:
         return
     if not found.fits:
         click.echo("Nothing was kept for receipts: mass, damping and friction do not explain how the handle moved.")
-        end_if(found)
+        end_if(True)
     report = str((folder / "bench.md").resolve())
     bench = workstation.DeviceBench.model_validate({**kept(found, day), "report": report})
     workstation.save(workstation.load_or_default()[0].with_bench(bench))

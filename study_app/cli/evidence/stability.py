@@ -121,11 +121,14 @@ def _print_one(workers: Workers, *, withheld: bool, delivered: bool, velocity: b
     from study_app.validation.stability import delivered_force, withheld_force
     from study_app.validation.velocity import criteria
 
-    with progress() as show, executor_for(workers) as executor:
-        if velocity:
+    if velocity:
+        with progress() as show:
             rows = criteria.measure(lambda what: show(f"measuring {what}"))
-            text, missed = criteria.report(rows), not all(row.met for row in rows)
-        elif estimated:
+        click.echo(criteria.report(rows))
+        end_if(not all(row.met for row in rows))
+        return
+    with progress() as show, executor_for(workers) as executor:
+        if estimated:
             show("applying estimates in closed loops")
             verdicts = applied_estimates.judge_all(applied_estimates.applied_cases(estimated), executor)
             text, missed = applied_estimates.report(verdicts), any(it.harmed for it in verdicts)

@@ -88,6 +88,9 @@ def timing(
     elif of_devices:
         measured(partial(compare_devices, seconds), load, to)
     elif lsl:
+        from study_app.validation.outlets.localhost import localhost_only
+
+        localhost_only()
         measured(partial(measure_streams, seconds), load, to)
     elif triggers is not None:
         measured(partial(measure_triggers, triggers, seconds), load, to)
@@ -144,11 +147,9 @@ def compare_devices(seconds: float, ending: threading.Event, show: ShowProgress)
 def measure_streams(seconds: float, ending: threading.Event, show: ShowProgress) -> Result:
     """Return what another process receives, and what that costs the servo."""
     from study_app.validation.outlets.lateness import compare
-    from study_app.validation.outlets.localhost import localhost_only
     from study_app.validation.outlets.outlet_report import stream_text
     from study_app.validation.outlets.streams import stream
 
-    localhost_only()
     found = stream(seconds, ending=ending, progress=show)
     ratios = compare(min(seconds, MOST_COMPARED_S), ending=ending, progress=show)
     missed = not found.met or any(one.percentile == 50 and one.verdict == "missed" for one in ratios)
