@@ -255,7 +255,7 @@ def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
         line = source.count(b"\n", 0, error.start) + 1
         raise ProtocolError(name, (Problem("file", "is not UTF-8 text", line, "save it as UTF-8"),)) from error
     try:
-        return frozen(tomllib.loads(text)), Places(text)
+        document: dict[str, Any] = frozen(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:  # which names the place in its message
         sentence = re.sub(r" \(at .*\)$", "", str(error))
         place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
@@ -267,6 +267,7 @@ def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
         raise ProtocolError(name, (broken,)) from error
     except ValueError as error:  # Python's own limit of digits names no place either
         raise ProtocolError(name, (Problem("file", "holds a whole number beyond 64 bits"),)) from error
+    return document, Places(text)
 
 
 def _validated(model: type[M], document: Mapping[str, Any]) -> tuple[M | None, list[Fault]]:
