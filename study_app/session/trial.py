@@ -90,7 +90,7 @@ class Recording:
 class FrameStatistics:
     """Adds up frames as they come.
 
-    Without a window that paints, the first frame is reported and a later one need not.
+    Without a window that paints, only the first frame must be reported.
     """
 
     def __init__(self, *, late_s: float, due_ns: int, paints: bool = True, videos: bool = False) -> None:
