@@ -39,6 +39,9 @@ from study_app.number_text import counted
 
 RESAMPLES: Final = 1999
 MOST_RESAMPLES: Final = 100_000
+TIE: Final = 1e-4
+"""Resampled t this close to the observed one count as ties: single precision rounds them apart, on each CPU its own way."""
+
 ROUNDING: Final = 1 / 6
 """The variance that rounding to whole points hides in a difference of two answers; added to every variance, so that a
 resample without spread is not infinitely far away."""
@@ -60,7 +63,7 @@ def p_within(differences: Array, bound: float, seed: int, resamples: int = RESAM
     t = drawn / np.sqrt(np.maximum(spread, np.float32(ROUNDING)))
     error = np.sqrt(differences.var(axis=1) + ROUNDING)
     below, above = ((mean + side * bound) / error for side in (-1, 1))
-    reached = np.maximum((t <= below.astype(np.float32)).sum(axis=0), (t >= above.astype(np.float32)).sum(axis=0))
+    reached = np.maximum((t <= np.float32(below + TIE)).sum(axis=0), (t >= np.float32(above - TIE)).sum(axis=0))
     return np.asarray((1 + reached) / (1 + resamples))
 
 
