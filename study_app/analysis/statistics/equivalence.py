@@ -40,7 +40,7 @@ from study_app.number_text import counted
 RESAMPLES: Final = 1999
 MOST_RESAMPLES: Final = 100_000
 TIE: Final = 1e-4
-"""Resampled t this close to the observed one count as ties: single precision rounds them apart, on each CPU its own way."""
+"""Resampled t this close to the observed one are ties: single precision rounds them apart, on each CPU differently."""
 
 ROUNDING: Final = 1 / 6
 """The variance that rounding to whole points hides in a difference of two answers; added to every variance, so that a

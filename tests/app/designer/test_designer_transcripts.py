@@ -28,9 +28,10 @@ TIP = re.compile(r"^(StaticText readOnly .+) \| = \|  \| =$")
 
 @pytest.fixture(autouse=True)
 def no_time_passes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the participant's page stand still, and typing be one step."""
+    """Let the participant's page stand still, typing be one step, and drafts be due."""
     for module in ("app.designer.editing", "app.designer.participant.preview", "gui.designer.participant.live_page"):
         monkeypatch.setattr(f"study_app.{module}.time", SimpleNamespace(monotonic=lambda: 1000.0))
+    monkeypatch.setattr("study_app.app.designer.saving.time", SimpleNamespace(monotonic=lambda: 2000.0))
 
 
 def settle(designer: Any) -> None:
