@@ -87,7 +87,7 @@ PLOT_SETTINGS: Final[Mapping[Any, Any]] = {
     "xtick.major.size": 2.5,
     "ytick.major.size": 0,
 }
-"""Settings of figures that matplotlib lays out itself: the plots of evaluation and validation."""
+"""Settings of figures that matplotlib lays out itself: the plots of evidence and `lab.identify`."""
 
 
 @cache

@@ -14,7 +14,7 @@ from pathlib import Path
 import hypothesis
 import pytest
 
-from study_app.validation.outlets.localhost import localhost_only
+from study_app.evidence.outlets.localhost import localhost_only
 from study_app.workers.executors import Workers
 
 # An example may compile on a fresh machine: how long one takes is no failure.

@@ -21,6 +21,9 @@ from study_app.app.session.session_windows import connect_windows, make_cockpit,
 from study_app.app.session.termination import ended_from_outside
 from study_app.devices.rig import open_rig, study_settings
 from study_app.errors import SessionError, StudyError
+from study_app.evidence.computer import machine as machine_here
+from study_app.evidence.timing.delay_results import BESIDE, DELAYS_S, VIRTUAL_HZ, Delayed, Shown
+from study_app.evidence.timing.machine_load import LoadName, busy_cores
 from study_app.gui.application import application_here
 from study_app.gui.display.opengl import WITHOUT_OPENGL
 from study_app.gui.display.screens import choose_screens
@@ -31,9 +34,6 @@ from study_app.session.resume import FIRST
 from study_app.session.start import NewSession, open_store
 from study_app.store.recordings import read_frames
 from study_app.store.sessions.open_session import SessionStore
-from study_app.validation.computer import machine as machine_here
-from study_app.validation.timing.delay_results import BESIDE, DELAYS_S, VIRTUAL_HZ, Delayed, Shown
-from study_app.validation.timing.machine_load import LoadName, busy_cores
 
 SIZE_PX: Final = (1920, 1080)
 OPERATOR_PX: Final = (1600, 900)

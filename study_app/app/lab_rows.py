@@ -1,7 +1,7 @@
 """What a setting costs, how true it is, and what there is to feel it with, as the lab says it."""
 
 from study_app.devices.registry import list_devices
-from study_app.evaluation.appraisal import Costs, Errors
+from study_app.evidence.appraisal import Costs, Errors
 from study_app.haptics.model.effects import NAMED
 from study_app.viewmodels.devices.list_view import device_label
 from study_app.viewmodels.lab import CostRow, ErrorRow

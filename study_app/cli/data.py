@@ -308,7 +308,7 @@ def replay(session: Path) -> None:
     Also lists the trials whose recordings are lost, missing or not comparable. Ends with exit code 3 if a force
     differs, a recording is missing, or nothing could be compared.
     """
-    from study_app.evaluation.replay import replay as replay_session
+    from study_app.session.replay import replay as replay_session
 
     found = replay_session(session)
     for sentence in (*found.differences, *found.missing, *found.uncompared):

@@ -74,8 +74,8 @@ def _changed(file: str, liquid: str, changes: tuple[str, ...]) -> Scene:
 )
 def scene(scene: str, liquid: str | None, delay: int) -> None:
     """Print the effects that a scene needs and why, the measured cost of each, and the expected force error."""
-    from study_app.evaluation.cost import report
-    from study_app.evaluation.expected_error import error_report
+    from study_app.evidence.cost import report
+    from study_app.evidence.expected_error import error_report
     from study_app.protocol.load import load_scene, load_scenes
 
     chosen = [load_scene(scene, liquid)] if liquid else list(load_scenes(scene).values())
@@ -86,7 +86,7 @@ def scene(scene: str, liquid: str | None, delay: int) -> None:
 @click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write into.")
 def figures(to: Path) -> None:
     """Redraw the thesis' Figs 3 to 8: force over time on programmed paths, with captions."""
-    from study_app.validation.thesis_figures import figures as draw
+    from study_app.evidence.thesis_figures import figures as draw
 
     echo_files(draw(to))
 
@@ -120,10 +120,10 @@ def identify(
     vy_mps, vz_mps where they are known; or t_s, velocity_mps, force_n for a motion along one line; or, from a
     rheometer, shear_rate_per_s, shear_stress_pa.
     """
-    from study_app.evaluation.identify import measured_force as measurements
-    from study_app.evaluation.identify import preset as identified
-    from study_app.evaluation.identify.fit import Fit, fit
-    from study_app.evaluation.identify.flow_curve import CurveFit, fit_curve
+    from study_app.lab.identify import measured_force as measurements
+    from study_app.lab.identify import preset as identified
+    from study_app.lab.identify.fit import Fit, fit
+    from study_app.lab.identify.flow_curve import CurveFit, fit_curve
 
     chosen = _changed(scene, liquid, changes)
     read = measurements.read(measured)

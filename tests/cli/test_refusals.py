@@ -12,8 +12,8 @@ from study_app.authoring.writer.refused import Refused
 from study_app.cli import commands, main
 from study_app.cli.devices import _ask_operator
 from study_app.errors import OutletError, ProtocolError, StudyError
+from study_app.evidence.accuracy import liquid_survey
 from study_app.store.workstation import DEFAULTS, load
-from study_app.validation.accuracy import liquid_survey
 from tests.compiled import needs_servo
 
 

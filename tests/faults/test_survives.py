@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from study_app.evaluation.replay import replay
+from study_app.session.replay import replay
 from study_app.store.folders import StudyFolder
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo

@@ -6,9 +6,9 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from study_app.app.windows_load import lend
+from study_app.evidence.soak.soak import soak
+from study_app.evidence.timing.loops import LEAD_IN, PERIOD_NS
 from study_app.protocol.load import load_scenes
-from study_app.validation.soak.soak import soak
-from study_app.validation.timing.loops import LEAD_IN, PERIOD_NS
 from tests.compiled import needs_servo
 
 FLAT_BYTES = 5 * 2**20

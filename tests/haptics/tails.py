@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from study_app.evaluation.reference_model import respond
+from study_app.evidence.reference_model import respond
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.tick import tick
 from study_app.haptics.model.motion import Motion

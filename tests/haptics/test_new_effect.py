@@ -71,7 +71,7 @@ def spring_force(parameters, liquid, local, state):
 USES = """
 import sys
 import study_app
-from study_app.evaluation.identify.parameters import find
+from study_app.lab.identify.parameters import find
 from study_app.haptics.model.gate import describe_gate
 from study_app.haptics.model.overrides import override_all
 from study_app.haptics.model.paths import path

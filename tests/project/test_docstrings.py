@@ -41,7 +41,7 @@ EXAMPLES = (
     "study_app.haptics.runtime.offline.simulate",
     "study_app.analysis.data.study_tables.load_study",
     "study_app.analysis.evaluate.evaluate",
-    "study_app.evaluation.replay.replay",
+    "study_app.session.replay.replay",
 )
 
 

@@ -38,8 +38,8 @@ def test_the_wheel_contains_the_protocols_and_the_typeface(installed: Path) -> N
 
 
 def test_the_wheel_contains_the_fluid_solvers_tables(installed: Path) -> None:
-    tables = ROOT / "study_app" / "validation" / "cfd"
-    shipped = {path.name for path in (installed / "study_app" / "validation" / "cfd").glob("*.csv")}
+    tables = ROOT / "study_app" / "evidence" / "cfd"
+    shipped = {path.name for path in (installed / "study_app" / "evidence" / "cfd").glob("*.csv")}
     assert shipped == {path.name for path in tables.glob("*.csv")} >= {"steady.csv", "fits.csv", "honey-600mmps.csv"}
 
 

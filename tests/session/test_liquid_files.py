@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 
 from study_app.errors import ProtocolError, StoreError
-from study_app.evaluation.replay import replay
 from study_app.protocol.checks.warnings import liquid_warnings
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, load_scenes, parse, protocol_hash, source_bytes
@@ -20,6 +19,7 @@ from study_app.protocol.orders.schedule import Trial, build_schedule, stream
 from study_app.protocol.source.files import unbundled
 from study_app.protocol.source.json_schema import schema
 from study_app.session.pages import TaskPage
+from study_app.session.replay import replay
 from study_app.session.simulated import rehearsal
 from study_app.session.start import resumed
 from study_app.session.transitions.page_builder import page

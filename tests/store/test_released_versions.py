@@ -11,7 +11,7 @@ import pytest
 from study_app import __version__
 from study_app.analysis.export.export import export
 from study_app.analysis.report.write_report import report
-from study_app.evaluation.replay import replay
+from study_app.session.replay import replay
 from study_app.session.simulated import rehearsal
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder

@@ -3,8 +3,8 @@
 import logging
 from collections.abc import Callable
 
-from study_app.evaluation.appraisal import Costs, Errors
-from study_app.evaluation.appraisal_worker import AppraisalClient, Question
+from study_app.evidence.appraisal import Costs, Errors
+from study_app.evidence.appraisal_worker import AppraisalClient, Question
 from study_app.haptics.model.scene import Scene
 
 log = logging.getLogger(__name__)

@@ -47,9 +47,9 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
         exclude_each_other(liquids=every, path=None if path == DEFAULT_PATH else path)
         _survey(scene, to)
         return
-    from study_app.validation.accuracy.accuracy_report import markdown
-    from study_app.validation.accuracy.accuracy_report import write as write_all
-    from study_app.validation.accuracy.comparison import accuracy as measure
+    from study_app.evidence.accuracy.accuracy_report import markdown
+    from study_app.evidence.accuracy.accuracy_report import write as write_all
+    from study_app.evidence.accuracy.comparison import accuracy as measure
 
     numerical, physical, notes = _subjects(scene, liquid)
     one = numerical or physical
@@ -68,8 +68,8 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
 
 def _survey(file: str | None, to: Path | None) -> None:
     """Print or write the error of the force of every liquid of a file."""
+    from study_app.evidence.accuracy.liquid_survey import survey, survey_markdown, write_survey
     from study_app.protocol.load import load_scenes
-    from study_app.validation.accuracy.liquid_survey import survey, survey_markdown, write_survey
 
     prepare(to)
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
@@ -106,9 +106,9 @@ def _subjects(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scen
 
 def motion_along(path: str, scene: Scene) -> Motion:
     """Return the motion of a path's name or a motion file, at the scene's rate."""
-    from study_app.evaluation.hand_motions import stir
-    from study_app.evaluation.identify.measured_force import at_rate
+    from study_app.evidence.hand_motions import stir
     from study_app.haptics.model import motion, paths
+    from study_app.lab.identify.measured_force import at_rate
 
     if path == DEFAULT_PATH:
         return stir(scene.scale, scene.rate_hz)
@@ -142,12 +142,12 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
     A ball of 68 mm starts, moves at constant speed and stops abruptly, at 0.2 and 0.6 m/s. Fitting takes about a
     minute. Further motions, such as oscillations and a reversal, are used by --refit.
     """
-    from study_app.validation.cfd.fits import fit_all
-    from study_app.validation.cfd.law_fit import refit as refit_all
-    from study_app.validation.cfd.law_fit import refit_markdown, write_refit
-    from study_app.validation.cfd.model_comparison import fits_markdown, steady_markdown, write
-    from study_app.validation.cfd.solver import solve as solve_all
-    from study_app.validation.cfd.stored_flows import held_out, steady, stored, training
+    from study_app.evidence.cfd.fits import fit_all
+    from study_app.evidence.cfd.law_fit import refit as refit_all
+    from study_app.evidence.cfd.law_fit import refit_markdown, write_refit
+    from study_app.evidence.cfd.model_comparison import fits_markdown, steady_markdown, write
+    from study_app.evidence.cfd.solver import solve as solve_all
+    from study_app.evidence.cfd.stored_flows import held_out, steady, stored, training
 
     exclude_each_other(refit=refit, materials=materials)
     if solve and to is None:
@@ -174,12 +174,7 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
 
 def _materials(to: Path | None, workers: Workers, *, solve: bool) -> None:
     """Print or write the law's error in Herschel–Bulkley liquids, with the stored table or a new one."""
-    from study_app.validation.cfd.yield_flow import (
-        materials_markdown,
-        solve_materials,
-        stored_materials,
-        write_materials,
-    )
+    from study_app.evidence.cfd.yield_flow import materials_markdown, solve_materials, stored_materials, write_materials
 
     if solve and to is not None:
         with progress(lambda text: click.echo(text, err=True)) as show, executor_for(workers) as executor:

@@ -63,10 +63,10 @@ def stability(
     model of hand and device, a wrong delay estimate, lost samples, releases in mid-stroke, and the driver of the Falcon
     with its emulator. Ends with exit code 3 if a case is unstable with the safety layer on.
     """
-    from study_app.validation.stability import stability_report as found
-    from study_app.validation.stability.case_groups import groups, some, sweep
-    from study_app.validation.stability.fidelity import fidelities
-    from study_app.validation.stability.stability_cases import parse
+    from study_app.evidence.stability import stability_report as found
+    from study_app.evidence.stability.case_groups import groups, some, sweep
+    from study_app.evidence.stability.fidelity import fidelities
+    from study_app.evidence.stability.stability_cases import parse
 
     instead = {"withheld": withheld, "delivered": delivered, "velocity": velocity, "delayed": delayed}
     exclude_each_other(to=to, case=line, table=table, **instead, estimation=estimated, only=only)
@@ -87,7 +87,7 @@ def stability(
         _print_one(workers, withheld=withheld, delivered=delivered, velocity=velocity, estimated=estimated or 0)
         return
     if delayed is not None:
-        from study_app.validation.stability import force_delay
+        from study_app.evidence.stability import force_delay
 
         with progress() as show:
             shares = force_delay.write(delayed, lambda done, of: show(f"{done} of {of} delays", done / of))
@@ -117,9 +117,9 @@ def stability(
 
 def _print_one(workers: Workers, *, withheld: bool, delivered: bool, velocity: bool, estimated: int) -> None:
     """Print one measurement of its own; end with 3 if a goal is not met, or a loop became unstable."""
-    from study_app.validation.online_estimation import applied_estimates
-    from study_app.validation.stability import delivered_force, withheld_force
-    from study_app.validation.velocity import criteria
+    from study_app.evidence.online_estimation import applied_estimates
+    from study_app.evidence.stability import delivered_force, withheld_force
+    from study_app.evidence.velocity import criteria
 
     if velocity:
         with progress() as show:

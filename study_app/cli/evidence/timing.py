@@ -20,7 +20,7 @@ from study_app.errors import DisplayError, StudyError
 
 if TYPE_CHECKING:
     from study_app.app.windows_load import WindowsThread
-    from study_app.validation.timing.machine_load import LoadName
+    from study_app.evidence.timing.machine_load import LoadName
 
 Result: TypeAlias = tuple[str, str, bool]
 """A text, the name of its file, and whether a limit is missed."""
@@ -88,15 +88,15 @@ def timing(
     elif of_devices:
         measured(partial(compare_devices, seconds), load, to)
     elif lsl:
-        from study_app.validation.outlets.localhost import localhost_only
+        from study_app.evidence.outlets.localhost import localhost_only
 
         localhost_only()
         measured(partial(measure_streams, seconds), load, to)
     elif triggers is not None:
         measured(partial(measure_triggers, triggers, seconds), load, to)
     else:
-        from study_app.validation.timing.measurement import timing as time_loops
-        from study_app.validation.timing.timing_report import text, write
+        from study_app.evidence.timing.measurement import timing as time_loops
+        from study_app.evidence.timing.timing_report import text, write
 
         prepare(to)
         with ending_by_signal() as (ending, _), progress(partial(click.echo, err=True)) as show:
@@ -107,7 +107,7 @@ def timing(
 
 def time_delays(seconds: float, load: LoadName, to: Path | None) -> None:
     """Print how well delays are kept; without a display, on none."""
-    from study_app.validation.timing.delay_report import text, write
+    from study_app.evidence.timing.delay_report import text, write
 
     if sys.platform == "linux" and not any(map(os.environ.get, ("QT_QPA_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY"))):
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
@@ -122,8 +122,8 @@ def time_delays(seconds: float, load: LoadName, to: Path | None) -> None:
 
 def measured(measure: Callable[[threading.Event, ShowProgress], Result], load: LoadName, to: Path | None) -> None:
     """Print and keep what is measured under load, until Ctrl+C; end with 3 where a limit is missed."""
+    from study_app.evidence.timing.machine_load import under_load
     from study_app.store.atomic import write_file
-    from study_app.validation.timing.machine_load import under_load
 
     prepare(to)
     windows = windows_thread(load) if load != "none" else None
@@ -138,7 +138,7 @@ def measured(measure: Callable[[threading.Event, ShowProgress], Result], load: L
 
 def compare_devices(seconds: float, ending: threading.Event, show: ShowProgress) -> Result:
     """Return how late ticks begin with each emulated device."""
-    from study_app.validation.timing.device_lateness import emulated_devices, text, time_devices
+    from study_app.evidence.timing.device_lateness import emulated_devices, text, time_devices
 
     found = time_devices(seconds, emulated_devices(), ending=ending, progress=show)
     return text(found), "devices.txt", any(one.missed for one in found)
@@ -146,9 +146,9 @@ def compare_devices(seconds: float, ending: threading.Event, show: ShowProgress)
 
 def measure_streams(seconds: float, ending: threading.Event, show: ShowProgress) -> Result:
     """Return what another process receives, and what that costs the servo."""
-    from study_app.validation.outlets.lateness import compare
-    from study_app.validation.outlets.outlet_report import stream_text
-    from study_app.validation.outlets.streams import stream
+    from study_app.evidence.outlets.lateness import compare
+    from study_app.evidence.outlets.outlet_report import stream_text
+    from study_app.evidence.outlets.streams import stream
 
     found = stream(seconds, ending=ending, progress=show)
     ratios = compare(min(seconds, MOST_COMPARED_S), ending=ending, progress=show)
@@ -158,8 +158,8 @@ def measure_streams(seconds: float, ending: threading.Event, show: ShowProgress)
 
 def measure_triggers(port: str, seconds: float, ending: threading.Event, show: ShowProgress) -> Result:
     """Return how long events take to their bytes on a port."""
-    from study_app.validation.outlets.outlet_report import trigger_text
-    from study_app.validation.outlets.trigger_delays import measure
+    from study_app.evidence.outlets.outlet_report import trigger_text
+    from study_app.evidence.outlets.trigger_delays import measure
 
     found = measure(port, seconds, ending=ending, progress=show)
     return trigger_text(found), "triggers.txt", bool(found.wrong)
@@ -167,7 +167,7 @@ def measure_triggers(port: str, seconds: float, ending: threading.Event, show: S
 
 def check_seconds(seconds: float) -> None:
     """Refuse seconds out of range."""
-    from study_app.validation.timing.measurement import LEAST_S, MOST_S
+    from study_app.evidence.timing.measurement import LEAST_S, MOST_S
 
     if not LEAST_S <= seconds <= MOST_S:
         raise StudyError(f"outlets are measured for {LEAST_S:g} to {MOST_S:g} s, not {seconds:g}")
@@ -219,9 +219,9 @@ def soak(
 
     FILE defines the liquids; default: rek2024. Ctrl+C ends it with the report so far.
     """
+    from study_app.evidence.soak.soak import soak as soak_servo
+    from study_app.evidence.timing.machine_load import under_load
     from study_app.protocol.load import load_scenes
-    from study_app.validation.soak.soak import soak as soak_servo
-    from study_app.validation.timing.machine_load import under_load
 
     scenes = load_scenes(protocol)
     prepare(to)

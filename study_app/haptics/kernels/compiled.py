@@ -28,7 +28,7 @@ from platformdirs import user_cache_path
 log = logging.getLogger(__name__)
 
 _PACKAGE = Path(__file__).resolve().parents[2]
-_KERNEL_FOLDERS = ("haptics", "devices", "evaluation", "validation")
+_KERNEL_FOLDERS = ("haptics", "devices", "evidence")
 SHIPPED_CACHE = _PACKAGE / "compiled"
 """Caches that came with the program; only the bundle has them."""
 
@@ -177,7 +177,7 @@ def part(function: F) -> F:
 
 
 def workings(function: F) -> F:
-    """Compile ``function`` for evaluation, not for the servo: like `kernel`, but it may allocate arrays."""
+    """Compile ``function`` for evidence, not for the servo: like `kernel`, but it may allocate arrays."""
     return cast(F, numba.njit(**_OPTIONS)(function))
 
 

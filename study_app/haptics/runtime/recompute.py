@@ -12,6 +12,7 @@ import numpy as np
 from study_app.haptics.kernels.compiled import kernel, part
 from study_app.haptics.kernels.effects.wake import REST_MPS
 from study_app.haptics.kernels.passivity import log_acted, log_delivery, log_saturation
+from study_app.haptics.kernels.safety import begin_scene
 from study_app.haptics.kernels.tick import tick
 from study_app.haptics.kernels.vector import copy, distance, square
 from study_app.haptics.model.effects import local_wake, wake
@@ -88,6 +89,28 @@ def recompute_sample(model: Any, safety: Record, samples: Any, trail: Record, pl
             continue
         take_sample(model, safety, sample, delivered)
         _note(model, trail, places)
+
+
+@kernel
+def recompute_scenes(
+    rest: Any, earlier: Any, model: Any, serial_before: int, serial: int, safety: Record, samples: Any, first: int
+) -> None:
+    """Recompute each of ``samples`` from ``first`` on by the model of its scene, and write the forces into them.
+
+    ``model`` is that of the scene ``serial``, ``earlier`` that of ``serial_before``, ``rest`` that of all others.
+    """
+    for i in range(first, samples.shape[0]):
+        sample = samples[i]
+        if i > 0 and sample.scene != samples[i - 1].scene:
+            begin_scene(safety)
+        if was_lost_at_read(sample):
+            continue
+        if sample.scene == serial and serial != 0:
+            take_sample(model, safety, sample, True)
+        elif sample.scene == serial_before and serial_before != 0:
+            take_sample(earlier, safety, sample, True)
+        else:
+            take_sample(rest, safety, sample, True)
 
 
 @part

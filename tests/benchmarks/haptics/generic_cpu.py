@@ -16,7 +16,7 @@ BATCHES = 100
 NAMES = ("rek2024", "physical_liquids", "physical2", "slime")
 PROGRAM = """
 import hashlib, json, sys
-from study_app.evaluation.cost import Bench
+from study_app.evidence.cost import Bench
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.paths import path
 from study_app.haptics.runtime.offline import simulate

@@ -5,7 +5,7 @@ Run it by itself: ``python tests/benchmarks/haptics/unsteady_drag.py``.
 
 import statistics
 
-from study_app.evaluation.cost import Bench
+from study_app.evidence.cost import Bench
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.scene import Liquid, Scene
 

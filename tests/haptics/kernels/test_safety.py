@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from study_app.errors import StudyError
+from study_app.evidence.stability.damping_boundary import measured_estimators
 from study_app.haptics.kernels.safety import begin_scene
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.estimators import NAMED
@@ -21,7 +22,6 @@ from study_app.haptics.model.slope_limits import (
 )
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack, pack_into
-from study_app.validation.stability.damping_boundary import measured_estimators
 from tests.haptics.scenes import HONEY, UNBENT, WATER, Hand, liquid, moving, scene, vectors
 
 ESTIMATORS = {"line": Line(), "foaw": Foaw(), "kalman": Kalman(), "raw": Raw()}

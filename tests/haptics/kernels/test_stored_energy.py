@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from study_app.evidence.stability.withheld_force import MOST, QUICK, SHAKEN, measure
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import LIMITER_ENERGY
 from study_app.haptics.model.scene import Ewma, Kalman, Scene
 from study_app.haptics.model.slope_limits import handle_limits
 from study_app.haptics.runtime.pack import pack
-from study_app.validation.stability.withheld_force import MOST, QUICK, SHAKEN, measure
 from tests.haptics.scenes import COMPILED, Hand, liquid
 
 compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")

@@ -9,6 +9,7 @@ from scipy.stats import norm
 
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.levels.summaries import sensitivities
+from study_app.evidence.thresholds.estimated_exponents import planted_exponent, simulate_estimates
 from study_app.protocol.checks.expected_precision import (
     EstimationPlan,
     MeanPlan,
@@ -24,7 +25,6 @@ from study_app.protocol.trials.methods import Constant
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.detection import NORMAL, two_intervals
 from study_app.psychophysics.precision import ESTIMATE_NOISE
-from study_app.validation.thresholds.estimated_exponents import planted_exponent, simulate_estimates
 
 DESIGNS = ("2ifc", "3ifc", "4ifc", "abx", "oddity", "samedifferent", "yesno")
 COMPARED = """

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from study_app.evaluation.replay import replay
+from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.blinding import opened, read_key
 from study_app.store.folders import StudyFolder

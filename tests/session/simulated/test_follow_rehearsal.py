@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study_app.evaluation.replay import replay
 from study_app.haptics.model.layout import LIMITER_FADE
 from study_app.protocol.load import load
 from study_app.protocol.model import Follow
+from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.folders import StudyFolder
 from study_app.store.recordings import read_samples

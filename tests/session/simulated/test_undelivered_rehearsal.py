@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from study_app.evaluation.replay import replay
+from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse, resume
 from study_app.store.blinded.blinding import opened, read_key
 from study_app.store.folders import StudyFolder

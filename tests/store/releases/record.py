@@ -18,7 +18,7 @@ from study_app import __version__
 from study_app.protocol.load import source_bytes
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from tests.evaluation.recorded_sessions import STRESSED, stressed
+from tests.session.replay.recorded_sessions import STRESSED, stressed
 
 HERE = Path(__file__).resolve().parent
 PATIENCE_S = 300.0

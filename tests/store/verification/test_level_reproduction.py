@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.errors import StoreError
-from study_app.evaluation.replay import replay
+from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse, resume
 from study_app.store.blinded.blinding import opened, read_key
 from study_app.store.blinded.unblinding import unblind

@@ -8,7 +8,7 @@ element,
 
 This is linear in the |e_j|, so sums are stored and only entering and leaving elements are added and subtracted: this
 module computes the response to the sums and updates the list per tick; ``wake_segments`` maintains segments and sums.
-``evaluation.reference_model`` is the literal definition, element by element.
+``evidence.reference_model`` is the literal definition, element by element.
 """
 
 from __future__ import annotations

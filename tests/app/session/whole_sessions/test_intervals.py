@@ -6,10 +6,10 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from study_app.evaluation.replay import replay
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import ChoicePage, EndPage, FeedbackPage, TaskPage
+from study_app.session.replay import replay
 from study_app.store.verification.reproduction import reproduced
 from tests.app.people import Person, attended, events, rows, window
 from tests.compiled import needs_servo

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from study_app.evaluation.reference_model import local_wakes
+from study_app.evidence.reference_model import local_wakes
 from study_app.haptics.model.effects.current import Uniform
 from study_app.haptics.model.effects.local_wake import CELLS, LocalWake
 from study_app.haptics.model.force_rules import VERSIONS

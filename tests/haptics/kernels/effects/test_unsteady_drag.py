@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
-from study_app.evaluation.reference_solutions import oscillation, start
-from study_app.evaluation.unsteady_law import unsteady_n
+from study_app.evidence.cfd import fits, stored_flows
+from study_app.evidence.reference_solutions import oscillation, start
+from study_app.evidence.stability.stability_cases import parse
+from study_app.evidence.stability.verdict import judge
+from study_app.evidence.unsteady_law import unsteady_n
 from study_app.haptics.kernels.effects.unsteady_drag import RATES_PER_S, WEIGHTS_RPS
 from study_app.haptics.model.laws.drag_laws import finite_reynolds
 from study_app.haptics.model.motion import Motion
@@ -12,9 +15,6 @@ from study_app.haptics.model.scene import Box, Kalman, MotionBox
 from study_app.haptics.model.slope_limits import steady
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack
-from study_app.validation.cfd import fits, stored_flows
-from study_app.validation.stability.stability_cases import parse
-from study_app.validation.stability.verdict import judge
 from tests.haptics.scenes import COMPILED, UNBENT, Hand, liquid, moving, scene, vectors
 from tests.haptics.unsteady import ADDED_M3, FLUIDS, force, highest_gain, random_motion, tank
 

@@ -5,6 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from study_app.evidence.stability.damping_boundary import boundary_nspm
+from study_app.evidence.stability.trace_measures import fast_part
+from study_app.evidence.stability.withheld_force import measure
 from study_app.haptics.kernels.estimators import kalman
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.model.device_dynamics import Dynamics
@@ -17,9 +20,6 @@ from study_app.haptics.model.slope_limits import damping_limits, table
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack
 from study_app.haptics.runtime.recompute import new_wake_places, recompute_sample
-from study_app.validation.stability.damping_boundary import boundary_nspm
-from study_app.validation.stability.trace_measures import fast_part
-from study_app.validation.stability.withheld_force import measure
 from tests.haptics.scenes import COMPILED, HONEY, UNBENT, WATER, Hand, vectors
 
 pytestmark = pytest.mark.slow

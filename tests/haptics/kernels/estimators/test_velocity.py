@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.errors import StudyError
-from study_app.evaluation.reference_model import lowered
+from study_app.evidence.reference_model import lowered
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Ewma, Given, Knee
 from study_app.haptics.runtime.offline import simulate

@@ -1,1 +1,0 @@
-"""What the program computes about its model: computation time, expected error, replay, fitted parameters."""

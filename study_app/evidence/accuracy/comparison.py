@@ -1,0 +1,261 @@
+"""Accuracy against computation time: every candidate against its reference, and all timed in one run."""
+
+import math
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Literal, NamedTuple, TypeAlias
+
+import numpy as np
+
+from study_app.errors import StudyError
+from study_app.evidence import reference_solutions as truths
+from study_app.evidence.accuracy import candidate_sets
+from study_app.evidence.accuracy.candidates import Rung, given
+from study_app.evidence.cfd.solver_truths import solver_truths
+from study_app.evidence.computer import machine
+from study_app.evidence.force_error import ROUNDING, Error, error_of
+from study_app.evidence.hand_motions import with_velocity
+from study_app.evidence.reference_solutions import Truth
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Scene
+
+Kind: TypeAlias = Literal["numerical", "physical"]
+
+
+ALIKE: Final = 1.05
+"""Times within this factor count as equal."""
+
+FINE_S: Final = 1e-6
+"""Required resolution of the clock: batches take 100 µs and more."""
+
+REPEATS: Final = 5
+BATCHES: Final = 40
+ALLOWANCE_S: Final = 0.8
+"""Time limit of a candidate per repeat; a slower one runs fewer batches, at least one."""
+
+
+def _clock() -> Callable[[], int]:
+    """Return a clock [ns] that stops while other programs run, or if that is too coarse, one that does not."""
+    fine = time.get_clock_info("thread_time").resolution <= FINE_S
+    return time.thread_time_ns if fine else time.perf_counter_ns
+
+
+class Time(NamedTuple):
+    """Computation time per tick [ns]: median and 99th percentile of batches of 1,000 ticks, medians over repeats."""
+
+    median_ns: float
+    p99_ns: float
+    batches: int
+
+
+@dataclass(frozen=True)
+class Row:
+    """One candidate against one reference."""
+
+    kind: Kind
+    liquid: str
+    truth: str
+    rung: Rung
+    error: Error
+    time: Time
+    memory_bytes: int
+    chosen: bool
+    on_front: bool = False
+
+    @property
+    def ns_per_ms(self) -> float:
+        """Computation time per millisecond of motion [ns]: at 1 kHz, that of a tick."""
+        return self.time.median_ns * self.rung.rate_hz / 1000
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """All results: rows, sources of the references, omissions with reasons, the machine and the motion."""
+
+    rows: tuple[Row, ...]
+    truths: tuple[Truth, ...]
+    notes: tuple[str, ...]
+    machine: str
+    motion: str
+
+    def of(self, kind: Kind) -> tuple[Row, ...]:
+        """Return the rows against one kind of reference."""
+        return tuple(row for row in self.rows if row.kind == kind)
+
+
+def accuracy(
+    numerical: Scene | None,
+    physical: Scene | None,
+    motion: Motion,
+    *,
+    named: str = "the motion",
+    notes: Sequence[str] = (),
+    repeats: int = REPEATS,
+    batches: int = BATCHES,
+    allowance_s: float = ALLOWANCE_S,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Accuracy:
+    """Measure the candidates of one scene against its definition, and those of another against physics.
+
+    ``motion`` is at the scenes' rate; it is what the definition is followed along, and what all rungs are timed along.
+
+    Raises
+    ------
+    StudyError
+        The first scene's liquid exerts no force along the motion, or a stored table cannot be used.
+    """
+    said = list(notes)
+    if motion.velocity_mps is None:
+        said.append("the motion brings no velocities: central differences of its places count as the true ones")
+        motion = with_velocity(motion)
+    fewest = len(motion.t_s) // max(candidate_sets.SLOWER)
+    if fewest < Rung.BATCH:
+        said.append(f"the motion is short: calls, of some µs, count in times of {fewest} ticks a batch, not 1,000")
+    measured: list[Row] = []
+    found: list[Truth] = []
+    if numerical is not None:
+        scene = candidate_sets.drag_and_wake(numerical)
+        rungs, choice = candidate_sets.numerical(scene)
+        truth = truths.definition(given(scene), motion)
+        if not truth.cases[0].force_n.any():
+            raise StudyError(
+                f"along {named} {scene.liquids[0].id} exerts no force: there is no share of it to be wrong by"
+            )
+        measured += _rows("numerical", scene, rungs, choice, (truth,), progress)
+        found.append(truth)
+    if physical is not None:
+        rungs, choice = candidate_sets.physical(physical)
+        real = _physical_truths(rungs[0].scene, said)
+        measured += _rows("physical", physical, rungs, choice, real, progress)
+        found += real
+    progress("timing")
+    times = race(tuple(dict.fromkeys(row.rung for row in measured)), motion, repeats, batches, allowance_s)
+    rows = tuple(replace(row, time=times[row.rung]) for row in measured)
+    return Accuracy(_with_fronts(rows), tuple(found), tuple(said), machine(), named)
+
+
+def _physical_truths(scene: Scene, notes: list[str]) -> tuple[Truth, ...]:
+    measured = truths.steady(scene)
+    if measured is None:
+        notes.append("steady drag: no experiment is known at Reynolds numbers so low")
+    solved = solver_truths(scene)
+    if not solved:
+        notes.append(f"fluid solver: no table is stored for {scene.liquids[0].id} and this ball")
+    steady = () if measured is None else (measured,)
+    return (*steady, truths.oscillation(scene), truths.start(scene), *solved)
+
+
+def _rows(
+    kind: Kind,
+    scene: Scene,
+    rungs: Sequence[Rung],
+    choice: Rung,
+    against: Sequence[Truth],
+    progress: Callable[[str], None],
+) -> list[Row]:
+    unknown = Time(math.nan, math.nan, 0)
+    rows = []
+    for rung in rungs:
+        progress(f"{kind}: {rung.name}")
+        for truth in against:
+            error = error_of(rung.forces_against(truth), truth)
+            chosen = rung is choice
+            rows.append(Row(kind, scene.liquids[0].id, truth.name, rung, error, unknown, rung.memory_bytes, chosen))
+    return rows
+
+
+class _Bench:
+    """One candidate along the motion, repeatedly, with its memory filled before the timing."""
+
+    def __init__(self, rung: Rung, motion: Motion) -> None:
+        self._rung, self._motion, self._clock_ns = rung, motion, _clock()
+        self._begin()
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin a new repeat: times per tick [ns] of its batches, and the elapsed time [s]."""
+        self.costs_ns: list[float] = []
+        self.passed_s = 0.0
+
+    def _begin(self) -> None:
+        self._rung.begin(self._motion)
+        liquid = self._rung.scene.liquids[0]
+        length = liquid.wake.length if liquid.wake is not None and "wake" in liquid.effects else 0
+        filled = min(round(length * self._rung.rate_hz / 1000), self._rung.ticks - self._size)
+        self._rung.take(0, filled)
+        self._at = filled
+
+    @property
+    def _size(self) -> int:
+        return min(self._rung.BATCH, self._rung.ticks)
+
+    def batch(self) -> None:
+        """Run one batch and store its time."""
+        if self._at + self._size > self._rung.ticks:
+            self._begin()
+        began_s, began = time.perf_counter(), self._clock_ns()
+        self._rung.take(self._at, self._at + self._size)
+        self.costs_ns.append((self._clock_ns() - began) / self._size)
+        self.passed_s += time.perf_counter() - began_s
+        self._at += self._size
+
+
+def race(rungs: Sequence[Rung], motion: Motion, repeats: int, batches: int, allowance_s: float) -> dict[Rung, Time]:
+    """Return the times of all candidates, in alternating batches, so that slow phases of the machine affect all alike.
+
+    What other programs take is not counted: it would strike a batch of 10 ms each time, and one of 100 µs hardly ever.
+    """
+    benches = {rung: _Bench(rung, motion) for rung in rungs}
+    costs: dict[Rung, list[list[float]]] = {rung: [] for rung in rungs}
+    for _ in range(repeats):
+        for bench in benches.values():
+            bench.forget()
+        for _ in range(batches):
+            for bench in benches.values():
+                if bench.passed_s < allowance_s:
+                    bench.batch()
+        for rung, bench in benches.items():
+            costs[rung].append(bench.costs_ns)
+    return {
+        rung: Time(
+            statistics.median(statistics.median(one) for one in taken),
+            statistics.median(float(np.percentile(one, 99)) for one in taken),
+            sum(len(one) for one in taken),
+        )
+        for rung, taken in costs.items()
+    }
+
+
+def worst(rows: Sequence[Row]) -> dict[Rung, Row]:
+    """Return each candidate's row against the reference with its greatest error."""
+    found: dict[Rung, Row] = {}
+    for row in rows:
+        if row.rung not in found or row.error.rms > found[row.rung].error.rms:
+            found[row.rung] = row
+    return found
+
+
+def front(points: dict[Rung, Row]) -> tuple[Rung, ...]:
+    """Return the Pareto-optimal candidates in time and error, cheapest first.
+
+    Rounding errors count as equal, and so do times that differ by less than clocks and neighbours can tell.
+    """
+
+    def error(row: Row) -> float:
+        return max(row.error.rms, ROUNDING)
+
+    def beats(other: Row, row: Row) -> bool:
+        if error(other) == error(row):
+            return other.ns_per_ms < row.ns_per_ms
+        return error(other) < error(row) and other.ns_per_ms <= row.ns_per_ms * ALIKE
+
+    best = [row for row in points.values() if not any(beats(other, row) for other in points.values())]
+    return tuple(row.rung for row in sorted(best, key=lambda row: row.ns_per_ms))
+
+
+def _with_fronts(rows: tuple[Row, ...]) -> tuple[Row, ...]:
+    kinds = {kind: [row for row in rows if row.kind == kind] for kind in ("numerical", "physical")}
+    on_it = {rung for of in kinds.values() for rung in front(worst(of))}
+    return tuple(replace(row, on_front=row.rung in on_it) for row in rows)

@@ -1,0 +1,194 @@
+"""Accuracy of the force of each liquid, its range of speed, the time per tick, and differences between drag laws."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from study_app.evidence import reference_solutions as truths
+from study_app.evidence.accuracy import candidate_sets
+from study_app.evidence.cfd.solver_truths import solver_truths
+from study_app.evidence.cfd.stored_flows import held_out, stored, training
+from study_app.evidence.expected_error import Expected, expected
+from study_app.evidence.force_error import error_of
+from study_app.evidence.reference_solutions import measured_drag_n
+from study_app.haptics.model.laws.drag_laws import LAWS, finite_reynolds
+from study_app.haptics.model.scene import Liquid, Scene
+from study_app.store.atomic import write_file
+
+NO_REFERENCE_REYNOLDS: Final = 1000.0
+"""Greatest Reynolds number with a solution or measurement of an unsteady motion in this program."""
+FILE: Final = "liquids.md"
+REYNOLDS: Final = (1.0, 10.0, 100.0, 200.0, 1e3, 3e3, 1e4, 3e4, 1e5)
+
+
+def clift_gauvin(reynolds: float) -> float:
+    """Return C_d Re/24 of a sphere by Clift & Gauvin 1971, Re ≤ 3·10⁵."""
+    return 1 + 0.15 * math.pow(reynolds, 0.687) + 0.42 / 24 * reynolds / (1 + 42500 * math.pow(reynolds, -1.16))
+
+
+def turton_levenspiel(reynolds: float) -> float:
+    """Return C_d Re/24 of a sphere by Turton & Levenspiel 1986, Powder Technology 47, Re ≤ 2·10⁵."""
+    high = 0.413 / 24 * reynolds / (1 + 16300 * math.pow(reynolds, -1.09))
+    return 1 + 0.173 * math.pow(reynolds, 0.657) + high
+
+
+def cheng(reynolds: float) -> float:
+    """Return C_d Re/24 of a sphere by Cheng 2009, Powder Technology 189, Re ≤ 2·10⁵."""
+    high = 0.47 / 24 * reynolds * (1 - math.exp(-0.04 * math.pow(reynolds, 0.38)))
+    return math.pow(1 + 0.27 * reynolds, 0.43) + high
+
+
+PUBLISHED: Final[Mapping[str, Callable[[float], float]]] = {
+    "Schiller–Naumann 1933": LAWS["schiller-naumann"],
+    "Clift–Gauvin 1971": clift_gauvin,
+    "Turton–Levenspiel 1986": turton_levenspiel,
+    "Haider–Levenspiel 1989": LAWS["haider-levenspiel"],
+    "Brown–Lawler 2003": LAWS["brown-lawler"],
+    "Cheng 2009": cheng,
+}
+
+
+@dataclass(frozen=True)
+class Surveyed:
+    """One liquid: its Reynolds number at the scene's greatest speed, its model, and the errors of that.
+
+    Errors are RMS shares with velocities known, against creeping flow, experiments and the fluid solver; None where
+    there is no such truth, or the ball is too fast for creeping flow to matter. ``solver_reynolds`` are the least and
+    the greatest of the solved motions.
+    """
+
+    liquid: str
+    speed_mps: float
+    mps_per_reynolds: float
+    model: str
+    creeping: float | None
+    steady: float | None
+    solver: float | None
+    solver_reynolds: tuple[float, float]
+    expected: Expected
+
+    @property
+    def reynolds(self) -> float:
+        """Re at the scene's greatest speed."""
+        return self.speed_mps / self.mps_per_reynolds
+
+
+def survey(scenes: Mapping[str, Scene], progress: Callable[[str], None] = lambda _: None) -> tuple[Surveyed, ...]:
+    """Measure every liquid with a viscosity of a file, by name; thicker ones first."""
+    found = []
+    for name, scene in scenes.items():
+        liquid = scene.liquids[0]
+        if liquid.viscosity_pa_s is None or liquid.drag.law == "linear":
+            continue
+        progress(name)
+        found.append(_surveyed(name, scene, liquid, liquid.viscosity_pa_s))
+    return tuple(sorted(found, key=lambda it: it.reynolds))
+
+
+def _surveyed(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) -> Surveyed:
+    rungs, model = candidate_sets.physical(scene)
+    alone = rungs[0].scene
+
+    def share(truth: truths.Truth) -> float:
+        return error_of(model.forces_against(truth), truth).rms
+
+    steady, solved = truths.steady(alone), solver_truths(alone)
+    mps_per_reynolds = viscosity_pa_s / (liquid.density_kg_m3 * scene.body.diameter_m)
+    motions = [case.motion for it in solved for case in it.cases]
+    speeds = [float(np.abs(it.velocity_mps).max()) for it in motions if it.velocity_mps is not None]
+    speed_mps = scene.motion_in(liquid).speed_mps or math.nan
+    creeping = max(share(truths.oscillation(alone)), share(truths.start(alone)))
+    return Surveyed(
+        name,
+        speed_mps,
+        mps_per_reynolds,
+        model.name,
+        creeping if speed_mps <= NO_REFERENCE_REYNOLDS * mps_per_reynolds else None,
+        None if steady is None else share(steady),
+        max(map(share, solved)) if solved else None,
+        (min(speeds) / mps_per_reynolds, max(speeds) / mps_per_reynolds) if solved else (math.nan, math.nan),
+        expected(scene),
+    )
+
+
+def spread(reynolds: float) -> float:
+    """Return the greatest difference of the published laws of steady drag, relative to their mean."""
+    ratios = [law(reynolds) for law in PUBLISHED.values()]
+    return (max(ratios) - min(ratios)) * len(ratios) / sum(ratios)
+
+
+def write_survey(found: tuple[Surveyed, ...], to: Path) -> Path:
+    """Write the survey as Markdown into the folder ``to``; return the file.
+
+    Raises
+    ------
+    StoreError
+        The file cannot be written.
+    """
+    write_file(to / FILE, f"{survey_markdown(found)}\n".encode())
+    return to / FILE
+
+
+def survey_markdown(found: tuple[Surveyed, ...]) -> str:
+    """Return liquids, and drag laws over the Reynolds number, as Markdown."""
+    highest = max(it.case.reynolds for it in (*stored(), *training(), *held_out()))
+    lines = [f"| {' | '.join(_HEADINGS)} |", f"|---|---:|---|{'---:|' * (len(_HEADINGS) - 3)}"]
+    for it in found:
+        least, greatest = it.solver_reynolds
+        checked_mps = min(it.speed_mps, highest * it.mps_per_reynolds)
+        cells = (
+            it.liquid,
+            f"{float(f'{it.reynolds:.3g}'):,g} ({it.speed_mps:g} m/s)",
+            it.model,
+            _percent(it.creeping),
+            _percent(it.steady),
+            _percent(it.solver) + (f" (Re {_range(least, greatest)})" if it.solver is not None else ""),
+            f"{checked_mps:.2g} m/s" if it.model == "unsteady drag" else "–",
+            _percent(spread(it.reynolds)),
+            _percent(it.expected.causes.law),
+            _percent(it.expected.error_share),
+            f"{it.expected.cost_ns:.0f}",
+        )
+        lines.append(f"| {' | '.join(cells)} |")
+    lines += ["", _WHAT.format(highest), "", f"| Re | {' | '.join(PUBLISHED)} | unsteady drag | experiments | spread |"]
+    lines.append("|---:" * (len(PUBLISHED) + 4) + "|")
+    for reynolds in REYNOLDS:
+        drags = [law(reynolds) for law in (*PUBLISHED.values(), finite_reynolds)]
+        values = " | ".join(f"{24 / reynolds * ratio:.3g}" for ratio in (*drags, _measured(reynolds)))
+        lines.append(f"| {reynolds:,g} | {values} | {_percent(spread(reynolds))} |")
+    return "\n".join(lines)
+
+
+_HEADINGS: Final = (
+    "liquid", "greatest Re (speed)", "model", "creeping flow", "steady drag", "fluid solver", "solved up to",
+    "drag laws differ by", "strokes, known velocity", "strokes, estimated velocity", "ns per tick",
+)  # fmt: skip
+_WHAT: Final = (
+    "Errors: RMS of the error over RMS of the force, the greatest of several references, with velocities known. "
+    "Creeping flow: at Re 0.01. Steady drag: against experiments. Fluid solver: at 1 kHz; unsteady drag meets each "
+    "motion with constants that are fitted to the other motions. Solved up to: the speed at Re {:.3g}, the greatest of "
+    f"a solved motion, or the scene's greatest speed. Above Re {NO_REFERENCE_REYNOLDS:g} there is no reference for "
+    "unsteady motion, and steady drag is as uncertain as published laws of it differ. "
+    "Strokes: at the scene's greatest speed and acceleration, against the laws themselves, with velocities known and "
+    "with those of the scene's estimator from encoder counts, after limits. Below, drag coefficients by each law."
+)
+
+
+def _measured(reynolds: float) -> float:
+    """Return C_d Re/24 by experiment."""
+    liquid = Liquid(id="any", density_kg_m3=1.0, viscosity_pa_s=1.0)
+    return float(measured_drag_n(liquid, 1.0, np.array([reynolds]))[0]) / (3 * math.pi * reynolds)
+
+
+def _range(least: float, greatest: float) -> str:
+    return " to ".join(dict.fromkeys(f"{it:.2g}" if it < 10 else f"{it:.0f}" for it in (least, greatest)))
+
+
+def _percent(share: float | None) -> str:
+    if share is None:
+        return "–"
+    return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.2g} %"

@@ -1,0 +1,40 @@
+"""The results of a scene's appraisal: its computation time and its accuracy."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class EffectCost:
+    """The time of an effect per tick [ns]; None with the reason if it is absent."""
+
+    effect: str
+    ns: float | None
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Costs:
+    """The time of a scene per tick, of a scene without liquids, and of each effect [ns]."""
+
+    tick_ns: float
+    rest_ns: float
+    effects: tuple[EffectCost, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """The errors of a scene against the exact definition (``evidence.reference_model``), along programmed paths.
+
+    ``wake`` is the largest difference as a share of Σ|e|/S, ``force_n`` that of the forces [N]; None where there is no
+    reference. ``lag_s`` is the lag of the velocity filter under constant acceleration. ``left_out`` are effects that
+    were not compared. ``withheld`` is the share of the force that safety withholds in the requested stroke
+    (``evidence.appraisal_measurement``), None without one. ``velocity`` is the relative error of the velocity, and
+    what it would be if nothing of the device's dynamics were unknown; None if nothing is.
+    """
+
+    wake: float | None
+    force_n: float | None
+    lag_s: float
+    left_out: tuple[str, ...]
+    withheld: float | None = None
+    velocity: tuple[float, float] | None = None

@@ -1,0 +1,130 @@
+"""Measures computation time and accuracy of a scene with one liquid, fast enough for use while it is presented."""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from study_app.evidence import reference_model
+from study_app.evidence.appraisal import Costs, EffectCost, Errors
+from study_app.evidence.cost import measure
+from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, Dynamics
+from study_app.haptics.model.effects import NAMED
+from study_app.haptics.model.gate import calls_for, resolve
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.paths import path
+from study_app.haptics.model.scene import Effect, Everywhere, Knee, Scene
+from study_app.haptics.runtime.offline import samples_along, simulate
+from study_app.protocol.trials.tasks import Stroke
+
+BATCHES: Final = 60
+RAMP_MPS2: Final = 2.0
+_RAMP_S: Final = 0.5
+_COMPARED: Final[tuple[Effect, ...]] = ("drag", "wake")
+_MOTIONS: Final = (
+    ("reverse", {"revolutions": 1.0, "against_s": 0.7, "rest_s": 0.5}),
+    ("zigzag", {"leg_s": 0.25, "legs": 8.0}),
+)
+LASTS_S: Final = 2.0
+HAND_M: Final = 0.03
+HAND_HZ: Final = 2.0
+FINE_M: Final = 10e-6
+"""An encoder count at the handle that is finer than the assumed one."""
+
+
+def costs(scene: Scene, *, batches: int = BATCHES) -> Costs:
+    """Measure the computation time of a scene with one liquid."""
+    found = measure(scene, batches=batches)
+    liquid = resolve(scene).liquids[0]
+    asked = scene.liquids[0].effects != "auto"
+    bounds_n = {verdict.effect: verdict.bound_n for verdict in calls_for(scene)}
+    rows = []
+    for effect in NAMED:
+        ns = found.effects_ns.get((liquid.id, effect))
+        if effect in liquid.effects and ns is not None:
+            rows.append(EffectCost(effect, max(ns, 0.0)))
+        else:
+            out = f"out, {bounds_n[effect]:.2f} N" if effect in bounds_n else "not used"
+            rows.append(EffectCost(effect, None, "not used" if asked else out))
+    return Costs(found.scene_ns, found.rest_ns, tuple(rows))
+
+
+def errors(scene: Scene) -> Errors:
+    """Return the errors of a scene with one liquid against the definition: its drag and wake, everywhere."""
+    scene = resolve(scene)
+    liquid = scene.liquids[0]
+    kept = tuple(effect for effect in liquid.effects if effect in _COMPARED)
+    plain = liquid.model_copy(update={"effects": kept, "region": Everywhere()})
+    compared = scene.model_copy(update={"liquids": (plain,), "origin_m": (0.0, 0.0, 0.0)})
+    wake: float | None = None
+    force_n: float | None = None
+    if kept:
+        found = [_difference(compared, path(name, rate_hz=scene.rate_hz, **how)) for name, how in _MOTIONS]
+        force_n = max(newtons for _, newtons in found)
+        wake = max(share for share, _ in found) if "wake" in kept else None
+    left_out = tuple(effect for effect in liquid.effects if effect not in kept)
+    return Errors(wake, force_n, lag_s(scene), left_out)
+
+
+def lag_s(scene: Scene) -> float:
+    """Return the lag of a scene's velocity [s] under constant acceleration: (v − v_filtered)/a."""
+    t_s = np.arange(round(_RAMP_S * scene.rate_hz) + 1) / scene.rate_hz
+    rest = np.zeros_like(t_s)
+    motion = Motion(t_s, np.column_stack([0.5 * RAMP_MPS2 * t_s**2, rest, rest]))
+    still = scene.model_copy(update={"liquids": (), "knee": Knee(law="none"), "origin_m": (0.0, 0.0, 0.0)})
+    seen = simulate(still, motion)
+    last = len(t_s) // 4  # of the end, at which the filter has settled
+    return float(np.mean(RAMP_MPS2 * t_s[-last:] - seen["vx_mps"][-last:])) / RAMP_MPS2
+
+
+def velocity_errors(scene: Scene, dynamics: Dynamics) -> tuple[float, float]:
+    """Return the relative error of the velocity on a device, and on one of which nothing is unknown; RMS over RMS.
+
+    The hand moves by `HAND_M` at `HAND_HZ`. An unknown encoder count is taken to be `FINE_M`, an unknown delay a tick.
+    """
+    known = dynamics._replace(
+        delay_s=BELIEVED_TICKS / scene.rate_hz if dynamics.delay_s is None else dynamics.delay_s,
+        count_m=FINE_M if "count_m" in dynamics.assumed else dynamics.count_m,
+        assumed=(),
+    )
+    return _velocity_error(scene, dynamics, known.count_m), _velocity_error(scene, known, known.count_m)
+
+
+def _velocity_error(scene: Scene, dynamics: Dynamics, count_m: float) -> float:
+    t_s = np.arange(round(LASTS_S * scene.rate_hz)) / scene.rate_hz
+    turns = 2.0 * math.pi * HAND_HZ * t_s
+    rest = np.zeros_like(t_s)
+    counted_m = scene.scale * count_m * np.rint(HAND_M * np.sin(turns) / count_m)
+    still = scene.model_copy(update={"liquids": (), "knee": Knee(law="none"), "origin_m": (0.0, 0.0, 0.0)})
+    seen = samples_along(still, Motion(t_s, np.column_stack([counted_m, rest, rest])), dynamics)
+    true_mps = scene.scale * HAND_M * 2.0 * math.pi * HAND_HZ * np.cos(turns)
+    settled = len(t_s) // 4
+    wrong_mps = seen["velocity_mps"][settled:, 0] - true_mps[settled:]
+    return float(np.sqrt(np.mean(wrong_mps**2) / np.mean(true_mps[settled:] ** 2)))
+
+
+def _difference(scene: Scene, motion: Motion) -> tuple[float, float]:
+    """Return the largest differences of wake, as a share of Σ|e|/S, and force [N] along a motion."""
+    table = simulate(scene, motion)
+    true = reference_model.respond(scene, motion, exact=True)
+    wake_mps = np.column_stack([table[f"wake_{axis}_mps"] for axis in "xyz"])
+    force_n = np.column_stack([table[f"f{axis}_n"] for axis in "xyz"])
+    largest_mps = float(true.size_mps.max())
+    apart_mps = float(np.linalg.norm(wake_mps - true.wake_mps, axis=1).max())
+    share = apart_mps / largest_mps if largest_mps > 0 else 0.0
+    return share, float(np.linalg.norm(force_n - true.force_n, axis=1).max())
+
+
+def withheld_share(scene: Scene, stroke: Stroke, dynamics: Dynamics) -> float:
+    """Return Σ|F_a - F_b| / Σ|F_a| along a stroke that is imposed on the position, from rest; 0 without a force.
+
+    The stroke is centred on the device's origin, and the loop is that of a device of these ``dynamics``.
+    F_a is the force after norm clamp and fades, F_b the force after slope limits, passivity controller and slew limit.
+    """
+    t_s = np.arange(round(LASTS_S * scene.rate_hz)) / scene.rate_hz
+    along_m = scene.scale * stroke.amplitude_m * np.cos(2.0 * math.pi * stroke.frequency_hz * t_s)
+    still = np.zeros_like(t_s)
+    position_m = np.add(scene.origin_m, np.column_stack((along_m, still, still)))
+    samples = samples_along(scene, Motion(t_s, position_m), dynamics)
+    permitted_n = float(samples["permitted_n"].sum())
+    return float(samples["withheld_n"].sum()) / permitted_n if permitted_n > 0.0 else 0.0

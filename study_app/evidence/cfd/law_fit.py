@@ -1,0 +1,181 @@
+"""The constants of unsteady drag by least squares over solved motions, and the errors of motions left out of the fit.
+
+The equations of the law are fitted along motions whose speed and acceleration are known exactly: the constants are
+then those of the flow, and no delay of a tick or of a velocity estimator is fitted into them.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from study_app.errors import StudyError
+from study_app.evidence.cfd.fits import MODELS, judge
+from study_app.evidence.cfd.stored_flows import LEFT_OUT, LEFT_OUT_FILE, Table
+from study_app.evidence.unsteady_law import CONSTANTS, Constants, late_mps
+from study_app.haptics.model.motion import Floats
+from study_app.store.atomic import write_file
+from study_app.store.tables.csv_files import csv_text_of
+
+STEP: Final = 0.005
+"""Interval between the rows that are compared [D/U]."""
+BEGIN: Final = Constants(c_m=0.5, c_y=1.0, c_z=2.0, c_s=1.0, beta=1.0, r_0=5.0)
+"""Initial values of the search: orders of magnitude."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotionError:
+    """RMS error as a share of the RMS force, and greatest error as a share of the greatest force, of one motion.
+
+    ``fitted`` with the constants fitted to all motions, None of a motion that is held out of the fit; ``left_out`` with
+    those fitted to all other motions, ``others``; ``program`` with the program's own constants in its tick at 1 kHz.
+    Each is (RMS, greatest).
+    """
+
+    table: Table
+    others: Constants
+    fitted: tuple[float, float] | None
+    left_out: tuple[float, float]
+    program: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """The constants by all motions, and the errors of each motion."""
+
+    constants: Constants
+    errors: tuple[MotionError, ...]
+
+
+class _Solved:
+    """One solved motion on even times, in the units of its liquid."""
+
+    def __init__(self, table: Table) -> None:
+        case = table.case
+        t = np.arange(0.0, case.profile.end, STEP)
+        self._case = case
+        self._w_mps = case.profile.speed(t)[:, np.newaxis] * case.speed_mps
+        self._dw_mps2 = case.profile.acceleration(t)[:, np.newaxis] * (case.speed_mps / case.unit_s)
+        self._interval_s = np.full(len(t), STEP * case.unit_s)
+        t_s, _, force_n = table.columns.values()
+        self._force_n = np.interp(t * case.unit_s, t_s, force_n)
+        stokes_nspm = 3 * math.pi * case.viscosity_pa_s * case.diameter_m
+        added_kg = case.density_kg_m3 * math.pi / 12 * case.diameter_m**3
+        self._stokes_nspm = stokes_nspm
+        self._prompt_n = -stokes_nspm * self._w_mps[:, 0] - added_kg * self._dw_mps2[:, 0]
+
+    def residuals(self, constants: Constants) -> Floats:
+        """Return the errors (n,), whose sum of squares is the square of the RMS share."""
+        residuals: Floats = self._error_n(constants) / np.linalg.norm(self._force_n)
+        return residuals
+
+    def errors(self, constants: Constants) -> tuple[float, float]:
+        """Return the RMS and the greatest error as shares of the RMS and the greatest force."""
+        error_n = self._error_n(constants)
+        share = float(np.linalg.norm(error_n) / np.linalg.norm(self._force_n))
+        return share, float(np.abs(error_n).max() / np.abs(self._force_n).max())
+
+    def _error_n(self, constants: Constants) -> Floats:
+        case = self._case
+        nu_m2ps = case.viscosity_pa_s / case.density_kg_m3
+        late = late_mps(self._w_mps, self._dw_mps2, self._interval_s, case.diameter_m, nu_m2ps, constants)
+        error_n: Floats = self._prompt_n - self._stokes_nspm * late[:, 0] - self._force_n
+        return error_n
+
+
+def refit(
+    tables: Sequence[Table], held_out: Sequence[Table] = (), progress: Callable[[str], None] = lambda _: None
+) -> Refit:
+    """Return the constants by all tables, each of equal weight, and each table's errors when it is left out.
+
+    The errors of the tables that are ``held_out`` come last.
+
+    Raises
+    ------
+    StudyError
+        There are fewer than two tables, or a search does not end.
+    """
+    if len(tables) < 2:
+        raise StudyError(f"{len(tables)} solved motion(s): a fit that leaves one out needs at least two")
+    solved = [_Solved(it) for it in tables]
+    progress(f"fitting the constants to {len(tables)} motions ...")
+    constants = fit_constants(tables)
+    errors = []
+    for table, one in zip(tables, solved, strict=True):
+        progress(f"... without {table.case.liquid_id}, {table.notes['title']} ...")
+        others = _fit([it for it in solved if it is not one], constants)
+        errors.append(MotionError(table, others, one.errors(constants), one.errors(others), _as_run(table)))
+    errors += [MotionError(it, constants, None, _Solved(it).errors(constants), _as_run(it)) for it in held_out]
+    return Refit(constants, tuple(errors))
+
+
+def _as_run(table: Table) -> tuple[float, float]:
+    """Return the errors of the program's tick."""
+    (program,) = [it for it in MODELS if it.effects == ("unsteady_drag",)]
+    judged = judge(program, table, {})
+    return judged.share, judged.worst_n / float(np.abs(table.columns["force_n"]).max())
+
+
+def fit_constants(tables: Sequence[Table]) -> Constants:
+    """Return the constants by all tables, each of equal weight.
+
+    Raises
+    ------
+    StudyError
+        The search does not end.
+    """
+    return _fit([_Solved(it) for it in tables], BEGIN)
+
+
+def _fit(solved: Sequence[_Solved], begin: Constants) -> Constants:
+    """Search in the logarithms, so that constants stay positive."""
+
+    def residuals(logs: Floats) -> Floats:
+        constants = Constants(*np.exp(logs).tolist())
+        return np.concatenate([it.residuals(constants) for it in solved])
+
+    found = least_squares(residuals, np.log(begin), diff_step=1e-4, xtol=1e-6, ftol=1e-9)
+    if not found.success:
+        raise StudyError(f"no constants were found: {found.message}")
+    return Constants(*np.exp(found.x).tolist())
+
+
+def write_refit(found: Refit, to: Path) -> tuple[Path, ...]:
+    """Write constants and errors as Markdown, and the constants without each motion as CSV, into a folder.
+
+    Raises
+    ------
+    StoreError
+        A file cannot be written.
+    """
+    rows = [[it.table.case.name, *(f"{value:.6g}" for value in it.others)] for it in found.errors if it.fitted]
+    files = {LEFT_OUT_FILE: csv_text_of([LEFT_OUT, *rows]), "refit.md": f"{refit_markdown(found)}\n"}
+    for name, text in files.items():
+        write_file(to / name, text.encode())
+    return tuple(to / name for name in files)
+
+
+def refit_markdown(found: Refit) -> str:
+    """Return the constants and the errors as Markdown."""
+    lines = ["| constant | fitted | in the program |", "|---|---:|---:|"]
+    lines += [
+        f"| {name} | {fitted:.3g} | {own:g} |"
+        for name, fitted, own in zip(Constants._fields, found.constants, CONSTANTS, strict=True)
+    ]
+    lines += [
+        "",
+        "RMS error as a share of the RMS force (greatest error as a share of the greatest force)",
+        "",
+        "| motion | liquid | Re | fitted to all | left out of the fit | program, 1 kHz |",
+        "|---|---|---:|---:|---:|---:|",
+    ]
+    for it in sorted(found.errors, key=lambda one: one.table.case.reynolds):
+        errors = (it.fitted, it.left_out, it.program)
+        shares = " | ".join("held out" if one is None else f"{one[0]:.1%} ({one[1]:.1%})" for one in errors)
+        case = it.table.case
+        lines.append(f"| {case.title} | {case.liquid_id} | {case.reynolds:.3g} | {shares} |")
+    return "\n".join(lines)

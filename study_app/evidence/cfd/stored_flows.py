@@ -1,0 +1,168 @@
+"""Solved flows as CSV files, with comment lines ``# name: value`` on what made them; read without the solver."""
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from importlib.resources.abc import Traversable
+from typing import Final
+
+import numpy as np
+
+from study_app.errors import StudyError
+from study_app.evidence.cfd.cases import Case
+from study_app.evidence.cfd.profiles import PROFILES, STOPPING
+from study_app.evidence.unsteady_law import Constants
+from study_app.haptics.model.motion import Floats
+from study_app.store.tables.csv_files import csv_text_of
+
+MOTION: Final = ("t_s", "velocity_mps", "force_n")
+"""Along one axis; the force on the ball, so against the motion at first."""
+STEADY: Final = ("reynolds", "drag_coefficient", "drag_coefficient_coarse", "drag_coefficient_narrow")
+"""C_d, the same on a coarser grid, and in a box of half the size."""
+STEADY_FILE: Final = "steady.csv"
+TRAINING_FOLDER: Final = "training"
+HELD_OUT_FOLDER: Final = "held_out"
+LEFT_OUT: Final = ("motion", *Constants._fields)
+"""The constants of unsteady drag that are fitted to all motions but one, for each motion."""
+LEFT_OUT_FILE: Final = "left_out.csv"
+OF_THE_MODEL: Final = ("density_kg_m3", "viscosity_pa_s", "diameter_m", "computing_s_per_s")
+"""The notes of a table of `MOTION` by which models are compared with it."""
+_OF_THE_CASE: Final = ("density_kg_m3", "viscosity_pa_s", "diameter_m", "speed_mps")
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """One file: its notes and its named columns, each (n,)."""
+
+    notes: dict[str, str]
+    columns: dict[str, Floats]
+
+    @property
+    def case(self) -> Case:
+        """What was solved, by the notes of a table of `MOTION`."""
+        profile = PROFILES[self.notes.get("profile", STOPPING.name)]
+        density_kg_m3, viscosity_pa_s, diameter_m, speed_mps = (float(self.notes[name]) for name in _OF_THE_CASE)
+        return Case(self.notes["liquid"], density_kg_m3, viscosity_pa_s, diameter_m, speed_mps, profile)
+
+
+def text(notes: Mapping[str, str], columns: Mapping[str, Sequence[float] | Floats]) -> bytes:
+    """Return a table as the bytes of its file."""
+    head = "".join(f"# {name}: {value}\n" for name, value in notes.items())
+    rows = ([f"{value:.7g}" for value in row] for row in zip(*columns.values(), strict=True))
+    return (head + csv_text_of([columns, *rows])).encode()
+
+
+def notes_of(case: Case) -> dict[str, str]:
+    """Return the notes that say what was solved."""
+    values = (case.density_kg_m3, case.viscosity_pa_s, case.diameter_m, case.speed_mps)
+    return {
+        "liquid": case.liquid_id,
+        "profile": case.profile.name,
+        **{name: f"{value:.6g}" for name, value in zip(_OF_THE_CASE, values, strict=True)},
+    }
+
+
+def stored(folder: Traversable | None = None) -> tuple[Table, ...]:
+    """Return the tables of `MOTION`, of the package or of a folder, by liquid and speed.
+
+    Raises
+    ------
+    StudyError
+        There is none, or one cannot be understood.
+    """
+    return _motions(folder or package())
+
+
+def training(folder: Traversable | None = None) -> tuple[Table, ...]:
+    """Return the tables of the motions that constants are fitted to in addition to those of `stored`.
+
+    Raises
+    ------
+    StudyError
+        There is none, or one cannot be understood.
+    """
+    return _motions((folder or package()) / TRAINING_FOLDER)
+
+
+def held_out(folder: Traversable | None = None) -> tuple[Table, ...]:
+    """Return the tables of the motions that no fit uses.
+
+    Raises
+    ------
+    StudyError
+        There is none, or one cannot be understood.
+    """
+    return _motions((folder or package()) / HELD_OUT_FOLDER)
+
+
+def left_out(folder: Traversable | None = None) -> dict[str, Constants]:
+    """Return the constants of unsteady drag fitted without a motion, by the name of its case; often none.
+
+    Raises
+    ------
+    StudyError
+        The file cannot be understood.
+    """
+    file = (folder or package()) / LEFT_OUT_FILE
+    if not file.is_file():
+        return {}
+    try:
+        header, *rows = csv.reader(file.read_text(encoding="utf-8").splitlines())
+        if tuple(header) != LEFT_OUT:
+            raise ValueError(f"its columns are {','.join(header)}, not {','.join(LEFT_OUT)}")  # noqa: TRY301
+        return {name: Constants(*map(float, values)) for name, *values in rows}
+    except (OSError, ValueError, TypeError) as error:
+        raise StudyError(
+            f"{file.name} cannot be used ({error}): make it again with liquid-study cfd --refit --to DIR"
+        ) from error
+
+
+def _motions(place: Traversable) -> tuple[Table, ...]:
+    names = place.iterdir() if place.is_dir() else ()
+    files = sorted((it for it in names if it.name.endswith("mmps.csv")), key=lambda it: it.name)
+    if not files:
+        raise StudyError(f"{place} holds no tables of the fluid solver: make them with liquid-study cfd --solve")
+    return tuple(read(it, MOTION, OF_THE_MODEL) for it in files)
+
+
+def steady(folder: Traversable | None = None) -> Table:
+    """Return the table of `STEADY`.
+
+    Raises
+    ------
+    StudyError
+        It is not there, or cannot be understood.
+    """
+    return read((folder or package()) / STEADY_FILE, STEADY)
+
+
+def package() -> Traversable:
+    """Return the folder of the stored tables."""
+    return resources.files("study_app.evidence.cfd")
+
+
+def read(file: Traversable, names: Sequence[str], noted: Sequence[str] = ()) -> Table:
+    """Return a table with these columns, and numbers in the notes ``noted``.
+
+    Raises
+    ------
+    StudyError
+        It is not there, or cannot be understood.
+    """
+    try:
+        lines = file.read_text(encoding="utf-8").splitlines()
+        said = (line[1:].split(":", 1) for line in lines if line.startswith("#"))
+        notes = {name.strip(): value.strip() for name, value in said}
+        for name in noted:
+            float(notes.get(name, f"no note of {name}"))
+        header, *rows = csv.reader(line for line in lines if not line.startswith("#"))
+        if tuple(header) != tuple(names):
+            raise ValueError(f"its columns are {','.join(header)}, not {','.join(names)}")  # noqa: TRY301
+        numbers = np.array([[float(field) for field in row] for row in rows]).T
+        columns = dict(zip(names, numbers, strict=True))
+    except (OSError, ValueError) as error:
+        raise StudyError(
+            f"the solver's table {file.name} cannot be used ({error}): make it again with liquid-study cfd --solve"
+        ) from error
+    return Table(notes, columns)

@@ -1,0 +1,199 @@
+"""Steady creeping flow of Herschel–Bulkley liquids around a ball: the fluid solver's drag, and the law's next to it.
+
+In units of the ball's diameter D, its speed U and the stress K (U/D)^n, the viscosity is
+
+    η = g^(n−1) + Bi/g,   g² = γ̇² + ε²,   γ̇² = 2 e:e,   Bi = τ_y/(K (U/D)^n),
+
+with the rate of strain e and a small ε, by which the liquid that does not yield is very viscous instead of rigid. Each
+flow is found by Newton's method from the one with a larger ε. The table has the drag over 3πD² K (U/D)^n, that of a
+Newtonian liquid with the viscosity K (U/D)^(n−1). The liquid is unbounded: it moves only near the ball.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Executor
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from study_app.errors import StudyError
+from study_app.evidence.cfd.flow import ORDER, Flow, Grid, library
+from study_app.evidence.cfd.solver import made
+from study_app.evidence.cfd.stored_flows import package, read, text
+from study_app.haptics.model.laws.rheology import HerschelBulkley, creeping_n
+from study_app.haptics.model.motion import Floats
+from study_app.store.atomic import write_file
+from study_app.store.output_files import make_folder
+
+COMMAND: Final = "liquid-study cfd --materials --solve"
+FILE: Final = "herschel_bulkley.csv"
+COMPARISON_FILE: Final = "materials.md"
+COLUMNS: Final = ("flow_index", "bingham", "drag", "drag_coarse", "drag_smooth")
+"""The drag, the same on a coarser grid, and with 3.3 times the ε."""
+INDICES: Final = (0.3, 0.5, 0.7, 1.0)
+BINGHAM: Final = (0.1, 1.0, 10.0, 30.0)
+GRID: Final = Grid(ahead=15, behind=25, aside=15, ball=0.08, near=0.3, far=4)
+COARSE: Final = Grid(ahead=15, behind=25, aside=15, ball=0.15, near=0.6, far=4)
+SMOOTHING: Final = (0.03, 0.005, 0.001, 0.0003)
+"""ε/√(1 + Bi), one after the other: the more plastic, the faster is the shear next to the ball."""
+PERMITTED: Final = 0.04
+"""Greatest error of the law."""
+_ROUNDS: Final = 80
+_SETTLED: Final = 1e-7
+_SHORTEST: Final = 0.05
+
+
+class YieldFlow(Flow):
+    """Creeping flow of a Herschel–Bulkley liquid around the ball."""
+
+    def drags(self, flow_index: float, bingham: Sequence[float]) -> Iterator[tuple[float, float]]:
+        """Yield the drag at rising Bingham numbers, with the least ε and with the one before.
+
+        Raises
+        ------
+        StudyError
+            No steady flow was found.
+        """
+        ng = self._ng
+        flow, residual = ng.GridFunction(self._space), self._zeros()
+        flow.vec.data = self._stream
+        yield_stress, smoothing = ng.Parameter(0.0), ng.Parameter(1.0)
+        (u, w, _), r = self._trial, ng.y
+        du, dw = ng.grad(u), ng.grad(w)
+        squared = 2 * (du[0] ** 2 + dw[1] ** 2 + (w / r) ** 2) + (du[1] + dw[0]) ** 2 + smoothing * smoothing
+        viscosity = ng.exp((flow_index - 1) / 2 * ng.log(squared)) + yield_stress / ng.sqrt(squared)
+        form = ng.BilinearForm(self._space)
+        form += self._integral(self._stokes(viscosity))
+        for value in bingham:
+            yield_stress.Set(value)
+            found = []
+            for small in SMOOTHING:
+                smoothing.Set(small * math.sqrt(1 + value))
+                if not self._settles(form, flow):
+                    raise StudyError(f"no steady flow was found at n = {flow_index:g}, Bi = {value:g}")
+                form.Apply(flow.vec, residual)
+                found.append(-2 * math.pi * ng.InnerProduct(residual, self._at_ball) / (3 * math.pi))
+            yield found[-1], found[-2]
+
+    def _settles(self, form: Any, flow: Any) -> bool:
+        """Solve by Newton's method, with steps shortened until the residual falls; return whether it converged."""
+        ng = self._ng
+        free, residual, step, before, left = ng.Projector(self._free, True), *(self._zeros() for _ in range(4))
+
+        def misfit() -> float:
+            form.Apply(flow.vec, residual)
+            left.data = free * residual
+            return float(left.Norm())
+
+        size = misfit()
+        for _ in range(_ROUNDS):
+            form.AssembleLinearization(flow.vec)
+            step.data = form.mat.Inverse(self._free, inverse="umfpack") * residual
+            before.data = flow.vec
+            share = 1.0
+            while True:
+                flow.vec.data = before - share * step
+                now = misfit()
+                if now < (1 - 0.1 * share) * size or share < _SHORTEST:
+                    break
+                share /= 2
+            size = now
+            if step.Norm() < _SETTLED * flow.vec.Norm():
+                return True
+        return False
+
+
+def solve_materials(to: Path, executor: Executor, progress: Callable[[str], None]) -> Path:
+    """Write the table of Herschel–Bulkley liquids, solved by an executor, into the folder ``to``; return the file.
+
+    Raises
+    ------
+    StudyError
+        NGSolve is not installed, no steady flow was found, or the file cannot be written.
+    """
+    library()
+    make_folder(to)
+    rows: list[tuple[float, ...]] = []
+    for index, found in zip(INDICES, executor.map(_solved, INDICES), strict=True):
+        rows += found
+        progress(f"n {index:g}: drag {', '.join(f'{row[2]:.4f}' for row in found)}")
+    notes = {
+        "title": "creeping drag of a sphere in Herschel–Bulkley liquids, over 3πD² K (U/D)^n",
+        **made(COMMAND),
+        "method": f"axisymmetric, order {ORDER}, ε/√(1 + Bi) {SMOOTHING[-1]:g} and {SMOOTHING[-2]:g}: {GRID}; {COARSE}",
+    }
+    write_file(to / FILE, text(notes, dict(zip(COLUMNS, np.array(rows).T, strict=True))))
+    return to / FILE
+
+
+def _solved(flow_index: float) -> list[tuple[float, ...]]:
+    """Return the rows of the table of one flow index."""
+    fine, coarse = YieldFlow(GRID).drags(flow_index, BINGHAM), YieldFlow(COARSE).drags(flow_index, BINGHAM)
+    return [
+        (flow_index, bingham, drag, rough, smooth)
+        for bingham, (drag, smooth), (rough, _) in zip(BINGHAM, fine, coarse, strict=True)
+    ]
+
+
+def stored_materials(folder: Traversable | None = None) -> dict[str, Floats]:
+    """Return the columns of the stored table.
+
+    Raises
+    ------
+    StudyError
+        It is not there, or cannot be understood.
+    """
+    return read((folder or package()) / FILE, COLUMNS).columns
+
+
+def law_drag(flow_index: float, bingham: float) -> float:
+    """Return the drag by the law of the servo, in the units of the table."""
+    liquid = HerschelBulkley(yield_stress_pa=bingham, consistency_pa_sn=1.0, flow_index=flow_index)
+    return sum(creeping_n(liquid, 1.0, 1.0)) / (3 * math.pi)
+
+
+def errors(columns: dict[str, Floats]) -> Floats:
+    """Return the law's error (n,) as a share of the solver's drag."""
+    pairs = zip(columns["flow_index"].tolist(), columns["bingham"].tolist(), strict=True)
+    found: Floats = np.array([law_drag(*pair) for pair in pairs]) / columns["drag"] - 1
+    return found
+
+
+def materials_markdown(columns: dict[str, Floats]) -> str:
+    """Return the comparison as a table."""
+    wrong = errors(columns)
+    grid, smooth = (float(np.abs(columns[name] / columns["drag"] - 1).max()) for name in COLUMNS[3:])
+    lines = [
+        "Creeping drag of a sphere in Herschel–Bulkley liquids, over 3πD² K (U/D)^n: solver (error of the law).",
+        "",
+        "| Bi | " + " | ".join(f"n {index:g}" for index in INDICES) + " |",
+        "|---:|" + "---:|" * len(INDICES),
+        *_rows(columns, wrong),
+        "",
+        f"The law errs by at most {np.abs(wrong).max():.1%} (permitted: {PERMITTED:.0%}). Edges twice as long change "
+        f"the drag by at most {grid:.2%}, 3.3 times the ε by {smooth:.2%}.",
+    ]
+    return "\n".join(lines)
+
+
+def write_materials(columns: dict[str, Floats], to: Path) -> Path:
+    """Write the comparison as Markdown into the folder ``to``; return the file.
+
+    Raises
+    ------
+    StoreError
+        The file cannot be written.
+    """
+    write_file(to / COMPARISON_FILE, f"{materials_markdown(columns)}\n".encode())
+    return to / COMPARISON_FILE
+
+
+def _rows(columns: dict[str, Floats], wrong: Floats) -> Iterable[str]:
+    for bingham in BINGHAM:
+        here = columns["bingham"] == bingham
+        cells = (
+            f"{drag:.3f} ({100 * error:+.1f} %)" for drag, error in zip(columns["drag"][here], wrong[here], strict=True)
+        )
+        yield f"| {bingham:g} | " + " | ".join(cells) + " |"

@@ -1,0 +1,199 @@
+"""The expected result of a scene's choice of effects: its time per tick, and its force error during strokes of a hand.
+
+The hand makes back-and-forth strokes with the greatest speed and acceleration of the scene's motion, quantised to
+encoder counts, with the scene's velocity estimator. The force is the one sent, after limits.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from study_app.evidence import reference_solutions
+from study_app.evidence.cost import measure
+from study_app.evidence.force_error import ROUNDING, error_of
+from study_app.evidence.hand_motions import COUNT_M, stroke
+from study_app.evidence.non_newtonian_law import non_newtonian_n
+from study_app.evidence.reference_model import local_wakes, lowered, resistance_nspm, respond
+from study_app.evidence.reference_solutions import CYCLES, Case, Truth
+from study_app.evidence.scene_variants import with_effects
+from study_app.evidence.unsteady_law import unsteady_n
+from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, Dynamics
+from study_app.haptics.model.effect import GRAVITY_MPS2
+from study_app.haptics.model.effects.local_wake import LocalWake
+from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.motion import Floats, Motion
+from study_app.haptics.model.scene import Effect, Everywhere, Scene
+from study_app.haptics.runtime.offline import samples_along
+from study_app.lab.identify.measured_force import vectors_x
+
+SETTLED: Final = 2 / 3
+"""After this share of the strokes the flow no longer depends on their start."""
+
+
+class Causes(NamedTuple):
+    """What each cause changes of a force along the same strokes: RMS of the change over the RMS of the reference.
+
+    From the reference to the force sent, one step each: the scene's effects with exact velocities (``law``), dw/dt
+    smoothed (``acceleration``), velocities estimated from encoder counts (``velocity``), and the safety layer of a
+    device with this delay (``limits``).
+    """
+
+    velocity: float = 0.0
+    acceleration: float = 0.0
+    limits: float = 0.0
+    law: float = 0.0
+
+
+class Expected(NamedTuple):
+    """The time of a scene's choice per tick, and the RMS error of its force, relative to the reference's RMS and in N.
+
+    ``causes`` splits the error, ``against`` describes the reference.
+    """
+
+    cost_ns: float
+    error_share: float
+    error_n: float
+    causes: Causes
+    against: str
+
+
+def expected(scene: Scene, delay_ticks: int = BELIEVED_TICKS) -> Expected:
+    """Measure a scene's cost and predict its error; of several liquids that with the greatest one."""
+    return Expected(measure(scene).scene_ns, *_errors(resolve(scene), delay_ticks))
+
+
+def error_report(scene: Scene, delay_ticks: int = BELIEVED_TICKS) -> str:
+    """Return the expected error on a device with a delay as a line of text."""
+    error_share, error_n, causes, against = _errors(resolve(scene), delay_ticks)
+    split = (f"{name} {f'{100 * it:.2g} %' if it > ROUNDING else 'none'}" for name, it in causes._asdict().items())
+    return (
+        f"expected error in its fastest strokes, delay {delay_ticks}: {error_n:.2g} N, {100 * error_share:.2g} % of "
+        f"the force; by {', '.join(split)}; against {against}"
+    )
+
+
+def _errors(scene: Scene, delay_ticks: int) -> tuple[float, float, Causes, str]:
+    if not scene.liquids:
+        return 0.0, 0.0, Causes(), "a scene without liquid"
+    return max((_of_one(scene, index, delay_ticks) for index in range(len(scene.liquids))), key=lambda it: it[1])
+
+
+def _of_one(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, Causes, str]:
+    """Return the errors of one liquid, as if it were the only one, everywhere and without a current."""
+    liquid = scene.liquids[index].model_copy(update={"region": Everywhere(), "current": None})
+    named: tuple[Effect, ...] = () if liquid.effects == "auto" else liquid.effects
+    kept = tuple(it for it in named if it not in {"current", "surface"})
+    alone = with_effects(scene.model_copy(update={"liquids": (liquid,)}), *kept)
+    box = alone.motion_in(liquid)
+    speed_mps, rate_per_s = box.speed_mps or math.nan, reference_solutions.strokes_per_s(alone)
+    motion = stroke(speed_mps, rate_per_s, CYCLES, alone.rate_hz)
+    if "unsteady_drag" in kept:
+        true_n = _unsteady_n(alone, motion, speed_mps, rate_per_s)
+        against = "the law of unsteady drag, which is within 8 % of a fluid solver at Re 0.3 to 100, and buoyancy"
+    elif "non_newtonian" in kept:
+        true_n = _non_newtonian_n(alone, motion, speed_mps, rate_per_s)
+        against = f"the {liquid.non_newtonian.kind} law (no reference in unsteady flow), added mass and buoyancy"
+    elif liquid.viscosity_pa_s is not None and liquid.drag.law != "linear" and not {"wake", "local_wake"} & set(kept):
+        true_n = physical_n(alone, speed_mps, rate_per_s, motion.t_s)
+        against = "drag by experiments, added mass, buoyancy and the history of creeping flow (an upper bound)"
+    else:
+        kept = tuple(it for it in kept if it in {"drag", "wake", "local_wake"})
+        alone = with_effects(alone, *kept)
+        true_n = _defined_n(alone, motion)
+        against = f"the definition of {' and '.join(kept).replace('_', ' ') or 'nothing'}"
+    if not true_n.any():
+        return 0.0, 0.0, Causes(), against
+    truth = Truth("", "", (Case(motion, true_n, motion.t_s >= SETTLED * motion.t_s[-1]),))
+    steps_n = [true_n, *_forces(alone, motion, Dynamics(delay_ticks / alone.rate_hz, COUNT_M))]
+    law, acceleration, velocity, limits = (
+        error_of([true_n + after_n - before_n], truth).rms for before_n, after_n in itertools.pairwise(steps_n)
+    )
+    whole = error_of(steps_n[-1:], truth)
+    return whole.rms, whole.rms_n, Causes(velocity, acceleration, limits, law), against
+
+
+def _forces(scene: Scene, motion: Motion, dynamics: Dynamics) -> Iterator[Floats]:
+    """Yield the forces (n, 3) [N] of which each differs from the one before by one more cause, as `Causes` lists."""
+    yield samples_along(scene, motion, dynamics).force_n
+    yield samples_along(scene, motion, dynamics, smooths=True).force_n
+    step_m = dynamics.count_m * scene.scale
+    seen = (
+        motion if scene.velocity.kind == "given" else Motion(motion.t_s, np.rint(motion.position_m / step_m) * step_m)
+    )
+    felt = samples_along(scene, seen, dynamics)
+    yield felt.force_n
+    yield felt.device_force_n
+
+
+def physical_n(scene: Scene, speed_mps: float, rate_per_s: float, t_s: Floats) -> Floats:
+    """Return the best-known force (n, 3) [N] on a ball in strokes along x, v = speed · sin ωt.
+
+    Steady drag by experiment, −½ρV dv/dt of the added mass, −6πµR (R/δ)(v + (dv/dt)/ω) of the history, which is exact
+    in creeping flow (Landau & Lifshitz §24) and an upper bound in faster flow, and net buoyancy.
+    """
+    liquid, radius_m = scene.liquids[0], scene.body.diameter_m / 2
+    mu, rho, volume_m3 = liquid.viscosity_pa_s or math.nan, liquid.density_kg_m3, scene.body.volume_m3
+    v, dv = speed_mps * np.sin(rate_per_s * t_s), speed_mps * rate_per_s * np.cos(rate_per_s * t_s)
+    drag_n = np.sign(v) * reference_solutions.measured_drag_n(liquid, scene.body.diameter_m, np.abs(v))
+    added_n = 0.5 * rho * volume_m3 * dv
+    delta_m = math.sqrt(2 * mu / (rho * rate_per_s))
+    history_n = 6 * math.pi * mu * radius_m**2 / delta_m * (v + dv / rate_per_s)
+    return np.column_stack([-drag_n - added_n - history_n, np.full_like(v, _lift_n(scene)), np.zeros_like(v)])
+
+
+def _unsteady_n(scene: Scene, motion: Motion, speed_mps: float, rate_per_s: float) -> Floats:
+    """Return unsteady drag by its equations, of a stroke whose acceleration is known, and buoyancy, (n, 3) [N]."""
+    t_s = motion.t_s
+    v, dv = speed_mps * np.sin(rate_per_s * t_s), speed_mps * rate_per_s * np.cos(rate_per_s * t_s)
+    even_s = np.full(len(t_s), 1 / scene.rate_hz)
+    force_n: Floats = unsteady_n(scene, vectors_x(v), vectors_x(dv), even_s) + np.array([0.0, _lift_n(scene), 0.0])
+    return force_n
+
+
+def _non_newtonian_n(scene: Scene, motion: Motion, speed_mps: float, rate_per_s: float) -> Floats:
+    """Return non-Newtonian drag by its equations, added mass and buoyancy, (n, 3) [N]."""
+    liquid, t_s = scene.liquids[0], motion.t_s
+    v, dv = speed_mps * np.sin(rate_per_s * t_s), speed_mps * rate_per_s * np.cos(rate_per_s * t_s)
+    added_n = 0.5 * liquid.density_kg_m3 * scene.body.volume_m3 * dv
+    drag_n = non_newtonian_n(scene, vectors_x(v), np.full(len(t_s), 1 / scene.rate_hz))
+    force_n: Floats = drag_n - vectors_x(added_n) + np.array([0.0, _lift_n(scene), 0.0])
+    return force_n
+
+
+def _lift_n(scene: Scene) -> float:
+    """Return net buoyancy, upward [N]."""
+    return (scene.liquids[0].density_kg_m3 - scene.body.density_kg_m3) * scene.body.volume_m3 * GRAVITY_MPS2
+
+
+def _defined_n(scene: Scene, motion: Motion) -> Floats:
+    """Return drag and wake by the literal definition, (n, 3) [N]."""
+    liquid = scene.liquids[0]
+    if "drag" not in liquid.effects:
+        return np.zeros_like(motion.position_m)
+    local = liquid.local_wake
+    if local is None or "local_wake" not in liquid.effects:
+        return respond(scene, motion, exact=True).force_n
+    velocity_mps = motion.velocity_mps if motion.velocity_mps is not None else np.zeros_like(motion.position_m)
+    v = np.array([lowered(row, scene.knee) for row in velocity_mps])
+    w = v - _local_wake(scene, local, v, motion)
+    speeds = np.linalg.norm(w, axis=1)
+    return -np.array([resistance_nspm(scene, speed) for speed in speeds.tolist()])[:, np.newaxis] * w
+
+
+def _local_wake(scene: Scene, wake: LocalWake, v: Floats, motion: Motion) -> Floats:
+    upright = 1.0 if wake.axes == "xyz" else 0.0
+    found: Floats = local_wakes(
+        v * np.array([1.0, upright, 1.0]),
+        motion.position_m,
+        np.full(len(v), 1 / scene.rate_hz),
+        max(1, math.floor(wake.length * scene.rate_hz / 1000)),
+        wake.scaling * scene.rate_hz / 1000,
+        wake.exponent,
+        wake.decay,
+        wake.reach_m or scene.body.diameter_m,
+        wake.spreading_m2ps,
+    )
+    return found

@@ -1,0 +1,251 @@
+"""What a soak found: its numbers as text and as a table for machines, and what of it is wrong."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from study_app.evidence.soak.faulty_device import BUTTON, GLITCH, JUMP, KINDS, LOST, LOST_AT_WRITE, NON_FINITE, SILENCE
+from study_app.evidence.soak.sample_audit import TOLERANCE_N
+from study_app.evidence.soak.wake_drift import Drift
+from study_app.haptics.model.layout import LIMITER_NAMES
+from study_app.store.atomic import write_file
+
+MOST_DRIFT: Final = 1e-9  # of the wake, in units of Σ|e|/S
+MOST_GROWTH_BYTES: Final = 5 * 2**20
+MOST_RESIDUE_N: Final = 1e-12
+FELT_N: Final = 0.05
+
+_SEEN: Final = {
+    NON_FINITE: "not_finite",
+    GLITCH: "displaced",
+    SILENCE: "silent",
+    JUMP: "long_ticks",
+    BUTTON: "buttons",
+    LOST: "lost",
+    LOST_AT_WRITE: "lost_at_write",
+}
+
+
+@dataclass(slots=True)
+class Rests:
+    """What was left of wake [m/s] and force [N] after the hand had kept still, at most.
+
+    ``pushed_s`` is how long a force above ``FELT_N`` was sent to a hand that kept still.
+    """
+
+    count: int = 0
+    pushed_s: float = 0.0
+    wake_mps: float = 0.0
+    force_n: float = 0.0
+
+
+@dataclass(frozen=True)
+class Soaked:
+    """The numbers of a soak.
+
+    ``memory`` [bytes] is read soon after the start, at every tenth and at the end; ``counts`` is a record of
+    ``audit.COUNTS``, ``device`` one of ``faults.FAULTS``.
+    """
+
+    hours: float
+    virtual: bool
+    seed: int
+    rate_hz: float
+    scenes: tuple[str, ...]
+    planned: int
+    ticks: int
+    took_s: float
+    memory: tuple[int, ...]
+    drift: Drift
+    rests: Rests
+    counts: Any
+    device: Any
+    overruns: int
+    dropped: int
+    recoveries: int
+    loads: int
+    stops: int
+
+    @property
+    def growth_bytes(self) -> int:
+        """How much more memory is held at the end than soon after the start."""
+        return self.memory[-1] - self.memory[0]
+
+    @property
+    def faults(self) -> tuple[tuple[str, int, int, int | None], ...]:
+        """Of each kind: its name, how many times, how many readings, and how many of these telemetry has."""
+        rows = []
+        for kind, name in enumerate(KINDS):
+            shown = kind != JUMP or self.virtual  # a tick may take long for other reasons too
+            seen = int(self.counts[_SEEN[kind]]) if shown else None
+            rows.append((name, int(self.device.episodes[kind]), int(self.device.injected[kind]), seen))
+        return tuple(rows)
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """What is wrong, a sentence each; empty where nothing is."""
+        checks = (*self._promises(), *self._residues(), *self._sums())
+        return tuple(sentence for sentence, wrong in checks if wrong)
+
+    def _promises(self) -> Iterator[tuple[str, bool]]:
+        """Yield what no sample and no written force may break."""
+        counts, device = self.counts, self.device
+        first = f", first at tick {counts.first_tick}"
+        yield f"{counts.excess} forces above the limit of {counts.limit_n:g} N{first}", counts.excess > 0
+        yield f"{counts.no_number} non-finite forces{first}", counts.no_number > 0
+        spoilt = int(counts.limiters[LIMITER_NAMES.index("non_finite")])
+        yield f"{spoilt} non-finite forces of the liquids", spoilt > 0
+        yield f"{device.not_finite} non-finite forces were written", device.not_finite > 0
+        yield f"a force of {device.most_n:.3g} N was written", device.most_n > counts.limit_n + TOLERANCE_N
+        yield (
+            f"{counts.steps} steps of up to {counts.steepest_n:.3g} N, not {counts.slew_n:g} N{first}",
+            counts.steps > 0,
+        )
+        yield f"{counts.unstopped} forces other than zero while stopped{first}", counts.unstopped > 0
+        yield f"{counts.believed} implausible readings accepted{first}", counts.believed > 0
+        yield f"the clock is off its ticks by up to {counts.drift_ns} ns{first}", counts.drift_ns > 0
+        yield f"the last force written is {device.last_n.tolist()} N, not zero", bool(device.last_n.any())
+
+    def _residues(self) -> Iterator[tuple[str, bool]]:
+        """Yield what must not build up; a number that is none counts as too much."""
+        drift, rests = self.drift.worst, self.rests
+        yield f"the wake is off its definition by {drift:.2g} of Σ|e|/S", not drift <= MOST_DRIFT
+        yield f"a wake of {rests.wake_mps:.2g} m/s is left after a rest", rests.wake_mps != 0.0
+        yield f"a force of {rests.force_n:.2g} N is left after a rest", not rests.force_n <= MOST_RESIDUE_N
+        yield f"memory grew by {_mib(self.growth_bytes):.1f} MiB", self.growth_bytes > MOST_GROWTH_BYTES
+
+    def _sums(self) -> Iterator[tuple[str, bool]]:
+        """Yield what must be the same counted in two places; some of it only where no sample is missing."""
+        counts = self.counts
+        lost = counts.samples + self.dropped != self.ticks or counts.missing > self.dropped
+        yield f"{self.ticks} ticks are not {counts.samples} samples and {self.dropped} dropped", lost
+        if self.dropped == 0:
+            wrong = counts.overruns != self.overruns
+            yield f"{self.overruns} overruns, but {counts.overruns} follow from the ticks", wrong
+            for name, _, readings, seen in self.faults:
+                yield f"{readings} readings of {name}, but {seen} in telemetry", seen not in {None, readings}
+
+    @property
+    def verdict(self) -> str:
+        """The result in one line."""
+        if self.findings:
+            return f"found: {'; '.join(self.findings)}"
+        part = "" if self.ticks >= self.planned else f" in the {100 * self.ticks / self.planned:.1f} % that were run"
+        return f"sound: nothing found{part}"
+
+    def text(self) -> str:
+        """Return the report for people."""
+        clock = "virtual" if self.virtual else "real"
+        pace = self.ticks / self.rate_hz / self.took_s if self.took_s > 0.0 else 0.0
+        fast = f", {pace:.0f} times as fast as real time" if self.virtual else ""
+        return "\n".join(
+            (
+                f"soak of {self.hours:g} h in {clock} time at {self.rate_hz:g} Hz, seed {self.seed}",
+                f"liquids: {', '.join(self.scenes)}",
+                f"{self.ticks:,} of {self.planned:,} ticks in {self.took_s:.1f} s{fast}",
+                *self._drift_text(),
+                *self._force_text(),
+                *self._counter_text(),
+                "",
+                "memory [MiB]",
+                f"  {' '.join(f'{_mib(held):.1f}' for held in self.memory)}; growth {_mib(self.growth_bytes):+.1f}",
+                "",
+                self.verdict,
+            )
+        )
+
+    def _drift_text(self) -> tuple[str, ...]:
+        drift, rests = self.drift, self.rests
+        return (
+            "",
+            "drift",
+            f"  clock against ticks   {self.counts.drift_ns} ns",
+            f"  wake and definition   {drift.worst:.1e} of Σ|e|/S at most in {drift.comparisons:,} comparisons; "
+            f"a wake ran for {drift.longest_s:,.0f} s",
+            f"  left after {rests.count:,} rests   wake {rests.wake_mps:g} m/s, force {rests.force_n:.1e} N; "
+            f"more than {FELT_N} N for {rests.pushed_s:.2f} s at most",
+        )
+
+    def _force_text(self) -> tuple[str, ...]:
+        counts, device = self.counts, self.device
+        return (
+            "",
+            "forces",
+            f"  largest written       {device.most_n:.6f} N of {counts.limit_n:g} N, {device.writes:,} writes",
+            f"  largest step          {counts.steepest_n:.6f} N",
+            f"    let go              {counts.let_go_n:.6f} N at a stop or a fault",
+            f"    paid back           {counts.paid_n:.6f} N by the passivity controller",
+            f"  non-finite forces     {counts.no_number + device.not_finite}",
+        )
+
+    def _counter_text(self) -> tuple[str, ...]:
+        counts = self.counts
+        limiters = zip(LIMITER_NAMES, counts.limiters.tolist(), strict=True)
+        latest_ms = 1e3 * counts.latest_s
+        return (
+            "",
+            "counters",
+            f"  overruns {self.overruns:,}; dropped samples {self.dropped:,}; latest tick {latest_ms:.3f} ms late",
+            f"  readings refused {counts.refused:,}; stale faults {counts.stale:,}; recoveries {self.recoveries:,}",
+            f"  scenes presented {self.loads:,}; force stopped by the host {self.stops:,} times",
+            f"  limiters: {', '.join(f'{name} {ticks:,}' for name, ticks in limiters)}",
+            "",
+            f"  {'fault':<14}{'times':>10}{'readings':>12}{'seen':>12}",
+            *(
+                f"  {name:<14}{times:>10,}{readings:>12,}{'-' if seen is None else f'{seen:,}':>12}"
+                for name, times, readings, seen in self.faults
+            ),
+        )
+
+    def table(self) -> dict[str, Any]:
+        """Return the report for machines."""
+        return {
+            "hours": self.hours,
+            "virtual": self.virtual,
+            "seed": self.seed,
+            "rate_hz": self.rate_hz,
+            "scenes": list(self.scenes),
+            "ticks_planned": self.planned,
+            "ticks": self.ticks,
+            "took_s": self.took_s,
+            "clock_drift_ns": int(self.counts.drift_ns),
+            "wake_drift": self.drift.worst,
+            "wake_comparisons": self.drift.comparisons,
+            "longest_wake_s": self.drift.longest_s,
+            "rests": self.rests.count,
+            "residue_wake_mps": self.rests.wake_mps,
+            "residue_force_n": self.rests.force_n,
+            "pushed_at_rest_s": self.rests.pushed_s,
+            "largest_force_n": float(self.device.most_n),
+            "largest_step_n": float(self.counts.steepest_n),
+            "largest_let_go_n": float(self.counts.let_go_n),
+            "largest_energy_step_n": float(self.counts.paid_n),
+            "latest_s": float(self.counts.latest_s),
+            "overruns": self.overruns,
+            "dropped": self.dropped,
+            "refused": int(self.counts.refused),
+            "stale_faults": int(self.counts.stale),
+            "recoveries": self.recoveries,
+            "scenes_presented": self.loads,
+            "force_stops": self.stops,
+            "limiters": dict(zip(LIMITER_NAMES, self.counts.limiters.tolist(), strict=True)),
+            "faults": {name: {"times": n, "readings": r, "seen": seen} for name, n, r, seen in self.faults},
+            "memory_bytes": list(self.memory),
+            "findings": list(self.findings),
+        }
+
+    def write(self, to: Path) -> tuple[Path, ...]:
+        """Write both reports into the folder ``to``; return the files."""
+        files = {
+            to / "soak.txt": self.text() + "\n",
+            to / "soak.json": json.dumps(self.table(), indent=2, ensure_ascii=False) + "\n",
+        }
+        for path, content in files.items():
+            write_file(path, content.encode())
+        return tuple(files)
+
+
+def _mib(held_bytes: float) -> float:
+    return held_bytes / 2**20

@@ -1,0 +1,360 @@
+"""The servo as it is, for hours or days, while hand and hardware do all they can to it.
+
+Each round has three parts. *Rough*: every fault there is, liquids changed every few seconds, the force stopped and let
+on again, the device lost and found. *Steady*: one liquid, and only such faults as its wake must live through, so that
+its sums run on and on. *Rest*: the hand keeps still for longer than the wake is long. A round lasts an hour, or a
+quarter of a shorter soak, but five seconds at least.
+
+Every sample is looked at (``audit``), the wake is compared with its definition (``ledger``), memory is read at every
+tenth. On a virtual clock the same loop ticks as fast as it computes.
+"""
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from random import Random
+from types import TracebackType
+from typing import Final, Literal, NamedTuple, Self, TypeAlias
+
+import numpy as np
+import psutil
+
+from study_app.errors import DeviceLost, ServoFault, StudyError
+from study_app.evidence.soak import exact_wake, sample_audit
+from study_app.evidence.soak.exact_wake import wake_of
+from study_app.evidence.soak.faulty_device import (
+    BUTTON,
+    GLITCH,
+    JUMP,
+    LOST,
+    LOST_AT_WRITE,
+    NON_FINITE,
+    SILENCE,
+    FaultyDevice,
+)
+from study_app.evidence.soak.restless_hand import RestlessHand
+from study_app.evidence.soak.result import FELT_N, Rests, Soaked
+from study_app.evidence.soak.sample_audit import Audit
+from study_app.evidence.soak.wake_drift import Drift
+from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.layout import SAMPLE, records
+from study_app.haptics.model.motion import Floats
+from study_app.haptics.model.scene import Scene
+from study_app.haptics.model.slope_limits import slew_limit_n
+from study_app.haptics.runtime.clocks.clock import SystemClock, VirtualClock
+from study_app.haptics.runtime.pack import elements_needed
+from study_app.haptics.runtime.servo import Servo
+from study_app.haptics.runtime.telemetry import HISTORY
+
+MOST_HOURS: Final = 10_000.0
+FEWEST_TICKS: Final = 1_000
+LONGEST_ROUND_S: Final = 3600.0
+SHORTEST_ROUND_S: Final = 5.0
+ROUGH: Final = 0.35  # share of a round
+SETTLING_S: Final = 2.0  # until a hand that keeps still has come to rest, and its velocity too
+LONGEST_REST: Final = 0.4  # share of a round; where a rest takes more, there is none
+MOST_TICKS: Final = (
+    1000  # between two looks: fewer than a wake is long, so that what spoils it is seen before it is gone
+)
+WAITING_S: Final = 0.25  # likewise, on a clock that runs by itself
+PATIENCE_S: Final = 10.0  # with a servo that takes no tick
+
+# kind: share of all faults, fewest and most readings
+ROUGH_FAULTS: Final = {
+    NON_FINITE: (4.0, 1, 8),
+    GLITCH: (4.0, 1, 8),
+    SILENCE: (4.0, 3, 60),
+    JUMP: (2.0, 1, 1),
+    BUTTON: (1.0, 1, 50),
+    LOST: (1.0, 1, 1),
+    LOST_AT_WRITE: (1.0, 1, 1),
+}
+STEADY_FAULTS: Final = {NON_FINITE: (1.0, 1, 4), GLITCH: (1.0, 1, 4), SILENCE: (1.0, 3, 40), JUMP: (0.5, 1, 1)}
+ROUGH_GAP: Final = (20, 600)
+STEADY_GAP: Final = (50, 4000)
+
+Part: TypeAlias = Literal["rough", "steady", "rest"]
+
+
+class Stretch(NamedTuple):
+    """A part of a round, and the tick before which it ends."""
+
+    part: Part
+    round: int
+    end: int
+
+
+@dataclass(slots=True)
+class _Due:
+    """At which tick the host does something next; below 0: it does not."""
+
+    motion: int = 0
+    scene: int = -1
+    stop: int = -1
+    fade: int = -1
+
+
+class Soak:
+    """One soak: step it until it is over, then ask for its report; leaving it as a context stops the servo.
+
+    Parameters
+    ----------
+    scenes : what is felt, by name; all of one rate
+    hours : how long, on the servo's clock
+    virtual : on a virtual clock, as fast as it computes
+    seed : of motions, scenes and faults
+    """
+
+    def __init__(self, scenes: Mapping[str, Scene], hours: float, *, virtual: bool, seed: int = 1) -> None:
+        self._scenes = {name: resolve(scene) for name, scene in scenes.items()}
+        self._names = list(self._scenes)
+        self._lasting = [name for name in self._names if wake_of(self._scenes[name])] or self._names
+        self._rate_hz = next(iter(self._scenes.values())).rate_hz
+        self.hours, self.virtual, self.seed = hours, virtual, seed
+        self.ticks = ticks_of(hours, self._rate_hz)
+        self._draw = Random(seed).random  # noqa: S311 - faults keep no secrets
+        clock = VirtualClock() if virtual else SystemClock()
+        hand = RestlessHand(Random(seed + 1))  # noqa: S311
+        self.hand = hand
+        self.device = FaultyDevice(hand, clock, seed)
+        self._longest_wake = max(elements_needed(scene) for scene in self._scenes.values())
+        self.servo = Servo(self.device, clock=clock, rate_hz=self._rate_hz, elements=self._longest_wake)
+        limit_n = min(hand.force_limit_n, max(scene.force_limit_n for scene in self._scenes.values()))
+        slew_n = max(slew_limit_n(1 / self._rate_hz, hand.dynamics, scene.velocity) for scene in self._scenes.values())
+        self.audit = Audit(limit_n, slew_n, round(1e9 / self._rate_hz), max(hand.workspace_m))
+        self.drift = Drift()
+        self.reader = self.servo.telemetry.reader()
+        self._due, self._rests = _Due(), Rests()
+        self._recoveries, self._loads, self._stops = 0, 0, 0
+        self._presented = self._names[0]
+        self.stretch: Stretch | None = None
+        self._still_from = 0
+        self._memory: list[int] = []
+        self._began_s = self._ticked_s = 0.0
+
+    @property
+    def done(self) -> int:
+        """How many ticks were taken."""
+        return int(self.servo.telemetry.written[0])
+
+    def __enter__(self) -> Self:
+        sample_audit.prepare()
+        exact_wake.prepare()
+        self.servo.prepare()
+        for _ in range(2):
+            records(SAMPLE, HISTORY).status = 1  # the most that a look takes: what the system keeps of it is no growth
+        self._began_s = time.perf_counter()
+        self._ticked_s = time.monotonic()
+        if not self.virtual:
+            self.servo.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.servo.stop()
+
+    def step(self, ending: threading.Event | None = None) -> None:
+        """Do what is due, let some ticks pass, and look at them; an ``ending`` that is set cuts the waiting short."""
+        tick = self.done
+        stretch = self._at(tick)
+        if self.stretch is None or (stretch.part, stretch.round) != (self.stretch.part, self.stretch.round):
+            self._leave()
+            self.stretch = stretch
+            self._enter(stretch, tick)
+        self._act(stretch, tick)
+        due = [at for at in (self._due.motion, self._due.scene, self._due.stop, self._due.fade) if at > tick]
+        ticks = min(MOST_TICKS, self.ticks - tick, stretch.end - tick, *(at - tick for at in due))
+        if self.virtual:
+            self.servo.advance(ticks)
+        else:
+            (ending or threading.Event()).wait(min(ticks / self._rate_hz, WAITING_S))
+        self._look()
+        if self.servo.fault is not None:
+            self._recover()
+        self._watch(tick)
+
+    def _watch(self, before: int) -> None:
+        """Raise ``ServoFault`` where ticks have stopped coming without a fault: waiting longer would find no end."""
+        now_s = time.monotonic()
+        if self.done > before:
+            self._ticked_s = now_s
+        elif now_s - self._ticked_s > PATIENCE_S:
+            raise ServoFault(f"the servo has taken no tick for {PATIENCE_S:g} s, after {before} of {self.ticks} ticks")
+
+    def report(self) -> Soaked:
+        """Stop the servo, look at what is left, and say what was found so far."""
+        took_s = time.perf_counter() - self._began_s
+        if self.done >= self.ticks:
+            self._leave()
+        self.servo.stop()
+        self._look()
+        counts, device = self.audit.counts, self.device.state
+        return Soaked(
+            hours=self.hours,
+            virtual=self.virtual,
+            seed=self.seed,
+            rate_hz=self._rate_hz,
+            scenes=tuple(self._names),
+            planned=self.ticks,
+            ticks=self.done,
+            took_s=took_s,
+            memory=(*self._memory, psutil.Process().memory_info().rss),
+            drift=self.drift,
+            rests=self._rests,
+            counts=counts.copy(),
+            device=device.copy(),
+            overruns=self.servo.overruns,
+            dropped=self.reader.dropped,
+            recoveries=self._recoveries,
+            loads=self._loads,
+            stops=self._stops,
+        )
+
+    def _at(self, tick: int) -> Stretch:
+        """Return the part of its round that a tick is in."""
+        length = round(self._rate_hz * min(max(900 * self.hours, SHORTEST_ROUND_S), LONGEST_ROUND_S))
+        number = tick // length
+        rest = round(SETTLING_S * self._rate_hz) + self._longest_wake
+        if rest > LONGEST_REST * length:
+            rest = 0
+        first = number * length
+        ends: tuple[tuple[Part, int], ...] = (
+            ("rough", first + round(ROUGH * length)),
+            ("steady", first + length - rest),
+            ("rest", first + length),
+        )
+        part, end = next((part, end) for part, end in ends if tick < end)
+        return Stretch(part, number, end)
+
+    def _enter(self, stretch: Stretch, tick: int) -> None:
+        """Set the stage for a part of a round."""
+        self._due = _Due(motion=tick)
+        if stretch.part == "rest":
+            self._still_from = tick
+            self.device.allow({}, ROUGH_GAP)
+            self.servo.fade_in()
+            self.hand.keep_still()
+            self._due.motion = -1
+        elif stretch.part == "steady":
+            self.device.allow(STEADY_FAULTS, STEADY_GAP)
+            self.servo.fade_in()
+            self._load(self._lasting[stretch.round % len(self._lasting)])
+        else:
+            self.device.allow(ROUGH_FAULTS, ROUGH_GAP)
+            self._due.scene = tick
+            self._due.stop = self._later(tick, 1.0, 10.0)
+
+    def _leave(self) -> None:
+        """Read what a rest has left of wake and force."""
+        sample = self.servo.telemetry.latest()
+        if self._is_left_alone and sample is not None:
+            self._rests.count += 1
+            self._rests.wake_mps = max(self._rests.wake_mps, _size(sample.wake_mps))
+            self._rests.force_n = max(self._rests.force_n, _size(sample.force_n))
+
+    @property
+    def _is_left_alone(self) -> bool:
+        """Whether the hand keeps still in a liquid that leaves no force by itself."""
+        effects = {effect for liquid in self._scenes[self._presented].liquids for effect in liquid.effects}
+        return self.stretch is not None and self.stretch.part == "rest" and not effects - {"drag", "wake"}
+
+    def _act(self, stretch: Stretch, tick: int) -> None:
+        """Do what is due: another motion, another liquid, the force stopped, the force let on again."""
+        due = self._due
+        if 0 <= due.motion <= tick:
+            due.motion = tick + max(1, round(self.hand.go_on() * self._rate_hz))
+        if 0 <= due.scene <= tick:
+            self._load(self._names[int(self._draw() * len(self._names))])
+            due.scene = self._later(tick, 0.2, 10.0)
+        if 0 <= due.stop <= tick:
+            self.servo.stop_force()
+            self._stops += 1
+            due.stop = self._later(tick, 2.0, 20.0)
+        if 0 <= due.fade <= tick:
+            self.servo.fade_in()
+            due.fade = -1
+        elif due.fade < 0 and not self.servo.force_is_on and stretch.part != "rest":
+            due.fade = self._later(tick, 0.05, 1.0)
+
+    def _later(self, tick: int, least_s: float, most_s: float) -> int:
+        return tick + max(1, round((least_s + (most_s - least_s) * self._draw()) * self._rate_hz))
+
+    def _load(self, name: str) -> None:
+        """Present a liquid; a servo that has just stopped itself gets it when it has recovered."""
+        self._presented = name
+        with suppress(DeviceLost, ServoFault):
+            self.drift.expect(self.servo.load(self._scenes[name]), self._scenes[name])
+            self._loads += 1
+
+    def _recover(self) -> None:
+        """Start a servo that has stopped itself anew, as a host does once the cable is back."""
+        self.servo.stop()
+        self._look()
+        self._recoveries += 1
+        if not self.virtual:
+            self.servo.start()
+        self._load(self._presented)
+
+    def _look(self) -> None:
+        """Look at all samples that are new, and at every tenth at the memory."""
+        samples = self.reader.read()
+        self.audit.take(samples)
+        self.drift.take(samples)
+        pushed = samples.tick[np.linalg.norm(samples.device_force_n, axis=1) > FELT_N]
+        if self._is_left_alone and pushed.size:
+            self._rests.pushed_s = max(self._rests.pushed_s, (int(pushed[-1]) - self._still_from) / self._rate_hz)
+        if len(self._memory) <= min(10 * self.done // self.ticks, 9) and self.done > 0:
+            self._memory.append(psutil.Process().memory_info().rss)
+
+
+def _size(vector: Floats) -> float:
+    """Return the length of (3,), infinite where it is not finite."""
+    return float(np.nan_to_num(np.linalg.norm(vector), nan=np.inf))
+
+
+def ticks_of(hours: float, rate_hz: float) -> int:
+    """Return how many ticks a soak takes.
+
+    Raises
+    ------
+    StudyError
+        So long or so short a soak makes no sense.
+    """
+    fewest = FEWEST_TICKS / rate_hz / 3600
+    if not fewest <= hours <= MOST_HOURS:
+        raise StudyError(f"a soak lasts {fewest:.2g} to {MOST_HOURS:g} hours, not {hours:g}")
+    return round(hours * 3600 * rate_hz)
+
+
+def soak(
+    scenes: Mapping[str, Scene],
+    hours: float,
+    *,
+    virtual: bool,
+    seed: int = 1,
+    ending: threading.Event | None = None,
+    progress: Callable[[str], None] = lambda _line: None,
+) -> Soaked:
+    """Soak the servo in ``scenes`` and return what was found; one that is asked to end early says what it has.
+
+    ``progress`` hears a line at the start and at every tenth, ``ending`` is set by whoever wants no more.
+
+    Raises
+    ------
+    StudyError
+        Hours out of range.
+    """
+    ending = ending or threading.Event()
+    with Soak(scenes, hours, virtual=virtual, seed=seed) as run:
+        progress(f"{run.ticks:,} ticks begin; Ctrl+C ends the run with the report so far")
+        tenth = 0
+        while run.done < run.ticks and not ending.is_set():
+            run.step(ending)
+            if 10 * run.done // run.ticks > tenth:
+                tenth = 10 * run.done // run.ticks
+                held_mib = psutil.Process().memory_info().rss / 2**20
+                progress(f"{10 * tenth:3} %  {run.done:,} ticks, drift {run.drift.worst:.1e}, {held_mib:.1f} MiB")
+        return run.report()

@@ -1,0 +1,314 @@
+"""Which cases are judged, group by group: the sweep of the first plant, and what it leaves out.
+
+Every group is drawn from the seed and its own name, so that the cases of one do not depend on the others.
+"""
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from random import Random
+from typing import Any, Final, NamedTuple
+
+from study_app.evidence.stability.closed_loop import BURST_PERIOD_S
+from study_app.evidence.stability.stability_cases import (
+    CIRCLES,
+    DAMPER,
+    DEVICE,
+    FALCON,
+    FILTERS,
+    FIRST,
+    GRIPS,
+    LETS_GO,
+    PLANTS,
+    REACHES,
+    SECOND,
+    SINE,
+    STROKE,
+    THROWN,
+    Case,
+    liquids,
+    materials,
+    of_physical2,
+    scenes,
+)
+
+SCALES: Final = (1.0, 3.0, 10.0, 20.0, 40.0)
+RATES_HZ: Final = (250.0, 500.0, 1000.0, 2000.0)
+HANDLES_KG: Final = (0.03, 0.05, 0.1, 0.25)
+FALCONS_KG: Final = (0.1, 0.25, 0.6)
+"""Handles of the cases through the Falcon's driver, which says that its grip is no lighter."""
+FALCONS_HZ: Final = (500.0, 1000.0)
+PHASES: Final = 12
+FIRST_RELEASE_S: Final = 0.6
+CASES: Final = 1500
+"""Of each group of misjudged delays and masses and of disturbed samples."""
+KALMAN_CASES: Final = 250
+"""Of each group that is judged with the Kalman filter, too."""
+
+DRAWN: Final[Mapping[str, tuple[Any, ...]]] = {
+    "estimator": ("ewma", "ewma", "ewma", "line", "foaw", "raw"),
+    "motion": (REACHES, CIRCLES, STROKE),
+    "speed_mps": (0.1, 0.3, 0.6, 1.0),
+    "mass_kg": (0.1, 0.25, 0.6),
+    "viscous_nspm": (0.0, 0.5),
+    "coulomb_n": (0.0, 0.3),
+    "quantum_um": (20.0, 38.0, 60.0),
+    "noise_um": (0.0, 30.0),
+    "jitter": (0.0, 0.2),
+    "missed": (0.0, 0.02),
+}
+
+
+LINKS: Final[Mapping[str, tuple[Any, ...]]] = {
+    "estimator": ("ewma", "kalman"),
+    "motion": (REACHES, CIRCLES, SINE),
+    "release_s": (0.6, 0.7, 0.8),
+    "force_delay_ms": (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0),
+    "force_jitter_ms": (0.0, 0.0, 5.0, 20.0, 50.0),
+    "force_loss": (0.0, 0.0, 0.1, 0.5),
+}
+"""How a study delays forces; a link that does nothing is one of 48."""
+OUTLIERS: Final[Mapping[str, tuple[Any, ...]]] = {"outliers": (0.002, 0.02), "outlier_mm": (0.5, 2.0, 5.0, 20.0)}
+JUMPS: Final[Mapping[str, tuple[Any, ...]]] = {"burst_ms": (4.0, 8.0, 20.0, 40.0), "jump_mm": (0.5, 2.0, 5.0, 20.0)}
+DELAYS: Final[Mapping[str, tuple[Any, ...]]] = {"slows_to": (2, 3, 4), "swaps": (1,)}
+DISTURBED: Final[Mapping[str, Mapping[str, tuple[Any, ...]]]] = {
+    "outliers": OUTLIERS,
+    "jumps at a reconnection": JUMPS,
+    "delay that jumps": DELAYS,
+    "everything at once": {**OUTLIERS, **JUMPS, **DELAYS, "lost": (0.0, 0.1), "duplicated": (0.0, 0.05)},
+}
+"""What is wrong with the samples or the delay of a device, by group."""
+LATE_CASES: Final = 1000
+"""Loops with a force link."""
+DEVICE_CASES: Final = 500
+"""Loops whose device measures the velocity."""
+
+MEASURED: Final[Mapping[str, tuple[Any, ...]]] = {
+    "estimator": (DEVICE,),
+    "motion": (REACHES, CIRCLES, SINE),
+    "release_s": (0.6, 0.7, 0.8),
+    "velocity_lag": (0.0, 0.5, 1.0, 2.0, 4.0, 7.5),
+    "velocity_filter": FILTERS,
+    "velocity_noise_mmps": (0.0, 2.0, 10.0),
+    "velocity_count_mmps": (0.0, 1.0, 5.0),
+}
+"""How devices measure it: the noise of ``line`` with 2 to 15 samples at a count of 38 um lies between."""
+
+FALCONS: Final[Mapping[str, tuple[Any, ...]]] = {
+    **DRAWN,
+    "mass_kg": FALCONS_KG,
+    "motion": (REACHES, CIRCLES, SINE),
+    "noise_um": (0.0,),
+    "jitter": (0.0,),
+    "missed": (0.0,),
+    "quantum_um": (38.0,),
+}
+"""Motions within its workspace, and nothing that the emulated Falcon decides itself."""
+
+
+class Group(NamedTuple):
+    """Cases that have something in common, which ``name`` says."""
+
+    name: str
+    cases: tuple[Case, ...]
+
+
+def sweep(seed: str = "stability") -> tuple[Case, ...]:
+    """Return the cases of the sweep: each liquid at each scale, rate, delay and grip; the rest from a fixed seed."""
+    return tuple(_drawn(seed, _grid(GRIPS)))
+
+
+def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ...]:
+    """Return all groups but the sweep itself, with at most ``count`` cases each."""
+    light = {**DRAWN, "mass_kg": HANDLES_KG}
+    held, released = [tuple(_grid(hands)) for hands in (("light", "middle", "firm"), (LETS_GO, THROWN))]
+    both = [dataclasses.replace(case, plant=plant) for plant in PLANTS for case in (*held, *released)]
+    releases = tuple(_releases(f"{seed} releases", PLANTS, HANDLES_KG))
+
+    def changed(name: str, change: Callable[[Case], Case | None], cases: Iterable[Case]) -> Group:
+        found = tuple(case for case in map(change, cases) if case is not None)
+        return Group(name, tuple(_drawn(f"{seed} {name}", some(found, min(CASES, count or CASES)), light)))
+
+    found = [
+        Group(name, tuple(_drawn(f"{seed} {name}", [_second(case) for case in some(cases, count)], light)))
+        for name, cases in (("second plant, held", held), ("second plant, let go", released))
+    ]
+    for name, change in CHANGES.items():
+        found.append(changed(name, change, both))
+    found += [
+        Group(name, tuple(map(change, _drawn(f"{seed} {name}", some(both, min(CASES, count or CASES)), light))))
+        for name, change in MASSES.items()
+    ]
+    for name, own in DISTURBED.items():
+        cases = some(both, min(CASES, count or CASES))
+        found.append(Group(name, tuple(_drawn(f"{seed} {name}", cases, {**light, **own}))))
+    found.append(Group("let go in mid-stroke", some(releases, count)))
+    in_gap = tuple(_in_gap(f"{seed} let go in a gap", releases))
+    found.append(Group("let go in a gap of samples", some(in_gap, min(CASES, count or CASES))))
+    for name in (*MISJUDGED, *MASSES):
+        cases = tuple(case for case in map({**CHANGES, **MASSES}[name], releases) if case is not None)
+        found.append(Group(f"let go in mid-stroke, {name}", some(cases, min(CASES, count or CASES))))
+    driven = "through the Falcon's driver"
+    driven_held = some(tuple(_grid(("light", "middle", "firm"), (FALCON,), FALCONS_HZ, (1,))), count)
+    driven_held = tuple(_drawn(f"{seed} {driven}", driven_held, FALCONS))
+    found.append(Group(f"{driven}, held", driven_held))
+    driven_free = (dataclasses.replace(case, delay=1) for case in _releases(f"{seed} {driven}", (FALCON,), FALCONS_KG))
+    found.append(Group(f"{driven}, let go in mid-stroke", some(tuple(driven_free), count)))
+    found += _of_liquids("non-Newtonian liquids", materials, seed, light, count)
+    found += _of_liquids("liquids of physical2", of_physical2, seed, light, count)
+    found.append(_late_forces(seed, light, count))
+    by_device = _by_device(seed, light, count)
+    fewer = min(KALMAN_CASES, count or KALMAN_CASES)
+    return (*found, by_device, *(_with_kalman(group, fewer) for group in (Group("first plant", sweep(seed)), *found)))
+
+
+def _of_liquids(
+    name: str, names: Callable[[], Iterable[str]], seed: str, choices: Mapping[str, tuple[Any, ...]], count: int | None
+) -> Iterator[Group]:
+    """Yield groups for liquids outside the sweep: its own cases, with misjudged delays, and with releases."""
+    whole = tuple(_grid(GRIPS, names=names))
+    yield Group(name, tuple(_drawn(f"{seed} {name}", some(whole, count), choices)))
+    for change in MISJUDGED:
+        cases = [case for case in map(CHANGES[change], whole) if case is not None]
+        few = some(cases, min(CASES, count or CASES))
+        yield Group(f"{name}, {change}", tuple(_drawn(f"{seed} {name} {change}", few, choices)))
+    free = tuple(_releases(f"{seed} {name}", PLANTS, HANDLES_KG, names))
+    yield Group(f"{name}, let go in mid-stroke", some(free, count))
+
+
+def _late_forces(seed: str, choices: Mapping[str, tuple[Any, ...]], count: int | None) -> Group:
+    """Return loops with a force link: held, thrown and let go, in half of them the strongest damper."""
+    name = "late forces"
+    whole = tuple(_grid(GRIPS, PLANTS, names=lambda: (*liquids(), *[DAMPER] * len(liquids()))))
+    cases = some(whole, min(LATE_CASES, count or LATE_CASES))
+    return Group(name, tuple(_drawn(f"{seed} {name}", cases, {**choices, **LINKS})))
+
+
+def _by_device(seed: str, choices: Mapping[str, tuple[Any, ...]], count: int | None) -> Group:
+    """Return loops whose device measures the velocity, in half of them the strongest damper."""
+    name = "velocity measured by the device"
+    whole = tuple(_grid(GRIPS, PLANTS, names=lambda: (*liquids(), *[DAMPER] * len(liquids()))))
+    cases = some(whole, min(DEVICE_CASES, count or DEVICE_CASES))
+    return Group(name, tuple(_drawn(f"{seed} {name}", cases, {**choices, **MEASURED})))
+
+
+def _with_kalman(group: Group, count: int) -> Group:
+    """Return some cases of a group with the Kalman filter in place of their estimators."""
+    cases = (dataclasses.replace(case, estimator="kalman") for case in some(group.cases, count))
+    return Group(f"kalman: {group.name}", tuple(cases))
+
+
+def some(cases: Sequence[Case], count: int | None) -> tuple[Case, ...]:
+    """Return ``count`` of the cases, spread over all of them: the same in every run."""
+    if count is None or count >= len(cases):
+        return tuple(cases)
+    return tuple(Random(count).sample(cases, count))  # noqa: S311 - no secret
+
+
+def _second(case: Case) -> Case:
+    return dataclasses.replace(case, plant=SECOND)
+
+
+def _believing(less: int) -> Callable[[Case], Case | None]:
+    """Return what makes a loop believe its delay to be shorter by ``less`` ticks; None of those that cannot."""
+
+    def change(case: Case) -> Case | None:
+        believed = case.delay - less
+        return dataclasses.replace(case, believed=believed) if 0 <= believed <= 4 else None
+
+    return change
+
+
+def _slowing(case: Case) -> Case | None:
+    return dataclasses.replace(case, slows_to=case.delay + 1) if case.delay < 4 else None
+
+
+def _measuring(less: int) -> Callable[[Case], Case | None]:
+    """Return what makes a loop begin with such a belief, and the device measure its delay."""
+
+    def change(case: Case) -> Case | None:
+        believed = case.delay - less
+        return dataclasses.replace(case, believed=believed, slows_to=case.delay) if believed >= 0 else None
+
+    return change
+
+
+CHANGES: Final[Mapping[str, Callable[[Case], Case | None]]] = {
+    "delay believed one tick too short": _believing(1),
+    "delay believed one tick too long": _believing(-1),
+    "device slower by a tick from 0.5 s on": _slowing,
+    "delay two ticks too short, measured": _measuring(2),
+    "delay three ticks too short, measured": _measuring(3),
+    "10 % of samples lost": lambda case: dataclasses.replace(case, lost=0.1),
+    "5 % of samples repeated": lambda case: dataclasses.replace(case, duplicated=0.05),
+    "no sample for 20 ms, again and again": lambda case: dataclasses.replace(case, burst_ms=20.0),
+}
+MISJUDGED: Final = tuple(CHANGES)[:3]
+MASSES: Final[Mapping[str, Callable[[Case], Case]]] = {
+    "least mass stated at half": lambda case: dataclasses.replace(case, believed_kg=0.5 * case.mass_kg),
+    "least mass stated at 1.25 times": lambda case: dataclasses.replace(case, believed_kg=1.25 * case.mass_kg),
+    "mass doubled and halved every 150 ms": lambda case: dataclasses.replace(case, other_kg=2.0 * case.mass_kg),
+}
+"""Changes of what the device states of its handle, or of the handle itself; made once its mass has been drawn."""
+
+
+def _grid(
+    hands: Iterable[str],
+    plants: Iterable[str] = (FIRST,),
+    rates_hz: Iterable[float] = RATES_HZ,
+    delays: Iterable[int] = range(5),
+    names: Callable[[], Iterable[str]] = liquids,
+) -> Iterator[Case]:
+    """Yield each liquid, by default of the sweep, at each scale, rate, delay and grip."""
+    for liquid, scale, rate_hz, delay, hand, plant in itertools.product(
+        names(), SCALES, rates_hz, delays, hands, plants
+    ):
+        yield Case(liquid=liquid, scale=scale, rate_hz=rate_hz, delay=delay, hand=hand, plant=plant)
+
+
+def _drawn(seed: str, cases: Iterable[Case], choices: Mapping[str, tuple[Any, ...]] = DRAWN) -> Iterator[Case]:
+    """Yield cases, the rest of each drawn from ``choices``."""
+    draw = Random(seed)  # noqa: S311 - the same cases in every run
+    for case in cases:
+        yield dataclasses.replace(case, **{name: _one(draw, values) for name, values in choices.items()})
+
+
+def _releases(
+    seed: str, plants: Iterable[str], masses_kg: Iterable[float], names: Callable[[], Iterable[str]] = liquids
+) -> Iterator[Case]:
+    """Yield releases at every phase of strokes of 1 to 4 Hz ±30 mm, in the loop of a study.
+
+    The damper's are drawn from a stream of their own, so that those of the liquids stay the ones that were judged.
+    """
+    shared, own = Random(seed), {DAMPER: Random(f"{seed} {DAMPER}")}  # noqa: S311 - the same cases in every run
+    for plant, liquid, mass_kg, phase in itertools.product(plants, names(), masses_kg, range(PHASES)):
+        draw = own.get(liquid, shared)
+        case = Case(liquid=liquid, hand=LETS_GO, motion=SINE, mass_kg=mass_kg, plant=plant)
+        hz = _one(draw, (1.0, 2.0, 4.0))
+        yield dataclasses.replace(
+            case,
+            scale=scenes()[liquid].scale,
+            delay=_one(draw, (0, 1, 1, 2)),
+            viscous_nspm=_one(draw, (0.0, 0.5)),
+            speed_mps=round(peak_mps(hz, 0.5e-3 * case.way_mm), 5),
+            release_s=round(FIRST_RELEASE_S + phase / (PHASES * hz), 5),
+        )
+
+
+def _in_gap(seed: str, cases: Iterable[Case]) -> Iterator[Case]:
+    """Yield releases at a moment at which samples are missing, after which they may be off."""
+    draw = Random(seed)  # noqa: S311 - the same cases in every run
+    for case in cases:
+        burst_ms, jump_mm = _one(draw, JUMPS["burst_ms"]), _one(draw, (0.0, *JUMPS["jump_mm"]))
+        release_s = round(3 * BURST_PERIOD_S - 1e-3 * burst_ms * draw.random(), 5)
+        yield dataclasses.replace(case, burst_ms=burst_ms, jump_mm=jump_mm, release_s=release_s)
+
+
+def peak_mps(frequency_hz: float, amplitude_m: float) -> float:
+    """Return the greatest speed of a sine."""
+    return 2.0 * math.pi * frequency_hz * amplitude_m
+
+
+def _one(draw: Random, choices: tuple[Any, ...]) -> Any:
+    return choices[int(draw.random() * len(choices))]

@@ -1,0 +1,217 @@
+"""The maximum stable damping of a free handle, measured with the real tick, and the table of limits."""
+
+import itertools
+import math
+from collections.abc import Iterable, Iterator
+from concurrent.futures import Executor
+from typing import Any, Final
+
+import numpy as np
+
+from study_app.evidence.stability.closed_loop import LOOP, STROKE, TRACE, begin, run
+from study_app.haptics.kernels.plant import new_handle
+from study_app.haptics.kernels.safety import new_safety
+from study_app.haptics.kernels.tick_schedule import new_schedule
+from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
+from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.estimators import NAMED as ESTIMATORS
+from study_app.haptics.model.estimators import lead
+from study_app.haptics.model.layout import SAMPLE, records
+from study_app.haptics.model.scene import Body, Ewma, Foaw, Kalman, Knee, Lead, Line, Liquid, Scene, Velocity
+from study_app.haptics.model.slope_limits import INERTIA_SHARE, DampingLimits, Entry
+from study_app.haptics.runtime.pack import pack
+
+PERIODS_S: Final = (0.5e-3, 1e-3, 2e-3, 4e-3)
+DELAYS: Final = (0, 1, 2, 3, 4)
+FREE_HANDLE_KG: Final = 0.1
+FRICTION_NSPM: Final = 0.5
+
+FELT_NSPM: Final = 53.0
+"""What is felt as it is at 1 kHz, up to one tick of delay, with "ewma" and "kalman": light oil has a secant of 55 N·s/m
+where it reaches 8 N at scale 10; this takes 4 % of that one force, and with "ewma" is 75 % of what a free handle of
+0.1 kg is stable with."""
+FELT_SHARE: Final = 0.75
+"""Of the boundary that a limit takes there at most, if the filter is another."""
+FELT_INERTIA_SHARE: Final = 0.85
+"""Of this limit, for added mass and history: those of honey are felt as they are, too."""
+SHARE: Final = 0.5
+"""Of the boundary that a limit takes elsewhere: a quadratic law has twice the slope of its secant."""
+FAST_SHARE: Final = 0.4
+"""The same beyond 1 kHz, where a count of the encoder is a greater speed and the slew limit a steeper force."""
+FAST_NSPM: Final = 40.0
+"""The most there."""
+FAST_KALMAN_NSPM: Final = 22.0
+"""The same with "kalman", which passes on more of a hand that lets go while a wake breaks."""
+KALMAN_SHARE: Final = 0.64
+"""Of the limits above, with "kalman", up to 1 kHz, but where liquids are felt as they are: at 1, a held one in tar was
+restless at 250 Hz, and one let go swung at 500 Hz, the delay one tick longer than believed; at 0.8, one let go in gear
+oil at scale 40 was restless with 3 ticks of delay."""
+COUNT_N: Final = 0.25
+"""The most that one count of a Falcon's encoder may be felt as [N]."""
+COUNT_M: Final = 38e-6
+WINDOWS: Final = ("line", "foaw")
+NOMINAL_S: Final = 1e-3
+
+SWING_MPS: Final = 0.04
+"""A handle that swings slower than this is at rest where the encoder has counts: they alone keep it moving."""
+
+_THROWN_MPS = 0.02
+_TIRED = 0.05
+_LASTS_S = 3.0
+_STEP = 1.01
+
+
+def boundary_nspm(
+    velocity: Velocity,
+    period_s: float,
+    delay: int,
+    *,
+    believed: int | None = None,
+    mass_kg: float = FREE_HANDLE_KG,
+    friction_nspm: float = FRICTION_NSPM,
+) -> float:
+    """Return the greatest linear damping [N·s/m] under which a handle let go comes to rest, to 1 %.
+
+    ``believed`` is the delay that the loop takes for its own, by default ``delay``. The safety layer is off. The
+    encoder is exact, but for "kalman": there it has counts of a Falcon's size, since what the filter makes of them is
+    not linear.
+    """
+    believed = delay if believed is None else believed
+    low, high = 0.1, 1e5
+    while high / low > _STEP:
+        middle = math.sqrt(low * high)
+        if _comes_to_rest(velocity, period_s, (delay, believed), middle, mass_kg, friction_nspm):
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def passive_nspm(friction_nspm: float, period_s: float = NOMINAL_S, delay: int = 0, alpha: float = 0.1) -> float:
+    """Return the greatest damping B that filter and delay leave passive on a handle of friction b, whatever holds it.
+
+    After Colgate & Schenkel (1997) with K = 0, for v filtered by v += α(u - v): b > B · sup -α Re(e^(-jdθ) / (e^jθ -
+    (1 - α))) over 0 < θ ≤ π, which is b > B α/(2 - α) for d = 0.
+    """
+    weight = _weight(alpha, period_s)
+    angles = np.linspace(1e-4, math.pi, 20_001)
+    lags = np.exp(-1j * delay * angles) / (np.exp(1j * angles) - (1.0 - weight))
+    return float(friction_nspm / np.max(-weight * lags.real))
+
+
+def measured_estimators() -> tuple[Velocity, ...]:
+    """Return the estimators that the table has entries of."""
+    found: tuple[Any, ...] = tuple(
+        kind.model(**({} if kind.parameter is None else {kind.parameter: value}))
+        for kind in ESTIMATORS.values()
+        if kind.of_device
+        for value in kind.measured or (None,)
+    )
+    return found
+
+
+def measure_limits(
+    velocities: Iterable[Velocity] | None = None, *, executor: Executor | None = None
+) -> Iterator[Entry]:
+    """Yield the table of limits, line by line; of all estimators, or of some; by an executor or here."""
+    loops = itertools.product(velocities or measured_estimators(), PERIODS_S, DELAYS[1:])
+    in_turn = map if executor is None else executor.map
+    yield from in_turn(_entry, *zip(*loops, strict=True))
+
+
+def _entry(velocity: Velocity, period_s: float, delay: int) -> Entry:
+    felt = velocity.kind in {"ewma", "kalman"} and period_s == NOMINAL_S and delay <= 1
+    drag = _limit_nspm(velocity, period_s, delay, felt=felt)
+    inertia = (FELT_INERTIA_SHARE if felt else INERTIA_SHARE) * drag
+    limits = DampingLimits(_rounded_down(drag), _rounded_down(inertia))
+    parameter = ESTIMATORS[velocity.kind].parameter
+    value = None if parameter is None else float(getattr(velocity, parameter))
+    return Entry(velocity.kind, value, period_s, delay, limits)
+
+
+def _limit_nspm(velocity: Velocity, period_s: float, delay: int, *, felt: bool) -> float:
+    """Return the limit of drag: a share of the boundary, less where that is noisy or the filter may be mistaken.
+
+    The raw difference passes a count of the encoder on whole, the others as `_weight` says. A window has a fixed number
+    of samples: in a faster loop it is shorter, its slope noisier in the same ratio.
+    """
+    fast = period_s < NOMINAL_S
+    if velocity.kind in WINDOWS and fast:
+        return _limit_nspm(velocity, NOMINAL_S, delay, felt=felt) * period_s / NOMINAL_S
+    share = FELT_SHARE if felt else FAST_SHARE if fast else SHARE
+    limits = [share * boundary_nspm(velocity, period_s, delay)]
+    if felt:
+        limits.append(FELT_NSPM)
+    if fast:
+        limits.append(FAST_KALMAN_NSPM if isinstance(velocity, Kalman) else FAST_NSPM)
+    if not isinstance(velocity, Kalman):
+        limits.append(COUNT_N * period_s / COUNT_M / _newest_weight(velocity, period_s))
+    else:
+        wrong = (it for it in (delay - 1, delay + 1) if it <= MOST_DELAY)
+        limits += [boundary_nspm(velocity, period_s, it, believed=delay) for it in wrong]
+        limits.append(FELT_SHARE * boundary_nspm(Ewma(), period_s, delay))
+        if not felt and not fast:
+            return KALMAN_SHARE * min(limits)
+    return min(limits)
+
+
+def _weight(alpha: float, period_s: float) -> float:
+    """Return the weight of the newest difference in a loop of this period."""
+    return float(1.0 - (1.0 - alpha) ** (period_s / NOMINAL_S))
+
+
+def _newest_weight(velocity: Velocity, period_s: float) -> float:
+    """Return how much of a count's speed an estimator takes on at once: 6/(n(n + 1)) of a slope through n samples."""
+    match velocity:
+        case Ewma():
+            return _weight(velocity.alpha, period_s)
+        case Lead():
+            return _weight(lead.ALPHA, period_s) * (1.0 + lead.LEAD_S / lead.SMOOTHING_S)
+        case Line() | Foaw():
+            return 6.0 / (velocity.samples * (velocity.samples + 1))
+        case _:
+            return 1.0
+
+
+def _rounded_down(value: float) -> float:
+    return math.floor(value * 10) / 10
+
+
+def _comes_to_rest(
+    velocity: Velocity,
+    period_s: float,
+    delays: tuple[int, int],
+    damping_nspm: float,
+    mass_kg: float,
+    friction_nspm: float,
+) -> bool:
+    """Return whether a handle thrown into a linear damper comes to rest; ``delays``: the loop's, the one believed."""
+    counts = isinstance(velocity, Kalman)
+    dynamics = Dynamics(delay_s=delays[1] * period_s, count_m=COUNT_M, mass_kg=mass_kg)
+    body = Body()
+    stokes = Liquid(
+        id="damper",
+        density_kg_m3=1.0,
+        viscosity_pa_s=damping_nspm / (3.0 * math.pi * body.diameter_m),
+        drag=Drag(law="schiller-naumann"),
+    )
+    scene = Scene(scale=1.0, rate_hz=1.0 / period_s, liquids=(stokes,), velocity=velocity, knee=Knee(law="none"))
+    loop = records(LOOP, 1)[0]
+    loop.motion, loop.speed_mps, loop.moving_s, loop.until_s = STROKE, _THROWN_MPS, math.inf, math.inf
+    handle = new_handle(mass_kg=mass_kg, viscous_nspm=friction_nspm, motor_limit_n=8.0, delay=delays[0])
+    handle.held = 0
+    handle.quantum_m = COUNT_M if counts else 0.0
+    begin(loop, handle)
+    trace = records(TRACE, round(_LASTS_S / period_s))
+    run(
+        pack(scene, limits=DampingLimits(damping_nspm, damping_nspm), dynamics=dynamics),
+        new_safety(delay_ticks=delays[1])[0],
+        records(SAMPLE, 1)[0],
+        handle,
+        new_schedule(period_s),
+        loop,
+        trace,
+        0,
+    )
+    speeds_mps = np.linalg.norm(trace.velocity_mps[-len(trace) // 10 :], axis=1)
+    return bool(not loop.broken and speeds_mps.max() < (SWING_MPS if counts else _TIRED * _THROWN_MPS))

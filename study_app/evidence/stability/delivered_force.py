@@ -1,0 +1,235 @@
+"""The force that arrives: sent forces of every shipped liquid against the law on the hand's true motion.
+
+An arm holds a handle of 0.2 kg through its tissue (`arm_plant`, middle) and moves it by 1.6 Hz ±20 mm at 1 kHz, with
+every delay, estimator and device. The law is the same scene on the handle's true motion, velocities given. Buoyancy,
+which needs no velocity, is left out.
+
+- *error*: RMS of sent force less law over RMS of the law;
+- *withheld*: Σ|F_a - F_b| / Σ|F_a|, F_a the force of the effects, F_b the force sent, whatever took it;
+- *unstable*: which of the same strokes by light, middle and firm hands, and of releases at four phases with each plant,
+  are unstable (`verdict`).
+"""
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import replace
+from functools import cache
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from study_app.evidence.scene_variants import without_buoyancy
+from study_app.evidence.stability.case_groups import peak_mps
+from study_app.evidence.stability.closed_loop import TRACE, follow
+from study_app.evidence.stability.device_bench import new_bench
+from study_app.evidence.stability.stability_cases import DAMPER, FIRST, LETS_GO, SECOND, SINE, Case, scene_of, scenes
+from study_app.evidence.stability.verdict import judge
+from study_app.evidence.velocity.held_handle import DIRECTION, WHOLE
+from study_app.evidence.velocity.wiener_bound import wiener_bound
+from study_app.haptics.model.layout import records
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.runtime.offline import simulate
+
+
+class Limit(NamedTuple):
+    """The greatest error [%], or multiple of the Wiener bound for liquids of `BOUNDED`, and share withheld [%]."""
+
+    error: float
+    withheld: float
+
+
+HONEY: Final = "honey of physical2"
+BOUNDED: Final = "others of physical2"
+STEEP: Final = "steeper than a loop bears"
+THESIS: Final = "rek2024"
+GROUPS: Final = {
+    "physical2_": BOUNDED,
+    "physical_": "physical_liquids",
+    "slime_": "slime",
+    "forcedelay_": "dampers",
+    "viscosityjnd_": "dampers",
+    "thickness_": "dampers",
+}
+"""By the beginning of a liquid's name; all others are of the thesis."""
+SINGLE: Final = {
+    "physical2_honey": HONEY,
+    **dict.fromkeys(("physical_tar", "physical2_tar", "slime_toothpaste", "slime_cornstarch"), STEEP),
+}
+LIMITS: Final[Mapping[tuple[str, str], tuple[Limit, Limit, Limit]]] = {
+    (HONEY, "kalman"): (Limit(15, 13), Limit(18, 18), Limit(72, 75)),
+    (BOUNDED, "kalman"): (Limit(1.6, 1), Limit(1.6, 5), Limit(12, 80)),
+    (THESIS, "kalman"): (Limit(9, 2), Limit(42, 36), Limit(70, 65)),
+    ("physical_liquids", "kalman"): (Limit(18, 13), Limit(20, 21), Limit(75, 77)),
+    ("slime", "kalman"): (Limit(13, 5), Limit(67, 66), Limit(82, 81)),
+    ("dampers", "kalman"): (Limit(3, 1), Limit(3, 1), Limit(3, 1)),
+    (STEEP, "kalman"): (Limit(85, 87), Limit(92, 92), Limit(95, 95)),
+    (HONEY, "ewma"): (Limit(40, 5), Limit(40, 26), Limit(74, 70)),
+    (BOUNDED, "ewma"): (Limit(4.2, 5), Limit(4.2, 5), Limit(11, 70)),
+    (THESIS, "ewma"): (Limit(18, 5), Limit(40, 30), Limit(67, 60)),
+    ("physical_liquids", "ewma"): (Limit(40, 5), Limit(40, 27), Limit(76, 73)),
+    ("slime", "ewma"): (Limit(17, 5), Limit(58, 58), Limit(76, 76)),
+    ("dampers", "ewma"): (Limit(11, 1), Limit(11, 1), Limit(11, 1)),
+    (STEEP, "ewma"): (Limit(92, 88), Limit(95, 95), Limit(97, 97)),
+}
+"""By group and estimator: at one, two and three ticks of delay, on every device."""
+
+
+class Device(NamedTuple):
+    """Encoder count and mass of a handle, and the least mass that its driver states."""
+
+    count_um: float
+    mass_kg: float
+    least_kg: float
+
+
+DEVICES: Final[Mapping[str, Device]] = {
+    "falcon": Device(38.0, 0.2, 0.1),
+    "inverse3": Device(14.0, 0.2, 0.1),
+    "force-dimension": Device(10.0, 0.2, 0.2),
+}
+"""A count of the Inverse3 is not published: [choice]. All drivers permit 8 N."""
+ESTIMATORS: Final = ("kalman", "ewma")
+DELAYS: Final = (1, 2, 3)
+LASTS_S: Final = 6.0
+SETTLED_S: Final = 1.5
+RELEASES: Final = 4
+
+
+class Delivered(NamedTuple):
+    """One liquid in one loop: error, Wiener bound and share withheld [%], and the unstable cases."""
+
+    liquid: str
+    estimator: str
+    delay: int
+    device: str
+    error: float
+    bound: float
+    withheld: float
+    unstable: tuple[Case, ...]
+
+    @property
+    def group(self) -> str:
+        """The group whose limits apply."""
+        of_file = (group for name, group in GROUPS.items() if self.liquid.startswith(name))
+        return SINGLE.get(self.liquid) or next(of_file, THESIS)
+
+    @property
+    def share_of_limits(self) -> tuple[float, float]:
+        """Error and share withheld over their limits."""
+        limit = LIMITS[self.group, self.estimator][self.delay - 1]
+        most = limit.error * self.bound if self.group == BOUNDED else limit.error
+        return self.error / most, self.withheld / limit.withheld
+
+    @property
+    def met(self) -> bool:
+        """Whether both limits are kept, and no case is unstable."""
+        return max(self.share_of_limits) <= 1.0 and not self.unstable
+
+
+@cache
+def shipped_liquids() -> Mapping[str, tuple[str, ...]]:
+    """Return the liquids of all shipped studies, those of the same force once, with the names of the others."""
+    found: dict[str, list[str]] = {}
+    for name, scene in scenes().items():
+        if name not in {"dense", DAMPER}:
+            alone = without_buoyancy(scene).model_dump(include={"scale", "rate_hz", "body", "knee", "liquids"})
+            alone["liquids"][0].pop("id")
+            found.setdefault(str(alone), []).append(name)
+    return {first: tuple(others) for first, *others in found.values()}
+
+
+def measure(
+    names: Sequence[str] | None = None,
+    estimators: Sequence[str] = ESTIMATORS,
+    delays: Sequence[int] = DELAYS,
+    devices: Sequence[str] = tuple(DEVICES),
+    *,
+    executor: Executor | None = None,
+) -> tuple[Delivered, ...]:
+    """Return what arrives of liquids (by default all), by an executor or here."""
+    planned = itertools.product(devices, estimators, names or shipped_liquids(), delays)
+    in_turn = map if executor is None else executor.map
+    return tuple(in_turn(_measured, *zip(*planned, strict=True)))
+
+
+def _measured(device: str, estimator: str, liquid: str, delay: int) -> Delivered:
+    of_device = DEVICES[device]
+    case = Case(
+        liquid=liquid,
+        scale=scenes()[liquid].scale,
+        delay=delay,
+        estimator=estimator,
+        motion=SINE,
+        speed_mps=peak_mps(WHOLE.frequency_hz, WHOLE.amplitude_m),
+        way_mm=2e3 * WHOLE.amplitude_m,
+        quantum_um=of_device.count_um,
+        mass_kg=of_device.mass_kg,
+        believed_kg=of_device.least_kg,
+        plant=SECOND,
+    )
+    unstable = tuple(one for one in _strokes(case) if not judge(one, safe=True).stable)
+    return Delivered(liquid, estimator, delay, device, *errors(case), unstable)
+
+
+def errors(case: Case) -> tuple[float, float, float]:
+    """Return the error, the Wiener bound, and the share withheld [%] in a held stroke."""
+    scene = without_buoyancy(scene_of(case))
+    bench = new_bench(case, safe=True, scene=scene)
+    trace = records(TRACE, round(LASTS_S * case.rate_hz))
+    path_m = np.outer(WHOLE.places_m(np.arange(len(trace)) / case.rate_hz), DIRECTION)
+    follow(bench.model, bench.safety[0], bench.sample[0], bench.handle, bench.pace, bench.loop, trace, path_m)
+    law = simulate(scene, Motion(trace.t_s, scene.scale * trace.position_m, scene.scale * trace.velocity_mps))
+    counted = trace.t_s >= SETTLED_S
+    law_n = np.column_stack([law.fx_n, law.fy_n, law.fz_n])[counted]
+    sent_n, asked_n = trace.sent_n[counted], trace.asked_n[counted]
+    error = math.sqrt(float(np.sum((sent_n - law_n) ** 2) / np.sum(law_n**2)))
+    withheld = float(np.linalg.norm(asked_n - sent_n, axis=1).sum() / np.linalg.norm(asked_n, axis=1).sum())
+    bound = wiener_bound(scene, 1e-6 * case.quantum_um, case.delay / case.rate_hz)
+    return 100 * error, 100 * bound, 100 * withheld
+
+
+def _strokes(case: Case) -> Iterator[Case]:
+    """Yield the strokes that are judged: held, and released at phases of a cycle."""
+    for hand in ("light", "middle", "firm"):
+        yield replace(case, hand=hand)
+    for plant, phase in itertools.product((FIRST, SECOND), range(RELEASES)):
+        released_s = round(0.6 + phase / (RELEASES * WHOLE.frequency_hz), 5)
+        yield replace(case, hand=LETS_GO, plant=plant, release_s=released_s)
+
+
+def report(found: Sequence[Delivered]) -> str:
+    """Return the table, and whether each limit is met."""
+    return "\n".join(_lines(found))
+
+
+def _lines(found: Sequence[Delivered]) -> Iterator[str]:
+    yield f"force sent against the law on the true motion, middle hand, {WHOLE}: RMS error, least error of a linear"
+    yield "estimator, share withheld [%], unstable cases; at 1, 2, 3 ticks of delay"
+    for (device, estimator), of_loop in itertools.groupby(found, key=lambda one: (one.device, one.estimator)):
+        yield ""
+        yield f"{device}, {DEVICES[device].count_um:g} µm, {estimator}"
+        for liquid, rows in itertools.groupby(of_loop, key=lambda one: one.liquid):
+            cells = (f"{it.error:6.1f} {it.bound:5.1f} {it.withheld:5.1f} {len(it.unstable):2d}" for it in rows)
+            same = "".join(f" = {name}" for name in shipped_liquids().get(liquid, ()))
+            yield f"  {liquid:20}{'  '.join(cells)}{same}"
+    yield ""
+    for (group, estimator), limits in LIMITS.items():
+        for delay, limit in enumerate(limits, start=1):
+            of_limit = [it for it in found if (it.group, it.estimator, it.delay) == (group, estimator, delay)]
+            if of_limit:
+                yield _verdict(of_limit, limit, f"{group}, {estimator}, {delay} tick{'s' * (delay > 1)}")
+    unstable = [case for it in found for case in it.unstable]
+    yield f"unstable cases: {len(unstable)}"
+    yield from map(str, unstable)
+
+
+def _verdict(rows: Sequence[Delivered], limit: Limit, what: str) -> str:
+    units = " times the least" if rows[0].group == BOUNDED else " %", " %"
+    shares = (max(shares) for shares in zip(*(it.share_of_limits for it in rows), strict=True))
+    said = (
+        f"{name} at most {most:g}{unit}: {'met' if share <= 1.0 else 'not met'} ({share * most:.3g})"
+        for name, most, unit, share in zip(limit._fields, limit, units, shares, strict=True)
+    )
+    return f"{what}: {'; '.join(said)}"

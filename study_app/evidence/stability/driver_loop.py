@@ -1,0 +1,247 @@
+"""Cases through the driver of a Falcon and its emulator, compared with the scripted device in the same hand.
+
+The servo's own compiled loop runs on the driver's C functions; grip and hand are the emulator's, with mass and friction
+of the case. Samples, encoders and delay are those of the Falcon. What is judged is that of `verdict`, and:
+
+- *energy*: also where the motors gave to a grip that was let go, beyond what they took from it until it met an end
+  stop, 2 mJ more than a scripted device does that acts as late. Where a light handle swings until the passivity
+  controller calms it, that hangs on micrometres and milliseconds (1 to 11 mJ in honey): the worst of three encoder
+  counts counts and, before it is called unstable, of releases up to 2 ms earlier and later;
+- *force*: compared with that of the scripted device in place of the motion without feedback.
+"""
+
+import dataclasses
+import math
+import threading
+from typing import Any, Final
+
+import numpy as np
+
+from study_app.devices.falcon.emulated import EmulatedFalcon
+from study_app.devices.falcon.emulator.emulator import Emulator
+from study_app.devices.scripted import ScriptedDevice
+from study_app.evidence.stability.closed_loop import TRACE, place
+from study_app.evidence.stability.device_bench import FORCE_LIMIT_N, lasts_s, new_bench
+from study_app.evidence.stability.stability_cases import GRIPS, LETS_GO, Case, scene_of
+from study_app.evidence.stability.trace_measures import fast_part, given_out_j, lowest_balance
+from study_app.evidence.stability.verdict import (
+    ALLOWANCE_J,
+    FAST_HZ,
+    ONCE_S,
+    REASONS,
+    RESTLESS_N,
+    SWING_MPS,
+    Verdict,
+    acted,
+    swing,
+    windows,
+)
+from study_app.haptics.kernels.c_functions import Driver
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.loop import CONTROL, ClockCalls, DeviceCalls, Output, Records, run
+from study_app.haptics.kernels.safety import new_safety
+from study_app.haptics.kernels.vector import copy, distance, norm
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.layout import new_command, new_reading, records
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.pack import pack
+from study_app.haptics.runtime.telemetry import Telemetry
+
+DELAY: Final = 1
+"""Ticks that a Falcon's force is late."""
+BEYOND_SCRIPTED_J: Final = 2e-3
+SHIFTS_S: Final = (-2e-3, -1e-3, 1e-3, 2e-3)
+COUNTS_M: Final = (38e-6, 48e-6, 57e-6)
+"""Of a Falcon's encoders at the grip, over its workspace."""
+STOP_M: Final = (0.055, 0.055, 0.05)
+AT_STOP: Final = 0.999
+MOTOR_STEP_N: Final = 0.1
+"""What the units of three motors may add to the limit."""
+
+_READY_S = 0.3  # the hand goes to where the motion begins
+_RESTS_S = 0.6  # and waits until the force has faded in
+_ROW_S = 0.5e-3
+
+_ours = threading.local()
+
+
+class _Falcon(EmulatedFalcon):
+    """A Falcon in the hand of a case, which is as new for each."""
+
+    def __init__(self) -> None:
+        super().__init__(emulator=Emulator(running=True, tremor_m=0.0))
+
+    def open(self) -> None:
+        super().open()
+        self._opened = self.memory.copy(), self.hand.memory.copy()
+
+    def renew(self) -> None:
+        """Be as after it was opened."""
+        self.memory[:], self.hand.memory[:] = self._opened
+
+
+class _Scripted(ScriptedDevice):
+    """The scripted device, as late as a Falcon."""
+
+    def __init__(self, count_m: float) -> None:
+        super().__init__(tremor_m=0.0, quantum_m=count_m)
+        self.state.handle.delay = DELAY
+
+
+def judge_driven(case: Case) -> Verdict:
+    """Run a case through the Falcon's driver, and say whether it is stable."""
+    falcon = opened_falcon()
+    falcon.renew()
+    dynamics = falcon.dynamics
+    trace = falcon_trace(case, falcon)
+    if not (np.isfinite(trace.sent_n).all() and np.isfinite(trace.position_m).all()):
+        return Verdict(case, True, ("not finite",), math.nan, math.nan, math.nan, math.nan, math.nan, acted(trace))
+    others = scripted_traces(case, dynamics)
+    balance_j, strongest_n, longest_m = lowest_balance(trace)
+    permitted_j = -ALLOWANCE_J - (1 + DELAY) * strongest_n * longest_m
+    lacks = balance_j < permitted_j
+    if case.hand == LETS_GO:
+        balance_j = -_given_out(case, trace)
+        permitted_j = -BEYOND_SCRIPTED_J - max(_given_out(case, other) for other in others)
+        for shift_s in SHIFTS_S:
+            if balance_j < permitted_j:
+                near = dataclasses.replace(case, release_s=case.release_s + shift_s)
+                given_j = max(_given_out(near, other) for other in scripted_traces(near, dynamics))
+                permitted_j = min(permitted_j, -BEYOND_SCRIPTED_J - given_j)
+    swing_mps = swing(trace, case)
+    fast_n, scripted_n = _restlessness(case, trace, others)
+    found = (
+        False,
+        np.linalg.norm(trace.sent_n, axis=1).max() > FORCE_LIMIT_N + MOTOR_STEP_N,
+        lacks or balance_j < permitted_j,
+        swing_mps > SWING_MPS,
+        fast_n - scripted_n > RESTLESS_N,
+    )
+    reasons = tuple(reason for reason, holds in zip(REASONS, found, strict=True) if holds)
+    return Verdict(case, True, reasons, balance_j, permitted_j, swing_mps, fast_n, scripted_n, acted(trace))
+
+
+def falcon_trace(case: Case, falcon: _Falcon) -> Any:
+    """Return the trace of a case on the Falcon."""
+    trace = _trace(case, falcon, falcon.hand, falcon.dynamics)
+    trace.acting_n[:-1] = trace.acting_n[1:]  # of the handle, which keeps what acted up to the present
+    return trace
+
+
+def scripted_traces(case: Case, dynamics: Dynamics) -> list[Any]:
+    """Return the traces of a case on scripted devices, one for each encoder count."""
+    devices = [_Scripted(count_m) for count_m in COUNTS_M]
+    return [_trace(case, device, device, dynamics) for device in devices]
+
+
+def opened_falcon() -> _Falcon:
+    """Return the opened Falcon of this thread."""
+    if not hasattr(_ours, "falcon"):
+        _ours.falcon = _Falcon()
+        _ours.falcon.open()
+    falcon: _Falcon = _ours.falcon
+    return falcon
+
+
+def _trace(case: Case, device: Driver, hand: Any, dynamics: Dynamics) -> Any:
+    """Return the trace of a case from the begin of its motion on, on a device and the hand at it."""
+    handle, grip = hand.state.handle, GRIPS[case.hand]
+    handle.mass_kg, handle.viscous_nspm, handle.coulomb_n = case.mass_kg, case.viscous_nspm, case.coulomb_n
+    handle.hand_kg, handle.stiffness_npm, handle.damping_nspm = grip.mass_kg, grip.stiffness_npm, grip.damping_nspm
+    handle.stop_m = STOP_M
+    hand.follow(*_motion(case))
+    clock, control = VirtualClock(), records(CONTROL, 1)
+    control[0].period_ns = control[0].deadline_ns = round(1e9 / case.rate_hz)
+    control[0].run, control[0].serial[:] = 1, 1
+    models = tuple(pack(scene_of(case), dynamics=dynamics) for _ in range(2))
+    safety = new_safety(device.force_limit_n, dynamics.delay_ticks(case.rate_hz))
+    telemetry = Telemetry(history=16)
+    arguments = (
+        control,
+        models,
+        safety,
+        Records(new_reading(), new_command()),
+        Output(telemetry.ring, telemetry.written),
+        DeviceCalls(device.context, device.read.address, device.write.address),
+        ClockCalls(clock.context, clock.now.address, clock.sleep.address),
+    )
+    run(*arguments, round(_RESTS_S * case.rate_hz))
+    rows = round(lasts_s(case) * case.rate_hz)
+    released = round(case.release_s * case.rate_hz) if case.hand == LETS_GO else rows
+    trace = records(TRACE, rows)
+    done = _follow(*arguments, handle, trace, released)
+    return trace[:done]
+
+
+@kernel
+def _follow(
+    control: Any,
+    models: Any,
+    safety: Any,
+    exchanged: Any,
+    output: Any,
+    device: Any,
+    clock: Any,
+    handle: Any,
+    trace: Any,
+    released: int,
+) -> int:
+    """Take a tick of the servo's loop for each row of ``trace``; let go before row ``released``; return how many."""
+    one: Any = np.int64(1)  # with a literal the loop is compiled a second time
+    for k in range(trace.shape[0]):
+        if k == released:
+            handle.held = 0
+        if run(control, models, safety, exchanged, output, device, clock, one) < 1:
+            return k
+        sample = output.ring[(output.written[0] - 1) % output.ring.shape[0]]
+        row, model = trace[k], models[0]
+        row.t_s = k * 1e-9 * control[0].period_ns
+        copy(handle.position_m, row.position_m)
+        copy(handle.velocity_mps, row.velocity_mps)
+        copy(sample.force_n, row.asked_n)
+        copy(sample.device_force_n, row.sent_n)
+        copy(handle.force_n, row.acting_n)
+        copy(safety[0].passivity.lift_n, row.lift_n)
+        for axis in range(3):
+            row.drift_mps[axis] = model.state[0].drift_mps[axis] / model.parameters[0].scale
+        row.reserve_j = safety[0].passivity.reserve_j
+        row.permitted_n, row.withheld_n = norm(safety[0].permitted_n), distance(safety[0].permitted_n, row.sent_n)
+        row.delay = DELAY
+        row.limiters = sample.limiters
+    return int(trace.shape[0])
+
+
+def _motion(case: Case) -> tuple[Any, Any]:
+    """Return times (n,) [s] and places (n, 3) [m] of the hand: to the begin, a rest there, and the case's motion."""
+    loop = new_bench(case, safe=True).loop
+    t_s = np.arange(0.0, _RESTS_S + lasts_s(case), _ROW_S)
+    places_m = np.zeros((len(t_s), 3))
+    _places(loop, np.maximum(t_s - _RESTS_S, 0.0), places_m)
+    return t_s, places_m * np.minimum(t_s / _READY_S, 1.0)[:, np.newaxis]
+
+
+@kernel
+def _places(loop: Any, t_s: Any, out_m: Any) -> None:
+    for k in range(t_s.shape[0]):
+        place(loop, t_s[k], out_m[k])
+
+
+def _given_out(case: Case, trace: Any) -> float:
+    """Return the most that the motors gave to the handle from its release until it met an end stop [J]."""
+    first = int(np.searchsorted(trace.t_s, case.release_s - 1e-9))
+    met = (np.abs(trace.position_m[first:]) >= AT_STOP * np.array(STOP_M)).any(axis=1)
+    last = first + int(np.argmax(met)) if met.any() else len(trace)
+    return float(given_out_j(trace[first:last]))
+
+
+def _restlessness(case: Case, trace: Any, others: list[Any]) -> tuple[float, float]:
+    """Return the force's fast part, and the scripted device's greatest, where they differ most."""
+    found = []
+    for window_s in windows(case):
+        begins, ends = np.searchsorted(trace.t_s, window_s)
+        fast_n, *others_n = (
+            fast_part(one.sent_n, case.rate_hz, FAST_HZ, begins, min(ends, len(one)), ONCE_S)
+            for one in (trace, *others)
+        )
+        found.append((fast_n, max(others_n)))
+    return max(found, key=lambda pair: pair[0] - pair[1])

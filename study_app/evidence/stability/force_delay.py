@@ -1,0 +1,110 @@
+"""What the passivity controller leaves of a force that a study delays: per liquid, hand and delay.
+
+A hand stirs a handle of 0.1 kg at 1 kHz and one tick of delay along a sine of ±30 mm and at most 0.2 m/s. The force of
+the liquid, within the slope limits, comes later to the passivity controller, as if the liquid were on another computer.
+Buoyancy is left out: it is constant. Counted is from the second second on.
+
+- *left*: RMS of the force sent over RMS of the force as it came to the controller;
+- *withheld*: Σ|F_a - F_b| / Σ|F_a| of the two, as ``withheld_share`` of a trial.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from study_app.evidence.scene_variants import without_buoyancy
+from study_app.evidence.stability.closed_loop import TRACE, follow
+from study_app.evidence.stability.device_bench import new_bench
+from study_app.evidence.stability.stability_cases import Case, scene_of, scenes
+from study_app.haptics.model.layout import records
+from study_app.protocol.checks.delayed_force import Entry
+from study_app.store.atomic import write_file
+from study_app.store.tables.csv_files import csv_text_of
+
+LIQUIDS: Final = (
+    "water",
+    "honey",
+    "light_oil",
+    "syrup",
+    *(f"physical2_{name}" for name in ("water", "olive_oil", "glycerin", "gear_oil", "honey")),
+)
+ESTIMATORS: Final = ("ewma", "kalman")
+HANDS: Final = ("light", "middle", "firm")
+DELAYS_MS: Final = (0, 1, 2, 5, 10, 20, 50, 100, 200)
+AMPLITUDE_M: Final = 0.03
+SPEED_MPS: Final = 0.2
+DIRECTION: Final = (0.8, 0.0, 0.6)
+LASTS_S: Final = 6.0
+SETTLED_S: Final = 1.0
+
+
+def measure(
+    liquids: Iterable[str] = LIQUIDS,
+    estimators: Iterable[str] = ESTIMATORS,
+    hands: Iterable[str] = HANDS,
+    delays_ms: Iterable[float] = DELAYS_MS,
+) -> Iterator[Entry]:
+    """Yield the table, line by line."""
+    hands, delays_ms, estimators = tuple(hands), tuple(delays_ms), tuple(estimators)
+    for liquid in liquids:
+        for estimator in estimators:
+            for hand in hands:
+                for delay_ms in delays_ms:
+                    yield _entry(liquid, estimator, hand, delay_ms)
+
+
+def write(file: Path, progress: Callable[[int, int], None]) -> tuple[Entry, ...]:
+    """Measure the table, write it as ``protocol.checks.delayed_force`` reads it, and return it.
+
+    ``progress`` is called with the number of lines done and of all.
+
+    Raises
+    ------
+    StoreError
+        The file cannot be written.
+    """
+    found: list[Entry] = []
+    lines = len(LIQUIDS) * len(ESTIMATORS) * len(HANDS) * len(DELAYS_MS)
+    for entry in measure():
+        found.append(entry)
+        progress(len(found), lines)
+    rows: list[tuple[Any, ...]] = [Entry._fields]
+    rows += [(*entry[:3], *(f"{value:g}" for value in entry[3:])) for entry in found]
+    write_file(file, csv_text_of(rows).encode())
+    return tuple(found)
+
+
+def report(entries: Iterable[Entry]) -> str:
+    """Return the shares left [%] as a table: a line for each liquid, estimator and hand, a column for each delay."""
+    entries = tuple(entries)
+    delays_ms = sorted({it.delay_ms for it in entries})
+    kept = {it[:4]: it.left_percent for it in entries}
+    lines = [f"{'force left [%], delayed by [ms]':40}" + "".join(f"{delay:6g}" for delay in delays_ms)]
+    for liquid, estimator, hand in dict.fromkeys(it[:3] for it in entries):
+        shares = (kept.get((liquid, estimator, hand, delay), math.nan) for delay in delays_ms)
+        lines.append(f"{f'{liquid}, {estimator}, {hand}':40}" + "".join(f"{share:6.0f}" for share in shares))
+    return "\n".join(lines)
+
+
+def delayed_trace(case: Case) -> Any:
+    """Return the trace of a hand that stirs the case's liquid, buoyancy aside, with the case's delay of the force."""
+    bench = new_bench(case, safe=True, scene=without_buoyancy(scene_of(case)))
+    trace = records(TRACE, round(LASTS_S * case.rate_hz))
+    t_s = np.arange(len(trace)) / case.rate_hz
+    path_m = np.outer(AMPLITUDE_M * np.sin(SPEED_MPS / AMPLITUDE_M * t_s), DIRECTION)
+    follow(bench.model, bench.safety[0], bench.sample[0], bench.handle, bench.pace, bench.loop, trace, path_m)
+    return trace
+
+
+def _entry(liquid: str, estimator: str, hand: str, delay_ms: float) -> Entry:
+    scale = scenes()[liquid].scale
+    case = Case(liquid=liquid, scale=scale, estimator=estimator, hand=hand, force_delay_ms=delay_ms)
+    trace = delayed_trace(case)
+    counted = trace[trace.t_s >= SETTLED_S]
+    sent_n = np.linalg.norm(counted.sent_n, axis=1)
+    left = math.sqrt(float(np.mean(sent_n**2) / np.mean(counted.permitted_n**2)))
+    withheld = float(np.sum(counted.withheld_n) / np.sum(counted.permitted_n))
+    return Entry(liquid, estimator, hand, delay_ms, round(100 * left, 1), round(100 * withheld, 1))

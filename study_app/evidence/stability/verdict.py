@@ -1,0 +1,202 @@
+"""Whether a closed loop was stable: five things that must not happen, and the numbers that say so.
+
+- *not finite*: a force or the handle's position is not finite;
+- *limit*: the servo sent more than it may;
+- *energy*: the passivity at the handle (force that acts · true step, at most what the liquid can give back) fell below
+  -1 mJ and the work of the steps under way, (1 + delay) · strongest force · longest step; or below -10 mJ, if that is
+  lower, where the loop is mistaken about the device's delay;
+- *oscillation*: the handle, at rest or let go, goes on swinging above 12 Hz at more than 40 mm/s and does not tire over
+  0.4 s, or does so above 40 Hz while it is being moved;
+- *force*: above 40 Hz the force exceeds that of the same motion played without feedback by more than 0.05 N in the mean
+  square root over a stretch of 0.4 s or more, the strongest 0.1 s of each aside.
+
+Where a study delays the force, the handle works at the bounds of the controller: an encoder count and the noise count
+for the energy, the swing may reach 100 mm/s, and the force a fifth more than that of the motion without feedback.
+
+"The same motion without feedback" is the most restless of three: the hand's own as long as it holds the handle, the
+motors off; the handle's, without what is faster than 40 Hz; and the latter with the encoder's last count undecided, as
+where a handle rests between two counts. The last two begin from the same state of the liquid, and samples are lost and
+repeated in the same ticks. A start, a stop and a release excite every frequency: what follows within 0.2 s is left out
+here; the oscillation is what must not outlive it. 0.1 s are left aside because a wake that breaks turns the force from
+one tick to the next, by the model's own definition, and when a hand that swings back makes it break hangs on
+micrometres: what happens once is no restlessness. A hand that shakes a handle makes it break at every reversal, with
+the motors off, too: hence the first of the three, also for a hand that lets go later.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from study_app.evidence.stability.closed_loop import begin, play
+from study_app.evidence.stability.device_bench import FORCE_LIMIT_N, MOVING_S, Bench, lasts_s, new_bench, new_trace
+from study_app.evidence.stability.stability_cases import LETS_GO, THROWN, Case
+from study_app.evidence.stability.trace_measures import fast_part, lowest_balance, smooth
+from study_app.haptics.model.layout import LIMITER_NAMES
+from study_app.haptics.model.slope_limits import DampingLimits
+
+REASONS: Final = ("not finite", "limit", "energy", "oscillation", "force")
+
+SETTLES_S: Final = 0.2
+LEAD_S: Final = 0.06
+"""How long before a stretch is compared its playing begins, for filters to settle."""
+
+ALLOWANCE_J: Final = 1e-3
+MISJUDGED_ALLOWANCE_J: Final = 10e-3
+"""The same where the device's delay is another than the loop believes, or changes."""
+SLOW_HZ: Final = 12.0
+FAST_HZ: Final = 40.0
+SWING_MPS: Final = 0.04
+LATE_SWING_MPS: Final = 0.1
+"""The same of a force that a study delays: 1 mJ, which the controller tolerates, moves 0.2 kg at this speed."""
+LATE_SHARE: Final = 0.2
+"""Such a force is restless beyond this share of the one without feedback: jitter and loss make steps of its size."""
+ONCE_S: Final = 0.1
+TIRED: Final = 0.8
+RESTLESS_N: Final = 0.05
+SPREAD_S: Final = math.sqrt(math.log(2.0)) / (2.0 * math.pi * FAST_HZ)  # a Gaussian mean that halves 40 Hz's power
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What became of a case: ``reasons`` why it is unstable, none if it is not, and what was measured.
+
+    ``acted`` is the share of ticks in which each limiter acted, in the order of ``LIMITER_NAMES``.
+    """
+
+    case: Case
+    safe: bool
+    reasons: tuple[str, ...]
+    balance_j: float
+    permitted_j: float
+    swing_mps: float
+    fast_n: float
+    played_n: float
+    acted: tuple[float, ...]
+
+    @property
+    def stable(self) -> bool:
+        """Whether there is no reason to call it unstable."""
+        return not self.reasons
+
+
+def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Verdict:
+    """Run a case, with the safety layer or without, and say whether it is stable.
+
+    ``limits`` are tried in place of the table's.
+    """
+    bench = new_bench(case, safe=safe, limits=limits)
+    trace = new_trace(case)
+    begin(bench.loop, bench.handle)
+    row = 0
+    before = []
+    for start_s, _ in windows(case):
+        row = bench.run(trace, row, start_s - LEAD_S)
+        before.append((row, bench.copy()))
+    trace = trace[: bench.run(trace, row, lasts_s(case))]
+    if bench.loop.broken:
+        return Verdict(case, safe, ("not finite",), math.nan, math.nan, math.nan, math.nan, math.nan, acted(trace))
+    balance_j, strongest_n, longest_m = lowest_balance(trace)
+    linked = bool(case.force_delay_ms or case.force_jitter_ms or case.force_loss)
+    permitted_j = -ALLOWANCE_J - (1 + max(case.delay, case.slows_to)) * strongest_n * longest_m
+    if linked:
+        permitted_j -= strongest_n * (case.quantum_um + case.noise_um) * 1e-6
+    if case.misjudged:
+        permitted_j = min(permitted_j, -MISJUDGED_ALLOWANCE_J)
+    swing_mps = swing(trace, case)
+    fast_n, played_n = _restlessness(case, trace, before, limits)
+    found = (
+        False,
+        safe and np.linalg.norm(trace.sent_n, axis=1).max() > FORCE_LIMIT_N * (1.0 + 1e-9),
+        balance_j < permitted_j,
+        swing_mps > (LATE_SWING_MPS if linked else SWING_MPS),
+        fast_n - played_n > (max(RESTLESS_N, LATE_SHARE * played_n) if linked else RESTLESS_N),
+    )
+    reasons = tuple(reason for reason, holds in zip(REASONS, found, strict=True) if holds)
+    return Verdict(case, safe, reasons, balance_j, permitted_j, swing_mps, fast_n, played_n, acted(trace))
+
+
+def windows(case: Case) -> Iterator[tuple[float, float]]:
+    """Yield the stretches of time [s] over which the force's fast part is compared."""
+    if case.hand == THROWN:
+        yield SETTLES_S, 1.0
+        yield 1.0, lasts_s(case)
+    elif case.hand == LETS_GO:
+        yield SETTLES_S, case.release_s
+        yield case.release_s + SETTLES_S, lasts_s(case)
+    else:
+        yield SETTLES_S, MOVING_S
+        yield MOVING_S + SETTLES_S, lasts_s(case)
+
+
+def swing(trace: Any, case: Case) -> float:
+    """Return the least swing [m/s] over the last 0.4 s if it does not tire, or over a second of the motion before."""
+
+    def swings(corner_hz: float, times_s: Any) -> float:
+        rows = np.searchsorted(trace.t_s, times_s)
+        found = [
+            fast_part(trace.velocity_mps, case.rate_hz, corner_hz, first, last)
+            for first, last in itertools.pairwise(rows)
+        ]
+        return min(found) if found[-1] > TIRED * found[0] else 0.0
+
+    return max(
+        swings(SLOW_HZ, np.linspace(lasts_s(case) - 0.4, lasts_s(case), 5)),
+        swings(FAST_HZ, np.linspace(SETTLES_S, SETTLES_S + 1.0, 6)),
+    )
+
+
+def _restlessness(
+    case: Case, trace: Any, before: list[tuple[int, Bench]], limits: DampingLimits | None
+) -> tuple[float, float]:
+    """Return the force's fast part, and that of the same motion without feedback, where they differ most."""
+    calm_m, calm_n = np.zeros((len(trace), 3)), np.zeros((len(trace), 3))
+    smooth(trace, SPREAD_S, calm_m, calm_n)
+    calm_mps = np.gradient(calm_m, trace.t_s, axis=0)
+    undecided_m = case.quantum_um * 1e-6 * (np.random.default_rng(1).random(calm_m.shape) - 0.5)
+    passive = _passive(case, bool(before[0][1].loop.safe), limits)
+    found = []
+    for window_s, (first, bench) in zip(windows(case), before, strict=True):
+        begins, ends = np.searchsorted(trace.t_s, window_s)
+        played = [passive] if passive is not None and len(passive) >= ends else []
+        for places_m in (calm_m, calm_m + undecided_m):
+            again, answer = bench.copy(), trace.copy()
+            answer.sent_n[:first] = 0.0
+            answer.sent_n[first:] = calm_n[first:]
+            answer.velocity_mps[:] = calm_mps
+            play(
+                again.model,
+                again.safety[0],
+                again.sample[0],
+                again.handle,
+                again.pace,
+                again.loop,
+                answer[first:ends],
+                places_m[first:ends],
+            )
+            played.append(answer)
+        fast_n, *others_n = (
+            fast_part(one.sent_n, case.rate_hz, FAST_HZ, begins, min(ends, len(one)), ONCE_S)
+            for one in (trace, *played)
+        )
+        found.append((fast_n, max(others_n)))
+    return max(found, key=lambda pair: pair[0] - pair[1])
+
+
+def _passive(case: Case, safe: bool, limits: DampingLimits | None) -> Any | None:
+    """Return the trace of a hand that holds the handle while the motors are off, as long as it holds it."""
+    if case.hand == THROWN:
+        return None
+    off = new_bench(case, safe=safe, limits=limits)
+    off.handle.motor_limit_n = off.loop.arm.motor_limit_n = 0.0
+    begin(off.loop, off.handle)
+    trace = new_trace(case)
+    return trace[: off.run(trace, 0, min(lasts_s(case), off.loop.release_s))]
+
+
+def acted(trace: Any) -> tuple[float, ...]:
+    """Return the share of ticks in which each limiter acted."""
+    return tuple(float(np.mean((trace.limiters >> k) & 1)) for k in range(len(LIMITER_NAMES)))

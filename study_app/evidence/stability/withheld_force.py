@@ -1,0 +1,202 @@
+"""The share of each liquid's force that passivity controller and slew limit withhold in quick motion, and after it.
+
+The share is Σ|F_a - F_b| / Σ|F_a|, F_a the force after slope limit, fades and norm clamp, F_b the force sent. A handle
+is moved along straight strokes A cos 2πft, which begin at rest; and along one second each of four of slow stirring
+after 0.9 s of such a stroke, in circles of the radius 30 mm. Each motion is imposed three times: on the position
+itself, whatever the force; by a hand that holds the handle firmly enough to follow a stroke of 8 Hz; and on a hand that
+holds it through the tissue of its fingers, in which it swings, so that strokes have no goal.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study_app.evidence.stability.arm_plant import MIDDLE
+from study_app.evidence.stability.closed_loop import TRACE, follow
+from study_app.evidence.stability.device_bench import new_bench
+from study_app.evidence.stability.stability_cases import Case, liquids
+from study_app.haptics.model.layout import records
+
+
+class Stroke(NamedTuple):
+    """A straight motion to and fro."""
+
+    frequency_hz: float
+    amplitude_mm: float
+
+    def __str__(self) -> str:
+        return f"{self.frequency_hz:g} Hz ±{self.amplitude_mm:g}"
+
+
+SLOW: Final = (Stroke(1.0, 30.0), Stroke(2.0, 30.0), Stroke(3.0, 30.0))
+QUICK: Final = (Stroke(4.0, 30.0), Stroke(5.0, 20.0), Stroke(5.0, 30.0), Stroke(8.0, 10.0))
+STROKES: Final = SLOW + QUICK
+SHOWN_SHAKE: Final = QUICK[2]
+RATE_HZ: Final = 1000.0
+STROKE_S: Final = 3.0
+SHAKE_S: Final = 0.9
+STIRRING_MPS: Final = 0.2
+STIRRING_M: Final = 0.03
+SECONDS: Final = 4
+DIRECTION: Final = (0.8, 0.0, 0.6)
+
+HAND_KG: Final = 0.554
+HAND_NPM: Final = 2000.0
+HAND_NSPM: Final = 60.0
+"""Mass of the middle grip, with stiffness and damping that keep the handle on its path at 8 Hz. [choice]"""
+HANDLE_KG: Final = 0.1
+SHAKEN_KG: Final = 0.2
+"""In tissue: with `ewma`, one of 0.1 kg swings in physical honey by itself."""
+
+MOST: Final = 0.05
+MOST_REVERSED: Final = 0.08
+REVERSED: Final = ("physical_honey", "kalman")
+"""Its force reverses from +8 N to −8 N (the force limit), which takes the slew limit 13 ms. [choice]"""
+MOST_AFTER: Final = 0.005
+EXEMPT: Final = ("physical_tar",)
+ESTIMATORS: Final = ("ewma", "kalman")
+"""Those that studies use."""
+IMPOSED: Final = "position imposed"
+HELD: Final = "handle held"
+SHAKEN: Final = "hand shaken"
+MODES: Final = (IMPOSED, HELD, SHAKEN)
+
+
+class Withheld(NamedTuple):
+    """Shares of one liquid's force: of each stroke in `STROKES`, and of each second after each shake in `QUICK`."""
+
+    liquid: str
+    estimator: str
+    mode: str
+    strokes: tuple[float, ...]
+    after: tuple[tuple[float, ...], ...]
+
+    @property
+    def quick(self) -> float:
+        """The greatest share of all strokes that have a goal."""
+        return 0.0 if self.mode == SHAKEN else max(self.strokes)
+
+    @property
+    def most(self) -> float:
+        """The greatest share permitted in a stroke."""
+        return MOST_REVERSED if (self.liquid, self.estimator) == REVERSED else MOST
+
+    @property
+    def lasting(self) -> float:
+        """The greatest share from one second after a shake on."""
+        return max(share for seconds in self.after for share in seconds[1:])
+
+    @property
+    def met(self) -> bool:
+        """Whether the liquid keeps both goals; tar has none."""
+        return self.liquid in EXEMPT or (self.quick <= self.most and self.lasting < MOST_AFTER)
+
+
+def measure(
+    names: Sequence[str] | None = None,
+    estimators: Sequence[str] = ESTIMATORS,
+    *,
+    delay: int = 1,
+    executor: Executor | None = None,
+) -> tuple[Withheld, ...]:
+    """Return the shares of liquids (by default all that ship), each at its own scale, at 1 kHz."""
+    shipped = [name for name in liquids() if name not in {"dense", "damper"}]
+    planned = [
+        (
+            Case(
+                liquid=liquid,
+                scale=liquids()[liquid].scale,
+                delay=delay,
+                estimator=estimator,
+                mass_kg=SHAKEN_KG if mode == SHAKEN else HANDLE_KG,
+            ),
+            mode,
+        )
+        for estimator, mode, liquid in itertools.product(estimators, MODES, names or shipped)
+    ]
+    in_turn = map if executor is None else executor.map
+    return tuple(in_turn(_measured, *zip(*planned, strict=True)))
+
+
+def report(found: Sequence[Withheld]) -> str:
+    """Return the table of shares in percent, and whether each goal is met."""
+    return "\n".join(_lines(found))
+
+
+def _lines(found: Sequence[Withheld]) -> Iterator[str]:
+    yield "force withheld by passivity controller and slew limit [%]: Σ|F_a - F_b| / Σ|F_a|; strokes in mm"
+    for (estimator, mode), rows in itertools.groupby(found, key=lambda one: (one.estimator, one.mode)):
+        yield ""
+        yield (
+            f"{f'{estimator}, {mode}':21}"
+            + "".join(f"{stroke!s:>11}" for stroke in STROKES)
+            + (f"   in second 1 to {SECONDS} after {SHOWN_SHAKE}, most after one second")
+        )
+        for row in rows:
+            after = "".join(f"{100 * share:7.1f}" for share in row.after[QUICK.index(SHOWN_SHAKE)])
+            goals = "no goal" if row.liquid in EXEMPT else "met" if row.met else "not met"
+            yield (
+                f"  {row.liquid:19}"
+                + "".join(f"{100 * share:11.1f}" for share in row.strokes)
+                + (f"  {after}{100 * row.lasting:10.1f}   {goals}")
+            )
+    counted = [one for one in found if one.liquid not in EXEMPT]
+    lasting = max(one.lasting for one in counted)
+    yield ""
+    for most in sorted({one.most for one in counted}):
+        quick = max(one.quick for one in counted if one.most == most)
+        which = "tar aside" if most == MOST else " with ".join(REVERSED)
+        yield f"at most {most:.0%} in every stroke, {which}: {_goal(quick <= most)} ({quick:.1%})"
+    yield f"nothing (< {MOST_AFTER:.1%}) from one second after a shake on, tar aside: " + (
+        f"{_goal(lasting < MOST_AFTER)} ({lasting:.1%})"
+    )
+
+
+def _goal(met: bool) -> str:
+    return "met" if met else "not met"
+
+
+def _measured(case: Case, mode: str) -> Withheld:
+    strokes = tuple(_share(_played(case, _stroke_m(stroke, STROKE_S), mode)) for stroke in STROKES)
+    after = []
+    for shake in QUICK:
+        shaken_m = _stroke_m(shake, SHAKE_S)
+        trace = _played(case, np.concatenate([shaken_m, _stirring_m(shaken_m[-1])]), mode)
+        seconds = np.split(trace[len(shaken_m) :], SECONDS)
+        after.append(tuple(_share(second) for second in seconds))
+    return Withheld(case.liquid, case.estimator, mode, strokes, tuple(after))
+
+
+def _stroke_m(stroke: Stroke, lasts_s: float) -> NDArray[np.float64]:
+    """Return places (rows, 3) [m] of a stroke, one a millisecond."""
+    t_s = np.arange(round(lasts_s * RATE_HZ)) / RATE_HZ
+    along_m = 1e-3 * stroke.amplitude_mm * np.cos(2.0 * math.pi * stroke.frequency_hz * t_s)
+    return np.outer(along_m, DIRECTION)
+
+
+def _stirring_m(from_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return places (rows, 3) [m] of slow stirring that begins at a place."""
+    angle = STIRRING_MPS / STIRRING_M * np.arange(1, round(SECONDS * RATE_HZ) + 1) / RATE_HZ
+    return from_m + STIRRING_M * np.column_stack([np.cos(angle) - 1.0, np.zeros_like(angle), np.sin(angle)])
+
+
+def _played(case: Case, path_m: NDArray[np.float64], mode: str) -> Any:
+    """Return the trace of a handle along a path."""
+    bench = new_bench(case, safe=True)
+    handle, bench.loop.rigid = bench.handle, mode == IMPOSED
+    handle.hand_kg, handle.stiffness_npm, handle.damping_nspm = HAND_KG, HAND_NPM, HAND_NSPM
+    if mode == SHAKEN:
+        handle.hand_kg, handle.stiffness_npm, handle.damping_nspm = 0.0, MIDDLE.tissue_npm, MIDDLE.tissue_nspm
+    trace = records(TRACE, len(path_m))
+    follow(bench.model, bench.safety[0], bench.sample[0], handle, bench.pace, bench.loop, trace, path_m)
+    return trace
+
+
+def _share(trace: Any) -> float:
+    permitted_n = float(trace.permitted_n.sum())
+    return float(trace.withheld_n.sum()) / permitted_n if permitted_n > 0.0 else 0.0

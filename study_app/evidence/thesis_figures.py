@@ -1,0 +1,169 @@
+"""The thesis' Figs 3 to 8 drawn anew: force over time per axis, by the servo's own tick."""
+
+import textwrap
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from study_app import figure_style as style
+from study_app.evidence.thesis_motions import FIGURES, Run, ThesisFigure
+from study_app.store.atomic import write_file
+from study_app.store.output_files import make_folder
+
+PLOT_PT: Final = 128.0
+TOP_PT: Final = 46.0
+FOOT_PT: Final = 32.0
+LINE_PT: Final = 11.0
+SIDE_PT: Final = 30.0
+RIGHT_PT: Final = 16.0
+GAP_PT: Final = 40.0
+HEADING_PT: Final = 14.0
+CAPTION_LETTERS: Final = 118
+ARROW_S: Final = 2.75
+_COMPONENTS: Final = {"x": ("fx_n", "right"), "y": ("fy_n", "up"), "z": ("fz_n", "toward you")}
+
+
+def figures(to: Path) -> tuple[Path, ...]:
+    """Write every figure as PNG, SVG and PDF, each with its caption as text, into the folder ``to``; return the files.
+
+    The same version of the program writes the same bytes.
+
+    Raises
+    ------
+    StoreError
+        The folder or a file cannot be written.
+    """
+    make_folder(to)
+    written = []
+    for make in FIGURES:
+        shown = make()
+        drawn = draw(shown)
+        title = f"Fig. {shown.number}: {shown.title}"
+        files = {kind: style.file_bytes(drawn, kind, title, style.PLOT_SETTINGS) for kind in style.FORMATS}
+        files["txt"] = f"{title}. {shown.caption}\n".encode()
+        for kind, content in files.items():
+            write_file(to / f"{shown.name}.{kind}", content)
+            written.append(to / f"{shown.name}.{kind}")
+    return tuple(written)
+
+
+@style.own_settings(style.PLOT_SETTINGS)
+def draw(shown: ThesisFigure) -> Figure:
+    """Draw one figure: title, force over time, what explains it (the path, or the liquid's speed), caption."""
+    caption = textwrap.wrap(shown.caption, CAPTION_LETTERS)
+    height_pt = TOP_PT + PLOT_PT + FOOT_PT + LINE_PT * len(caption)
+    figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, height_pt / 72), facecolor="white")
+
+    def write(left_pt: float, down_pt: float, text: str, **look: Any) -> None:
+        figure.text(left_pt / style.PAGE_WIDTH_PT, 1 - down_pt / height_pt, text, va="top", **look)
+
+    def place(left_pt: float, width_pt: float) -> Axes:
+        bottom = 1 - (TOP_PT + PLOT_PT) / height_pt
+        return figure.add_axes(
+            (left_pt / style.PAGE_WIDTH_PT, bottom, width_pt / style.PAGE_WIDTH_PT, PLOT_PT / height_pt)
+        )
+
+    write(SIDE_PT, 6, f"Fig. {shown.number}", fontsize=9, fontweight="bold")
+    write(SIDE_PT + 38, 6, shown.title, fontsize=9)
+    write(SIDE_PT, TOP_PT + PLOT_PT + FOOT_PT - 6, "\n".join(caption), color=style.TEXT_SOFT, linespacing=1.25)
+    if len(shown.runs) > 2:
+        _compare(place, shown)
+    else:
+        _take_apart(place, shown)
+    return figure
+
+
+def _take_apart(place: Callable[[float, float], Axes], shown: ThesisFigure) -> None:
+    """Draw the axes of each run's force in a plot of its own, and their path."""
+    path_pt = PLOT_PT
+    width_pt = (style.PAGE_WIDTH_PT - SIDE_PT - path_pt - RIGHT_PT) / len(shown.runs) - GAP_PT
+    plots = []
+    for number, run in enumerate(shown.runs):
+        plots.append(place(SIDE_PT + number * (width_pt + GAP_PT), width_pt))
+        _components(plots[-1], run, shown.events, several=len(shown.runs) > 1)
+    limits = np.array([plot.get_ylim() for plot in plots])
+    for plot in plots:
+        plot.set_ylim(limits[:, 0].min() * 1.08, limits[:, 1].max() * 1.08)
+    _path(place(style.PAGE_WIDTH_PT - RIGHT_PT - path_pt, path_pt), shown.runs[0])
+
+
+def _compare(place: Callable[[float, float], Axes], shown: ThesisFigure) -> None:
+    """Draw the force of all runs along the straight motion, and how much of its speed the liquid takes up."""
+    width_pt = (style.PAGE_WIDTH_PT - SIDE_PT - GAP_PT - RIGHT_PT) / 2
+    force, liquid = place(SIDE_PT, width_pt), place(SIDE_PT + width_pt + GAP_PT, width_pt)
+    colours = style.STEPS if len(shown.runs) == len(style.STEPS) else style.STEPS[::2]
+    for run, colour in zip(shown.runs, colours, strict=True):
+        table = run.table
+        force.plot(table.t_s, table.fx_n, color=colour, label=run.label)
+        liquid.plot(table.t_s, table.wake_x_mps / table.vx_mps, color=colour, label=run.label)
+    headings = ("Force along x [N]; along y and z it is zero", "Speed of the liquid over that of the body")
+    for axes, heading in zip((force, liquid), headings, strict=True):
+        _time_axis(axes, float(shown.runs[0].table.t_s[-1]))
+        axes.set_title(heading, pad=HEADING_PT)
+        _name_curves(axes, shorter=len(shown.runs) > 3)
+
+
+def _time_axis(axes: Axes, until_s: float) -> None:
+    axes.set_xlim(0, until_s)
+    axes.set_xlabel("Time [s]", loc="right", labelpad=1)
+    axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
+    axes.yaxis.set_major_locator(MaxNLocator(5))
+    axes.axhline(0, color=style.ZERO, linewidth=0.6, zorder=1)
+
+
+def _name_curves(axes: Axes, *, shorter: bool = False) -> None:
+    """Name the curves in a row under the heading, never over the data."""
+    handles, labels = axes.get_legend_handles_labels()
+    axes.legend(
+        handles,
+        labels,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=len(labels),
+        frameon=False,
+        handlelength=1.2 if shorter else 2.2,
+        handletextpad=0.5,
+        columnspacing=0.9 if shorter else 1.4,
+        borderpad=0,
+        borderaxespad=0.3,
+    )
+
+
+def _components(axes: Axes, run: Run, events: Sequence[tuple[float, str]], *, several: bool) -> None:
+    """Draw the force of one run, a line per axis."""
+    table = run.table
+    _time_axis(axes, float(table.t_s[-1]))
+    axes.set_title(f"Force [N], {run.label}" if several else "Force [N]", pad=HEADING_PT)
+    for name, (column, meaning) in _COMPONENTS.items():
+        label = name if several else f"{name} ({meaning})"
+        axes.plot(table.t_s, table[column], **style.AXES[name], label=label)
+    _name_curves(axes)
+    for time_s, word in events:
+        axes.axvline(time_s, color=style.AXIS, linewidth=0.7, linestyle=(0, (3, 2)))
+        at_foot: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points"}
+        axes.annotate(word, (time_s, 0), xytext=(3, 3), color=style.TEXT_SOFT, **at_foot)
+
+
+def _path(axes: Axes, run: Run) -> None:
+    """Draw the path as seen from above."""
+    colour = style.TEXT_SOFT
+    x_m, z_m = run.motion.position_m[:, 0], run.motion.position_m[:, 2]
+    axes.set_title("Path from above [m]", pad=HEADING_PT)
+    axes.plot(x_m, z_m, color=colour, linewidth=1.1)
+    axes.plot(x_m[0], z_m[0], "o", color=style.TEXT, markersize=4)
+    axes.annotate("start", (x_m[0], z_m[0]), xytext=(5, 0), textcoords="offset points", va="center", color=colour)
+    at = int(np.searchsorted(run.motion.t_s, ARROW_S))
+    arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.1, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", (x_m[at + 40], z_m[at + 40]), (x_m[at], z_m[at]), arrowprops=arrow)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.invert_yaxis()
+    axes.margins(0.18)
+    axes.set_xlabel("x", loc="right", labelpad=1)
+    axes.set_ylabel("z", loc="bottom", labelpad=1, rotation=0)
+    axes.xaxis.set_major_locator(MaxNLocator(3))
+    axes.yaxis.set_major_locator(MaxNLocator(4))

@@ -1,0 +1,136 @@
+"""How late the servo's ticks begin with each emulated device, compared with the scripted hand in the same run.
+
+All take quarter seconds in turn, as the loops of `measurement` do, so that the machine's load strikes all alike.
+"""
+
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study_app.devices.registry import discover, open_device
+from study_app.devices.simulated.hand_commands import hand_of
+from study_app.errors import StudyError
+from study_app.evidence.timing.loops import PERIOD_NS, ServoLoop, granted
+from study_app.evidence.timing.measurement import LEAST_S, MOST_S, TICK_S
+
+REFERENCE: Final = "scripted"
+MOST_RATIO: Final = 1.5
+_DRAWS: Final = 1000
+_REACH_M: Final = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceLateness:
+    """The lateness of ticks with a device; ``low`` and ``high`` are the ends of the 95 % interval of ``ratio``.
+
+    ``ratio`` is that of the 99th percentile to the scripted hand's; resampled are quarter seconds, both devices' alike.
+    """
+
+    name: str
+    ticks: int
+    p50_us: float
+    p99_us: float
+    ratio: float
+    low: float
+    high: float
+
+    @property
+    def missed(self) -> bool:
+        """Whether the ratio is above the limit, and not by chance."""
+        return self.low > MOST_RATIO
+
+    @property
+    def verdict(self) -> str:
+        """What that comes to, in a word or two."""
+        if self.missed:
+            return "missed"
+        return "met" if self.ratio <= MOST_RATIO else "undecided: measure for longer"
+
+
+def emulated_devices() -> tuple[str, ...]:
+    """Return the names of the devices that move by themselves, the scripted hand first."""
+    names = [device.name for device in discover().devices if device.moves_by_itself]
+    return (REFERENCE, *(name for name in names if name != REFERENCE))
+
+
+def time_devices(
+    seconds: float,
+    names: Sequence[str],
+    *,
+    ending: threading.Event,
+    progress: Callable[[str], object] = lambda _line: None,
+) -> tuple[DeviceLateness, ...]:
+    """Return how late ticks begin with each device.
+
+    Parameters
+    ----------
+    names : of the devices, the scripted hand first
+    ending : is set by whoever wants no more
+
+    Raises
+    ------
+    StudyError
+        The seconds are out of range.
+    ServoFault, DeviceLost
+        A servo stopped itself.
+    """
+    if not LEAST_S <= seconds <= MOST_S:
+        raise StudyError(f"each device is timed for {LEAST_S:g} to {MOST_S:g} s, not {seconds:g}")
+    rounds, ticks = max(round(seconds / TICK_S), 2), round(TICK_S * 1e9) // PERIOD_NS
+    grant = granted().best or granted().normal
+    late_ns: dict[str, list[NDArray[np.int64]]] = {name: [] for name in names}
+    with ExitStack() as stack:
+        devices = {name: stack.enter_context(open_device(name)) for name in names}
+        loops = {name: ServoLoop(grant, real_time=True, spin_us=None, device=devices[name]) for name in names}
+        for number in range(rounds):
+            for name in names:
+                if ending.is_set():
+                    raise KeyboardInterrupt
+                hand = hand_of(devices[name])
+                if hand is not None:
+                    hand.reach_to(_REACH_M * (-1) ** number, 0.0, 0.0)
+                late_ns[name].append(loops[name].run(ticks).lateness_ns)
+            progress(f"{100 * (number + 1) // rounds:3} %")
+    return tuple(_compared(name, late_ns) for name in names)
+
+
+def _compared(name: str, late_ns: dict[str, list[NDArray[np.int64]]]) -> DeviceLateness:
+    own, reference = late_ns[name], late_ns[REFERENCE]
+    rng = np.random.default_rng(1)
+    draws = [_ratio(own, reference, rng.integers(0, len(own), len(own))) for _ in range(_DRAWS)]
+    p50_ns, p99_ns = np.percentile(np.concatenate(own), [50, 99])
+    low, high = np.percentile(draws, [2.5, 97.5])
+    return DeviceLateness(
+        name,
+        sum(map(len, own)),
+        1e-3 * float(p50_ns),
+        1e-3 * float(p99_ns),
+        _ratio(own, reference, np.arange(len(own))),
+        float(low),
+        float(high),
+    )
+
+
+def _ratio(own: list[NDArray[np.int64]], reference: list[NDArray[np.int64]], rounds: Any) -> float:
+    """Return the ratio of the 99th percentiles of both over the same ``rounds``."""
+    late, early = (float(np.percentile(np.concatenate([one[k] for k in rounds]), 99)) for one in (own, reference))
+    return late / early
+
+
+def text(found: Sequence[DeviceLateness]) -> str:
+    """Return the table as text."""
+    return "\n".join(_lines(found)) + "\n"
+
+
+def _lines(found: Sequence[DeviceLateness]) -> Iterator[str]:
+    yield f"{'device':<28}{'ticks':>8}{'p50 us':>9}{'p99 us':>9}   p99 : {REFERENCE} (95 % interval)"
+    for one in found:
+        yield f"{one.name:<28}{one.ticks:>8}{one.p50_us:>9.0f}{one.p99_us:>9.0f}" + (
+            "" if one.name == REFERENCE else f"   {one.ratio:.2f} ({one.low:.2f} to {one.high:.2f}): {one.verdict}"
+        )
+    yield f"limit: {MOST_RATIO:g}; missed where the whole interval is above it"

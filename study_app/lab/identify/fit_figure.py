@@ -1,0 +1,161 @@
+"""A fit as a figure: the force measured and fitted, and the residual over time and over speed."""
+
+import textwrap
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from study_app import figure_style as style
+from study_app.haptics.model.motion import Floats
+from study_app.lab.identify.fit import Fit
+
+MEASURED: Final = "#b4bec7"
+TOP_PT: Final = 40.0
+FORCE_PT: Final = 120.0
+RESIDUAL_PT: Final = 92.0
+GAP_PT: Final = 36.0
+FOOT_PT: Final = 34.0
+LINE_PT: Final = 11.0
+SIDE_PT: Final = 34.0
+RIGHT_PT: Final = 14.0
+SPEED_PT: Final = 128.0
+CAPTION_LETTERS: Final = 118
+BINS: Final = 12
+LEAST_IN_BIN: Final = 20
+
+
+@style.own_settings(style.PLOT_SETTINGS)
+def draw(found: Fit) -> Figure:
+    """Draw the force, measured and fitted, over time; below it the residual over time, and along the motion."""
+    caption = textwrap.wrap(_caption(found), CAPTION_LETTERS)
+    height_pt = TOP_PT + FORCE_PT + GAP_PT + RESIDUAL_PT + FOOT_PT + LINE_PT * len(caption)
+    figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, height_pt / 72), facecolor="white")
+    time_pt = style.PAGE_WIDTH_PT - SIDE_PT - RIGHT_PT - SPEED_PT - GAP_PT
+
+    def place(left_pt: float, down_pt: float, width_pt: float, tall_pt: float) -> Axes:
+        bottom = 1 - (down_pt + tall_pt) / height_pt
+        box = (left_pt / style.PAGE_WIDTH_PT, bottom, width_pt / style.PAGE_WIDTH_PT, tall_pt / height_pt)
+        return figure.add_axes(box)
+
+    def write(left_pt: float, down_pt: float, words: str, **look: Any) -> None:
+        figure.text(left_pt / style.PAGE_WIDTH_PT, 1 - down_pt / height_pt, words, va="top", **look)
+
+    below_pt = TOP_PT + FORCE_PT + GAP_PT
+    right_pt = SIDE_PT + time_pt + GAP_PT
+    write(SIDE_PT, 6, f"{found.liquid_id}: measured and fitted force", fontsize=9, fontweight="bold")
+    _force(place(SIDE_PT, TOP_PT, time_pt, FORCE_PT), found)
+    _residual(place(SIDE_PT, below_pt, time_pt, RESIDUAL_PT), found)
+    _along(place(right_pt, below_pt, SPEED_PT, RESIDUAL_PT), found)
+    limit_n = 1.05 * float(np.abs(found.residual_n).max()) or 1.0
+    for axes in figure.axes[1:]:
+        axes.set_ylim(-limit_n, limit_n)
+    write(right_pt, TOP_PT - 13, "Fitted, with 95 % intervals", color=style.TEXT_SOFT)
+    write(right_pt, TOP_PT + 3, "\n".join(_values(found)), linespacing=1.45)
+    write(SIDE_PT, below_pt + RESIDUAL_PT + FOOT_PT - 8, "\n".join(caption), color=style.TEXT_SOFT, linespacing=1.25)
+    return figure
+
+
+def _values(found: Fit) -> list[str]:
+    """Return two lines for each parameter: name and value, then the interval."""
+    lines = []
+    for it in found.parameters:
+        value, interval = found.row(it)
+        lines += [f"{it.name}  {value}", f"   {interval}"]
+    return lines
+
+
+def _caption(found: Fit) -> str:
+    text = (
+        "Grey: measured. Lines: fitted by least squares through the servo's own tick. The residual, measured − fitted, "
+        f"is {found.rms_n:.3g} N RMS, {100 * found.share:.1f} % of the force; its correlation from row to row is "
+        f"{found.following:.2f}."
+    ).replace("-", "−")
+    along = " Right: its part along the motion over speed, dots are medians; a slope or bend there is a wrong law."
+    return text + along + "".join(f" Warning: {warning}." for warning in found.warnings)
+
+
+def _axes(found: Fit) -> list[tuple[int, str]]:
+    return [(axis, "xyz"[axis]) for axis in found.axes]
+
+
+def _force(axes: Axes, found: Fit) -> None:
+    """Draw each axis of the force, the measured one as a wide line behind."""
+    t_s = found.motion.t_s
+    _time_axis(axes, found)
+    axes.set_title("Force on the ball [N]", pad=6)
+    for axis, _ in _axes(found):
+        axes.plot(t_s, found.measured_n[:, axis], color=MEASURED, linewidth=2.4, rasterized=True)
+    for axis, name in _axes(found):
+        axes.plot(t_s, found.fitted_n[:, axis], **style.AXES[name], label=name)
+    _name_curves(axes, len(found.axes))
+
+
+def _residual(axes: Axes, found: Fit) -> None:
+    """Draw each axis of the residual as dots, since a line through noise would fill the plot."""
+    _time_axis(axes, found)
+    axes.set_title("Measured − fitted [N]", pad=6)
+    axes.set_xlabel("Time [s]", loc="right", labelpad=1)
+    for axis, name in _axes(found):
+        look = {"color": style.AXES[name]["color"], "markersize": 1.1, "alpha": 0.55, "rasterized": True}
+        axes.plot(found.motion.t_s, found.residual_n[:, axis], ".", markeredgewidth=0, label=name, **look)
+    _name_curves(axes, len(found.axes))
+
+
+def _along(axes: Axes, found: Fit) -> None:
+    """Draw the residual's part along the motion over the speed."""
+    velocity_mps = _velocity_mps(found)
+    speed_mps = np.linalg.norm(velocity_mps, axis=1)
+    moves = speed_mps > 1e-3
+    along_n = np.sum(found.residual_n[moves] * velocity_mps[moves], axis=1) / speed_mps[moves]
+    axes.axhline(0, color=style.ZERO, linewidth=0.6, zorder=1)
+    axes.set_title("along the motion, over speed [m/s]", pad=6)
+    axes.xaxis.set_major_locator(MaxNLocator(4))
+    axes.yaxis.set_major_locator(MaxNLocator(5))
+    look: dict[str, Any] = {"markersize": 1.1, "alpha": 0.55, "rasterized": True}
+    axes.set_xlim(0, 1.05 * float(speed_mps.max()) or 1.0)
+    axes.plot(speed_mps[moves], along_n, ".", color=style.ZERO, markeredgewidth=0, **look)
+    middles = _medians(speed_mps[moves], along_n)
+    axes.plot(middles[:, 0], middles[:, 1], "o", color=style.AXES["y"]["color"], markersize=3.2)
+
+
+def _medians(speed_mps: Floats, along_n: Floats) -> Floats:
+    """Return middle speed and median residual, (k, 2), of equal intervals of speed with enough rows."""
+    if len(speed_mps) == 0:
+        return np.empty((0, 2))
+    edges = np.linspace(speed_mps.min(), speed_mps.max(), BINS + 1)
+    bins = np.clip(np.digitize(speed_mps, edges) - 1, 0, BINS - 1)
+    held = [bins == k for k in range(BINS) if np.count_nonzero(bins == k) >= LEAST_IN_BIN]
+    return np.array([(np.median(speed_mps[it]), np.median(along_n[it])) for it in held]).reshape(-1, 2)
+
+
+def _velocity_mps(found: Fit) -> Floats:
+    """Return the velocities (n, 3): as measured, or the slopes of the places."""
+    if found.motion.velocity_mps is not None:
+        return found.motion.velocity_mps
+    slopes: Floats = np.gradient(found.motion.position_m, found.motion.t_s, axis=0)
+    return slopes
+
+
+def _time_axis(axes: Axes, found: Fit) -> None:
+    axes.set_xlim(found.motion.t_s[0], found.motion.t_s[-1])
+    axes.xaxis.set_major_locator(MaxNLocator(7))
+    axes.yaxis.set_major_locator(MaxNLocator(5))
+    axes.axhline(0, color=style.ZERO, linewidth=0.6, zorder=1)
+
+
+def _name_curves(axes: Axes, columns: int) -> None:
+    """Name the axes in a row above the plot, never over the data."""
+    axes.legend(
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.02),
+        ncols=columns,
+        frameon=False,
+        markerscale=6,
+        handletextpad=0.5,
+        columnspacing=1.4,
+        borderpad=0,
+        borderaxespad=0.3,
+    )

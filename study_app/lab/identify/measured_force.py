@@ -1,0 +1,185 @@
+"""Reads measured motion and force, or a flow curve, from a file; prepares the motion for `simulate`."""
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
+from scipy.signal import savgol_filter
+
+from study_app.errors import StudyError
+from study_app.haptics.model.motion import PLACES, SHOWN, VELOCITIES, Floats, Motion, refuse_device
+
+FORCES: Final = ("fx_n", "fy_n", "fz_n")
+ALONG_A_LINE: Final = ("t_s", "velocity_mps", "force_n")
+FLOW_CURVE: Final = ("shear_rate_per_s", "shear_stress_pa")
+LONGEST_S: Final = 0.05
+SMOOTHED_S: Final = 0.025
+HEADER: Final = (
+    f"{','.join(PLACES + FORCES)}, with {','.join(VELOCITIES)} where they are known, or {','.join(ALONG_A_LINE)} for a "
+    f"motion along one line, or {','.join(FLOW_CURVE)} of a rheometer"
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measured:
+    """A motion of n rows in the scene frame, and the liquid's force (n, 3) on the body [N] measured along it."""
+
+    motion: Motion
+    force_n: Floats
+
+    def __post_init__(self) -> None:
+        if self.force_n.shape != (len(self.motion.t_s), 3) or not np.isfinite(self.force_n).all():
+            raise StudyError(f"a measured force is finite and (n, 3), not {self.force_n.shape}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlowCurve:
+    """Shear rates (n,) [1/s] and shear stresses (n,) [Pa] of steady shear, as a rheometer measures them."""
+
+    rate_per_s: Floats
+    stress_pa: Floats
+
+    def __post_init__(self) -> None:
+        for name, values in zip(FLOW_CURVE, (self.rate_per_s, self.stress_pa), strict=True):
+            if values.min() <= 0:
+                row = int(values.argmin()) + 1
+                raise StudyError(f"row {row} has {name} {values.min():g}: it must be above 0; remove the row")
+
+
+def read(path: Path) -> Measured | FlowCurve:
+    """Read a CSV file with one of the headers in `HEADER`, its columns in any order; others are not read.
+
+    Lines that begin with # are left out. Along a line, the motion is along x and places are summed from velocities.
+
+    Raises
+    ------
+    StudyError
+        The file cannot be read or used; with its first error in one line.
+    """
+    try:
+        refuse_device(path)
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            numbered = [(number, line) for number, line in enumerate(file, start=1) if line.strip()]
+    except OSError as error:
+        raise StudyError(f"cannot read {path}: {error.strerror}; name a CSV file of {HEADER}") from error
+    except UnicodeDecodeError as error:
+        raise StudyError(f"cannot read {path}: it is not UTF-8 text; name a CSV file of {HEADER}") from error
+    numbered = [(number, line) for number, line in numbered if not line.startswith("#")]
+    header = next(csv.reader([numbered[0][1]]), []) if numbered else []
+    names: tuple[str, ...] = PLACES + FORCES
+    if all(name in header for name in names):
+        names += VELOCITIES if all(name in header for name in VELOCITIES) else ()
+    elif all(name in header for name in ALONG_A_LINE):
+        names = ALONG_A_LINE
+    elif all(name in header for name in FLOW_CURVE):
+        names = FLOW_CURVE
+    else:
+        lacking = ", ".join(name for name in names if name not in header)
+        raise StudyError(f"{path} has no column {lacking}: the first line must name {HEADER}")
+    rows = _rows(path, numbered[1:], [header.index(name) for name in names])
+    try:
+        return _measured(rows, names)
+    except StudyError as error:
+        raise StudyError(f"{path}: {error}") from error
+
+
+def _rows(path: Path, numbered: list[tuple[int, str]], places: list[int]) -> Floats:
+    if not numbered:
+        raise StudyError(f"{path} has a header and no rows: give one for each moment that was measured")
+    rows = []
+    for number, line in numbered:
+        fields = next(csv.reader([line]))
+        if len(fields) <= max(places):
+            raise StudyError(f"{path}, line {number}: has {len(fields)} fields, fewer than the header names")
+        row = [_number(fields[place]) for place in places]
+        if None in row:
+            bad = fields[places[row.index(None)]]
+            raise StudyError(
+                f"{path}, line {number}: {bad[:SHOWN]!r} is not a finite number; correct it or remove the row"
+            )
+        rows.append(row)
+    return np.array(rows, float)
+
+
+def _number(field: str) -> float | None:
+    try:
+        value = float(field)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _measured(rows: Floats, names: tuple[str, ...]) -> Measured | FlowCurve:
+    if names == FLOW_CURVE:
+        return FlowCurve(rows[:, 0], rows[:, 1])
+    if names == ALONG_A_LINE:
+        return along_a_line(rows[:, 0], rows[:, 1], rows[:, 2])
+    velocity_mps = rows[:, 7:] if len(names) > len(PLACES + FORCES) else None
+    return Measured(Motion(rows[:, 0], rows[:, 1:4], velocity_mps), rows[:, 4:7])
+
+
+def vectors_x(values: Floats) -> Floats:
+    """Return vectors (n, 3) along x."""
+    zero = np.zeros_like(values)
+    return np.column_stack([values, zero, zero])
+
+
+def along_a_line(t_s: Floats, velocity_mps: Floats, force_n: Floats) -> Measured:
+    """Return a motion along x from its velocities (n,), and the force (n,) along x."""
+    way_m = np.concatenate([[0.0], np.cumsum((velocity_mps[1:] + velocity_mps[:-1]) / 2 * np.diff(t_s))])
+    return Measured(Motion(t_s, vectors_x(way_m), vectors_x(velocity_mps)), vectors_x(force_n))
+
+
+def centred(motion: Motion) -> Motion:
+    """Return the motion with velocities (n, 3): slopes of parabolas through the places 12.5 ms to both sides.
+
+    A measured force depends on the motion itself, not on a device's filter: these velocities have no lag. A motion that
+    has velocities stays as it is. [choice] 25 ms: a tenth of the period of the fastest strokes, 4 Hz.
+
+    Raises
+    ------
+    StudyError
+        Rows too few or too far apart.
+    """
+    if motion.velocity_mps is not None:
+        return motion
+    step_s = float(np.median(np.diff(motion.t_s))) if len(motion.t_s) > 1 else LONGEST_S
+    even = at_rate(motion, 1 / step_s)
+    rows = 2 * max(math.floor(SMOOTHED_S / 2 / step_s), 1) + 1
+    if len(even.t_s) < rows:
+        raise StudyError(f"{len(motion.t_s)} rows are too few to estimate velocities: measure for {SMOOTHED_S:g} s")
+    slopes = savgol_filter(even.position_m, rows, 2, deriv=1, delta=step_s, axis=0)
+    velocity_mps = np.column_stack([np.interp(motion.t_s, even.t_s, column) for column in slopes.T])
+    return Motion(motion.t_s, motion.position_m, velocity_mps)
+
+
+def at_rate(motion: Motion, rate_hz: float) -> Motion:
+    """Return the motion with a row for every tick; unchanged if it has them within half a tick.
+
+    Between the rows of a slower or uneven measurement places follow cubic splines, velocities straight lines.
+
+    Raises
+    ------
+    StudyError
+        Two rows are too far apart to interpolate between them.
+    """
+    step_s = np.diff(motion.t_s)
+    if len(step_s) == 0:
+        raise StudyError("one row is not a motion: measure at least 20 rows per second")
+    if step_s.max() > LONGEST_S:
+        row, gap_s = int(step_s.argmax()) + 2, float(step_s.max())
+        raise StudyError(f"row {row} comes {gap_s:.3g} s after the one before: {LONGEST_S:g} s is the most permitted")
+    tick_s = 1 / rate_hz
+    if abs(step_s.mean() / tick_s - 1) < 0.01 and (np.abs(step_s / tick_s - 1) < 0.5).all():
+        return motion
+    ticks = math.floor((motion.t_s[-1] - motion.t_s[0]) * rate_hz + 1e-6)
+    t_s = motion.t_s[0] + np.arange(ticks + 1) * tick_s
+    if motion.velocity_mps is None:
+        return Motion(t_s, CubicSpline(motion.t_s, motion.position_m)(t_s))
+    place = CubicHermiteSpline(motion.t_s, motion.position_m, motion.velocity_mps)
+    velocity_mps = np.column_stack([np.interp(t_s, motion.t_s, column) for column in motion.velocity_mps.T])
+    return Motion(t_s, place(t_s), velocity_mps)

@@ -1,0 +1,301 @@
+"""The search for a liquid's parameters: the force along a measured motion as a function of a few numbers.
+
+Positive parameters are searched by their logarithm, a wake's decay by its rate; pairs of which one must not be less
+than the other (`NO_LESS_THAN`), by the lesser and their ratio, at least 1. A length counts elements, so the force is
+only defined at integer lengths and interpolated between them; the search begins at several lengths, the result is
+rounded, and the other parameters are fitted again.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from study_app.errors import StudyError
+from study_app.haptics.model.motion import Floats
+from study_app.haptics.model.scene import Scene
+from study_app.haptics.runtime.offline import simulate
+from study_app.lab.identify.measured_force import Measured, at_rate
+from study_app.lab.identify.parameters import NO_LESS_THAN, Parameter, replace
+
+_LEAST_POSITIVE: Final = 1e-12
+_HIGHEST_EXPONENT: Final = 700.0
+_SHORTEST_START: Final = 5
+_STARTS: Final = 6
+_AROUND: Final = (0.5, 0.7, 1.4, 2.0)
+_ROUNDS: Final = 4
+_BETTER: Final = 1e-4
+_TRIAL: Final = 4  # steps from each start, before the best continue
+_MOST: Final = 100
+_STEP: Final = 1e-4
+_LENGTH_STEP: Final = 1e-2
+_ROUNDING: Final = 1e-12  # of exp(log(N)), so that S = N stays so
+
+
+class Coordinate(NamedTuple):
+    """How a parameter is searched: by a monotonic function u of its value; ``step`` for its derivative."""
+
+    to_u: Callable[[float], float]
+    to_value: Callable[[float], float]
+    step: float
+    relative: bool  # whether the step is a share of u
+
+
+_LINEAR: Final = Coordinate(lambda value: value, lambda u: u, _STEP, relative=True)
+_LOGARITHM: Final = Coordinate(
+    math.log, lambda u: math.exp(u) if u < _HIGHEST_EXPONENT else math.inf, _STEP, relative=False
+)
+_COUNT: Final = _LOGARITHM._replace(step=_LENGTH_STEP)
+_RATE: Final = Coordinate(lambda value: -1e3 * math.log(value), lambda u: math.exp(-1e-3 * u), _STEP, relative=True)
+
+
+def coordinate(parameter: Parameter) -> Coordinate:
+    """Return how a parameter is searched."""
+    if parameter.whole:
+        return _COUNT
+    if parameter.field == "decay":
+        return _RATE  # 1/s
+    return _LOGARITHM if parameter.least > 0 or (parameter.least == 0 and parameter.above) else _LINEAR
+
+
+def u_range(parameter: Parameter) -> tuple[float, float]:
+    """Return the least and the greatest u that the parameter's own model permits."""
+    it = coordinate(parameter)
+    if it is _RATE:
+        return 0.0, 1e3
+    if it is _LINEAR:
+        return parameter.least, parameter.most
+    return it.to_u(max(parameter.least, _LEAST_POSITIVE)), it.to_u(parameter.most)
+
+
+class Problem:
+    """A scene, the parameters that are searched, and the measurements.
+
+    z (p,) are the variables of the search: u, or for the greater of two in `NO_LESS_THAN` the logarithm of their ratio.
+    ``least`` and ``most`` (p,) are its range, ``start`` the scene's own values in it. ``compared``, ``varied`` and
+    ``more`` are words for warnings; ``alike`` is the correlation of two estimates from which their parameters count as
+    not distinguishable.
+    """
+
+    alike: ClassVar[float]
+    compared: ClassVar[str]
+    varied: ClassVar[str]
+    more: ClassVar[str]
+
+    def __init__(self, scene: Scene, liquid_id: str, parameters: tuple[Parameter, ...]) -> None:
+        self.parameters = parameters
+        self._scene, self._liquid_id = scene, liquid_id
+        self._coordinates = tuple(coordinate(it) for it in parameters)
+        self.length = next((k for k, it in enumerate(parameters) if it.whole), None)
+        places = {(it.table, it.field): k for k, it in enumerate(parameters)}
+        lesser = {k: places.get((it.table, NO_LESS_THAN.get(it.field, ""))) for k, it in enumerate(parameters)}
+        self.lesser = {k: of for k, of in lesser.items() if of is not None}
+        self.scaling = next((k for k, of in self.lesser.items() if of == self.length), None)
+        self.least, self.most = (np.array(ends) for ends in zip(*map(self._range, parameters), strict=True))
+        self.start = np.clip(self._to_z([it.value for it in parameters]), self.least, self.most)
+
+    @property
+    def columns(self) -> int:
+        """The number of values per measured row."""
+        return 1
+
+    def misfit(self, z: Floats) -> Floats:
+        """Return predicted − measured values, (m,), row by row."""
+        raise NotImplementedError
+
+    def values(self, z: Floats) -> list[float]:
+        """Return the parameters' values, each in its range, without rounding a length."""
+        values = [it.to_value(float(u)) for it, u in zip(self._coordinates, self.u(z), strict=True)]
+        values = [round(it) if abs(it - round(it)) < _ROUNDING * abs(it) else it for it in values]
+        return [min(max(value, it.least), it.most) for value, it in zip(values, self.parameters, strict=True)]
+
+    def u(self, z: Floats) -> Floats:
+        """Return u (p,)."""
+        u = np.array(z, float)
+        for k, lesser in self.lesser.items():
+            u[k] += u[lesser]
+        return u
+
+    def slopes(self, z: Floats) -> Floats:
+        """Return the derivative of the misfit by z, (m, p), from differences to both sides as far as permitted."""
+        columns = []
+        for k, it in enumerate(self._coordinates):
+            step = it.step * (max(abs(z[k]), 0.01) if it.relative else 1.0)
+            lower, upper = np.array(z, float), np.array(z, float)
+            lower[k] = max(z[k] - step, self.least[k])
+            upper[k] = min(z[k] + step, self.most[k])
+            columns.append((self.misfit(upper) - self.misfit(lower)) / (upper[k] - lower[k]))
+        return np.column_stack(columns)
+
+    def slopes_of_u(self, z: Floats) -> Floats:
+        """Return the derivative by u instead, (m, p)."""
+        slopes = self.slopes(z)
+        for k, lesser in self.lesser.items():
+            slopes[:, lesser] -= slopes[:, k]
+        return slopes
+
+    def rounded(self, z: Floats) -> Floats:
+        """Return z with a whole length; the scaling stays."""
+        if self.length is None:
+            return z
+        values = self.values(z)
+        values[self.length] = max(1, min(round(values[self.length]), self._longest(values, self.length)))
+        return self._to_z(values)
+
+    def moved(self, z: Floats, k: int, u: float) -> Floats:
+        """Return z with another length; the scaling is kept, or raised to the length."""
+        u = min(max(u, self.least[k]), self.most[k])
+        moved = np.array(z, float)
+        if self.scaling is not None:
+            moved[self.scaling] = max(z[self.scaling] + z[k] - u, 0.0)
+        moved[k] = u
+        return moved
+
+    def scene(self, z: Floats) -> Scene:
+        """Return the scene with the values of z, a length rounded."""
+        return replace(self._scene, self._liquid_id, self.parameters, self.values(z))
+
+    def _longest(self, values: Sequence[float], k: int) -> float:
+        """Return the greatest whole length that the scaling permits."""
+        scaling = math.inf if self.scaling is None else values[self.scaling]
+        return math.floor(min(self.parameters[k].most, scaling) * (1 + 1e-12))
+
+    def _range(self, it: Parameter) -> tuple[float, float]:
+        """Return the least and the greatest z."""
+        least, most = u_range(it)
+        return (0.0 if self.parameters.index(it) in self.lesser else least), most
+
+    def _to_z(self, values: Sequence[float]) -> Floats:
+        z = np.array([it.to_u(value) for it, value in zip(self._coordinates, values, strict=True)])
+        for k, lesser in self.lesser.items():
+            z[k] = max(z[k] - z[lesser], 0.0)
+        return z
+
+
+class ForceProblem(Problem):
+    """The force along a measured motion.
+
+    ``axes`` are the axes of the force in use: measured or predicted to be nonzero.
+
+    Raises
+    ------
+    StudyError
+        Too little was measured.
+    """
+
+    alike = 0.95
+    compared = "force along this motion"
+    varied = "this motion"
+    more = "measure more kinds of motion"
+
+    def __init__(self, scene: Scene, liquid_id: str, parameters: tuple[Parameter, ...], measured: Measured) -> None:
+        self.measured = measured
+        self._motion = at_rate(measured.motion, scene.rate_hz)
+        self._spacing = max(1, math.ceil(1000 / scene.rate_hz))
+        super().__init__(scene, liquid_id, parameters)
+        if not measured.force_n.any():
+            raise StudyError("the measured force is zero throughout: there is nothing to fit to")
+        simulated_n = self.force_n(self.start)
+        self.axes = tuple(axis for axis in range(3) if measured.force_n[:, axis].any() or simulated_n[:, axis].any())
+        if len(measured.force_n) * len(self.axes) <= len(parameters):
+            raise StudyError(f"{len(measured.force_n)} rows are too few for {len(parameters)} parameters")
+
+    @property
+    def columns(self) -> int:
+        """The number of axes in use."""
+        return len(self.axes)
+
+    def force_n(self, z: Floats) -> Floats:
+        """Return the force (n, 3) at the measured times; between whole lengths interpolated."""
+        values = self.values(z)
+        if self.length is None:
+            return self._simulated(values)
+        below, above, share = self._neighbours(values, self.length)
+        force_n = self._simulated(below)
+        return force_n if share == 0 else (1 - share) * force_n + share * self._simulated(above)
+
+    def misfit(self, z: Floats) -> Floats:
+        """Return simulated − measured force on the axes in use, (m,)."""
+        misfit: Floats = (self.force_n(z) - self.measured.force_n)[:, self.axes].ravel()
+        return misfit
+
+    def _simulated(self, values: Sequence[float]) -> Floats:
+        table = simulate(replace(self._scene, self._liquid_id, self.parameters, values), self._motion)
+        columns = (table.fx_n, table.fy_n, table.fz_n)
+        if self._motion is self.measured.motion:
+            return np.column_stack(columns)
+        return np.column_stack([np.interp(self.measured.motion.t_s, self._motion.t_s, it) for it in columns])
+
+    def _neighbours(self, values: list[float], k: int) -> tuple[list[float], list[float], float]:
+        """Return the values with the integer lengths on both sides, and the length's position between them, 0 … 1."""
+        longest = self._longest(values, k)
+        below = min(max(1.0, math.floor(values[k] / self._spacing + 1e-9) * self._spacing), longest)
+        above = min(below + self._spacing, longest)
+        share = (values[k] - below) / (above - below) if above > below else 0.0
+        share = min(share, 1.0) if share > 1e-9 else 0.0
+        return [*values[:k], below, *values[k + 1 :]], [*values[:k], above, *values[k + 1 :]], share
+
+    def _range(self, it: Parameter) -> tuple[float, float]:
+        """Return the least and the greatest z: a length is no longer than what was measured."""
+        if it.whole:
+            lasted_s = self._motion.t_s[-1] - self._motion.t_s[0]
+            most = math.floor(min(it.most, math.ceil(1000 * lasted_s)))
+            return 0.0, max(math.log(max(most, 1)), _LENGTH_STEP)
+        return super()._range(it)
+
+
+def solve(problem: Problem) -> tuple[Floats, bool]:
+    """Return the z of the least squares with an integer length, and whether the search converged."""
+    everything = np.ones(len(problem.start), bool)
+    best = _search(problem, problem.start if problem.length is None else _begin(problem, problem.length), everything)
+    z = problem.rounded(best.x)
+    others = np.array([k != problem.length for k in range(len(z))])
+    if problem.length is not None and others.any():
+        z = _search(problem, z, others).x
+    return z, best.status > 0
+
+
+def _begin(problem: Problem, k: int) -> Floats:
+    """Return a z near the least squares, searched at lengths over the whole range, then around the best."""
+    shortest = min(math.log(_SHORTEST_START), problem.most[k])
+    lengths = np.linspace(shortest, problem.most[k], _STARTS)
+    best = _best(problem, [problem.start, *(problem.moved(problem.start, k, length) for length in lengths)])
+    for _ in range(_ROUNDS):
+        near = _best(problem, [problem.moved(best.x, k, best.x[k] + math.log(it)) for it in _AROUND])
+        if near.cost >= best.cost * (1 - _BETTER):
+            break
+        best = near
+    begin: Floats = best.x
+    return begin
+
+
+def _best(problem: Problem, starts: Sequence[Floats]) -> Any:
+    """Return the best of a few steps from each start."""
+    everything = np.ones(len(problem.start), bool)
+    return min((_search(problem, it, everything, _TRIAL) for it in starts), key=lambda it: float(it.cost))
+
+
+def _search(problem: Problem, start: Floats, free: NDArray[np.bool_], most: int = _MOST) -> Any:
+    """Return scipy's result with the complete z as ``x``, including its fixed values."""
+
+    def whole(part: Floats) -> Floats:
+        z = np.array(start, float)
+        z[free] = part
+        return z
+
+    found = least_squares(
+        lambda part: problem.misfit(whole(part)),
+        np.clip(start, problem.least, problem.most)[free],
+        jac=lambda part: problem.slopes(whole(part))[:, free],
+        bounds=(problem.least[free], problem.most[free]),
+        x_scale="jac",
+        ftol=1e-10,
+        xtol=1e-8,
+        gtol=1e-14,
+        max_nfev=most,
+    )
+    found.x = whole(found.x)
+    return found

@@ -1,0 +1,382 @@
+"""Recomputes every force of a session from the recorded times and places, by the tick that sent them.
+
+The recordings contain the CRC-32 of each second of exact forces; here the forces are recomputed and compared with it.
+The same kind of processor gives the same bits, by the version of the force rules that the receipt states; seconds that
+differ are named. The delivered values of each interval are also recomputed and compared with the journal.
+
+The key is opened only in memory, and not printed: the user who replays a session stays blind.
+
+A recording begins shortly before its trial, so that the force it begins with is known; one that follows another without
+a pause continues from its end. Parts that cannot be recomputed are listed, since they are not proved.
+"""
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study_app.errors import StoreError
+from study_app.haptics.kernels.safety import START_FADE_S, new_safety
+from study_app.haptics.model.device_dynamics import Dynamics, dynamics_from
+from study_app.haptics.model.force_rules import ForceRules, rules_from
+from study_app.haptics.model.layout import LIMITER_FADE, SAMPLE, records
+from study_app.haptics.model.scene import FADE_S, Scene
+from study_app.haptics.runtime.pack import adjust_into, pack
+from study_app.haptics.runtime.recompute import recompute_scenes
+from study_app.protocol.model import Protocol
+from study_app.protocol.trials.presentation import link_seed, presented_by
+from study_app.session.recorded_intervals import (
+    as_one_scene,
+    delivered_again,
+    different,
+    error_again,
+    places_of,
+    scene_presented,
+    steps_of,
+)
+from study_app.store import receipt, recordings
+from study_app.store.atomic import is_there
+from study_app.store.blinded import blinding
+from study_app.store.blinded.blinding import as_recorded, opened, whole_protocol
+from study_app.store.folders import locate
+from study_app.store.journals import journal
+from study_app.store.journals.journal import Line
+from study_app.store.progress import is_of_intervals, named
+
+NAMED_SECONDS = 8
+_FORCES = ("force_n", "command_n", "device_force_n")
+_ROUNDING = 1e-9
+_FLOAT32 = 2.0**-23  # of the greater ones, a column's own precision
+
+
+@dataclass(frozen=True, slots=True)
+class Replayed:
+    """The result of a replay.
+
+    ``recordings`` were recomputed, ``seconds`` of them compared. ``differences`` has a sentence for each recording with
+    different forces, ``missing`` one for each missing recording of the journal, ``uncompared`` one for each that could
+    not be recomputed, or not to its end. ``lasted_s`` is the duration of the motion, ``computed_s`` that of the
+    recomputation; ``took_s`` includes reading the files and loading the code.
+    """
+
+    recordings: int
+    seconds: int
+    lasted_s: float
+    computed_s: float
+    took_s: float
+    differences: tuple[str, ...]
+    missing: tuple[str, ...]
+    uncompared: tuple[str, ...]
+
+    @property
+    def proved(self) -> bool:
+        """Whether data were compared, all are equal, and no recording is missing."""
+        return self.seconds > 0 and not self.differences and not self.missing
+
+
+def replay(session_folder: Path) -> Replayed:
+    """Recompute every recorded force of a session, and compare.
+
+    Raises
+    ------
+    StoreError
+        It is not a session folder, or its journal, receipt, key or a recording cannot be read.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> from study_app.session.simulated.rehearsal import rehearse
+    >>> study = rehearse("demo", participants=1, seed=1, results=Path(mkdtemp(), "demo"))
+    >>> found = replay(study / "data" / "sub-P001" / "ses-01")
+    >>> found.recordings, found.differences, found.proved
+    (4, (), True)
+    """
+    began = time.perf_counter()
+    study, session = locate(session_folder)
+    kept = receipt.read(session.receipt)
+    key = blinding.read_key(study.path)
+    if key.hash != kept["key_hash"]:
+        raise StoreError(f"{study.key} is not the key that {session.path} ran under: restore it from a copy")
+    lines = opened(journal.read(session.journal), key)
+    protocol, devices, (drawn_from, participant) = _ran(session.receipt, kept, key, lines)
+    _again(records(SAMPLE, 0), Scene(), devices[None], None)  # loads the compiled code: no part of what is measured
+    found = _Found()
+    ends = {_which(line): line for line in lines if line["event"] in ("trial_ended", "interval_ended")}
+    before: _Before | None = None
+    resumed_at: str | None = None
+    for started, line, resumed in _presented(lines):
+        if resumed != resumed_at:  # the servo was started anew: nothing goes on from the recording before
+            before, resumed_at = None, resumed
+        if resumed not in devices:
+            raise StoreError(f"{session.receipt} lacks the device since {resumed}: restore it from a copy")
+        name = named(started)
+        if line is None or line["event"] == "recording_lost":
+            why = "the journal gives no reason" if line is None else line["reason"]
+            found.uncompared.append(f"{name}: has no recording: {why}")
+            continue
+        path = session.path / line["recording"]
+        if not is_there(path):
+            found.missing.append(f"{name}: {line['recording']} is missing, but the journal mentions it")
+            continue
+        seed = link_seed(drawn_from, participant, *_which(started))
+        scene, steps = scene_presented(protocol, key, started, seed), steps_of(protocol, key, started, lines)
+        recorded, checks = recordings.read_samples(path), recordings.read_checks(path)
+        start = time.perf_counter()
+        samples = as_one_scene(recorded, steps)
+        before = _again(samples, scene, devices[resumed], before, places_of(recorded, steps))
+        found.compare(name, samples, before, checks)
+        if (ended := ends.get(_which(started))) is not None and _until_gap(samples.tick) == len(samples):
+            again: dict[str, float | None] = {}
+            if "interval" in started:
+                interval = presented_by(protocol, key.codes, started).intervals[started["interval"] - 1]
+                again |= delivered_again(protocol, interval, started, samples, ended).columns
+            if ended.get("delivered_error") is not None and ended["outcome"] != "interrupted":
+                again["delivered_error"] = error_again(scene, protocol.device.rate_hz, samples, ended)
+            found.differences += [f"{name}: the column {column} differs" for column in different(again, ended)]
+        found.computed_s += time.perf_counter() - start
+    return found.replayed(time.perf_counter() - began)
+
+
+class _Device(NamedTuple):
+    """A device as a receipt records it, and the rules by which its forces were computed."""
+
+    limit_n: float
+    dynamics: Dynamics
+    rules: ForceRules
+
+
+@dataclass(slots=True)
+class _Before:
+    """A recording computed again, and the models in the state it left them in: what the next one may go on from.
+
+    ``knows_its_start`` says that no force was under way as it began, or that it goes on from a recording of which that
+    is so.
+    """
+
+    serial: int
+    model: Any
+    safety: Any
+    samples: Any
+    knows_its_start: bool = True
+
+
+def _again(
+    samples: Any, scene: Scene, device: _Device, before: _Before | None, steps: Sequence[tuple[int, Scene]] = ()
+) -> _Before:
+    """Return the forces of ``samples`` computed again, in a copy; the scene that is theirs is the last one's.
+
+    From the samples named in ``steps`` on it has other numbers.
+    """
+    out = samples.copy()
+    serial = int(out.scene[-1]) if len(out) else 0
+    limit_n, dynamics, rules = device
+    rest = pack(scene.model_copy(update={"liquids": (), "fade_s": FADE_S}), dynamics=dynamics, rules=rules)
+    model = pack(scene, dynamics=dynamics, rules=rules)
+    first = 0
+    shared = _shared(before, out)
+    if before is not None and shared is not None:
+        first = shared
+        _copy_forces(before.samples[len(before.samples) - first :], out[:first])
+        _run_steps((rest, before.model, model), (before.serial, serial), before.safety[0], out, first, steps, device)
+        return _Before(serial, model, before.safety, out, before.knows_its_start)
+    safety = new_safety(limit_n)
+    if len(out) and out.tick[0] != 0:
+        _assume(safety[0], out)
+        first = 1
+    knows_its_start = not out.force_n[out.scene != serial].any()
+    _run_steps((rest, rest, model), (0, serial), safety[0], out, first, steps, device)
+    return _Before(serial, model, safety, out, knows_its_start)
+
+
+def _shared(before: _Before | None, out: Any) -> int | None:
+    """Return how many samples the recording before holds too, if this one goes on from it without a gap."""
+    if before is None or len(out) == 0 or len(before.samples) == 0:
+        return None
+    shared = int(before.samples.tick[-1] + 1 - out.tick[0])
+    return shared if 0 <= shared <= min(len(out), len(before.samples)) else None
+
+
+def _copy_forces(known: Any, out: Any) -> None:
+    for name in ("velocity_mps", "wake_mps", "force_n", "command_n", "device_force_n", "limiters", "status"):
+        out[name] = known[name]
+
+
+def _assume(safety: Any, out: Any) -> None:
+    """Take the first of the samples ``out`` as it was recorded, exactly.
+
+    Of a fade under way nothing but its length counts, since nothing is felt before the trial's own scene, which begins
+    its fade anew. The start's fade is over where a later sample before the next scene shows no fade.
+    """
+    other = np.flatnonzero(out.scene != out.scene[0])
+    lead = out[: other[0]] if other.size else out[:1]
+    fades = bool((lead.limiters & LIMITER_FADE).all())
+    safety.started = 1
+    safety.tick_ns = safety.usable_ns = out.time_ns[0]
+    safety.fade = 0.0 if fades else 1.0
+    safety.fade_s = START_FADE_S if fades else 0.0
+    safety.slewed_n[:] = out.command_n[0]
+
+
+def _run_steps(
+    models: tuple[Any, Any, Any],
+    serials: tuple[int, int],
+    safety: Any,
+    out: Any,
+    first: int,
+    steps: Sequence[tuple[int, Scene]],
+    device: _Device,
+) -> None:
+    """Take each of ``out`` from ``first`` on, with other numbers of its own scene from each step on."""
+    for place, scene in steps:
+        recompute_scenes(*models, *serials, safety, out[:place], first)
+        adjust_into(models[-1], scene, dynamics=device.dynamics, rules=device.rules)
+        first = max(first, place)
+    recompute_scenes(*models, *serials, safety, out, first)
+
+
+class _Found:
+    """What comes out recording by recording."""
+
+    def __init__(self) -> None:
+        self.recordings = 0
+        self.seconds = 0
+        self.lasted_s = 0.0
+        self.computed_s = 0.0
+        self.differences: list[str] = []
+        self.missing: list[str] = []
+        self.uncompared: list[str] = []
+
+    def replayed(self, took_s: float) -> Replayed:
+        """Return all of it, which took so long [s]."""
+        return Replayed(
+            self.recordings,
+            self.seconds,
+            self.lasted_s,
+            self.computed_s,
+            took_s,
+            tuple(self.differences),
+            tuple(self.missing),
+            tuple(self.uncompared),
+        )
+
+    def compare(self, name: str, samples: Any, again: _Before, checks: recordings.Checks) -> None:
+        """Compare one recording's checks with those of the forces computed again."""
+        if len(samples) == 0:
+            self.uncompared.append(f"{name}: holds no sample")
+            return
+        if not again.knows_its_start:
+            self.uncompared.append(f"{name}: continues from the force of a recording that is missing or has a gap")
+            return
+        self.recordings += 1
+        self.lasted_s += float(samples.time_ns[-1] - samples.time_ns[0]) * 1e-9
+        whole = _until_gap(samples.tick)
+        if whole < len(samples):
+            lost_s = whole / checks.rows
+            self.uncompared.append(f"{name}: samples are missing after {lost_s:.1f} s; what follows was not compared")
+        self.seconds += sum(
+            min((second + 1) * checks.rows, len(samples)) <= whole for second in range(len(checks.device_force))
+        )
+        differing = _other_sums(checks, again.samples) | _other_columns(checks, samples, again.samples)
+        for what, found in differing.items():
+            seconds = [second for second in found if min((second + 1) * checks.rows, len(samples)) <= whole]
+            if seconds:
+                lasted = len(checks.device_force)
+                self.differences.append(f"{name}: the {what} differs in {_listed(seconds)} of {lasted} seconds")
+
+
+def _other_sums(checks: recordings.Checks, again: Any) -> dict[str, list[int]]:
+    """Return the seconds whose exact forces have another CRC."""
+    found = {}
+    for what, kept, forces in (
+        ("force on the hand", checks.device_force, again.device_force_n),
+        ("force of the liquids", checks.effect_force, again.force_n),
+    ):
+        sums = recordings.crcs(forces, checks.rows)
+        found[what] = [second for second, (one, other) in enumerate(zip(kept, sums, strict=True)) if one != other]
+    return found
+
+
+def _other_columns(checks: recordings.Checks, samples: Any, again: Any) -> dict[str, list[int]]:
+    """Return the seconds in which a recorded column is further from what is recomputed than its rounding.
+
+    Of the samples before the trial's own scene nothing but the forces is known.
+    """
+    found = {}
+    own = samples.scene == samples.scene[-1]
+    for name, step in recordings.ROUNDED_TO.items():
+        recorded, computed = (np.nan_to_num(it[name].reshape(len(samples), -1)) for it in (samples, again))
+        permitted = step * (0.5 + _ROUNDING) + np.abs(computed) * _FLOAT32
+        known = True if name in _FORCES else own
+        rows = np.flatnonzero((np.abs(recorded - computed) > permitted).any(axis=1) & known)
+        found[f"column {name}"] = np.unique(rows // checks.rows).tolist()
+    for name in ("limiters", "status"):
+        rows = np.flatnonzero((samples[name] != again[name]) & own)
+        found[f"column {name}"] = np.unique(rows // checks.rows).tolist()
+    return found
+
+
+def _until_gap(ticks: NDArray[np.int64]) -> int:
+    """Return how many samples come before the first one that is missing."""
+    gaps = np.flatnonzero(np.diff(ticks) != 1)
+    return int(gaps[0]) + 1 if gaps.size else len(ticks)
+
+
+def _listed(seconds: list[int]) -> str:
+    shown = ", ".join(map(str, seconds[:NAMED_SECONDS]))
+    more = f" … ({len(seconds)} in all)" if len(seconds) > NAMED_SECONDS else ""
+    return f"second {shown}{more}"
+
+
+def _which(line: Line) -> tuple[int, int, int | None]:
+    return line["trial"], line["attempt"], line.get("interval")
+
+
+def _presented(lines: Sequence[Line]) -> Iterator[tuple[Line, Line | None, str | None]]:
+    """Yield the line of each presentation that was to be recorded, and the line about its recording, if there is one.
+
+    In the order of presentation, each with the time at which the session had been resumed, or its device connected
+    again, last; None before that.
+    """
+    events = ("recorded", "recording_lost")
+    ends = {_which(line): line for line in lines if line["event"] in events}
+    if not lines or not lines[0].get("recordings"):
+        return
+    resumed_at: str | None = None
+    started: Line = {}
+    for line in lines:
+        if line["event"] in ("session_resumed", "device_reconnected"):
+            resumed_at = line["at"]
+        elif line["event"] == "trial_started" and not is_of_intervals(line):
+            yield line, ends.get(_which(line)), resumed_at
+        elif line["event"] == "trial_started":
+            started = line
+        elif line["event"] == "interval_started":
+            yield {**started, "interval": line["interval"]}, ends.get(_which(line)), resumed_at
+
+
+def _ran(
+    path: Path, kept: Mapping[str, Any], key: blinding.Key, lines: Sequence[Line]
+) -> tuple[Protocol, dict[str | None, _Device], tuple[int, str]]:
+    """Return what ran, by the receipt that was ``kept`` at ``path``: protocol, devices, and seed with participant.
+
+    Devices are by the time at which they were opened again; that of the session's beginning is under None.
+    """
+    try:
+        described = {None: kept["device"]} | {entry["at"]: entry["device"] for entry in kept.get("resumed", ())}
+        described |= {line["at"]: line["described"] for line in lines if line["event"] == "device_reconnected"}
+        devices = {
+            at: _Device(float(device.get("force_limit_n", np.inf)), dynamics_from(device), rules_from(device))
+            for at, device in described.items()
+        }
+        whose = kept["seed"], kept["participant"]
+        return as_recorded(whole_protocol(kept["protocol"], key), kept, key), devices, whose
+    except KeyError as lacking:
+        raise StoreError(f"{path} lacks {lacking}: restore it from a copy") from lacking
+    except (AttributeError, TypeError, ValueError):  # said without the reason, which would tell conditions
+        raise StoreError(
+            f"{path} and the study's key give no protocol that this version can run: restore them from a copy"
+        ) from None

@@ -1,0 +1,66 @@
+"""Motions of the accuracy table, and its survey of liquids."""
+
+import numpy as np
+import pytest
+
+from study_app.cli.evidence.accuracy import motion_along
+from study_app.errors import StudyError
+from study_app.evidence.accuracy.comparison import accuracy
+from study_app.evidence.accuracy.liquid_survey import PUBLISHED, survey
+from study_app.haptics.model.motion import Motion
+from study_app.protocol.load import load_scenes
+from tests.evidence.accuracy.scenes import TANK, compiled
+
+pytestmark = pytest.mark.slow
+
+
+@compiled
+def test_a_motion_that_meets_no_force_is_refused():
+    rest = Motion(np.arange(100) / 1000, np.zeros((100, 3)))
+    with pytest.raises(StudyError, match="along a rest water exerts no force"):
+        accuracy(TANK, None, rest, named="a rest")
+
+
+def test_a_motion_file_of_another_rate_is_brought_to_the_scenes(tmp_path):
+    rows = "\n".join(f"{k / 50},{k / 100},0,0" for k in range(21))
+    (tmp_path / "slow.csv").write_text(f"t_s,x_m,y_m,z_m\n{rows}\n", encoding="utf-8")
+    read = motion_along(str(tmp_path / "slow.csv"), TANK)
+    assert read.t_s == pytest.approx(np.arange(401) / 1000)
+    assert read.position_m[:, 0] == pytest.approx(read.t_s / 2)
+
+
+CHOSEN = ("water", "honey", "olive_oil")
+
+
+@pytest.fixture(scope="module")
+def found():
+    scenes = load_scenes("physical2")
+    return {it.liquid: it for it in survey({name: scenes[name] for name in CHOSEN})}
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_a_published_law_is_stokes_drag_at_rest_and_a_spheres_at_its_end(name):
+    """The bounds are those of the spheres' standard drag curve: C_d 1.09 at Re 100, 0.38 to 0.5 from Re 3000 on."""
+    law = PUBLISHED[name]
+    assert law(1e-9) == pytest.approx(1, abs=1e-5)
+    assert law(100.0) * 24 / 100 == pytest.approx(1.09, rel=0.025)
+    for reynolds in (3e3, 1e4, 1e5):
+        assert 0.38 <= law(reynolds) * 24 / reynolds <= 0.5
+
+
+@compiled
+def test_each_liquid_is_compared_with_what_is_known_of_it(found):
+    assert list(found) == ["honey", "olive_oil", "water"]
+    honey, oil, water = found.values()
+    assert (honey.model, oil.model, water.model) == ("unsteady drag", "unsteady drag", "constant C_d + added mass")
+    assert max(honey.creeping, oil.creeping) < 0.01
+    assert 0 < honey.solver < 0.04
+    assert 0 < honey.steady < 0.05
+    assert honey.solver_reynolds[0] == pytest.approx(0.3, rel=0.05)
+    assert honey.solver_reynolds[1] == pytest.approx(honey.reynolds, rel=1e-3)
+    assert (oil.solver, water.solver, water.creeping) == (None, None, None)
+    assert water.reynolds == pytest.approx(998.2 * 0.6 * 0.068 / 1.0016e-3, rel=1e-3)
+    for it in found.values():
+        assert it.expected.causes.law < 0.08
+        assert 0.04 < it.expected.error_share < 0.16 + it.expected.causes.limits
+        assert it.expected.cost_ns > 0

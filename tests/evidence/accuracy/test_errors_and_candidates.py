@@ -1,0 +1,67 @@
+"""Errors of forces, their Pareto front, and the models that a scene is compared with."""
+
+import math
+
+import numpy as np
+import pytest
+
+from study_app.evidence.accuracy import candidate_sets
+from study_app.evidence.accuracy.candidates import LinearRung, TickRung
+from study_app.evidence.accuracy.comparison import Row, Time, front
+from study_app.evidence.force_error import Error, error_of
+from study_app.evidence.reference_solutions import Case, Truth
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import MotionBox
+from tests.evidence.accuracy.scenes import REAL, TANK
+
+pytestmark = pytest.mark.slow
+
+
+def one_case(*force_n):
+    force = np.array(force_n, float)
+    motion = Motion(np.arange(len(force)) / 1000, np.zeros_like(force))
+    return Truth("one", "", (Case(motion, force, np.array([True] * (len(force) - 1) + [False])),))
+
+
+def test_errors_are_of_the_rows_that_count_and_shares_of_the_true_force():
+    error = error_of([np.array([[1.0, 0, 0], [0, 2.5, 0], [9, 9, 9]])], one_case((2, 0, 0), (0, 2, 0), (0, 0, 0)))
+    assert error.rms_n == pytest.approx(math.sqrt((1 + 0.25) / 2))
+    assert error.most_n == 1
+    assert error.rms == pytest.approx(error.rms_n / 2)
+    assert error.most == 0.5
+    assert error.direction_deg == 0
+    assert error.target == 0.05
+
+
+def test_direction_counts_where_the_force_is_felt():
+    truth = one_case((2, 0, 0), (0.04, 0, 0), (0, 0, 0))
+    error = error_of([np.array([[0, 1.0, 0], [-1, 0, 0], [0, 0, 0]])], truth)
+    assert error.direction_deg == pytest.approx(90)
+    weak = error_of(
+        [np.array([[1e-3, 0, 0], [0, 1e-3, 0], [0, 0, 0]])], one_case((1e-3, 0, 0), (1e-3, 0, 0), (0, 0, 0))
+    )
+    assert weak.direction_deg == pytest.approx(math.sqrt(90**2 / 2))
+    assert weak.target == pytest.approx(50)
+
+
+def test_the_front_takes_rounding_errors_and_times_within_a_twentieth_as_equal():
+    def row(name, ns, rms):
+        rung = TickRung(name, name, "tick", TANK)
+        return rung, Row(
+            "numerical", "water", "t", rung, Error(0, 0, rms, 0, 0, 0.05), Time(ns, ns, 1), 1, chosen=False
+        )
+
+    points = dict([row("quick", 10, 0.5), row("dear", 20, 0.6), row("sums", 30, 1e-13), row("list", 900, 1e-16)])
+    assert [rung.name for rung in front(points)] == ["quick", "sums"]
+    alike = dict([row("quick", 100, 0.5), row("truer", 104, 0.1), row("truest", 150, 0.01)])
+    assert [rung.name for rung in front(alike)] == ["truer", "truest"]
+
+
+@pytest.mark.parametrize(("speed_mps", "expects"), [(1e-3, "no resistance"), (0.6, "+ history")])
+def test_the_ladder_has_the_gates_own_choice(speed_mps, expects):
+    box = MotionBox(speed_mps=speed_mps, acceleration_mps2=10 * speed_mps)
+    rungs, choice = candidate_sets.physical(REAL.model_copy(update={"motion": box}))
+    assert choice in rungs
+    assert expects in choice.name
+    assert isinstance(rungs[0], LinearRung)
+    assert candidate_sets.numerical(TANK)[1].name == "O(1) wake"

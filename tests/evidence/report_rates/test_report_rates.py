@@ -1,0 +1,99 @@
+"""How often verdicts are wrong: the simulated truth, and the quick way to the same verdicts."""
+
+import pytest
+
+from study_app.analysis.evaluate import found_in
+from study_app.analysis.findings.block_tests import of_tables
+from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay
+from study_app.analysis.findings.other_assumptions import SameWithOtherAssumptions
+from study_app.analysis.findings.recognition import LiquidRecognition
+from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer
+from study_app.analysis.planning.simulated_studies import plan
+from study_app.evidence.report_rates import known_effects as studies
+from study_app.evidence.report_rates import single_test_rates
+from study_app.evidence.report_rates.known_effects import EXTENTS, GENERATORS, Generator, Simulated, answers, simulated
+from study_app.evidence.report_rates.rates import markdown, table
+from study_app.evidence.report_rates.study_rates import CLAIMED, LOST, Cell, count, truth
+from study_app.protocol.load import load
+from study_app.protocol.simulated_observer import TrialFeatures
+
+
+@pytest.fixture(scope="module")
+def rek() -> Simulated:
+    """The thesis' study as if each liquid had its own force, without any rehearsal."""
+    protocol = load("rek2024")
+    force_n = {"water": 0.3, "honey": 1.2, "light_oil": 0.6}
+    felt = {
+        (block.id, name): (
+            TrialFeatures(force_n.get(name, 0.3), 3 * force_n.get(name, 0.3), 0.1, 0.05, 0.1, protocol.delay_s(name)),
+        )
+        for block in protocol.main_blocks
+        for name in block.conditions
+    }
+    return simulated(protocol, plan(protocol, felt))
+
+
+def test_each_generator_answers_in_its_own_way(rek: Simulated) -> None:
+    one, other = (answers(rek, generator, "full", 20, 3, 1) for generator in GENERATORS)
+    assert all((first != second).any() for first, second in zip(one, other, strict=True))
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+@pytest.mark.parametrize("participants", [5, 15])
+def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Simulated, participants: int) -> None:
+    people = tuple(f"P{number}" for number in range(participants))
+    for extent in EXTENTS:
+        given = answers(rek, "ordinal probit", extent, participants, 5, 2)
+        for block, values in zip(rek.blocks, given, strict=True):
+            single_ = {item.id: values[:, :, [column]] for column, item in enumerate(block.items)}
+            whole, quick = (
+                found_in(
+                    None, of_tables(block, rek.decided, people, single_, planning=False, verdicts_only=verdicts_only)
+                )
+                for verdicts_only in (False, True)
+            )
+            assert [one.verdict for one in ContrastsWithControl.of(quick)] == [
+                one.verdict for one in ContrastsWithControl.of(whole)
+            ]
+            assert (SettingsDiffer.of(quick), Pairs.of(quick)) == (SettingsDiffer.of(whole), Pairs.of(whole))
+            assert [one.p_adjusted for one in DelayTrend.of(quick)] == [one.p_adjusted for one in DelayTrend.of(whole)]
+            assert (LowestDelay.of(quick), DetectionThreshold.of(quick), SameWithOtherAssumptions.of(quick).mixed) == (
+                LowestDelay.of(whole),
+                DetectionThreshold.of(whole),
+                (),
+            )
+            recognised = LiquidRecognition.of(whole), LiquidRecognition.of(quick)
+            assert len({None if one is None else (one.verdict, one.found.p) for one in recognised}) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("generator", GENERATORS)
+def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(studies, "TRUTH", 200)
+    cells = [Cell(generator, extent, 5) for extent in EXTENTS]
+    rates = [rate for cell in cells for rate in count(rek, cell, truth(rek, cell), 1, 0, 2)]
+    assert {rate.studies for rate in rates} == {2}
+    assert {rate.cell for rate in rates} == {f"{generator}, {extent}" for extent in EXTENTS}
+    assert [rate.hits for rate in rates if rate.what == LOST[0]] == [0, 0, 0]
+    assert sum(rate.what == CLAIMED for rate in rates) == 2
+    assert not [rate for rate in rates if rate.limit == "at most 5 %" and rate.hits == 2]
+    assert {"detection threshold printed (delays)", "equal liquids distinguished (liquids)"} <= {
+        one.what for one in rates
+    }
+    assert rates == [rate for cell in cells for rate in count(rek, cell, truth(rek, cell), 1, 0, 2)]
+    assert len(markdown(rates).splitlines()) == len(table(rates).splitlines()) + 1 == len(rates) + 2
+
+
+@pytest.mark.slow
+def test_single_tests_are_counted() -> None:
+    (leaning,) = single_test_rates.count(("one in five differs by 5 points, the others by 0", 24), 1, 0, 4)
+    assert (leaning.studies, leaning.limit) == (4, "at most 5 %")
+    printed, covered = single_test_rates.count(("one threshold for all", 12), 1, 0, 4)
+    assert (printed.what, printed.hits, printed.studies, printed.limit) == (
+        single_test_rates.PRINTED,
+        4,
+        4,
+        "at least 93 %",
+    )
+    assert covered.hits >= 2

@@ -1,0 +1,111 @@
+"""The groups of cases beside the sweep: what is in them, and that loops and samples are disturbed as they say."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from study_app.evidence.stability.case_groups import CASES, groups
+from study_app.evidence.stability.closed_loop import begin
+from study_app.evidence.stability.device_bench import new_bench, new_trace
+from study_app.evidence.stability.stability_cases import materials, of_physical2, parse
+from study_app.evidence.stability.verdict import MISJUDGED_ALLOWANCE_J, judge
+from tests.haptics.scenes import COMPILED
+
+pytestmark = [pytest.mark.nightly, pytest.mark.slow]
+
+compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
+
+OTHER_LIQUIDS = {"non-Newtonian liquids": materials, "liquids of physical2": of_physical2}
+
+
+@pytest.fixture(scope="module")
+def all_groups():
+    return {group.name: group.cases for group in groups()}
+
+
+@compiled
+def test_a_sample_of_closed_loops_in_other_liquids_is_stable():
+    sampled = [group for group in groups(count=25) if group.name.startswith(tuple(OTHER_LIQUIDS))]
+    unstable = [case for group in sampled for case in group.cases if not judge(case, safe=True).stable]
+    assert not unstable
+
+
+def test_groups_follow_from_the_seed_and_can_be_thinned_out(all_groups):
+    assert {group.name: group.cases for group in groups()} == all_groups
+    assert groups("another")[0].cases != groups()[0].cases
+    few = groups(count=10)
+    assert {len(group.cases) for group in few} == {10}
+    assert max(map(len, all_groups.values())) > CASES
+
+
+def test_lines_of_earlier_versions_still_describe_the_same_case():
+    old = "liquid=syrup scale=20 rate_hz=500 delay=2 hand=thrown motion=stroke speed_mps=0.6 mass_kg=0.25 missed=0.02"
+    case = parse(old)
+    assert case.believed_delay == case.delay == 2
+    assert (case.plant, case.lost, case.duplicated, case.burst_ms, case.slows_to) == ("handle", 0.0, 0.0, 0.0, -1)
+
+
+def samples(case, ticks):
+    """Return of each tick whether its sample is new, and its position."""
+    bench, trace = new_bench(case, safe=True), new_trace(case)
+    begin(bench.loop, bench.handle)
+    fresh, places = [], []
+    for k in range(ticks):
+        bench.run(trace[: k + 1], k, math.inf)
+        fresh.append(bool(bench.sample[0].fresh))
+        places.append(bench.sample[0].position_m.copy())
+    return np.array(fresh), np.array(places)
+
+
+@compiled
+def test_hand_that_breaks_the_wake_at_each_reversal_is_as_restless_without_feedback():
+    """The wake of light oil turns the force at each reversal of 4 Hz, with the motors off more than with them."""
+    released = "liquid=light_oil hand=lets-go motion=sine speed_mps=0.75398 release_s=0.7 plant=arm"
+    held = dataclasses.replace(parse(released), hand="middle")
+    for case in (parse(released), held):
+        verdict = judge(case, safe=True)
+        assert verdict.stable, verdict
+
+
+SHORT = "hand=lets-go motion=sine viscous_nspm=0 plant=arm delay={} believed={} liquid={} scale={} mass_kg={} "
+TAR, THROWN_TAR = "speed_mps=0.1885 release_s=1.01667", "hand=thrown speed_mps=0.3 quantum_um=60 noise_um=30"
+
+
+@compiled
+@pytest.mark.parametrize(
+    "line",
+    [
+        SHORT.format(1, 0, "physical_tar", 3, 0.1) + TAR,  # accounted as a loop without delay
+        SHORT.format(2, 1, "light_oil", 10, 0.03) + "speed_mps=0.37699 release_s=0.85",  # a swing paid by the motion
+        SHORT.format(2, 1, "dense", 10, 0.1) + "speed_mps=0.1885 release_s=0.93333",
+        SHORT.format(2, 1, "dense", 10, 0.03) + "speed_mps=0.37699 release_s=0.93333",  # LIGHTER
+        SHORT.format(2, 1, "light_oil", 10, 0.05)
+        + "speed_mps=0.37699 release_s=1.05833 viscous_nspm=0.5 estimator=kalman",  # LIGHTER
+        SHORT.format(3, 2, "physical_tar", 3, 0.05)
+        + "rate_hz=500 estimator=kalman motion=reaches "
+        + THROWN_TAR,  # KALMAN_SHARE
+        SHORT.format(2, 1, "physical_tar", 1, 0.2) + "motion=stroke speed_mps=1 estimator=kalman",  # KALMAN_SLEW
+    ],
+)
+def test_a_delay_one_tick_longer_than_believed_leaves_the_loop_stable(line):
+    verdict = judge(parse(line), safe=True)
+    assert verdict.stable, verdict
+    assert verdict.balance_j > -MISJUDGED_ALLOWANCE_J
+
+
+@compiled
+@pytest.mark.parametrize(
+    "line",
+    [
+        "liquid=physical_tar scale=3 delay=2 hand=light motion=stroke speed_mps=0.6 mass_kg=0.05 viscous_nspm=0.5 "
+        "quantum_um=20 noise_um=30 jitter=0.2 missed=0.02 plant=arm",
+        "liquid=syrup scale=10 rate_hz=500 delay=2 hand=firm motion=stroke speed_mps=0.6 mass_kg=0.25 viscous_nspm=0 "
+        "plant=arm",
+    ],
+)
+def test_repeated_samples_do_not_make_the_force_restless(line):
+    verdict = judge(parse(f"{line} duplicated=0.05 estimator=kalman"), safe=True)
+    assert verdict.stable, verdict
+    assert verdict.fast_n < verdict.played_n + 0.02

@@ -1,0 +1,256 @@
+"""What a scene costs and how true it is, here and in the process that answers a lab."""
+
+import itertools
+import math
+from dataclasses import replace
+
+import numba
+import numpy as np
+import pytest
+
+from study_app.errors import StudyError
+from study_app.evidence import appraisal_measurement, cost
+from study_app.evidence.appraisal import Costs
+from study_app.evidence.appraisal_measurement import withheld_share
+from study_app.evidence.appraisal_worker import Question, appraise, start_appraisal_worker
+from study_app.evidence.cost import measure, report
+from study_app.evidence.expected_error import error_report, expected
+from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
+from study_app.haptics.model.effects.current import Uniform
+from study_app.haptics.model.effects.wake import Wake
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Box, Ewma, Given, Kalman, Line, Liquid, MotionBox, Raw, Scene
+from study_app.haptics.runtime.offline import samples_along
+from study_app.protocol.load import load, load_scenes
+from study_app.protocol.trials.tasks import Explore, Reach, Stroke
+from tests.haptics.materials import PRESETS, tank
+
+if numba.config.DISABLE_JIT:
+    pytest.skip("costs are those of compiled code", allow_module_level=True)
+
+THESIS, PHYSICAL = load_scenes("rek2024"), load_scenes("physical_liquids")
+SHAKE = Stroke(5.0, 0.03)
+QUICK = Stroke(8.0, 0.03)
+
+
+def test_costs_name_every_effect_and_why_it_is_not_there() -> None:
+    found = {it.effect: it for it in appraisal_measurement.costs(THESIS["water"], batches=5).effects}
+    assert found["wake"].ns is not None
+    assert found["wake"].ns > 0
+    assert (found["history"].ns, found["history"].why) == (None, "not used")
+    chosen = {it.effect: it for it in appraisal_measurement.costs(PHYSICAL["water"], batches=5).effects}
+    assert chosen["buoyancy"].ns is None
+    assert chosen["buoyancy"].why.startswith("out, 0.")
+    assert chosen["current"].why == "not used"
+
+
+@pytest.mark.parametrize("name", ["water", "light_oil", "syrup"])
+def test_the_thesis_liquids_are_the_definition_to_rounding(name: str) -> None:
+    found = appraisal_measurement.errors(THESIS[name])
+    assert found.wake is not None
+    assert found.force_n is not None
+    assert found.wake < 1e-12
+    assert found.force_n < 1e-9
+    assert found.left_out == ()
+
+
+@pytest.mark.parametrize(
+    ("unknown", "now", "known"),
+    [
+        (UNKNOWN, (0.11, 0.14), (0.0, 0.012)),  # EWMA in place of the Kalman filter
+        (Dynamics(1e-3, assumed=("count_m",)), (0.0, 0.02), (0.0, 0.012)),
+        (Dynamics(1e-3, 10e-6, assumed=("mass_kg",)), (0.0, 0.012), (0.0, 0.012)),
+    ],
+)
+def test_the_velocity_is_worse_where_the_devices_numbers_are_unknown(
+    unknown: Dynamics, now: tuple[float, float], known: tuple[float, float]
+) -> None:
+    scene = THESIS["honey"].model_copy(update={"velocity": Kalman()})
+    found = appraisal_measurement.velocity_errors(scene, unknown)
+    assert now[0] < found[0] < now[1]
+    assert known[0] < found[1] < known[1]
+    assert (found[0] > found[1]) == (unknown.assumed != ("mass_kg",))
+
+
+def test_an_error_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A reference with a tail of one element less is another liquid."""
+    true = appraisal_measurement.reference_model.respond
+
+    def shorter(scene, motion, *, exact=False):  # type: ignore[no-untyped-def]
+        liquid = scene.liquids[0]
+        wake = liquid.wake.model_copy(update={"length": liquid.wake.length - 1})
+        other = scene.model_copy(update={"liquids": (liquid.model_copy(update={"wake": wake}),)})
+        return true(other, motion, exact=exact)
+
+    monkeypatch.setattr(appraisal_measurement.reference_model, "respond", shorter)
+    found = appraisal_measurement.errors(THESIS["light_oil"])
+    assert found.wake is not None
+    assert found.wake > 1e-4
+
+
+@pytest.mark.parametrize(
+    ("velocity", "lag_ms"),
+    [(Ewma(), 9.5), (Ewma(alpha=0.5), 1.5), (Raw(), 0.5), (Line(samples=15), 7.0)],
+    ids=["ewma", "quick", "raw", "line"],
+)
+def test_the_lag_of_a_filter_is_that_of_its_closed_form(velocity: Ewma, lag_ms: float) -> None:
+    scene = THESIS["water"].model_copy(update={"velocity": velocity})
+    assert 1e3 * appraisal_measurement.lag_s(scene) == pytest.approx(lag_ms, rel=1e-6)
+
+
+def test_an_exploration_may_be_shaken_and_a_reach_goes_as_far_as_its_targets() -> None:
+    tank_m = (0.1, 0.06, 0.06)
+    assert Explore(kind="explore", min_s=1, max_s=3, instruction="Explore.").fastest_stroke(tank_m) == SHAKE
+    assert Explore(kind="explore", min_s=1, max_s=3, instruction="Explore.").fastest_stroke((0.04, 0.06, 0.06)) == (
+        5.0,
+        0.02,
+    )
+    reach = load("rek2024").tasks["reach"]
+    assert isinstance(reach, Reach)
+    stroke = reach.fastest_stroke(tank_m)
+    following = zip(reach.targets_m, (*reach.targets_m[1:], reach.targets_m[0]), strict=True)
+    assert 2 * stroke.amplitude_m == pytest.approx(max(math.dist(*pair) for pair in following))
+    assert stroke.frequency_hz == pytest.approx(1 / 0.6)
+
+
+def test_a_stroke_is_made_where_the_device_is_in_the_scene() -> None:
+    here = THESIS["light_oil"]
+    origin_m = (2.0, -1.0, 0.5)
+    there = here.model_copy(
+        update={
+            "origin_m": origin_m,
+            "liquids": tuple(
+                liquid.model_copy(update={"region": Box(centre_m=origin_m, size_m=(1.0, 1.0, 1.0))})
+                for liquid in here.liquids
+            ),
+        }
+    )
+    assert withheld_share(there, QUICK, UNKNOWN) == pytest.approx(withheld_share(here, QUICK, UNKNOWN), rel=1e-3)
+
+
+def test_what_is_withheld_depends_on_the_device_and_the_rate() -> None:
+    scene = THESIS["light_oil"]
+    usual = withheld_share(scene, QUICK, Dynamics(1e-3))
+    light = withheld_share(scene, QUICK, Dynamics(1e-3, mass_kg=0.02))
+    late = withheld_share(scene, QUICK, Dynamics(3e-3))
+    slow = withheld_share(scene.model_copy(update={"rate_hz": 500.0}), QUICK, Dynamics(1e-3))
+    assert len({usual, light, late, slow}) == 4
+    t_s = np.arange(10) / 1000
+    delays = samples_along(scene, Motion(t_s, np.zeros((10, 3))), Dynamics(2.5e-3)).delay_ticks
+    assert set(delays) == {3}
+
+
+@pytest.mark.slow
+def test_the_process_answers_the_newest_question_and_ends_when_closed() -> None:
+    worker = start_appraisal_worker()
+    try:
+        worker.order(Question(THESIS["honey"]))
+        device = Dynamics(2e-3, mass_kg=0.05)
+        newest = worker.order(Question(THESIS["light_oil"], QUICK, device))
+        answered: dict[int, list[object]] = {}
+        while len(answered.get(newest, [])) < 2:
+            told = worker.answers(wait_s=120.0)  # the first time it compiles
+            assert told
+            for number, answer in told:
+                answered.setdefault(number, []).append(answer)
+        assert answered[1][-1] is None, "it was given up for the newer one"
+        first, second = answered[newest]
+        assert isinstance(first, Costs)
+        assert [it.effect for it in first.effects if it.ns is not None] == ["drag", "wake"]
+        share = withheld_share(THESIS["light_oil"], QUICK, device)
+        assert share != withheld_share(THESIS["light_oil"], QUICK, UNKNOWN)
+        assert second == replace(appraisal_measurement.errors(THESIS["light_oil"]), withheld=share)
+        assert worker.works
+    finally:
+        worker.close()
+    assert not worker.works
+    worker.wait_until_ended()
+    assert worker.ended
+    worker.order(Question(THESIS["honey"]))
+    assert worker.answers() == []
+
+
+def test_what_cannot_be_measured_is_said() -> None:
+    wild = THESIS["water"].model_copy(update={"rate_hz": 100.0})  # slower than any loop that is known to be stable
+    told: list[object] = []
+    with pytest.raises(StudyError, match="no stable force is known"):
+        appraise(Question(wild), told.append, lambda: False)
+    assert told == []
+
+
+STROKES = MotionBox(speed_mps=0.6, acceleration_mps2=6)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.slow
+def test_non_newtonian_liquids_are_compared_with_their_law_added_mass_and_buoyancy(name):
+    whole = tank(name, scale=3.0, effects=("non_newtonian", "added_mass", "buoyancy"), motion=STROKES)
+    found = expected(whole)
+    assert found.causes.law < 0.05
+    assert 0.03 < found.error_share < 0.2 + found.causes.limits
+    known = expected(whole.model_copy(update={"velocity": Given()}))
+    assert known.error_share < 0.05 + known.causes.limits
+    lacking = expected(tank(name, scale=3.0, motion=STROKES))
+    assert lacking.causes.law > found.causes.law + 0.02
+    assert f"{PRESETS[name][1].kind} law (no reference in unsteady flow)" in error_report(whole)
+
+
+RIVER = Liquid(
+    id="river",
+    density_kg_m3=1000,
+    viscosity_pa_s=1e-3,
+    effects=("drag", "wake"),
+    wake=Wake(length=100, scaling=100),
+    current=Uniform(velocity_mps=(1, 0, 0)),
+)
+POOL = Liquid(id="pool", density_kg_m3=900, region=Box(size_m=(1, 1, 1)), effects="auto")
+BOTH = Scene(scale=3, liquids=(RIVER, POOL))
+
+
+class Clock:
+    """Says how long each batch took, by the scene it was of: a stopwatch under the test's control."""
+
+    def __init__(self, monkeypatch, cost_ns):
+        self.now_ns = 0
+        monkeypatch.setattr(cost.time, "perf_counter_ns", lambda: self.now_ns)
+
+        def run(bench, ticks):
+            self.now_ns += ticks * cost_ns(bench.scene)
+
+        original = cost.Bench.__init__
+
+        def begin(bench, scene):
+            bench.scene = scene
+            original(bench, scene)
+
+        monkeypatch.setattr(cost.Bench, "__init__", begin)
+        monkeypatch.setattr(cost.Bench, "run", run)
+
+
+PRICES = {"drag": 2, "wake": 40, "current": 5, "buoyancy": 3, "surface": 7, "added_mass": 11, "history": 90}
+
+
+def test_each_effect_costs_what_it_adds(monkeypatch):
+    Clock(monkeypatch, lambda scene: 20 + sum(PRICES[it] for liquid in scene.liquids for it in liquid.effects))
+    measured = measure(BOTH, batches=3)
+    expected = {("river", name): PRICES[name] for name in PRICES if name != "surface"}
+    expected |= {("pool", name): PRICES[name] for name in ("drag", "buoyancy", "surface", "added_mass")}
+    assert measured.effects_ns == expected
+    assert measured.rest_ns == 20
+    chosen = ("drag", "buoyancy", "added_mass")  # the pool's surface is out of reach
+    assert measured.scene_ns == 20 + 2 + 40 + sum(PRICES[it] for it in chosen)
+
+
+def test_the_median_is_told_not_the_mean(monkeypatch):
+    times = itertools.cycle([10, 10, 1000])
+    Clock(monkeypatch, lambda scene: next(times))
+    assert measure(Scene(), batches=9).rest_ns == 10
+
+
+def test_a_report_has_the_gates_table_with_costs_and_the_whole(monkeypatch):
+    Clock(monkeypatch, lambda scene: 20 + sum(PRICES[it] for liquid in scene.liquids for it in liquid.effects))
+    lines = report(Scene(liquids=(RIVER,)), batches=1).splitlines()
+    assert lines[0].startswith("river: effects named")
+    assert [line.split()[3] for line in lines[2:4]] == ["2", "40"]
+    assert lines[-1] == "one tick: 62 ns, 0.01 % of the tick period; 20 ns of it without liquids"

@@ -1,0 +1,111 @@
+"""Texts, tables and figures of results made up from their types, compared with reviewed files."""
+
+import sys
+import typing
+from collections import namedtuple
+from collections.abc import Callable, Iterator
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from study_app.evidence.accuracy import accuracy_report, candidates, liquid_survey
+from study_app.evidence.outlets import outlet_report
+from study_app.evidence.report_rates import rates
+from study_app.evidence.soak import soak
+from study_app.evidence.stability import delivered_force, force_delay, stability_report, withheld_force
+from study_app.evidence.thresholds import noticed_delays, verdicts
+from study_app.evidence.timing import delay_report, device_lateness, timing_report
+from study_app.evidence.timing.delay_results import Shown
+from study_app.evidence.velocity import criteria
+from tests.filled import filled
+from tests.golden import CHANGING, compare
+from tests.golden_figures import figure_of, stub_png
+
+GOLDEN = Path(__file__).parent / "golden"
+
+
+def shown(rng: np.random.Generator) -> tuple[Any, ...]:
+    """Return a trial of every screen, load and delay."""
+    places = product(("60 Hz", "144 Hz"), typing.get_args(typing.get_type_hints(Shown)["load"]), (0.0, 0.1))
+    return tuple(filled(Shown, rng, screen=screen, load=load, delay_s=late) for screen, load, late in places)
+
+
+def rung(rng: np.random.Generator) -> Any:
+    """Return what a report reads of a rung."""
+    family = filled(typing.get_type_hints(candidates.Rung)["family"], rng)
+    name, rate = filled(str, rng), float(rng.choice([250, 1000]))
+    return namedtuple("Rung", "name label family rate_hz counted")(name, name[:4], family, rate, bool(rate < 500))
+
+
+FAULTS = sys.modules[soak.FaultyDevice.__module__].FAULTS
+
+
+def soaked(to: Path) -> tuple[Path, ...]:
+    """Write soaks that passed, were cut short and failed."""
+    paths: list[Path] = []
+    for name, share in (("clean", 0), ("some", 1), ("failed", 9)):
+        rng = np.random.default_rng(share)
+        counts, device = (np.zeros(1, kind).view(np.recarray)[0] for kind in (soak.sample_audit.COUNTS, FAULTS))
+        for record in (counts, device):
+            for field in record.dtype.names if share else ():
+                record[field] = rng.integers(0, share + 1, record.dtype[field].shape)
+        drift, rests = (
+            soak.Drift(7, 1e-12 * 10**share, 30.0),
+            soak.Rests(share, 0.1 * share, 1e-5 * share, 0.001 * share),
+        )
+        made = filled(
+            soak.Soaked, rng, drift=drift, rests=rests, counts=counts, device=device, rate_hz=1000.0, seed=share,
+            memory=(2**20, 2**21, 2**21 + share * 2**18), planned=3600, ticks=3600 - share, stops=share,
+        )  # fmt: skip
+        paths += [path.rename(to / f"{name}-{path.name}") for path in made.write(to)]
+    return tuple(paths)
+
+
+GIVEN: dict[str, Any] = {
+    "acted": lambda rng: tuple(rng.choice([0.0, 0.03, 0.4], len(stability_report.LIMITER_NAMES)).tolist()),
+    "shown": shown, "rung": rung, "truths": (), "studies": 400, "hits": lambda rng: int(rng.choice([0, 12, 24, 390])),
+    "delay": lambda rng: int(rng.integers(1, 4)),
+    "device": lambda rng: str(rng.choice(list(delivered_force.DEVICES))),
+    "strokes": lambda rng: tuple(rng.choice([0.0, 0.03, 0.2], len(withheld_force.STROKES)).tolist()),
+    "after": lambda rng: tuple(tuple(rng.choice([0.0, 0.0004, 0.1], 4).tolist()) for _ in withheld_force.QUICK),
+    "reasons": lambda rng: tuple(rng.choice(["not finite", "swing"], int(rng.integers(0, 3)), replace=False)),
+}  # fmt: skip
+QUICK = (
+    timing_report.text, delay_report.text, device_lateness.text, outlet_report.stream_text, outlet_report.trigger_text,
+    verdicts.markdown, verdicts.table, noticed_delays.markdown, rates.markdown, rates.table,
+    stability_report.group_table, stability_report.in_words, stability_report.summary, force_delay.report,
+    criteria.report, withheld_force.report, delivered_force.report,
+)  # fmt: skip
+SLOW = (timing_report.write, delay_report.write, accuracy_report.write, liquid_survey.survey_markdown, soaked)
+REPORTS = (*QUICK, *(pytest.param(make, marks=pytest.mark.slow) for make in SLOW))
+
+
+def lines_of(make: Callable[..., Any], seed: int, folder: Path) -> Iterator[str]:
+    """Yield what a function returns or writes of results."""
+    rng = np.random.default_rng(seed)
+    hints = typing.get_type_hints(make)
+    written = [
+        folder if kind is Path else filled(kind, rng, **GIVEN) for name, kind in hints.items() if name != "return"
+    ]
+    made = make(*written)
+    if not isinstance(made, tuple):
+        yield made.decode() if isinstance(made, bytes) else str(made)
+        return
+    for path in sorted(one for one in made if one.suffix != ".svg"):
+        content = path.read_bytes()
+        yield f"## {path.name}"
+        yield from figure_of(content) if content.startswith(b"\x89PNG") else content.decode().splitlines()
+
+
+@pytest.mark.parametrize("make", REPORTS, ids=lambda make: f"{make.__module__.rpartition('.')[2]}-{make.__name__}")
+def test_reports_of_results(
+    make: Callable[..., Any], tmp_path: Path, pytestconfig: pytest.Config, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Figure, "savefig", lambda figure, to, **_: to.write(stub_png(figure)))
+    seeds = 1 if make is soaked else 2 if make.__name__ == "write" else 4
+    found = [line for seed in range(seeds) for line in (f"##### {seed}", *lines_of(make, seed, tmp_path))]
+    compare(GOLDEN / f"{make.__module__.rpartition('.')[2]}-{make.__name__}.txt", found, pytestconfig, mask=CHANGING)

@@ -1,0 +1,148 @@
+"""What each figure of the thesis states, asserted on the very runs that are drawn; then the files."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from study_app.errors import StoreError
+from study_app.evidence import thesis_figures, thesis_motions
+from study_app.evidence.thesis_motions import EXPONENTS, FIGURES, LENGTH, figure_3, figure_4, figure_5, figure_6
+from tests.haptics.scenes import COMPILED, WATER_FACTOR, vectors
+
+pytestmark = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
+
+INITIAL_N = WATER_FACTOR  # plain drag at 1 m/s
+
+
+def size(vectors_n):
+    """Return lengths (n,)."""
+    return np.linalg.norm(vectors_n, axis=1)
+
+
+def along(vectors_n, run):
+    """Return the part (n,) of each vector along the motion."""
+    return (vectors_n * run.motion.velocity_mps).sum(axis=1)
+
+
+def force(run):
+    """Return the force (n, 3) [N] of a run."""
+    return vectors(run.table, "force")
+
+
+def tick_of(shown, word):
+    """Return the row of an event."""
+    ((time_s, _),) = [event for event in shown.events if event[1] == word]
+    return int(np.searchsorted(shown.runs[0].motion.t_s, time_s))
+
+
+def test_figure_3_constant_force_against_the_motion_and_none_from_the_stop_on():
+    shown = figure_3()
+    (run,), stop = shown.runs, tick_of(shown, "stop")
+    assert size(force(run))[:stop] == pytest.approx(INITIAL_N)
+    assert along(force(run), run)[:stop] == pytest.approx(-INITIAL_N)
+    assert run.motion.velocity_mps[stop - 1].any()
+    assert not force(run)[stop:].any()
+
+
+def test_figure_4_the_relative_speed_falls_linearly_and_the_force_as_its_square():
+    shown = figure_4()
+    (run,), stop = shown.runs, tick_of(shown, "stop")
+    relative = size(run.motion.velocity_mps - vectors(run.table, "wake"))[:stop]
+    slope, start = np.polyfit(np.arange(stop), relative, 1)
+    assert (slope * LENGTH, start) == pytest.approx((-0.94, 1.0), abs=0.03)
+    assert abs(slope * np.arange(stop) + start - relative).max() < 0.01
+    assert size(force(run))[:stop] == pytest.approx(INITIAL_N * relative**2)
+    assert (along(force(run), run)[:stop] < 0).all()
+
+
+def test_figure_4_after_the_stop_a_push_along_the_former_motion_that_ends():
+    shown = figure_4()
+    (run,), stop = shown.runs, tick_of(shown, "stop")
+    push = force(run)[stop:]
+    assert push[0] @ run.motion.velocity_mps[stop - 1] == pytest.approx(size(push)[0])
+    assert 0.85 * INITIAL_N < size(push)[0] < 0.95 * INITIAL_N
+    assert (np.diff(size(push)) <= 1e-15).all()
+    assert not push[LENGTH:].any()
+
+
+def test_figure_5_a_jump_above_plain_drag_then_the_fall_after_the_stop():
+    shown = figure_5()
+    (run,), turn, stop = shown.runs, tick_of(shown, "turn back"), tick_of(shown, "stop")
+    felt = size(force(run))
+    assert felt[turn - 1] < 0.05 * INITIAL_N
+    assert felt[turn] > 3 * INITIAL_N
+    assert (along(force(run), run)[turn : turn + 500] < 0).all()
+    assert felt[stop] < felt[stop - 1]
+    assert felt[-1] == 0.0
+
+
+def test_figure_6_the_wake_stays_limited_unless_the_breaking_angle_exceeds_the_turns():
+    broken, whole = figure_6().runs
+    assert "45°" in broken.label
+    assert "100°" in whole.label
+    last_leg = slice(-400, None)
+    assert size(vectors(broken.table, "wake"))[last_leg].max() < 0.8
+    assert size(force(broken))[last_leg].min() > 0.3 * INITIAL_N
+    assert size(vectors(whole.table, "wake"))[last_leg].min() > 0.9
+    assert size(force(whole))[last_leg].max() < 0.02 * INITIAL_N
+    assert size(force(broken))[0] == pytest.approx(INITIAL_N)
+
+
+def test_figure_7_a_coarser_resolution_fills_more_slowly():
+    runs = thesis_motions.figure_7().runs
+    wakes = [run.table.wake_x_mps for run in runs]
+    for finer, coarser in itertools.pairwise(wakes):
+        assert (coarser[1:] <= finer[1:] + 1e-12).all()
+        assert coarser[3000] == pytest.approx(finer[3000] / 2, rel=0.05)
+    assert wakes[0][5000] == pytest.approx(wakes[0][-1])
+    assert [round(abs(run.table.fx_n[3000]) / INITIAL_N, 1) for run in runs] == [0.2, 0.5, 0.7]
+
+
+@pytest.mark.slow
+def test_figure_8_the_wake_fills_as_the_power_of_the_share_that_is_filled():
+    runs = thesis_motions.figure_8().runs
+    fill = np.arange(LENGTH + 1) / LENGTH
+    reckoned = slice(LENGTH // 4, LENGTH)
+    for run, exponent in zip(runs, EXPONENTS, strict=True):
+        share = run.table.wake_x_mps[: LENGTH + 1]
+        assert share[reckoned] == pytest.approx(fill[reckoned] ** exponent, rel=0.07)
+        assert share[-1] == pytest.approx(0.94, abs=0.005)
+        assert size(force(run))[: LENGTH + 1] == pytest.approx(INITIAL_N * (1 - share) ** 2)
+    late = runs[-1].table
+    assert abs(late.fx_n[2500]) > 0.85 * INITIAL_N
+    assert abs(late.fx_n[4900]) < 0.05 * INITIAL_N
+    halves = [int(np.argmax(run.table.wake_x_mps > 0.5)) for run in runs]
+    assert halves == sorted(halves)
+
+
+@pytest.mark.slow
+def test_every_figure_has_its_number_title_and_caption():
+    made = [make() for make in FIGURES]
+    assert [shown.number for shown in made] == list(range(3, 3 + len(made)))
+    for shown in made:
+        drawn = thesis_figures.draw(shown)
+        words = " ".join(text.get_text().replace("\n", " ") for text in drawn.texts)
+        assert f"Fig. {shown.number}" in words
+        assert shown.title in words
+        assert shown.caption in words
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+def test_the_same_bytes_every_time_in_three_formats_with_the_caption_as_text(monkeypatch, tmp_path):
+    monkeypatch.setattr(thesis_figures, "FIGURES", [figure_3, thesis_motions.figure_8])
+    first, second = thesis_figures.figures(tmp_path / "new" / "a"), thesis_figures.figures(tmp_path / "b")
+    assert [path.name for path in first] == [
+        f"figure-{number}.{kind}" for number in (3, 8) for kind in ("png", "svg", "pdf", "txt")
+    ]
+    assert sorted(path.name for path in (tmp_path / "b").iterdir()) == sorted(path.name for path in second)
+    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
+    caption = (tmp_path / "b" / "figure-3.txt").read_text(encoding="utf-8")
+    assert caption.startswith("Fig. 3: Three circles, drag alone. The body performs three circles")
+
+
+def test_a_folder_that_cannot_be_is_named(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StoreError, match=r"cannot make the folder .*choose another with --to"):
+        thesis_figures.figures(tmp_path / "file" / "below")

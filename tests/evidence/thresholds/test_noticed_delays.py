@@ -1,0 +1,63 @@
+"""The rated and the detected delay of the same simulated people."""
+
+import pytest
+
+from study_app.evidence.thresholds import noticed_delays
+from study_app.evidence.thresholds.noticed_delays import (
+    ADAPTED_S,
+    CRITERIA_S,
+    JND_S,
+    MEAN_CRITERION_S,
+    Compared,
+    compare,
+    people_of,
+    rated,
+)
+from study_app.protocol.streams import stream
+from study_app.protocol.trials.designs import default_design
+from study_app.session.simulated.participant import OBSERVER, Comparison
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def found() -> Compared:
+    return compare(40, 1)
+
+
+def test_the_forced_choice_finds_the_planted_delay_and_the_rating_the_criterion(found: Compared) -> None:
+    middle, low, high = found.detected_ms
+    assert low < 1000 * JND_S < high
+    assert middle == pytest.approx(1000 * JND_S, rel=0.1)
+    plain = [one for one in found.rated if not one.adapted_s]
+    thresholds = [float(one.found.effect or 0.0) for one in plain]
+    assert thresholds == sorted(thresholds)
+    for one, threshold in zip(plain, thresholds, strict=True):
+        assert threshold == pytest.approx(1000 * one.criterion_s, abs=20)
+        assert one.found.lower is not None
+        assert one.found.lower > high
+    assert [one.criterion_s for one in plain] == list(CRITERIA_S)
+
+
+def test_people_rate_by_every_criterion_and_once_more_after_adaptation(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(noticed_delays, "detected", lambda *_: (250.0, 240.0, 260.0))
+    monkeypatch.setattr(
+        noticed_delays, "rated", lambda _people, criterion_s, adapted_s, _seed: (criterion_s, adapted_s)
+    )
+    plain = [(criterion_s, 0.0) for criterion_s in CRITERIA_S]
+    assert compare(3, 1).rated == (*plain, (MEAN_CRITERION_S, ADAPTED_S))
+
+
+def test_adaptation_moves_the_rating_and_no_forced_choice(found: Compared) -> None:
+    people = people_of(400, 2)
+    before, after = (rated(people, MEAN_CRITERION_S, adapted, 2).found.effect for adapted in (0.0, 0.03))
+    assert before is not None
+    assert after is not None
+    assert before == pytest.approx(1000 * MEAN_CRITERION_S, abs=8)
+    assert after - before == pytest.approx(30, abs=12)
+    attended, design = Comparison(delays=True, smallest=False, observer=OBSERVER), default_design("2ifc")
+    for seed in range(50):
+        chosen = [
+            attended.choose(design, [0.2 - shift, 0.22 - shift], 0.0, stream(seed, "x").random) for shift in (0.0, 0.03)
+        ]
+        assert chosen[0] == chosen[1]

@@ -1,0 +1,160 @@
+"""How loops are timed: by the same rule, in ticks. No time is judged here."""
+
+import sys
+import threading
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+if numba.config.DISABLE_JIT:
+    pytest.skip("the servo exists compiled only", allow_module_level=True)
+
+
+from study_app.cli import main
+from study_app.evidence.timing.lateness import Lane, Timed
+from study_app.evidence.timing.loops import LEAD_IN, PERIOD_NS, granted, taken
+from study_app.evidence.timing.measurement import timing
+from study_app.evidence.timing.timed_scene import FULL, PlayedHand
+from study_app.evidence.timing.timing_report import BEGIN, END, markdown
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks.grants import Grant
+from study_app.haptics.runtime.pack import elements_needed
+from study_app.haptics.runtime.servo import Servo
+
+NORMAL = Grant("normal", "no more was requested")
+
+
+def lane(kind, grant, lateness_us, overruns=0, busy_us=()):
+    whole = [np.asarray(np.asarray(us) * 1000, np.int64) for us in (lateness_us, busy_us)]
+    return Lane(kind, grant, *whole, overruns)
+
+
+def found(*lanes, load="none", **changed):
+    fields = {
+        "machine": "a machine, 2 cores",
+        "load": load,
+        "seconds": 10.0,
+        "spin_us": 0.0,
+        "spun_share": 0.0,
+        "frames_hz": None,
+        "lanes": lanes,
+        "notes": ("priority: normal",),
+    }
+    return Timed(**(fields | changed))
+
+
+STEADY = np.full(1000, 20.0)
+WELL = found(
+    lane("servo", NORMAL, STEADY + 10, busy_us=np.full(1000, 2.0)),
+    lane("bare", NORMAL, STEADY),
+    lane("thread", NORMAL, np.where(np.arange(1000) < 100, 3000.0, 40.0), busy_us=np.full(1000, 40.0)),
+    lane("qt", NORMAL, np.full(1000, 900.0), overruns=5, busy_us=np.full(1000, 40.0)),
+)
+
+
+def after(*milliseconds):
+    """Return ticks of 10 µs that begin so long after the start [(n, 2) ns], after those of the lead-in."""
+    lead = [(k + 1) * PERIOD_NS for k in range(LEAD_IN)]
+    begun = [*lead, *(LEAD_IN * PERIOD_NS + round(ms * 1e6) for ms in milliseconds)]
+    return [(begun_ns, begun_ns + 10_000) for begun_ns in begun]
+
+
+def test_a_tick_that_comes_late_is_late_by_all_of_it_and_passes_deadlines_over():
+    late = taken(0, after(1, 5.4, 6))
+    assert late.lateness_ns.tolist() == [0, 3_400_000, 1_000_000]
+    assert late.overruns == 2
+    assert late.busy_ns.tolist() == [10_000] * 3
+
+
+def test_no_python_is_called_in_a_tick():
+    """Ten times the ticks make not one call more of a Python function, nor of one of its C functions."""
+    servo = Servo(PlayedHand(), clock=VirtualClock(), elements=elements_needed(FULL))
+    servo.load(FULL)
+    servo.advance(1)
+
+    def calls(ticks):
+        heard = []
+        sys.setprofile(lambda _frame, event, _argument: heard.append(event))
+        try:
+            servo.advance(ticks)
+        finally:
+            sys.setprofile(None)
+        return len(heard)
+
+    assert calls(5000) == calls(500)
+
+
+class FakeWindows:
+    """The windows' thread without Qt: ``timer`` calls at once."""
+
+    frames = 0
+
+    def timer(self, _period_ms, count, fire):
+        for _ in range(count):
+            fire()
+        return 0
+
+    def during(self, work):
+        return work()
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+def test_a_race_times_every_loop_in_every_class_it_is_granted():
+    lines = []
+    raced = timing(0.5, "none", FakeWindows(), progress=lines.append)
+    levels = ["normal"] if granted().best is None else ["normal", granted().best.level]
+    assert list(raced.levels) == levels
+    assert [one.kind for one in raced.lanes][:4] == ["servo", "bare", "thread", "qt"]
+    assert {one.ticks for one in raced.lanes} == {500}
+    assert all((one.lateness_ns >= 0).all() for one in raced.lanes)
+    assert len(raced.limits()) == 4 * len(levels)
+    assert lines[-1] == "100 %"
+    assert raced.frames_hz is None
+    assert not any(thread.name in {"servo", "timed"} for thread in threading.enumerate())
+
+
+def test_the_page_of_timing_has_such_a_table_to_be_replaced_whole():
+    page = (Path(__file__).resolve().parents[3] / "docs" / "timing.md").read_text(encoding="utf-8")
+    assert page.count(BEGIN) == page.count(END) == 1
+    held = page.split(BEGIN)[1].split(END, maxsplit=1)[0]
+    ours = markdown(WELL)
+    headings = [line for line in ours.splitlines() if line.startswith("| priority")]
+    assert [line for line in held.splitlines() if line.startswith("| priority")] == headings
+    for words in ("this servo", "bare compiled loop", "Python thread", "Qt timer", "cores", "of each loop at 1 kHz"):
+        assert words in held, "put DIR/timing.md, as timing --load gui --to DIR writes it, in place of the table"
+
+
+@pytest.mark.parametrize(("late_us", "shown"), [(100, "5.00"), (500, "25"), (19_980, "999"), (20_000, "> 1,000")])
+def test_a_ratio_to_the_bare_loop_has_as_many_digits_as_it_is_worth(late_us, shown):
+    table = markdown(found(lane("bare", NORMAL, STEADY), lane("qt", NORMAL, np.full(1000, float(late_us)))))
+    (row,) = [line for line in table.splitlines() if "Qt timer" in line]
+    assert row.count(f"| {shown} ") == 2, row
+
+
+@pytest.fixture
+def run(monkeypatch, capsys, tmp_path):
+    """Return what runs the command in this process; it returns exit code and what was said."""
+    monkeypatch.chdir(tmp_path)
+
+    def command(*words):
+        monkeypatch.setattr("sys.argv", ["liquid-study", "timing", *words])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return ended.value.code, *capsys.readouterr()
+
+    return command
+
+
+def test_without_a_display_windows_are_refused_in_one_line(run, monkeypatch):
+    pytest.importorskip("PySide6.QtWidgets")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("study_app.gui.application.QApplication.instance", lambda: None)
+    if sys.platform != "linux":
+        pytest.skip("a display can be missing")
+    code, said, complaint = run("--seconds", "0.5", "--load", "gui")
+    assert (code, said) == (2, "")
+    assert "no display" in complaint

@@ -1,0 +1,164 @@
+"""Flow curves of a rheometer, and strokes in non-Newtonian liquids: planted parameters are recovered."""
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from study_app.cli import commands
+from study_app.errors import StudyError
+from study_app.haptics.model.laws.rheology import stress_pa
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.overrides import override_all
+from study_app.lab.identify import measured_force
+from study_app.lab.identify.fit import fit
+from study_app.lab.identify.flow_curve import fit_curve
+from study_app.lab.identify.measured_force import FlowCurve
+from study_app.protocol.load import load_scene
+from tests.haptics.materials import PRESETS, tank
+from tests.haptics.scenes import COMPILED
+from tests.lab.identify.measurements import force_of
+
+pytestmark = pytest.mark.slow
+
+RATES = np.geomspace(0.05, 200, 25)
+STARTS = {
+    "ketchup": {"yield_stress_pa": 5.0, "consistency_pa_sn": 3.0, "flow_index": 0.6},
+    "toothpaste": {"yield_stress_pa": 20.0, "consistency_pa_sn": 200.0, "flow_index": 0.9},
+    "shampoo": {"zero_shear_viscosity_pa_s": 2.0, "time_constant_s": 0.5, "flow_index": 0.7},
+    "cornstarch": {"zero_shear_viscosity_pa_s": 2.0, "thickened_viscosity_pa_s": 10.0, "onset_shear_rate_per_s": 8.0},
+}
+
+
+def measured(name, *, noise=0.01, rates=RATES, seed=5):
+    """Return the flow curve of a preset with a relative error."""
+    stresses = np.array([stress_pa(PRESETS[name][1], rate) for rate in rates.tolist()])
+    return FlowCurve(rates, stresses * (1 + noise * np.random.default_rng(seed).standard_normal(len(rates))))
+
+
+def begun(name):
+    return override_all(tank(name), {f"non_newtonian.{field}": value for field, value in STARTS[name].items()})
+
+
+@pytest.mark.parametrize("name", STARTS)
+def test_planted_parameters_are_recovered_from_a_rheometer_with_1_percent_noise(name):
+    found = fit_curve(begun(name), name, list(STARTS[name]), measured(name))
+    for field, value in found.values.items():
+        true = getattr(PRESETS[name][1], field)
+        assert value == pytest.approx(true, rel=0.05)
+        lower, upper = found.intervals[field]
+        assert lower < true < upper
+    assert found.share == pytest.approx(0.01, rel=0.4)
+    assert found.warnings == ()
+
+
+def strokes():
+    """Return strokes of ±45 mm that get faster, from rest to 0.5 m/s, 6 s at 1 kHz."""
+    t_s = np.arange(6000) / 1000
+    rate_per_s = 2 * np.pi * (0.2 + 1.5 * t_s / 6)
+    angle = 2 * np.pi * (0.2 * t_s + 0.75 * t_s**2 / 6)
+    place, speed = 0.045 * np.sin(angle), 0.045 * rate_per_s * np.cos(angle)
+    still = np.zeros_like(t_s)
+    return Motion(t_s, np.column_stack([place, still, still]), np.column_stack([speed, still, still]))
+
+
+@pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
+@pytest.mark.parametrize("name", ["ketchup", "toothpaste", "cornstarch", "slime"])
+def test_planted_parameters_are_recovered_from_strokes_with_noise_of_0_03_n(name):
+    start = STARTS.get(name, {"zero_shear_viscosity_pa_s": 5.0, "relaxation_time_s": 0.1})
+    motion = strokes()
+    force_n = force_of(tank(name), motion)
+    force_n[:, 0] += 0.03 * np.random.default_rng(6).standard_normal(len(force_n))
+    begin = override_all(tank(name), {f"non_newtonian.{field}": value for field, value in start.items()})
+    found = fit(begin, name, list(start), motion, force_n)
+    for field, value in found.values.items():
+        assert value == pytest.approx(getattr(PRESETS[name][1], field), rel=0.05)
+
+
+def test_a_relaxation_time_does_not_change_a_flow_curve():
+    curve = FlowCurve(RATES, 20 * RATES)
+    found = fit_curve(tank("slime"), "slime", ["zero_shear_viscosity_pa_s", "relaxation_time_s"], curve)
+    assert found.values["zero_shear_viscosity_pa_s"] == pytest.approx(20)
+    assert not found.distinguishable
+    (warning,) = found.warnings
+    assert warning.startswith("relaxation_time_s does not change the stress at these shear rates: 0.3 is its initial")
+
+
+THICKENING = ["zero_shear_viscosity_pa_s", "thickened_viscosity_pa_s", "onset_shear_rate_per_s"]
+
+
+@pytest.mark.parametrize(("least", "most"), [(5.0, 6.0), (2.0, 2.0), (3.0, 1.0)])
+def test_a_liquid_that_hardly_thickens_or_thins_ends_at_equal_viscosities(least, most):
+    """Viscosity by the shear rate, below 5 per s and above; the search starts from cornstarch's parameters."""
+    stress_pa = np.where(RATES < 5, least, most) * RATES * (1 + 0.02 * np.random.default_rng(1).standard_normal(25))
+    found = fit_curve(tank("cornstarch"), "cornstarch", THICKENING, FlowCurve(RATES, stress_pa))
+    zero, thickened, _ = found.values.values()
+    assert min(least, most) * 0.9 < zero <= thickened < max(least, most) * 1.1
+    assert thickened < max(1.02, 1.1 * most / least) * zero
+
+
+def test_a_narrow_range_of_shear_rates_does_not_separate_the_parameters():
+    found = fit_curve(
+        begun("ketchup"), "ketchup", list(STARTS["ketchup"]), measured("ketchup", rates=np.geomspace(8, 12, 25))
+    )
+    assert any("cannot be distinguished by these shear rates" in warning for warning in found.warnings)
+    assert any("or measure a wider range of them" in warning for warning in found.warnings)
+
+
+@pytest.mark.parametrize(
+    ("names", "rows", "said"),
+    [
+        (
+            ["density_kg_m3"],
+            25,
+            "density_kg_m3 does not change a flow curve: fit parameters of the table non_newtonian",
+        ),
+        (["yield_stress"], 25, "no parameter is called 'yield_stress': did you mean 'yield_stress_pa'"),
+        (["yield_stress_pa", "flow_index"], 2, "2 shear rates are too few for 2 parameters"),
+    ],
+)
+def test_what_cannot_be_fitted_is_one_line(names, rows, said):
+    with pytest.raises(StudyError, match=said) as caught:
+        fit_curve(tank("ketchup"), "ketchup", names, measured("ketchup", rates=RATES[:rows]))
+    assert "\n" not in str(caught.value)
+
+
+def write_csv(path, curve):
+    rows = np.column_stack([curve.stress_pa, curve.rate_per_s])
+    np.savetxt(path, rows, delimiter=",", header="shear_stress_pa,shear_rate_per_s", comments="", fmt="%.17g")
+    return path
+
+
+def identify(*words):
+    return CliRunner().invoke(commands, ["identify", *map(str, words)], catch_exceptions=False)
+
+
+def test_from_a_rheometer_file_to_a_preset(tmp_path):
+    path = write_csv(tmp_path / "rheometer.csv", measured("ketchup"))
+    fields = ",".join(STARTS["ketchup"])
+    shown = identify("slime", "--measured", path, "--liquid", "ketchup", "--fit", fields, "--to", tmp_path / "out")
+    assert shown.exit_code == 0
+    assert "ketchup: 25 shear rates from 0.05 to 200 per s; residual 0.9 % of the stress, RMS" in shown.output
+    written = load_scene(tmp_path / "out" / "ketchup.toml", "ketchup").liquids[0].non_newtonian
+    for field in STARTS["ketchup"]:
+        assert getattr(written, field) == pytest.approx(getattr(PRESETS["ketchup"][1], field), rel=0.05)
+    text = (tmp_path / "out" / "ketchup.toml").read_text(encoding="utf-8")
+    assert "# Fitted to rheometer.csv (SHA-256 " in text
+    assert "  # 95 %: " in text
+    rows = np.genfromtxt(tmp_path / "out" / "ketchup-fit.csv", delimiter=",", names=True)
+    assert rows["residual_pa"] == pytest.approx(rows["shear_stress_pa"] - rows["fitted_pa"])
+    assert (tmp_path / "out" / "ketchup-fit.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("shear_rate_per_s,shear_stress_pa\n1,0\n", "row 1 has shear_stress_pa 0: it must be above 0"),
+        ("shear_rate_per_s,shear_stress_pa\n1,5\n-2,6\n", "row 2 has shear_rate_per_s -2: it must be above 0"),
+        ("shear_rate_per_s,viscosity_pa_s\n1,5\n", "or shear_rate_per_s,shear_stress_pa of a rheometer"),
+    ],
+)
+def test_a_flow_curve_that_cannot_be_used_is_one_line(tmp_path, text, said):
+    (tmp_path / "curve.csv").write_text(text)
+    with pytest.raises(StudyError, match=said) as caught:
+        measured_force.read(tmp_path / "curve.csv")
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,129 @@
+"""What a fit leaves behind, and the command from a file to a preset."""
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from study_app.cli import commands
+from study_app.haptics.model.effects.current import Uniform
+from study_app.haptics.model.overrides import override_all
+from study_app.haptics.model.scene import Box, Kalman, Liquid, Scene
+from study_app.lab.identify import measured_force, preset
+from study_app.lab.identify.fit import fit
+from study_app.protocol.load import load_scene
+from tests.haptics.scenes import COMPILED
+from tests.lab.identify.measurements import OIL, REACH, REVERSE, TANK, force_of, noisy, write_csv
+
+pytestmark = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    """Return a fit and the file it was measured in."""
+    force_n = noisy(TANK, REVERSE, 0.02)
+    path = write_csv(tmp_path_factory.mktemp("measured") / "tank.csv", REVERSE, force_n)
+    start = override_all(TANK, {"drag_coefficient": 0.5})
+    return fit(start, "tank", ["drag_coefficient", "scaling"], REVERSE, force_n), path
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "scene",
+    [
+        TANK,
+        OIL,
+        Scene(
+            scale=3,
+            origin_m=(0.1, -0.2, 1e-5),
+            liquids=(
+                Liquid(
+                    id="river",
+                    density_kg_m3=1000,
+                    region=Box(size_m=(1, 2, 3)),
+                    effects=("drag", "current"),
+                    current=Uniform(velocity_mps=(0.1, 0, 0)),
+                ),
+            ),
+        ),
+    ],
+)
+def test_the_preset_is_the_fitted_scene(scene, tmp_path):
+    (liquid,) = scene.liquids
+    (tmp_path / "measured.csv").write_text("t_s\n")
+    found = fit(scene, liquid.id, ["density_kg_m3"], REACH, noisy(scene, REACH, 0.02))
+    file = tmp_path / "preset.toml"
+    file.write_text(preset.preset(found, tmp_path / "measured.csv"), encoding="utf-8")
+    assert load_scene(file, liquid.id) == found.scene.model_copy(update={"velocity": Kalman()})
+    assert found.scene != scene
+    for command in ("check", "scene"):
+        told = CliRunner().invoke(commands, [command, str(file)], catch_exceptions=False)
+        assert (told.exit_code, f"{liquid.id}: effects named" in told.output) == (0, True)
+
+
+@pytest.mark.slow
+def test_the_residuals_in_the_table_are_measured_less_fitted(fitted, tmp_path):
+    found, path = fitted
+    written = preset.write(found, tmp_path / "new", path)
+    assert sorted(it.name for it in written) == sorted(it.name for it in (tmp_path / "new").iterdir())
+    rows = np.genfromtxt(tmp_path / "new" / "tank-fit.csv", delimiter=",", names=True)
+    force_n = force_of(found.scene, REVERSE)
+    for k, axis in enumerate("xyz"):
+        assert rows[f"fitted_{axis}_n"] == pytest.approx(force_n[:, k], abs=1e-12)
+        assert rows[f"residual_{axis}_n"] == pytest.approx(found.measured_n[:, k] - force_n[:, k], abs=1e-12)
+
+
+def test_places_along_a_line_follow_from_the_velocity(tmp_path):
+    (tmp_path / "line.csv").write_text("t_s,velocity_mps,force_n\n0,0,1\n0.01,0.2,2\n0.02,0.4,3\n0.04,0.4,4\n")
+    read = measured_force.read(tmp_path / "line.csv")
+    assert read.motion.position_m[:, 0] == pytest.approx([0, 0.001, 0.004, 0.012])
+    assert read.force_n[:, 0].tolist() == [1, 2, 3, 4]
+
+
+def identify(*words):
+    return CliRunner().invoke(commands, ["identify", *map(str, words)], catch_exceptions=False)
+
+
+@pytest.mark.slow
+def test_from_a_file_to_a_preset(tmp_path):
+    true = override_all(load_scene("rek2024", "honey"), {"drag_coefficient": 0.61})
+    path = write_csv(tmp_path / "honey.csv", REACH, noisy(true, REACH, 0.02), comment="# by hand\n")
+    told = identify(
+        "--measured", path, "rek2024", "--liquid", "honey", "--fit", "drag_coefficient", "--to", tmp_path / "out"
+    )
+    assert told.exit_code == 0
+    assert f"honey: {len(REACH.t_s)} rows over 1.8 s; residual 0.0283 N RMS, 1.2 % of the force" in told.output
+    written = load_scene(tmp_path / "out" / "honey.toml", "honey")
+    assert written.body.drag_coefficient == pytest.approx(0.61, rel=0.01)
+    assert written == true.model_copy(update={"body": written.body, "velocity": Kalman()})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "has no column t_s, x_m"),
+        ("t_s,x_m,y_m,z_m\n0,0,0,0\n", "has no column fx_n, fy_n, fz_n"),
+        ("t_s,velocity_mps,force_n\n", "a header and no rows"),
+        ("t_s,velocity_mps,force_n\n0,1,2\n0.001,nan,2\n", "line 3: 'nan' is not a finite number"),
+        ("t_s,velocity_mps,force_n\n0,1\n", "line 2: has 2 fields"),
+        ("t_s,velocity_mps,force_n\n0,1,2\n0,1,2\n", "time must increase"),
+        ("t_s,velocity_mps,force_n\n0,1,2\n9,1,2\n", "row 2 comes 9 s after"),
+        (b"\xff\xfe", "not UTF-8 text"),
+        (None, "cannot read"),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_one_line(tmp_path, monkeypatch, capsys, text, said):
+    from study_app.cli import main
+
+    path = tmp_path / "measured.csv"
+    if text is not None:
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    words = ["--measured", str(path), "rek2024", "--liquid", "honey", "--fit", "drag_coefficient"]
+    monkeypatch.setattr("sys.argv", ["liquid-study", "identify", *words])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    (line,) = printed.err.splitlines()
+    assert said in line

@@ -1,0 +1,203 @@
+"""Sessions replayed: the forces come out again to the last bit, and what was changed is named."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.devices.rig import Rig
+from study_app.devices.scripted import ScriptedDevice
+from study_app.errors import StoreError
+from study_app.haptics.model import gate
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.force_rules import FORCE_RULES, VERSIONS
+from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_SLEW, LIMITER_SLOPE
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
+from study_app.protocol import formats
+from study_app.session import replay as replay_module
+from study_app.session.replay import Replayed, replay
+from study_app.session.simulated.rehearsal import rehearse
+from study_app.session.transitions.events import Begin, Continue, EndAsked, PauseAsked, ResumeAsked
+from study_app.store import recordings
+from study_app.store.blinded.blinding import opened, read_key
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
+from study_app.store.sessions.recovery import reopen
+from tests.compiled import needs_servo
+from tests.faults.support import short
+from tests.session import small
+from tests.session.replay.recorded_sessions import STRESSED, begun, held, rewrite, session, stressed, troubled
+
+pytestmark = [needs_servo, pytest.mark.slow]
+
+
+class LightDevice(ScriptedDevice):
+    """A device whose light handle and force limit permit less force than those of `ScriptedDevice`."""
+
+    def __init__(self) -> None:
+        super().__init__(force_limit_n=1.0)
+
+    @property
+    def dynamics(self) -> Dynamics:
+        return Dynamics(0.0, 10e-6, 0.005)
+
+
+class TachometerDevice(ScriptedDevice):
+    """A device that measures its velocity."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.measure_velocity()
+
+
+def resumed_on_another_device(folder: Path) -> Path:
+    """Hold a session that goes on with another device after its first trial; return its folder."""
+    with ScriptedDevice() as device, Servo(device, clock=VirtualClock(), elements=100) as servo:
+        with begun(folder, device, servo) as store:
+            runner, wait = held(store, device, servo)
+            runner.post(Begin(store.clock.seconds()))
+            runner.post(Continue(store.clock.seconds()))
+            wait(1500)
+            runner.post(PauseAsked(store.clock.seconds(), "operator"))
+        place: Path = store.folder.path
+    with LightDevice() as device, Servo(device, clock=VirtualClock(), elements=100) as servo:
+        described = Rig(device, servo).described
+        with reopen(
+            place, small.protocol(), b"small", operator="", device=described, screens={}, now_ns=servo.now_ns
+        ) as store:
+            runner, wait = held(store, device, servo)
+            servo.advance(900)  # its recording begins at a tick that the one before holds too
+            runner.post(Begin(store.clock.seconds()))
+            runner.post(ResumeAsked(store.clock.seconds(), "operator"))
+            wait(1500)
+            runner.post(EndAsked(store.clock.seconds(), "aborted", ""))
+    return place
+
+
+def comes_out(place: Path, recordings: int) -> Replayed:
+    """Replay a session, whose recordings come out to the last bit."""
+    found = replay(place)
+    assert (found.differences, found.missing, found.uncompared) == ((), (), ())
+    assert (found.recordings, found.proved) == (recordings, True)
+    return found
+
+
+def stirred(folder: Path, device: ScriptedDevice, *, before: int, until: int) -> Path:
+    """Hold a session whose servo runs some ticks before it begins, and until its first trial; return its folder."""
+    with device, Servo(device, clock=VirtualClock(), elements=100) as servo:
+        servo.advance(before)
+        with begun(folder, device, servo) as store:
+            runner, wait = held(store, device, servo)
+            runner.post(Begin(store.clock.seconds()))
+            wait(until - before)
+            runner.post(Continue(store.clock.seconds()))
+            wait(1500)
+            runner.post(EndAsked(store.clock.seconds(), "aborted", ""))
+        place: Path = store.folder.path
+    return place
+
+
+def test_a_rehearsed_session_comes_out_to_the_last_bit(rehearsed: Path) -> None:
+    found = comes_out(session(rehearsed), 4)
+    assert found.lasted_s > 3
+    assert found.seconds == sum(
+        len(recordings.read_checks(path).device_force)
+        for path in session(rehearsed).glob("recordings/trial-00?.parquet")
+    )
+    assert 0 < found.computed_s < found.took_s
+
+
+def test_the_error_of_the_force_sent_comes_out_again_and_another_is_named(
+    rehearsed: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = StudyFolder(rehearsed)
+    lines = opened(journal.read(session(rehearsed) / "journal.jsonl"), read_key(study.path))
+    errors = [line["delivered_error"] for line in lines if line["event"] == "trial_ended"]
+    felt = [error for error in errors if error is not None]  # some of its trials are shorter than the fade-in
+    assert len(felt) > 0
+    assert all(0.005 < error < 1.0 for error in felt)
+    right = replay_module.error_again
+    monkeypatch.setattr(replay_module, "error_again", lambda *which: right(*which) + 2e-6)
+    found = replay(session(rehearsed)).differences
+    assert len(found) == len(felt)
+    assert all(it.endswith("the column delivered_error differs") for it in found)
+
+
+def test_a_session_is_replayed_with_the_model_that_its_receipt_records(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Replay uses the recorded effects where this program would choose others, and the recorded estimator."""
+    file = short.write(tmp_path)
+    text = file.read_text(encoding="utf-8").replace("format = 1", "format = 2", 1)
+    file.write_text(re.sub(r"^effects = \[.*?\]", 'effects = "auto"', text, flags=re.MULTILINE), encoding="utf-8")
+    rehearse(file, participants=1, seed=1, results=tmp_path / "results")
+    place = session(tmp_path / "results")
+    assert json.loads((place / "receipt.json").read_text())["protocol"]["scene"]["velocity"] == {"kind": "kalman"}
+    monkeypatch.setattr(gate, "_budget_n", lambda _scene, total_n: 0.9 * total_n)
+    monkeypatch.setattr(formats, "ESTIMATOR", "ewma")
+    comes_out(place, 4)
+    monkeypatch.setattr(replay_module, "as_recorded", lambda protocol, _receipt, _key: protocol)
+    assert replay(place).differences
+
+
+def test_repeats_pauses_stops_and_fades_come_out_to_the_last_bit(tmp_path: Path) -> None:
+    comes_out(troubled(tmp_path / "results"), 5)
+
+
+@pytest.mark.parametrize("liquid", STRESSED)
+def test_forces_that_limits_change_come_out_to_the_last_bit(tmp_path: Path, liquid: str) -> None:
+    place = stressed(tmp_path / "results", liquid)
+    limiters = recordings.read_samples(place / "recordings" / "trial-001.parquet").limiters
+    assert all((limiters & bit).any() for bit in (LIMITER_SLOPE, LIMITER_ENERGY, LIMITER_SLEW))
+    comes_out(place, 1)
+
+
+def test_a_session_that_goes_on_with_another_device_comes_out_to_the_last_bit(tmp_path: Path) -> None:
+    place = resumed_on_another_device(tmp_path / "results")
+    comes_out(place, 2)
+    receipt = json.loads((place / "receipt.json").read_text())
+    (place / "receipt.json").write_text(json.dumps(receipt | {"resumed": []}))
+    with pytest.raises(StoreError, match="lacks the device since"):
+        replay(place)
+
+
+def test_each_part_of_a_session_is_replayed_by_the_force_rules_that_its_receipt_states(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for liquid in small.TABLES["liquids"].values():
+        monkeypatch.setitem(liquid, "effects", ["drag", "added_mass"])
+    place = resumed_on_another_device(tmp_path / "results")
+    receipt = json.loads((place / "receipt.json").read_text())
+    lighter = receipt["resumed"][0]["device"]
+    assert receipt["device"]["force_rules"] == lighter["force_rules"] == FORCE_RULES
+    monkeypatch.setitem(VERSIONS, 1, VERSIONS[1]._replace(cut_inertia_share=0.0))
+    assert replay(place).proved
+    del lighter["force_rules"]
+    (place / "receipt.json").write_text(json.dumps(receipt))
+    differences = replay(place).differences
+    assert differences
+    assert all(line.startswith("trial 1, attempt 2:") for line in differences)
+    lighter["force_rules"] = FORCE_RULES + 1
+    (place / "receipt.json").write_text(json.dumps(receipt))
+    with pytest.raises(StoreError, match=f"force rules {FORCE_RULES + 1}, this version knows 1 to {FORCE_RULES}"):
+        replay(place)
+
+
+def test_a_session_on_a_device_that_measures_velocity_comes_out_to_the_last_bit(tmp_path: Path) -> None:
+    place = stirred(tmp_path / "results", TachometerDevice(), before=0, until=500)
+    comes_out(place, 1)
+
+    def nudge(columns: dict[str, Any]) -> None:
+        columns["device_velocity_x_mps"][-5:] += 1e-9
+
+    rewrite(place / "recordings" / "trial-001.parquet", nudge)
+    assert any("force on the hand differs" in line for line in replay(place).differences)
+
+
+@pytest.mark.parametrize("ticks", [200, 450, 550, 650])
+def test_a_trial_soon_after_a_short_preflight_comes_out_to_the_last_bit(tmp_path: Path, ticks: int) -> None:
+    """The recording begins while the servo's start fade is under way, of which 0.1 s are over by then."""
+    comes_out(stirred(tmp_path / "results", ScriptedDevice(), before=100, until=ticks), 1)

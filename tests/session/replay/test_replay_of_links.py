@@ -1,0 +1,127 @@
+"""Sessions whose force is sent late, with jitter and loss: replayed to the last bit, and delivered as requested."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from study_app.analysis.data.blocks import setting_name
+from study_app.analysis.data.study_tables import load_study
+from study_app.analysis.levels.summaries import levels_found
+from study_app.analysis.levels.thresholds import tracks
+from study_app.analysis.report.level_sections import withheld
+from study_app.protocol.load import parse
+from study_app.protocol.trials.presentation import presented_by
+from study_app.session import replay as replay_module
+from study_app.session.replay import replay
+from study_app.session.simulated.rehearsal import rehearse
+from study_app.store.blinded.blinding import opened, read_key
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
+from tests.compiled import needs_servo
+
+pytestmark = [pytest.mark.slow, needs_servo]
+
+STUDY = """\
+format = 2
+study.name = "late"
+sequence = ["pairs", "named"]
+[scene]
+fade_s = 0.3
+[liquids.damper]
+drag = { law = "linear", damping_nspm = 4 }
+[liquids.water]
+density_kg_m3 = 1000
+effects = ["drag", "wake"]
+wake = { length = 1700, scaling = 1700, exponent = 0.75 }
+[conditions.damper]
+liquid = "damper"
+force_jitter_ms = 4
+force_loss = 0.1
+[conditions.water]
+liquid = "water"
+force_delay_ms = 15
+force_loss = 0.2
+[conditions.prompt]
+liquid = "water"
+[tasks.stir]
+kind = "follow"
+cycles = 1
+[stimuli.delay]
+condition = "damper"
+vary = "force_delay_ms"
+levels = [20, 80]
+[methods.few]
+kind = "constant"
+levels = 2
+repetitions = 1
+[blocks.pairs]
+stimulus = "delay"
+method = "few"
+[blocks.named]
+conditions = ["water", "prompt"]
+standard = "prompt"
+design = "2ifc"
+repetitions = 1
+"""
+
+
+@pytest.fixture(scope="module")
+def rehearsed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("late")
+    protocol = folder / "late.toml"
+    protocol.write_text(STUDY)
+    return rehearse(protocol, participants=1, seed=2, results=folder / "study")
+
+
+def test_every_force_of_a_link_is_computed_again_to_its_checksum(rehearsed: Path) -> None:
+    (session,) = StudyFolder(rehearsed).sessions()
+    found = replay(session.path)
+    assert found.differences == found.missing == found.uncompared == ()
+    assert found.recordings == 6
+    assert found.proved
+
+
+def test_another_seed_of_the_link_is_found(rehearsed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(replay_module, "link_seed", lambda *_: 1)
+    (session,) = StudyFolder(rehearsed).sessions()
+    assert any("the force on the hand differs" in one for one in replay(session.path).differences)
+
+
+def test_the_session_measures_the_delays_that_were_requested(rehearsed: Path) -> None:
+    (session,) = StudyFolder(rehearsed).sessions()
+    key, protocol = read_key(rehearsed), parse(STUDY.encode(), "late.toml")
+    lines = opened(journal.read(session.journal), key)
+    started = {line["trial"]: line for line in lines if line["event"] == "trial_started"}
+    ended = [line for line in lines if line["event"] == "interval_ended"]
+    assert len(ended) == 6
+    errors_ms = []
+    for line in ended:
+        interval = presented_by(protocol, key.codes, started[line["trial"]]).intervals[line["interval"] - 1]
+        assert "invalid" not in line
+        if interval.vary == "force_delay_ms":
+            errors_ms.append(line["value_delivered"] - interval.value)
+    assert len(errors_ms) == 4
+    assert max(errors_ms) - min(errors_ms) < 2  # what both share is the jitter, 2.5 ms on average
+    assert sum(errors_ms) / 4 == pytest.approx(2.5, abs=1)
+
+
+def test_the_analysis_finds_delivered_delays_and_what_safety_withheld(rehearsed: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "opened"
+    shutil.copytree(rehearsed, folder)
+    unblind(folder, "AB", "to see what was delivered")
+    study = load_study(folder)
+    rows = tracks(study)
+    rows = rows[rows["block"] == "pairs"]
+    assert sorted(rows["level"]) == [20, 80]
+    assert (rows["level_delivered"] - rows["level"]).abs().max() < 1.5
+    pairs, named = levels_found(study)
+    assert [(one.low, one.n) for one in pairs.withheld] == [(20, 1), (80, 1)]
+    assert all(0 <= one.mean_percent <= one.most_percent < 5 for one in pairs.withheld)
+    assert "Force withheld by safety" in "".join(withheld(pairs))
+    assert named.withheld == ()
+    assert "".join(withheld(named)) == ""
+    (block,) = (one for one in study.levels if one.id == "named")
+    names = {one.condition: setting_name(one, block.settings) for one in block.settings}
+    assert names == {"water": "Water, force 15 ms late, 20 % of forces lost"}

@@ -1,0 +1,175 @@
+"""Levels that a participant set follow from the steps, every force from the recording; whoever changes one is found."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.session.replay import replay
+from study_app.session.simulated.rehearsal import rehearse, resume
+from study_app.store.blinded.blinding import opened, read_key, whole_protocol
+from study_app.store.journals import journal
+from study_app.store.receipt import read
+from study_app.store.verification.leaks import certain_telltales, find_leaks, recorded_numbers
+from study_app.store.verification.reproduction import reproduced
+from study_app.store.verification.verify_study import verify
+from tests.compiled import needs_servo
+from tests.protocol.trials.matching import ALONE, DELAY, text_of
+from tests.store.forging import Lines, change, cut
+
+pytestmark = [pytest.mark.slow, needs_servo]
+
+SHORT = ("repetitions = 4", "repetitions = 3")
+WATER = (
+    'drag = { law = "linear", damping_nspm = 6 }',
+    """density_kg_m3 = 1000
+viscosity_pa_s = 1
+effects = ["drag", "wake"]
+drag = { law = "haider-levenspiel" }
+wake = { length = 400, scaling = 1000, exponent = 0.5, breaking_angle_deg = 45, breaking_span_m = 0, decay = 0.99 }""",
+)
+VISCOSITY = (DELAY[0], 'vary = "viscosity_pa_s"\nlevel = "value"\nlevels = [0.4, 2.5]')
+
+
+@pytest.fixture(scope="module")
+def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("protocol") / "matching.toml"
+    path.write_text(text_of(SHORT))
+    return path
+
+
+@pytest.fixture(scope="module")
+def study(protocol: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return rehearse(protocol, participants=1, seed=2, results=tmp_path_factory.mktemp("matching") / "study")
+
+
+@pytest.fixture
+def session(study: Path, tmp_path: Path) -> Path:
+    """Return the session in a copy of the study, which may be changed."""
+    shutil.copytree(study, tmp_path / "study")
+    return session_of(tmp_path / "study")
+
+
+def session_of(study: Path) -> Path:
+    return next((study / "data").glob("sub-*/ses-*"))
+
+
+def lines_of(session: Path) -> list[dict[str, Any]]:
+    return opened(journal.read(session / "journal.jsonl"), read_key(session.parents[2]))
+
+
+def test_settings_follow_every_force_is_computed_again_and_the_study_is_sound(study: Path) -> None:
+    session = session_of(study)
+    found = reproduced(session)
+    assert (found.differences, found.followed) == ([], ["matching: 3 of 3 levels follow from the answers"])
+    proved = replay(session)
+    assert (proved.differences, proved.missing, proved.uncompared) == ((), (), ())
+    assert proved.recordings == 6
+    checked = verify(study, None)
+    assert (checked.errors, checked.warnings) == ((), ())
+
+
+def other_setting(lines: Lines) -> None:
+    next(line for line in lines if line.get("setting") is not None and line["trial"] == 2)["setting"] *= 1.01
+
+
+def other_step(lines: Lines) -> None:
+    next(line for line in lines if line["event"] == "stepped" and line["trial"] == 2)["steps"] += 1
+
+
+def other_answer(lines: Lines) -> None:
+    for line in lines:
+        if line["event"] == "choice" and line["trial"] == 2:
+            line["value"] += 1
+        elif line["event"] == "responses" and line["trial"] == 2:
+            line["items"][0]["value"] += 1
+
+
+def other_start(lines: Lines) -> None:
+    next(line for line in lines if line["event"] == "trial_started" and line["trial"] == 2)["level"] *= 1.001
+
+
+@pytest.mark.parametrize(
+    ("edit", "named"),
+    [
+        (other_setting, "trial 2, attempt 1: its steps lead to another setting"),
+        (other_step, "trial 2, attempt 1: its steps lead to another setting"),
+        (other_answer, "trial 2, attempt 1: its steps lead to another setting"),
+        (other_start, "trial 2, attempt 1: another level"),
+    ],
+)
+def test_what_was_changed_with_the_key_at_hand_is_found(
+    session: Path, edit: Callable[[Lines], None], named: str
+) -> None:
+    change(session, edit)
+    found = reproduced(session)
+    assert any(named in line for line in found.differences), found.differences
+    assert found.followed == ["matching: 2 of 3 levels follow from the answers"]
+
+
+def test_a_step_that_took_effect_at_another_scene_is_found_by_replay(session: Path) -> None:
+    def later(lines: Lines) -> None:
+        made = [line for line in lines if line["event"] == "stepped" and line["trial"] == 1]
+        made[0]["steps"], made[1]["steps"] = made[1]["steps"] + 9, made[0]["steps"] - 9
+
+    change(session, later)
+    assert any("trial 1, attempt 1, interval 2" in line for line in replay(session).differences)
+
+
+@pytest.mark.parametrize(
+    "share", [0.25, *(pytest.param(share, marks=pytest.mark.nightly) for share in (0.5, 0.75)), 0.95]
+)
+def test_a_session_that_was_killed_and_resumed_is_set_as_one_that_was_not(
+    session: Path, protocol: Path, share: float
+) -> None:
+    def kept() -> tuple[list[Any], list[Any]]:
+        lines = lines_of(session)
+        last = {line["trial"]: line for line in lines if line["event"] == "trial_started"}
+        sets = {line["trial"]: line["setting"] for line in lines if line.get("setting") is not None}
+        answers = {line["trial"]: line["items"][0]["value"] for line in lines if line["event"] == "responses"}
+        return [(n, line["level"], sets[n]) for n, line in sorted(last.items())], sorted(answers.items())
+
+    whole = kept()
+    cut(session, round(share * (session / "journal.jsonl").stat().st_size))
+    resume(session, protocol=protocol)
+    assert [row[:2] for row in kept()[0]] == [row[:2] for row in whole[0]]
+    assert kept() == whole
+    assert reproduced(session).differences == []
+    assert replay(session).differences == ()
+
+
+@pytest.mark.parametrize(
+    "edits", [(ALONE, DELAY), (WATER, VISCOSITY), (ALONE,)], ids=["delay", "viscosity with a wake", "alone"]
+)
+def test_other_numbers_are_set_and_proved(edits: tuple[tuple[str, str], ...], tmp_path: Path) -> None:
+    unjudged = ("[liquids", "[limits]\nwithheld_percent = 100\nlevel_error_percent = 100\n\n[liquids")
+    path = tmp_path / "matching.toml"
+    path.write_text(text_of(SHORT, unjudged, *edits))
+    session = session_of(rehearse(path, participants=1, seed=5, results=tmp_path / "study"))
+    assert reproduced(session).differences == []
+    proved = replay(session)
+    assert (proved.differences, proved.uncompared) == ((), ())
+    lines = lines_of(session)
+    scenes = {line["scene"] is None for line in lines if line["event"] == "stepped"}
+    assert scenes == {DELAY in edits}
+    assert sum(line["event"] == "responses" for line in lines) == 3
+
+
+def test_every_level_that_steps_led_to_is_looked_for_and_stands_nowhere(study: Path) -> None:
+    lines, key = lines_of(session_of(study)), read_key(study)
+    protocol = whole_protocol(read(session_of(study) / "receipt.json")["protocol"], key)
+    numbers = recorded_numbers(protocol, lines)
+    assert {line["setting"] for line in lines if line.get("setting") is not None} <= numbers
+    assert len(numbers) > sum(line["event"] == "trial_started" for line in lines) + 6
+    words = certain_telltales(key.tables, {}, numbers)
+    assert find_leaks(study, words) == []
+    assert words.in_text(f"{lines[-1]['n']} {max(numbers - {18.0})!r}")
+
+
+def test_a_level_that_was_set_is_found_in_a_note(session: Path) -> None:
+    level = next(line["setting"] for line in lines_of(session) if len(str(line.get("setting"))) > 6)
+    (session / "note.txt").write_text(f"it was {level!r}", encoding="utf-8")
+    warnings = [str(one) for one in verify(session.parents[2], None).warnings]
+    assert any("note.txt, line 1 reveals a condition, although the key is sealed" in one for one in warnings)
