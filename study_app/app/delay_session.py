@@ -21,9 +21,9 @@ from study_app.app.session.session_windows import connect_windows, make_cockpit,
 from study_app.app.session.termination import ended_from_outside
 from study_app.devices.rig import open_rig, study_settings
 from study_app.errors import SessionError, StudyError
+from study_app.evidence.computer import LoadName, busy_cores
 from study_app.evidence.computer import machine as machine_here
-from study_app.evidence.timing.delay_results import BESIDE, DELAYS_S, VIRTUAL_HZ, Delayed, Shown
-from study_app.evidence.timing.machine_load import LoadName, busy_cores
+from study_app.evidence.timing.delays import BESIDE, DELAYS_S, VIRTUAL_HZ, Delayed, Shown
 from study_app.gui.application import application_here
 from study_app.gui.display.opengl import WITHOUT_OPENGL
 from study_app.gui.display.screens import choose_screens

@@ -13,7 +13,7 @@ from PySide6.QtCore import QCoreApplication, QEventLoop, QObject, Qt, QTimer, Si
 from study_app.app.session.garbage_collection import collecting_here
 from study_app.devices.rig import open_rig, study_settings
 from study_app.devices.simulated.hand_commands import hand_of
-from study_app.evidence.timing.machine_load import LoadName
+from study_app.evidence.computer import LoadName
 from study_app.gui.application import application_here
 from study_app.gui.display.screens import choose_screens, place
 from study_app.gui.operator import OperatorWindow

@@ -1,8 +1,16 @@
-"""A description of the computer on which times were measured."""
+"""A description of the computer on which times were measured.
+
+What else the machine does while the loops are timed; windows are lent by ``app.windows_load``.
+"""
 
 import os
 import platform
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Final, Literal, Protocol, TypeAlias, TypeVar
 
 import numba
 import numpy as np
@@ -17,3 +25,47 @@ def machine() -> str:
         name = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), name)
     versions = f"Python {platform.python_version()}, numpy {np.__version__}, numba {numba.__version__}"
     return f"{name}, {os.cpu_count()} cores, {platform.system()}, {versions}"
+
+
+LoadName: TypeAlias = Literal["none", "gui", "gui+cpu"]
+
+T = TypeVar("T")
+
+_BUSY: Final = "import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    sum(range(100_000))\n"
+
+
+class Windows(Protocol):
+    """The windows' thread, lent by those who may open windows.
+
+    ``during`` runs ``work`` in another thread while the windows live in this one, and returns or raises what it does.
+    ``timer`` is a timer of theirs, to be used by ``work``; ``frames`` counts those that were painted.
+    """
+
+    @property
+    def frames(self) -> int: ...  # noqa: D102
+    def timer(self, period_ms: int, count: int, fire: Callable[[], object]) -> int: ...  # noqa: D102
+    def during(self, work: Callable[[], T]) -> T: ...  # noqa: D102
+
+
+def under_load(load: LoadName, windows: Windows | None, work: Callable[[], T]) -> T:
+    """Return what ``work`` returns, done while ``windows``, if there are any, live in this thread under this load."""
+    if windows is None:
+        return work()
+    if load == "gui+cpu":
+        with busy_cores():
+            return windows.during(work)
+    return windows.during(work)
+
+
+@contextmanager
+def busy_cores(count: int | None = None) -> Iterator[None]:
+    """Keep every core busy with a process of Python; those end with this one, however it ends."""
+    command = [sys.executable, "-S", "-c", _BUSY]
+    busy = [subprocess.Popen(command) for _ in range(count or os.cpu_count() or 1)]  # noqa: S603 - our own words
+    try:
+        yield
+    finally:
+        for one in busy:
+            one.terminate()
+        for one in busy:
+            one.wait()

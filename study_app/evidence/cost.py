@@ -40,7 +40,9 @@ def measure(scene: Scene, *, batches: int = BATCHES) -> Cost:
     scene = resolve(scene)
     rest = scene.model_copy(update={"liquids": ()})
     pairs = _pairs(scene)
-    benches = {it: Bench(it) for it in dict.fromkeys([scene, rest, *(it for pair in pairs.values() for it in pair)])}
+    benches = {
+        it: TickTimer(it) for it in dict.fromkeys([scene, rest, *(it for pair in pairs.values() for it in pair)])
+    }
     for _ in range(batches):
         for bench in benches.values():
             bench.batch()
@@ -66,7 +68,7 @@ def hand(ticks: int = WARM_UP) -> Floats:
     return 0.03 * np.column_stack([np.cos(angle), 0.2 * np.sin(3 * angle), np.sin(angle)])
 
 
-class Bench:
+class TickTimer:
     """One measured scene: its memory, and the time of every batch so far."""
 
     def __init__(self, scene: Scene, dynamics: Dynamics = UNKNOWN) -> None:

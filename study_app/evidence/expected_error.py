@@ -13,11 +13,9 @@ import numpy as np
 
 from study_app.evidence import reference_solutions
 from study_app.evidence.cost import measure
-from study_app.evidence.force_error import ROUNDING, error_of
-from study_app.evidence.hand_motions import COUNT_M, stroke
 from study_app.evidence.non_newtonian_law import non_newtonian_n
 from study_app.evidence.reference_model import local_wakes, lowered, resistance_nspm, respond
-from study_app.evidence.reference_solutions import CYCLES, Case, Truth
+from study_app.evidence.reference_solutions import COUNT_M, CYCLES, ROUNDING, Case, Truth, error_of, stroke
 from study_app.evidence.scene_variants import with_effects
 from study_app.evidence.unsteady_law import unsteady_n
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, Dynamics

@@ -1,24 +1,77 @@
-"""References for models of a liquid: motions with their forces.
+"""Motions of a hand with exact velocities, for measuring models along.
+
+References for models of a liquid: motions with their forces.
 
 There are two kinds. *Numerical*: the definition of the model itself, summed without rounding errors. *Physical*: the
 known forces on a real sphere: measured steady drag and the exact forces of creeping flow. None shares code with
 ``haptics.kernels.effects``.
+
+The error of a force against a reference solution.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from study_app.evidence.hand_motions import along_x, stroke
 from study_app.evidence.reference_model import respond
 from study_app.evidence.unsteady_law import Constants
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Liquid, Scene
 from study_app.lab.identify.measured_force import vectors_x
+
+RADIUS_M: Final = 0.03
+TURNS: Final = 1.5
+STIRRING_S: Final = 3.0
+REST_S: Final = 1.0
+STRETCHES: Final = 3
+
+
+def stir(scale: float, rate_hz: float) -> Motion:
+    """Return a stirring hand: 1.5 circles of 30 mm in 3 s, a rest, the same backward, a rest, and forward again.
+
+    Each segment has minimum jerk (Flash & Hogan 1985) with a small vertical motion: up to 0.18 m/s at the hand. In the
+    scene, it is ``scale`` times as large.
+    """
+    each_s = STIRRING_S + REST_S
+    t_s = np.arange(round(STRETCHES * each_s * rate_hz) + 1) / rate_hz
+    stretch = np.minimum(np.floor(t_s / each_s + 1e-9), STRETCHES - 1)
+    phase = np.clip((t_s - stretch * each_s) / STIRRING_S, 0.0, 1.0)
+    forth = np.where(stretch % 2 == 0, 1.0, -1.0)
+    angle = 2 * math.pi * TURNS * (phase**3 * (10 - 15 * phase + 6 * phase**2) * forth + (forth < 0))
+    angular_per_s = 2 * math.pi * TURNS * forth * 30 * phase**2 * (1 - phase) ** 2 / STIRRING_S
+    radius_m = scale * RADIUS_M
+    position_m = radius_m * np.column_stack([np.cos(angle), 0.1 * np.cos(2 * angle), np.sin(angle)])
+    along = radius_m * np.column_stack([-np.sin(angle), -0.2 * np.sin(2 * angle), np.cos(angle)])
+    return Motion(t_s, position_m, along * angular_per_s[:, np.newaxis])
+
+
+def stroke(speed_mps: float, rate_per_s: float, cycles: int, rate_hz: float) -> Motion:
+    """Return back-and-forth strokes along x, v = speed · sin ωt with ω = ``rate_per_s``."""
+    t_s = np.arange(round(cycles * 2 * math.pi / rate_per_s * rate_hz) + 1) / rate_hz
+    way_m = speed_mps / rate_per_s * (1 - np.cos(rate_per_s * t_s))
+    return along_x(t_s, way_m, speed_mps * np.sin(rate_per_s * t_s))
+
+
+def with_velocity(motion: Motion) -> Motion:
+    """Return the motion with its velocities; without any, with those of central differences."""
+    if motion.velocity_mps is not None or len(motion.t_s) < 2:
+        return motion
+    return Motion(motion.t_s, motion.position_m, np.gradient(motion.position_m, motion.t_s, axis=0))
+
+
+def along_x(t_s: Floats, way_m: Floats, velocity_mps: Floats) -> Motion:
+    """Return a motion along x."""
+    return Motion(t_s, vectors_x(way_m), vectors_x(velocity_mps))
+
+
+COUNT_M: Final = 38e-6
+"""One count of the Falcon's encoders, at the hand [m]."""
+
 
 DRAG_POINTS: Final = (
     (0.1585, 169.8),
@@ -181,3 +234,44 @@ def strokes_per_s(scene: Scene) -> float:
     """Return ω [1/s] of a stroke with the greatest speed and acceleration of the scene."""
     box = scene.motion_in(scene.liquids[0])
     return (box.acceleration_mps2 or math.nan) / (box.speed_mps or math.nan)
+
+
+RELATIVE: Final = 0.05
+FELT_N: Final = 0.05
+"""The accuracy target: max(5 % of the force, 0.05 N), below the smallest difference of force that people feel, 7 %."""
+ROUNDING: Final = 1e-9
+"""Errors below this share of the force are rounding errors, and count as equal."""
+
+
+class Error(NamedTuple):
+    """The errors of a force: root mean square and greatest [N], relative to those of the reference, and direction.
+
+    ``direction_deg`` is the root mean square angle where the reference is perceptible, or else not near zero.
+    """
+
+    rms_n: float
+    most_n: float
+    rms: float
+    most: float
+    direction_deg: float
+    target: float  # max(5 %, 0.05 N) as a share of the true force
+
+
+def error_of(forces_n: Sequence[Floats], truth: Truth) -> Error:
+    """Return the errors of forces, one (n, 3) array for each case of the reference."""
+    true_n = np.concatenate([case.force_n[case.counted] for case in truth.cases])
+    felt_n = np.concatenate([force[case.counted] for force, case in zip(forces_n, truth.cases, strict=True)])
+    sizes_n = np.linalg.norm(true_n, axis=1)
+    wrong_n = np.linalg.norm(felt_n - true_n, axis=1)
+    true_rms_n, true_most_n = _rms(sizes_n), float(sizes_n.max())
+    rms_n, most_n = _rms(wrong_n), float(wrong_n.max())
+    counts = (sizes_n >= min(FELT_N, RELATIVE * true_most_n)) & (np.linalg.norm(felt_n, axis=1) > 0)
+    cross = np.linalg.norm(np.cross(felt_n[counts], true_n[counts]), axis=1)
+    angles = np.degrees(np.arctan2(cross, (felt_n[counts] * true_n[counts]).sum(axis=1)))
+    target = max(RELATIVE, FELT_N / true_rms_n)
+    direction_deg = _rms(angles) if len(angles) else math.nan
+    return Error(rms_n, most_n, rms_n / true_rms_n, most_n / true_most_n, direction_deg, target)
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))

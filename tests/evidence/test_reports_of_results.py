@@ -12,15 +12,14 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from study_app.evidence.accuracy import accuracy_report, candidates, liquid_survey
+from study_app.evidence.accuracy import accuracy_report, candidates, survey
 from study_app.evidence.outlets import outlet_report
-from study_app.evidence.report_rates import rates
+from study_app.evidence.report_rates import simulation
 from study_app.evidence.soak import soak
-from study_app.evidence.stability import delivered_force, force_delay, stability_report, withheld_force
-from study_app.evidence.thresholds import noticed_delays, verdicts
-from study_app.evidence.timing import delay_report, device_lateness, timing_report
-from study_app.evidence.timing.delay_results import Shown
-from study_app.evidence.velocity import criteria
+from study_app.evidence.stability import delivered_force, force_delay, stability_report, velocity, withheld_force
+from study_app.evidence.thresholds import noticed_delays, planted
+from study_app.evidence.timing import delays, device_lateness, report
+from study_app.evidence.timing.delays import Shown
 from tests.filled import filled
 from tests.golden import CHANGING, compare
 from tests.golden_figures import figure_of, stub_png
@@ -74,14 +73,23 @@ GIVEN: dict[str, Any] = {
     "after": lambda rng: tuple(tuple(rng.choice([0.0, 0.0004, 0.1], 4).tolist()) for _ in withheld_force.QUICK),
     "reasons": lambda rng: tuple(rng.choice(["not finite", "swing"], int(rng.integers(0, 3)), replace=False)),
 }  # fmt: skip
-QUICK = (
-    timing_report.text, delay_report.text, device_lateness.text, outlet_report.stream_text, outlet_report.trigger_text,
-    verdicts.markdown, verdicts.table, noticed_delays.markdown, rates.markdown, rates.table,
-    stability_report.group_table, stability_report.in_words, stability_report.summary, force_delay.report,
-    criteria.report, withheld_force.report, delivered_force.report,
-)  # fmt: skip
-SLOW = (timing_report.write, delay_report.write, accuracy_report.write, liquid_survey.survey_markdown, soaked)
-REPORTS = (*QUICK, *(pytest.param(make, marks=pytest.mark.slow) for make in SLOW))
+QUICK = {
+    "timing_report-text": report.text, "delay_report-text": delays.text, "device_lateness-text": device_lateness.text,
+    "outlet_report-stream_text": outlet_report.stream_text, "outlet_report-trigger_text": outlet_report.trigger_text,
+    "verdicts-markdown": planted.markdown, "verdicts-table": planted.table,
+    "noticed_delays-markdown": noticed_delays.markdown,
+    "rates-markdown": simulation.markdown, "rates-table": simulation.table,
+    "stability_report-group_table": stability_report.group_table,
+    "stability_report-in_words": stability_report.in_words, "stability_report-summary": stability_report.summary,
+    "force_delay-report": force_delay.report, "criteria-report": velocity.report,
+    "withheld_force-report": withheld_force.report, "delivered_force-report": delivered_force.report,
+}  # fmt: skip
+SLOW = {
+    "timing_report-write": report.write, "delay_report-write": delays.write,
+    "accuracy_report-write": accuracy_report.write, "liquid_survey-survey_markdown": survey.survey_markdown,
+    "test_reports_of_results-soaked": soaked,
+}  # fmt: skip
+REPORTS = (*QUICK.items(), *(pytest.param(*one, marks=pytest.mark.slow) for one in SLOW.items()))
 
 
 def lines_of(make: Callable[..., Any], seed: int, folder: Path) -> Iterator[str]:
@@ -101,11 +109,11 @@ def lines_of(make: Callable[..., Any], seed: int, folder: Path) -> Iterator[str]
         yield from figure_of(content) if content.startswith(b"\x89PNG") else content.decode().splitlines()
 
 
-@pytest.mark.parametrize("make", REPORTS, ids=lambda make: f"{make.__module__.rpartition('.')[2]}-{make.__name__}")
+@pytest.mark.parametrize(("name", "make"), REPORTS)
 def test_reports_of_results(
-    make: Callable[..., Any], tmp_path: Path, pytestconfig: pytest.Config, monkeypatch: pytest.MonkeyPatch
+    name: str, make: Callable[..., Any], tmp_path: Path, pytestconfig: pytest.Config, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(Figure, "savefig", lambda figure, to, **_: to.write(stub_png(figure)))
-    seeds = 1 if make is soaked else 2 if make.__name__ == "write" else 4
+    seeds = 1 if make is soaked else 2 if name.endswith("write") else 4
     found = [line for seed in range(seeds) for line in (f"##### {seed}", *lines_of(make, seed, tmp_path))]
-    compare(GOLDEN / f"{make.__module__.rpartition('.')[2]}-{make.__name__}.txt", found, pytestconfig, mask=CHANGING)
+    compare(GOLDEN / f"{name}.txt", found, pytestconfig, mask=CHANGING)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from study_app.errors import StoreError
-from study_app.evidence import thesis_figures, thesis_motions
-from study_app.evidence.thesis_motions import EXPONENTS, FIGURES, LENGTH, figure_3, figure_4, figure_5, figure_6
+from study_app.evidence import thesis_figures
+from study_app.evidence.thesis_figures import EXPONENTS, FIGURES, LENGTH, figure_3, figure_4, figure_5, figure_6
 from tests.haptics.scenes import COMPILED, WATER_FACTOR, vectors
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
@@ -90,7 +90,7 @@ def test_figure_6_the_wake_stays_limited_unless_the_breaking_angle_exceeds_the_t
 
 
 def test_figure_7_a_coarser_resolution_fills_more_slowly():
-    runs = thesis_motions.figure_7().runs
+    runs = thesis_figures.figure_7().runs
     wakes = [run.table.wake_x_mps for run in runs]
     for finer, coarser in itertools.pairwise(wakes):
         assert (coarser[1:] <= finer[1:] + 1e-12).all()
@@ -101,7 +101,7 @@ def test_figure_7_a_coarser_resolution_fills_more_slowly():
 
 @pytest.mark.slow
 def test_figure_8_the_wake_fills_as_the_power_of_the_share_that_is_filled():
-    runs = thesis_motions.figure_8().runs
+    runs = thesis_figures.figure_8().runs
     fill = np.arange(LENGTH + 1) / LENGTH
     reckoned = slice(LENGTH // 4, LENGTH)
     for run, exponent in zip(runs, EXPONENTS, strict=True):
@@ -131,7 +131,7 @@ def test_every_figure_has_its_number_title_and_caption():
 @pytest.mark.nightly
 @pytest.mark.slow
 def test_the_same_bytes_every_time_in_three_formats_with_the_caption_as_text(monkeypatch, tmp_path):
-    monkeypatch.setattr(thesis_figures, "FIGURES", [figure_3, thesis_motions.figure_8])
+    monkeypatch.setattr(thesis_figures, "FIGURES", [figure_3, thesis_figures.figure_8])
     first, second = thesis_figures.figures(tmp_path / "new" / "a"), thesis_figures.figures(tmp_path / "b")
     assert [path.name for path in first] == [
         f"figure-{number}.{kind}" for number in (3, 8) for kind in ("png", "svg", "pdf", "txt")

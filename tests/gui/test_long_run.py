@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.app.windows_load import lend
 from study_app.evidence.soak.soak import soak
-from study_app.evidence.timing.loops import LEAD_IN, PERIOD_NS
+from study_app.evidence.timing.measurement import LEAD_IN, PERIOD_NS
 from study_app.protocol.load import load_scenes
 from tests.compiled import needs_servo
 

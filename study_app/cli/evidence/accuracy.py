@@ -68,7 +68,7 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
 
 def _survey(file: str | None, to: Path | None) -> None:
     """Print or write the error of the force of every liquid of a file."""
-    from study_app.evidence.accuracy.liquid_survey import survey, survey_markdown, write_survey
+    from study_app.evidence.accuracy.survey import survey, survey_markdown, write_survey
     from study_app.protocol.load import load_scenes
 
     prepare(to)
@@ -106,7 +106,7 @@ def _subjects(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scen
 
 def motion_along(path: str, scene: Scene) -> Motion:
     """Return the motion of a path's name or a motion file, at the scene's rate."""
-    from study_app.evidence.hand_motions import stir
+    from study_app.evidence.reference_solutions import stir
     from study_app.haptics.model import motion, paths
     from study_app.lab.identify.measured_force import at_rate
 
@@ -142,10 +142,9 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
     A ball of 68 mm starts, moves at constant speed and stops abruptly, at 0.2 and 0.6 m/s. Fitting takes about a
     minute. Further motions, such as oscillations and a reversal, are used by --refit.
     """
-    from study_app.evidence.cfd.fits import fit_all
+    from study_app.evidence.cfd.fits import fit_all, fits_markdown, steady_markdown, write
     from study_app.evidence.cfd.law_fit import refit as refit_all
     from study_app.evidence.cfd.law_fit import refit_markdown, write_refit
-    from study_app.evidence.cfd.model_comparison import fits_markdown, steady_markdown, write
     from study_app.evidence.cfd.solver import solve as solve_all
     from study_app.evidence.cfd.stored_flows import held_out, steady, stored, training
 

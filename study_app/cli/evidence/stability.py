@@ -117,9 +117,8 @@ def stability(
 
 def _print_one(workers: Workers, *, withheld: bool, delivered: bool, velocity: bool, estimated: int) -> None:
     """Print one measurement of its own; end with 3 if a goal is not met, or a loop became unstable."""
-    from study_app.evidence.online_estimation import applied_estimates
-    from study_app.evidence.stability import delivered_force, withheld_force
-    from study_app.evidence.velocity import criteria
+    from study_app.evidence.stability import applied_estimates, delivered_force, withheld_force
+    from study_app.evidence.stability import velocity as criteria
 
     if velocity:
         with progress() as show:

@@ -20,7 +20,7 @@ from study_app.errors import DisplayError, StudyError
 
 if TYPE_CHECKING:
     from study_app.app.windows_load import WindowsThread
-    from study_app.evidence.timing.machine_load import LoadName
+    from study_app.evidence.computer import LoadName
 
 Result: TypeAlias = tuple[str, str, bool]
 """A text, the name of its file, and whether a limit is missed."""
@@ -96,7 +96,7 @@ def timing(
         measured(partial(measure_triggers, triggers, seconds), load, to)
     else:
         from study_app.evidence.timing.measurement import timing as time_loops
-        from study_app.evidence.timing.timing_report import text, write
+        from study_app.evidence.timing.report import text, write
 
         prepare(to)
         with ending_by_signal() as (ending, _), progress(partial(click.echo, err=True)) as show:
@@ -107,7 +107,7 @@ def timing(
 
 def time_delays(seconds: float, load: LoadName, to: Path | None) -> None:
     """Print how well delays are kept; without a display, on none."""
-    from study_app.evidence.timing.delay_report import text, write
+    from study_app.evidence.timing.delays import text, write
 
     if sys.platform == "linux" and not any(map(os.environ.get, ("QT_QPA_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY"))):
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
@@ -122,7 +122,7 @@ def time_delays(seconds: float, load: LoadName, to: Path | None) -> None:
 
 def measured(measure: Callable[[threading.Event, ShowProgress], Result], load: LoadName, to: Path | None) -> None:
     """Print and keep what is measured under load, until Ctrl+C; end with 3 where a limit is missed."""
-    from study_app.evidence.timing.machine_load import under_load
+    from study_app.evidence.computer import under_load
     from study_app.store.atomic import write_file
 
     prepare(to)
@@ -146,9 +146,8 @@ def compare_devices(seconds: float, ending: threading.Event, show: ShowProgress)
 
 def measure_streams(seconds: float, ending: threading.Event, show: ShowProgress) -> Result:
     """Return what another process receives, and what that costs the servo."""
-    from study_app.evidence.outlets.lateness import compare
     from study_app.evidence.outlets.outlet_report import stream_text
-    from study_app.evidence.outlets.streams import stream
+    from study_app.evidence.outlets.streams import compare, stream
 
     found = stream(seconds, ending=ending, progress=show)
     ratios = compare(min(seconds, MOST_COMPARED_S), ending=ending, progress=show)
@@ -219,8 +218,8 @@ def soak(
 
     FILE defines the liquids; default: rek2024. Ctrl+C ends it with the report so far.
     """
+    from study_app.evidence.computer import under_load
     from study_app.evidence.soak.soak import soak as soak_servo
-    from study_app.evidence.timing.machine_load import under_load
     from study_app.protocol.load import load_scenes
 
     scenes = load_scenes(protocol)

@@ -35,8 +35,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     """
     from study_app.analysis.planning.simulated_studies import plan
     from study_app.evidence.report_rates.known_effects import simulated
-    from study_app.evidence.report_rates.rates import Rate, markdown, table
-    from study_app.evidence.report_rates.simulation import validate
+    from study_app.evidence.report_rates.simulation import Rate, markdown, table, validate
     from study_app.protocol.load import load
     from study_app.session.simulated.rehearsal import condition_features
     from study_app.store.output_files import write_files
@@ -98,9 +97,8 @@ def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, 
     participants are rehearsed with servo, files, unblinding and analysis. Every value is printed with its limit. Ends
     with exit code 3 if a value exceeds its limit.
     """
-    from study_app.evidence.thresholds.many_studies import NAMES, methods_alone, plant
-    from study_app.evidence.thresholds.verdicts import Verdict, markdown, table
-    from study_app.evidence.thresholds.whole_pipeline import PEOPLE, judged, rehearsed
+    from study_app.evidence.thresholds.many_studies import NAMES, PEOPLE, judged, methods_alone, plant, rehearsed
+    from study_app.evidence.thresholds.planted import Verdict, markdown, table
     from study_app.protocol.load import load, source_bytes
     from study_app.store.output_files import write_files
 
@@ -143,8 +141,7 @@ def delay_thresholds(people: int, seed: int, to: Path | None) -> None:
 
     The forced choice does not depend on a person's criterion; the rating does.
     """
-    from study_app.evidence.thresholds.noticed_delays import compare, markdown
-    from study_app.evidence.thresholds.noticed_figure import write
+    from study_app.evidence.thresholds.noticed_delays import compare, markdown, write
 
     with progress() as show:
         show("simulating people")

@@ -15,7 +15,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
 from study_app import figure_style as style
 from study_app.evidence.accuracy.comparison import Accuracy, Kind, Row, front, worst
-from study_app.evidence.force_error import FELT_N, RELATIVE, ROUNDING
+from study_app.evidence.reference_solutions import FELT_N, RELATIVE, ROUNDING
 
 WIDTH_PT: Final = 85 / 25.4 * 72
 LEFT_PT: Final = 27.0

@@ -11,13 +11,11 @@ import numpy as np
 
 from study_app.errors import StudyError
 from study_app.evidence import reference_solutions as truths
-from study_app.evidence.accuracy import candidate_sets
+from study_app.evidence.accuracy import candidates
 from study_app.evidence.accuracy.candidates import Rung, given
-from study_app.evidence.cfd.solver_truths import solver_truths
+from study_app.evidence.cfd.stored_flows import solver_truths
 from study_app.evidence.computer import machine
-from study_app.evidence.force_error import ROUNDING, Error, error_of
-from study_app.evidence.hand_motions import with_velocity
-from study_app.evidence.reference_solutions import Truth
+from study_app.evidence.reference_solutions import ROUNDING, Error, Truth, error_of, with_velocity
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Scene
 
@@ -110,14 +108,14 @@ def accuracy(
     if motion.velocity_mps is None:
         said.append("the motion brings no velocities: central differences of its places count as the true ones")
         motion = with_velocity(motion)
-    fewest = len(motion.t_s) // max(candidate_sets.SLOWER)
+    fewest = len(motion.t_s) // max(candidates.SLOWER)
     if fewest < Rung.BATCH:
         said.append(f"the motion is short: calls, of some µs, count in times of {fewest} ticks a batch, not 1,000")
     measured: list[Row] = []
     found: list[Truth] = []
     if numerical is not None:
-        scene = candidate_sets.drag_and_wake(numerical)
-        rungs, choice = candidate_sets.numerical(scene)
+        scene = candidates.drag_and_wake(numerical)
+        rungs, choice = candidates.numerical(scene)
         truth = truths.definition(given(scene), motion)
         if not truth.cases[0].force_n.any():
             raise StudyError(
@@ -126,7 +124,7 @@ def accuracy(
         measured += _rows("numerical", scene, rungs, choice, (truth,), progress)
         found.append(truth)
     if physical is not None:
-        rungs, choice = candidate_sets.physical(physical)
+        rungs, choice = candidates.physical(physical)
         real = _physical_truths(rungs[0].scene, said)
         measured += _rows("physical", physical, rungs, choice, real, progress)
         found += real

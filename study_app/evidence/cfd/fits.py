@@ -2,26 +2,40 @@
 
 Every model is fitted to every motion by ``identify.fit``; what it found is then tried on the same liquid at the other
 speed, where nothing is fitted any more: a parameter of a liquid must not change with the hand.
+
+The forces of the solver and of models as a figure: one column of a page, readable in grey.
+
+The fluid solver against published drag and our laws, and models against the solver, as text tables and as CSV.
 """
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
-from study_app.evidence.cfd.cases import Case
-from study_app.evidence.cfd.profiles import RAMP, STOP
+from study_app import figure_style as style
+from study_app.evidence.cfd.solved_cases import RAMP, STOP, Case
 from study_app.evidence.cfd.stored_flows import Table
+from study_app.evidence.reference_solutions import measured_drag_n
+from study_app.figure_style import PLOT_SETTINGS, file_bytes
 from study_app.haptics.model.effects.local_wake import LocalWake
 from study_app.haptics.model.effects.wake import Wake
+from study_app.haptics.model.laws.drag_laws import LAWS
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.overrides import override_all
 from study_app.haptics.model.scene import Effect, Given, Liquid, Scene
 from study_app.haptics.runtime.offline import simulate
 from study_app.lab.identify.fit import fit
 from study_app.lab.identify.measured_force import along_a_line
+from study_app.lab.identify.parameters import find
+from study_app.store.atomic import write_file
+from study_app.store.tables.csv_files import csv_text_of
 
 RATE_HZ: Final = 1000.0
 LAW: Final = "brown-lawler"
@@ -175,3 +189,156 @@ def share_of(error_n: Floats, force_n: Floats) -> float:
 
 def _rms(values: Floats) -> float:
     return math.sqrt(float(np.mean(values**2)))
+
+
+WIDTH_PT: Final = 85 / 25.4 * 72
+PANEL_PT: Final = 118.0
+LOOKS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
+    "drag of the Reynolds number": ("drag alone", {"color": "#5d6a75", "linestyle": (0, (1, 1.2))}),
+    "constant C_d, wake": ("constant $C_d$ and wake", {"color": "#b35600", "linestyle": (0, (5, 2))}),
+    "... history, added mass": ("drag, history, added mass", {"color": "#0b65a3", "linestyle": "-"}),
+}
+SOLVER: Final[dict[str, Any]] = {"color": "#13202c", "linewidth": 3.2, "alpha": 0.35}
+AFTER: Final = 8.0
+
+
+@style.own_settings(style.PLOT_SETTINGS)
+def draw(tables: Sequence[Table], fits: Sequence[Fitted]) -> Figure:
+    """Draw, for the fastest motion through each liquid, the force from its start to 8 D/U after its stop."""
+    shown = {table.case.liquid_id: table for table in sorted(tables, key=lambda it: it.case.speed_mps)}
+    height_pt = PANEL_PT * len(shown) + 30
+    figure = Figure(figsize=(WIDTH_PT / 72, height_pt / 72), facecolor="white")
+    axes = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
+    figure.subplots_adjust(left=0.12, right=0.98, top=1 - 44 / height_pt, bottom=28 / height_pt, hspace=0.42)
+    for ax, table in zip(axes, shown.values(), strict=True):
+        _panel(ax, table, [it for it in fits if it.case == table.case and it.model.name in LOOKS])
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="upper left", ncols=2, frameon=False, fontsize=6.8, bbox_to_anchor=(0.0, 1.0))
+    axes[-1].set_xlabel("time [s]")
+    return figure
+
+
+def _panel(ax: Axes, table: Table, fits: Sequence[Fitted]) -> None:
+    case, (motion, force_n) = table.case, even(table)
+    t_s = motion.t_s
+    kept = t_s <= (STOP + AFTER) * case.unit_s
+    ax.plot(t_s[kept], force_n[kept], label="fluid solver", **SOLVER)
+    order = [it.name for it in MODELS]
+    for it in sorted(fits, key=lambda it: order.index(it.model.name)):
+        label, look = LOOKS[it.model.name]
+        ax.plot(t_s[kept], it.force_n[kept], label=label, linewidth=1.1, **look)
+    even_n = float(np.interp(STOP * case.unit_s * 0.95, t_s, force_n))
+    ax.set_ylim(2.3 * even_n, -1.6 * even_n)
+    ax.axhline(0, color=style.ZERO, linewidth=0.6)
+    ax.set_title(f"{case.liquid_id}, {case.speed_mps:g} m/s, Re {case.reynolds:.2g}: force along the motion [N]")
+    ax.yaxis.set_major_locator(MaxNLocator(5))
+    _note(ax, "stop", (STOP * case.unit_s, 0), (-21, 5))
+    for peak, edge in ((int(force_n.argmin()), 0), (int(force_n.argmax()), 1)):
+        _note(ax, f"to {force_n[peak]:.1f} N", (t_s[peak], ax.get_ylim()[edge]), (9, -7 if edge else 3))
+
+
+def _note(ax: Axes, words: str, at: tuple[float, float], offset_pt: tuple[float, float]) -> None:
+    words = words.replace("-", "−")
+    ax.annotate(words, at, offset_pt, textcoords="offset points", fontsize=6.6, color=style.TEXT_SOFT)
+
+
+FITS_FILE: Final = "fits.csv"
+COLUMNS: Final = (
+    "table", "model", "parameters", "rms_n", "worst_n", "share", "within", "push", "carried",
+)  # fmt: skip
+MITTAL: Final = {50.0: 1.57, 100.0: 1.09}
+"""C_d of a sphere by a spectral method: Mittal 1999, Int. J. Numer. Meth. Fluids 30:921, as quoted in the validation of
+Notus CFD, https://doc.notus-cfd.org ("steady flows past a sphere")."""
+CONSTANT: Final = 0.47
+EDGE: Final = 1e-6
+
+
+def clift(reynolds: float) -> float:
+    """Return C_d of a sphere by Clift, Grace & Weber 1978, Bubbles, Drops and Particles, table 5.12, Re 0.01 to 260."""
+    if reynolds <= 20:
+        return 24 / reynolds * (1 + 0.1315 * math.pow(reynolds, 0.82 - 0.05 * math.log10(reynolds)))
+    return 24 / reynolds * (1 + 0.1935 * math.pow(reynolds, 0.6305))
+
+
+def steady_markdown(table: Table) -> str:
+    """Return steady drag as a Markdown table: the solver's C_d, and by how much others differ from it."""
+    names = ["coarser grid", "half the box", "Clift et al. 1978", "Mittal 1999", "experiments", *LAWS, "C_d 0.47"]
+    lines = [f"| Re | C_d, solver | {' | '.join(names)} |", "|---:" * (len(names) + 2) + "|"]
+    for reynolds, solved, coarse, narrow in zip(*(it.tolist() for it in table.columns.values()), strict=True):
+        others = [coarse, narrow, clift(reynolds), MITTAL.get(reynolds), _measured(reynolds)]
+        others += [law(reynolds) * 24 / reynolds for law in LAWS.values()]
+        shares = ["" if it is None else _signed(it / solved - 1) for it in (*others, CONSTANT)]
+        lines.append(f"| {reynolds:g} | {solved:.4g} | {' | '.join(shares)} |")
+    return "\n".join(lines)
+
+
+def fits_markdown(fits: Sequence[Fitted]) -> str:
+    """Return the fits as Markdown, a table for every motion."""
+    parts = []
+    for case in dict.fromkeys(it.case for it in fits):
+        lines = [
+            f"{case.liquid_id}, {case.speed_mps:g} m/s (Re {case.reynolds:.3g})",
+            "",
+            "| model | fitted | RMS error | greatest error | within target | push after the stop | other speed |",
+            "|---|---|---:|---:|---:|---:|---:|",
+        ]
+        lines += [_row(it) for it in fits if it.case == case]
+        parts.append("\n".join(lines))
+    return "\n\n".join([*parts, "\\* at the edge of what a scene permits: the best value may lie beyond."])
+
+
+def fits_csv(fits: Sequence[Fitted]) -> bytes:
+    """Return the fits as CSV, named `COLUMNS`; parameters as ``name=value`` apart by blanks."""
+    rows: list[Sequence[str]] = [COLUMNS]
+    for it in fits:
+        numbers = (it.rms_n, it.worst_n, it.share, it.within, it.push, it.carried)
+        given = " ".join(f"{name}={value!r}" for name, value in it.values.items())
+        rows.append([it.case.name, it.model.name, given, *(f"{number:.6g}" for number in numbers)])
+    return csv_text_of(rows).encode()
+
+
+def write(tables: Sequence[Table], drag: Table, fits: Sequence[Fitted], to: Path) -> tuple[Path, ...]:
+    """Write the fits as CSV, both tables as Markdown and the figure as PNG and SVG into a folder; return the files.
+
+    Raises
+    ------
+    StoreError
+        A file cannot be written.
+    """
+    figure = draw(tables, fits)
+    said = f"{steady_markdown(drag)}\n\n{fits_markdown(fits)}\n"
+    files = {FITS_FILE: fits_csv(fits), "cfd.md": said.encode()}
+    files |= {
+        f"cfd.{kind}": file_bytes(figure, kind, "Models against a fluid solver", PLOT_SETTINGS)
+        for kind in ("png", "svg")
+    }
+    for name, content in files.items():
+        write_file(to / name, content)
+    return tuple(to / name for name in files)
+
+
+def _row(it: Fitted) -> str:
+    edges = _at_the_edge(it)
+    fitted = ", ".join(f"{name} {value:.3g}{'*' if name in edges else ''}" for name, value in it.values.items())
+    fitted = fitted or "nothing"
+    return (
+        f"| {it.model.name} | {fitted} | {it.rms_n:.2g} N ({it.share:.1%}) | {it.worst_n:.2g} N | {it.within:.0%} | "
+        f"{_signed(it.push, 0)} | {it.carried:.1%} |"
+    )
+
+
+def _at_the_edge(it: Fitted) -> set[str]:
+    """Return which fitted parameters are the least or the greatest that a scene permits."""
+    ranges = find(scene_of(it.model, it.case), it.case.liquid_id, it.model.free) if it.model.free else ()
+    return {one.name for one in ranges if not one.least * (1 + EDGE) < it.values[one.name] < one.most * (1 - EDGE)}
+
+
+def _measured(reynolds: float) -> float:
+    """Return C_d by the experiments that `truths` interpolates, as of a sphere and liquid of size and density 1."""
+    speed_mps = np.array([1.0])
+    liquid = Liquid(id="any", density_kg_m3=1.0, viscosity_pa_s=1 / reynolds)
+    return float(measured_drag_n(liquid, 1.0, speed_mps)[0]) / (math.pi / 8)
+
+
+def _signed(share: float, digits: int = 1) -> str:
+    return f"{share:+.{digits}%}".replace("-", "−")

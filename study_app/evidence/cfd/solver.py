@@ -15,8 +15,8 @@ from typing import Final
 import numpy as np
 
 from study_app.errors import StudyError
-from study_app.evidence.cfd.cases import Case, cases, held_out_cases, training_cases
 from study_app.evidence.cfd.flow import ORDER, Flow, Grid, library
+from study_app.evidence.cfd.solved_cases import Case, cases, held_out_cases, training_cases
 from study_app.evidence.cfd.stored_flows import (
     HELD_OUT_FOLDER,
     MOTION,

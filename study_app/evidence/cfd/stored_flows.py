@@ -1,6 +1,10 @@
-"""Solved flows as CSV files, with comment lines ``# name: value`` on what made them; read without the solver."""
+"""Solved flows as CSV files, with comment lines ``# name: value`` on what made them; read without the solver.
+
+The solved flows as references for models of a liquid.
+"""
 
 import csv
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -10,10 +14,13 @@ from typing import Final
 import numpy as np
 
 from study_app.errors import StudyError
-from study_app.evidence.cfd.cases import Case
-from study_app.evidence.cfd.profiles import PROFILES, STOPPING
+from study_app.evidence.cfd.solved_cases import PROFILES, STOPPING
+from study_app.evidence.cfd.solved_cases import Case as SolvedCase
+from study_app.evidence.reference_solutions import Case, Truth, along_x
 from study_app.evidence.unsteady_law import Constants
 from study_app.haptics.model.motion import Floats
+from study_app.haptics.model.scene import Scene
+from study_app.lab.identify.measured_force import vectors_x
 from study_app.store.tables.csv_files import csv_text_of
 
 MOTION: Final = ("t_s", "velocity_mps", "force_n")
@@ -39,11 +46,11 @@ class Table:
     columns: dict[str, Floats]
 
     @property
-    def case(self) -> Case:
+    def case(self) -> SolvedCase:
         """What was solved, by the notes of a table of `MOTION`."""
         profile = PROFILES[self.notes.get("profile", STOPPING.name)]
         density_kg_m3, viscosity_pa_s, diameter_m, speed_mps = (float(self.notes[name]) for name in _OF_THE_CASE)
-        return Case(self.notes["liquid"], density_kg_m3, viscosity_pa_s, diameter_m, speed_mps, profile)
+        return SolvedCase(self.notes["liquid"], density_kg_m3, viscosity_pa_s, diameter_m, speed_mps, profile)
 
 
 def text(notes: Mapping[str, str], columns: Mapping[str, Sequence[float] | Floats]) -> bytes:
@@ -53,7 +60,7 @@ def text(notes: Mapping[str, str], columns: Mapping[str, Sequence[float] | Float
     return (head + csv_text_of([columns, *rows])).encode()
 
 
-def notes_of(case: Case) -> dict[str, str]:
+def notes_of(case: SolvedCase) -> dict[str, str]:
     """Return the notes that say what was solved."""
     values = (case.density_kg_m3, case.viscosity_pa_s, case.diameter_m, case.speed_mps)
     return {
@@ -166,3 +173,37 @@ def read(file: Traversable, names: Sequence[str], noted: Sequence[str] = ()) -> 
             f"the solver's table {file.name} cannot be used ({error}): make it again with liquid-study cfd --solve"
         ) from error
     return Table(notes, columns)
+
+
+def solver_truths(scene: Scene, folder: Traversable | None = None) -> tuple[Truth, ...]:
+    """Return the fluid solver's results for the scene's liquid and body, at the scene's rate; often none.
+
+    Raises
+    ------
+    StudyError
+        There are no tables, or one cannot be understood.
+    """
+    liquid = scene.liquids[0]
+    ours = (liquid.density_kg_m3, liquid.viscosity_pa_s or math.nan, scene.body.diameter_m)
+    more = (*training(), *held_out()) if folder is None else ()
+    tables = (*stored(folder), *more)
+    without = left_out() if folder is None else {}
+    found = []
+    for table in tables:
+        notes = table.notes
+        *of, computing_s = (float(notes[name]) for name in OF_THE_MODEL)
+        if not np.allclose(of, ours, rtol=0.01, atol=0):
+            continue
+        t_s, velocity_mps, force_n = table.columns.values()
+        even_s = np.arange(t_s[0], t_s[-1], 1 / scene.rate_hz)
+        even_mps = np.interp(even_s, t_s, velocity_mps)
+        way_m = np.concatenate([[0.0], np.cumsum((even_mps[1:] + even_mps[:-1]) / 2 * np.diff(even_s))])
+        case = Case(
+            along_x(even_s - even_s[0], way_m, even_mps),
+            vectors_x(np.interp(even_s, t_s, force_n)),
+            np.ones(len(even_s), bool),
+        )
+        source = f"fluid solver: {notes.get('command', 'unknown command')}"
+        title = notes.get("title", "a solved flow")
+        found.append(Truth(title, source, (case,), computing_s, notes.get("machine", ""), without.get(table.case.name)))
+    return tuple(found)

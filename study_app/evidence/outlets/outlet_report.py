@@ -5,8 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.evidence.outlets.lateness import MOST_RATIO, Ratio
-from study_app.evidence.outlets.streams import MOST_ERROR_MS, Streamed
+from study_app.evidence.outlets.streams import MOST_ERROR_MS, MOST_RATIO, Ratio, Streamed
 from study_app.evidence.outlets.trigger_delays import TriggerDelays
 from study_app.outlets.markers import HIGH_S
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.errors import OutletError, StudyError, WorkerError
-from study_app.evidence.outlets.pacing import paced
+from study_app.evidence.outlets.streams import paced
 from study_app.haptics.runtime.clocks.clock import SystemClock
 from study_app.outlets.markers import CODES, SinkThread, TriggerSink, marker_of
 from study_app.outlets.session_outlets import open_sink

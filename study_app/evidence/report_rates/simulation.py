@@ -1,14 +1,388 @@
-"""Simulates all cells by an executor: batches of the cells alternate, so that partial results are balanced."""
+"""Rates of simulated studies: counting, comparison with limits, and tables (Markdown, CSV).
+
+One batch of simulated studies evaluated by the report's own tests, and the errors of their verdicts.
+
+Rates of single tests: equivalence where a few notice strongly, coverage of thresholds, planned sizes.
+
+Simulates all cells by an executor: batches of the cells alternate, so that partial results are balanced.
+"""
+
+from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from functools import partial
-from typing import Final, TypeAlias
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from typing import Final, Literal, TypeAlias
 
-from study_app.evidence.report_rates import single_test_rates, study_rates
-from study_app.evidence.report_rates.known_effects import EXTENTS, GENERATORS, Simulated
-from study_app.evidence.report_rates.rates import Rate
-from study_app.evidence.report_rates.study_rates import BATCH, Cell
+import numpy as np
+from scipy.special import expit
+from scipy.stats import binomtest
+
+from study_app.analysis.data.blocks import Block
+from study_app.analysis.data.measures import Array
+from study_app.analysis.evaluate import found_in
+from study_app.analysis.findings.block_tests import Asked, of_tables
+from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay, common_ms
+from study_app.analysis.findings.finding import FOUND
+from study_app.analysis.findings.recognition import LiquidRecognition
+from study_app.analysis.findings.statement_tests import DelayTrend, OverAll, Pairs, SettingsDiffer, over_all
+from study_app.analysis.planning.power_curves import interval
+from study_app.analysis.report.sections import answers as answered
+from study_app.analysis.results import BlockFound, Failures, Results
+from study_app.analysis.statistics.equivalence import participants_needed, tost
+from study_app.analysis.statistics.thresholds import noticed
+from study_app.evidence.report_rates.known_effects import (
+    EXTENTS,
+    GENERATORS,
+    Extent,
+    Generator,
+    Simulated,
+    alike,
+    answers,
+    true_differences,
+)
+from study_app.store.tables.csv_files import csv_text_of
+
+Limit: TypeAlias = Literal["none", "at most 5 %", "at least 93 %", "at least 77 %", "at most 83 %", "counted"]
+
+Verdict: TypeAlias = Literal["yes", "no", "too few studies", "counted"]
+
+SURE: Final = 0.999
+"""Confidence of the interval that must lie beyond a limit to say that a rate does not keep to it."""
+
+ALLOWED: Final[dict[Limit, tuple[float, float, float, float]]] = {
+    "at most 5 %": (0.0, 0.05, 0.0, 0.075),
+    "at least 93 %": (0.93, 1.0, 0.905, 1.0),
+    "at least 77 %": (0.77, 1.0, 0.0, 1.0),
+    "at most 83 %": (0.0, 0.83, 0.0, 1.0),
+}
+"""Of each limit the range that the interval of a rate must touch, and the range that it must not leave."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """Number of ``hits`` among the simulated studies ``of`` one cell."""
+
+    cell: str
+    participants: int
+    what: str
+    limit: Limit
+    hits: int
+    studies: int
+
+    def __add__(self, other: Rate) -> Rate:
+        """Return the rate of both counts together, of the same thing in the same cell."""
+        return replace(self, hits=self.hits + other.hits, studies=self.studies + other.studies)
+
+    def __str__(self) -> str:
+        """Return the rate in one line."""
+        low, high = (100 * end for end in self.interval)
+        return (
+            f"{self.cell}, n = {self.participants}: {self.what}: {self.hits} of {self.studies}, "
+            f"{100 * self.share:.1f} % ({low:.1f} to {high:.1f}), {self.limit}: {self.holds}"
+        )
+
+    @property
+    def share(self) -> float:
+        """The share of studies."""
+        return self.hits / self.studies if self.studies else 0.0
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Wilson's 95 % interval of the share."""
+        return interval(self.share, self.studies) if self.studies else (0.0, 1.0)
+
+    @property
+    def holds(self) -> Verdict:
+        """Whether the rate keeps to its limit.
+
+        "yes" by the 95 % interval, "no" where even the 99.9 % interval lies beyond the limit: of a hundred rates that
+        are exactly at their limit some 95 % intervals miss it by chance. Between the two there are too few studies.
+        """
+        if self.limit == "counted":
+            return "counted"
+        if self.limit == "none":
+            return "no" if self.hits else "yes"
+        if not self.studies:
+            return "too few studies"
+        lowest, highest, least, most = ALLOWED[self.limit]
+        low, high = binomtest(self.hits, self.studies).proportion_ci(SURE, method="wilson")
+        if high < lowest or low > highest:
+            return "no"
+        low, high = self.interval
+        reaches = low <= highest and high >= lowest
+        return "yes" if reaches and low >= least and high <= most else "too few studies"
+
+
+def markdown(rates: Sequence[Rate]) -> str:
+    """Return the rates, each with its Wilson interval and whether its limit holds."""
+    lines = ["| studies | n | what happened | share | 95 % interval | of | limit | holds |", "|---" * 8 + "|"]
+    for rate in sorted(rates, key=lambda one: (one.cell, one.what, one.participants)):
+        low, high = (f"{100 * end:.1f}" for end in rate.interval)
+        lines.append(
+            f"| {rate.cell} | {rate.participants} | {rate.what} | {100 * rate.share:.1f} % | {low} to {high} % | "
+            f"{rate.studies} | {rate.limit} | {rate.holds} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def table(rates: Sequence[Rate]) -> bytes:
+    """Return the rates as CSV, a row each."""
+    rows: list[list[object]] = [
+        ["studies", "participants", "what", "limit", "hits", "of", "share", "low", "high", "holds"]
+    ]
+    for one in rates:
+        share = (f"{number:.6f}" for number in (one.share, *one.interval))
+        rows.append([one.cell, one.participants, one.what, one.limit, one.hits, one.studies, *share, one.holds])
+    return csv_text_of(rows).encode()
+
+
+BATCH: Final = 25
+DRAWS: Final = 999
+"""Of the test over all statements: its error rate holds with any number."""
+
+Event: TypeAlias = tuple[str, Limit]
+"""What is counted, and its limit."""
+
+Truth: TypeAlias = tuple[Array, ...]
+"""True differences of means to the first setting (settings, items), of each block."""
+
+LOST: Final[Event] = ("a part of the report is lost", "none")
+CLAIMED: Final = "the first page claims something"
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """Studies of one kind: model of the answers, true effects, and number of participants."""
+
+    generator: Generator
+    extent: Extent
+    participants: int
+
+    @property
+    def name(self) -> str:
+        """The cell in words, without its size."""
+        return f"{self.generator}, {self.extent}"
+
+
+def truth(simulation: Simulated, cell: Cell) -> Truth:
+    """Return the true effects in the studies of a cell, which do not depend on their size."""
+    return true_differences(simulation, cell.generator, cell.extent)
+
+
+def count_studies(
+    simulation: Simulated, cell: Cell, truth: Truth, seed: int, batch: int, studies: int
+) -> tuple[Rate, ...]:
+    """Return the rates of so many studies of a cell, those of batch number ``batch``."""
+    events: dict[Event, int] = {}
+    for study in range(batch * BATCH, batch * BATCH + studies):
+        for event, happened in _study(simulation, cell, truth, seed, study).items():
+            events[event] = events.get(event, 0) + happened
+    return tuple(
+        Rate(cell.name, cell.participants, what, limit, hits, studies) for (what, limit), hits in events.items()
+    )
+
+
+def _study(simulation: Simulated, cell: Cell, truth: Truth, seed: int, study: int) -> dict[Event, bool]:
+    failures = Failures()
+    given = answers(simulation, cell.generator, cell.extent, cell.participants, seed, study)
+    people = tuple(f"P{number:03d}" for number in range(cell.participants))
+    found: dict[Event, bool] = {}
+    results: list[BlockFound] = []
+    for place, (block, values) in enumerate(zip(simulation.blocks, given, strict=True)):
+        single = {item.id: values[:, :, [column]] for column, item in enumerate(block.items)}
+        asked = of_tables(
+            block,
+            simulation.decided if cell.extent != "partial" else replace(simulation.decided, noticed=None),
+            people,
+            single,
+            seed=1,
+            failures=failures,
+            planning=False,
+            verdicts_only=True,
+        )
+        result = found_in(None, asked)
+        if cell.extent != "partial":  # with draws of its own: the same draws in all studies would shift the rate
+            result = OverAll.add_to(result, over_all(replace(asked, seed=1 + study), DRAWS))
+        results.append(result)
+        judged = _in_delays if block.kind == "delays" else _in_liquids
+        for (what, at_most), hit in judged(asked, result, cell, truth[place]):
+            found[f"{what} ({block.kind})", at_most] = hit
+        if cell.extent == "empty":
+            overall = OverAll.of(result)
+            differs = overall is not None and (overall.p or 1.0) <= simulation.decided.alpha
+            found[f"test over all statements ({block.kind})", "at most 5 %"] = differs
+    found[LOST] = bool(failures.found)
+    if cell.extent != "partial":
+        whole = Results(simulation.decided, people, tuple(results), delivered=(), orders={}, performance=None, seed=1)
+        limit: Limit = "at most 5 %" if cell.extent == "empty" else "counted"
+        found[CLAIMED, limit] = any(one.claims for one in answered(whole))
+    return found
+
+
+def _in_liquids(asked: Asked, found: BlockFound, cell: Cell, _truth: Array) -> Iterator[tuple[Event, bool]]:
+    if cell.extent == "empty":
+        yield (
+            ("settings differ in a statement", "at most 5 %"),
+            any(one.verdict in FOUND for one in SettingsDiffer.of(found)),
+        )
+        yield ("liquids recognised", "at most 5 %"), _recognised(found)
+    equal = _equal_pairs(asked.block, cell.extent)
+    if equal:
+        found_equal = any(one.tested.verdict in FOUND and (one.first, one.second) in equal for one in Pairs.of(found))
+        yield ("equal liquids distinguished", "at most 5 %"), found_equal
+    if cell.extent == "full":
+        yield ("some liquids distinguished", "counted"), any(one.tested.verdict in FOUND for one in Pairs.of(found))
+        yield ("liquids recognised", "counted"), _recognised(found)
+
+
+def _recognised(found: BlockFound) -> bool:
+    recognition = LiquidRecognition.of(found)
+    return recognition is not None and recognition.verdict in FOUND
+
+
+def _equal_pairs(block: Block, extent: Extent) -> set[tuple[str, str]]:
+    """Return the pairs of codes whose settings are equal in truth."""
+    like = alike(block, extent)
+    codes = block.codes
+    return {
+        (first, second)
+        for one, first in enumerate(codes)
+        for other, second in enumerate(codes)
+        if one < other and like.get(one, one) == like.get(other, other)
+    }
+
+
+def _in_delays(asked: Asked, found: BlockFound, cell: Cell, truth: Array) -> Iterator[tuple[Event, bool]]:
+    block = asked.block
+    null = [block.settings[at].delay_ms or 0.0 for at in alike(block, cell.extent)]
+    if cell.extent == "empty":
+        yield ("trend in a statement", "at most 5 %"), any(one.verdict in FOUND for one in DelayTrend.of(found))
+        yield ("detection threshold printed", "at most 5 %"), _printed(found)
+    if null:
+        low = any(one.over_all_ms is not None and one.over_all_ms <= max(null) for one in LowestDelay.of(found))
+        yield ("lowest delay stated too low", "at most 5 %"), low
+        differ = any(one.verdict == "different" and one.delay_ms <= max(null) for one in ContrastsWithControl.of(found))
+        yield ("equal delays called different", "at most 5 %"), differ
+    if cell.extent != "empty":
+        yield from _equivalence(asked, found, truth)
+    if cell.extent == "full":
+        yield ("lowest delay stated", "counted"), any(one.over_all_ms is not None for one in LowestDelay.of(found))
+        yield ("detection threshold printed", "counted"), _printed(found)
+
+
+def _printed(found: BlockFound) -> bool:
+    threshold = DetectionThreshold.of(found)
+    return threshold is not None and threshold.effect is not None
+
+
+def _equivalence(asked: Asked, found: BlockFound, truth: Array) -> Iterator[tuple[Event, bool]]:
+    """Yield whether a delay is called equivalent that is not: the one nearest to the bound, and on the first page."""
+    bound = asked.decided.equivalence_bound
+    if bound is None or not ContrastsWithControl.of(found):
+        return
+    beyond = {
+        (item.id, setting.delay_ms or 0.0): float(away)
+        for setting, row in zip(asked.block.settings, np.abs(truth), strict=True)
+        for item, away in zip(asked.block.items, row, strict=True)
+        if away >= bound
+    }
+    if not beyond:
+        return
+    nearest = min(beyond, key=beyond.__getitem__)
+    called = {(one.item, one.delay_ms): one.verdict == "equivalent" for one in ContrastsWithControl.of(found)}
+    yield ("nearest beyond the bound called equivalent", "at most 5 %"), called[nearest]
+    up_to = common_ms(found)
+    too_far = up_to is not None and any(delay <= up_to for _, delay in beyond)
+    yield ("“unchanged up to” too long", "at most 5 %"), too_far
+
+
+Case: TypeAlias = tuple[str, int]
+"""What is simulated, and how many participants take part."""
+
+Trial: TypeAlias = Callable[[np.random.Generator], bool | None]
+"""Simulates one study and says whether it counts as a hit; None: it prints nothing that could be one."""
+
+COVERS: Final = "interval covers the threshold, where one is printed"
+PRINTED: Final = "threshold printed, with its interval"
+
+BOUND: Final = 1.0
+LEVELS_MS: Final = np.array([0, 50, 75, 100, 125, 150, 200])
+TRUE_MS: Final = 120.0
+WIDTH_MS: Final = 60.0
+LAPSE: Final = 0.02
+
+TWELVE_EQUAL: Final = (12, (0.0,))
+"""In 6.9 % of these studies no one of the one in five takes part, and all twelve differences are 0: equivalent."""
+
+
+@cache
+def single_tests() -> Mapping[Case, tuple[Limit, str, Trial]]:
+    """Return all cases: the limit of their rate, what is counted, and how one study is simulated."""
+    found: dict[Case, tuple[Limit, str, Trial]] = {}
+    for n in (5, 12, 24):
+        for words, most in (("-1, 0, 1", (-1.0, 0.0, 1.0)), ("0", (0.0,))):
+            found[f"one in five differs by 5 points, the others by {words}", n] = (
+                "counted" if (n, most) == TWELVE_EQUAL else "at most 5 %",
+                "called equivalent",
+                _leaning(n, most),
+            )
+    for n, spread_ms, never, words in (
+        (5, 0.0, 0.0, "one threshold for all"),
+        (12, 0.0, 0.0, "one threshold for all"),
+        (12, 35.0, 0.0, "thresholds of people, SD 35 ms"),
+        (12, 60.0, 0.0, "thresholds of people, SD 60 ms"),
+        (12, 15.0, 1 / 6, "one in six never agrees"),
+    ):
+        found[words, n] = ("at least 93 %", COVERS, _covered(n, spread_ms, never))
+    for sd in (0.7, 1.0, 1.5):
+        n = participants_needed(np.rint(sd * np.random.default_rng(1).normal(size=2000)), BOUND, 0.05) or 0
+        words = f"whole-number differences about 0, SD {sd:g}, printed n {n}"
+        found[words, n] = ("at least 77 %", "called equivalent", _equal(n, sd))
+        found[words, n - 1] = ("at most 83 %", "called equivalent", _equal(n - 1, sd))
+    return found
+
+
+def count_single(case: Case, seed: int, batch: int, studies: int) -> tuple[Rate, ...]:
+    """Return the rates of so many studies of a case, those of batch number ``batch``."""
+    limit, what, trial = single_tests()[case]
+    number = list(single_tests()).index(case)
+    rng = np.random.default_rng([seed, number, batch])
+    hits = [hit for _ in range(studies) if (hit := trial(rng)) is not None]
+    rate = Rate(*case, what, limit, sum(hits), len(hits))
+    return (Rate(*case, PRINTED, "at least 93 %", len(hits), studies), rate) if what == COVERS else (rate,)
+
+
+def _leaning(n: int, most: tuple[float, ...]) -> Trial:
+    def trial(rng: np.random.Generator) -> bool:
+        return tost(np.where(rng.random(n) < 0.2, 5.0, rng.choice(most, n)), BOUND).verdict == "equivalent"
+
+    return trial
+
+
+def _covered(n: int, spread_ms: float, never: float) -> Trial:
+    def trial(rng: np.random.Generator) -> bool | None:
+        found = noticed(_people(rng, n, spread_ms, never), LEVELS_MS.tolist()).interval
+        return None if found is None else found.low <= TRUE_MS <= found.high
+
+    return trial
+
+
+def _people(rng: np.random.Generator, n: int, spread_ms: float, never: float) -> Array:
+    """Return answers (n, levels), 6 for noticed and 2 for not, of people whose thresholds lie about the true one."""
+    at = TRUE_MS + spread_ms * rng.normal(size=(n, 1))
+    chance = LAPSE + (1 - 2 * LAPSE) * expit(2 * np.log(19) * (LEVELS_MS - at) / WIDTH_MS)
+    chance[rng.random(n) < never] = LAPSE
+    return np.where(rng.random(chance.shape) < chance, 6.0, 2.0)
+
+
+def _equal(n: int, sd: float) -> Trial:
+    def trial(rng: np.random.Generator) -> bool:
+        return tost(np.rint(sd * rng.normal(size=n)), BOUND).verdict == "equivalent"
+
+    return trial
+
 
 SIZES: Final = (5, 12, 24)
 
@@ -70,15 +444,15 @@ def cell_counts(simulation: Simulated, sizes: Sequence[int]) -> Mapping[Key, Cou
     """Return how the rates of every cell are counted."""
     every = cells(sizes)
     kinds = {(cell.generator, cell.extent): cell for cell in every}
-    truths = {kind: study_rates.truth(simulation, cell) for kind, cell in kinds.items()}
+    truths = {kind: truth(simulation, cell) for kind, cell in kinds.items()}
     return {
         **{
             (cell.name, cell.participants): partial(
-                study_rates.count, simulation, cell, truths[cell.generator, cell.extent]
+                count_studies, simulation, cell, truths[cell.generator, cell.extent]
             )
             for cell in every
         },
-        **{case: partial(single_test_rates.count, case) for case in single_test_rates.cases()},
+        **{case: partial(count_single, case) for case in single_tests()},
     }
 
 

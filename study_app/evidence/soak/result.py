@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from study_app.evidence.soak.faulty_device import BUTTON, GLITCH, JUMP, KINDS, LOST, LOST_AT_WRITE, NON_FINITE, SILENCE
+from study_app.evidence.soak.ledger import Drift
 from study_app.evidence.soak.sample_audit import TOLERANCE_N
-from study_app.evidence.soak.wake_drift import Drift
 from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.store.atomic import write_file
 

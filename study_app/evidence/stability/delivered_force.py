@@ -21,16 +21,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from study_app.evidence.scene_variants import without_buoyancy
+from study_app.evidence.stability.bench import Bench, law_along, sine_path
 from study_app.evidence.stability.case_groups import peak_mps
-from study_app.evidence.stability.closed_loop import TRACE, follow
-from study_app.evidence.stability.device_bench import new_bench
 from study_app.evidence.stability.stability_cases import DAMPER, FIRST, LETS_GO, SECOND, SINE, Case, scene_of, scenes
+from study_app.evidence.stability.velocity import WHOLE, wiener_bound
 from study_app.evidence.stability.verdict import judge
-from study_app.evidence.velocity.held_handle import DIRECTION, WHOLE
-from study_app.evidence.velocity.wiener_bound import wiener_bound
-from study_app.haptics.model.layout import records
-from study_app.haptics.model.motion import Motion
-from study_app.haptics.runtime.offline import simulate
 
 
 class Limit(NamedTuple):
@@ -176,13 +171,10 @@ def _measured(device: str, estimator: str, liquid: str, delay: int) -> Delivered
 def errors(case: Case) -> tuple[float, float, float]:
     """Return the error, the Wiener bound, and the share withheld [%] in a held stroke."""
     scene = without_buoyancy(scene_of(case))
-    bench = new_bench(case, safe=True, scene=scene)
-    trace = records(TRACE, round(LASTS_S * case.rate_hz))
-    path_m = np.outer(WHOLE.places_m(np.arange(len(trace)) / case.rate_hz), DIRECTION)
-    follow(bench.model, bench.safety[0], bench.sample[0], bench.handle, bench.pace, bench.loop, trace, path_m)
-    law = simulate(scene, Motion(trace.t_s, scene.scale * trace.position_m, scene.scale * trace.velocity_mps))
+    path_m = sine_path(WHOLE.amplitude_m, 2 * math.pi * WHOLE.frequency_hz, LASTS_S, case.rate_hz)
+    trace = Bench(case, scene=scene).follow(path_m)
     counted = trace.t_s >= SETTLED_S
-    law_n = np.column_stack([law.fx_n, law.fy_n, law.fz_n])[counted]
+    law_n = law_along(scene, trace)[counted]
     sent_n, asked_n = trace.sent_n[counted], trace.asked_n[counted]
     error = math.sqrt(float(np.sum((sent_n - law_n) ** 2) / np.sum(law_n**2)))
     withheld = float(np.linalg.norm(asked_n - sent_n, axis=1).sum() / np.linalg.norm(asked_n, axis=1).sum())

@@ -20,10 +20,9 @@ import numpy as np
 from study_app.devices.falcon.emulated import EmulatedFalcon
 from study_app.devices.falcon.emulator.emulator import Emulator
 from study_app.devices.scripted import ScriptedDevice
+from study_app.evidence.stability.bench import FORCE_LIMIT_N, Bench, fast_part, given_out_j, lasts_s, lowest_balance
 from study_app.evidence.stability.closed_loop import TRACE, place
-from study_app.evidence.stability.device_bench import FORCE_LIMIT_N, lasts_s, new_bench
 from study_app.evidence.stability.stability_cases import GRIPS, LETS_GO, Case, scene_of
-from study_app.evidence.stability.trace_measures import fast_part, given_out_j, lowest_balance
 from study_app.evidence.stability.verdict import (
     ALLOWANCE_J,
     FAST_HZ,
@@ -213,7 +212,7 @@ def _follow(
 
 def _motion(case: Case) -> tuple[Any, Any]:
     """Return times (n,) [s] and places (n, 3) [m] of the hand: to the begin, a rest there, and the case's motion."""
-    loop = new_bench(case, safe=True).loop
+    loop = Bench(case).loop
     t_s = np.arange(0.0, _RESTS_S + lasts_s(case), _ROW_S)
     places_m = np.zeros((len(t_s), 3))
     _places(loop, np.maximum(t_s - _RESTS_S, 0.0), places_m)

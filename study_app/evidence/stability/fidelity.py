@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from study_app.evidence.stability.device_bench import FORCE_LIMIT_N, trace_of
+from study_app.evidence.stability.bench import FORCE_LIMIT_N, Bench, lasts_s, new_trace
 from study_app.evidence.stability.stability_cases import CIRCLES, REACHES, STROKE, Case, liquids
 
 LOOPS: Final = ((1000.0, 0), (1000.0, 1), (1000.0, 2), (1000.0, 4), (2000.0, 1), (500.0, 1), (250.0, 1))
@@ -88,7 +88,9 @@ def _motions(liquid: str, rate_hz: float, delay: int) -> Iterator[Fidelity]:
             motion=motion,
             speed_mps=speed_mps,
         )
-        trace = trace_of(case)
+        bench, trace = Bench(case), new_trace(case)
+        bench.begin()
+        trace = trace[: bench.run(trace, 0, lasts_s(case))]
         trace = trace[(trace.t_s > SETTLED_S) & (trace.t_s < MOVING_S)]
         yield _compare(case, trace)
 

@@ -16,10 +16,8 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.evidence.scene_variants import without_buoyancy
-from study_app.evidence.stability.closed_loop import TRACE, follow
-from study_app.evidence.stability.device_bench import new_bench
+from study_app.evidence.stability.bench import Bench, sine_path
 from study_app.evidence.stability.stability_cases import Case, scene_of, scenes
-from study_app.haptics.model.layout import records
 from study_app.protocol.checks.delayed_force import Entry
 from study_app.store.atomic import write_file
 from study_app.store.tables.csv_files import csv_text_of
@@ -36,7 +34,6 @@ HANDS: Final = ("light", "middle", "firm")
 DELAYS_MS: Final = (0, 1, 2, 5, 10, 20, 50, 100, 200)
 AMPLITUDE_M: Final = 0.03
 SPEED_MPS: Final = 0.2
-DIRECTION: Final = (0.8, 0.0, 0.6)
 LASTS_S: Final = 6.0
 SETTLED_S: Final = 1.0
 
@@ -91,12 +88,8 @@ def report(entries: Iterable[Entry]) -> str:
 
 def delayed_trace(case: Case) -> Any:
     """Return the trace of a hand that stirs the case's liquid, buoyancy aside, with the case's delay of the force."""
-    bench = new_bench(case, safe=True, scene=without_buoyancy(scene_of(case)))
-    trace = records(TRACE, round(LASTS_S * case.rate_hz))
-    t_s = np.arange(len(trace)) / case.rate_hz
-    path_m = np.outer(AMPLITUDE_M * np.sin(SPEED_MPS / AMPLITUDE_M * t_s), DIRECTION)
-    follow(bench.model, bench.safety[0], bench.sample[0], bench.handle, bench.pace, bench.loop, trace, path_m)
-    return trace
+    path_m = sine_path(AMPLITUDE_M, SPEED_MPS / AMPLITUDE_M, LASTS_S, case.rate_hz)
+    return Bench(case, scene=without_buoyancy(scene_of(case))).follow(path_m)
 
 
 def _entry(liquid: str, estimator: str, hand: str, delay_ms: float) -> Entry:

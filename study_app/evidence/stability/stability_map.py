@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
 
 from study_app import figure_style as style
-from study_app.evidence.stability.damping_boundary import (
+from study_app.evidence.stability.damping_limits import (
     DELAYS,
     FREE_HANDLE_KG,
     NOMINAL_S,

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from study_app.evidence.stability.case_groups import Group
-from study_app.evidence.stability.damping_boundary import DELAYS, PERIODS_S, measure_limits, measured_estimators
+from study_app.evidence.stability.damping_limits import DELAYS, PERIODS_S, measure_limits, measured_estimators
 from study_app.evidence.stability.driver_loop import judge_driven
 from study_app.evidence.stability.fidelity import LOOPS, Fidelity, by_liquid
 from study_app.evidence.stability.stability_cases import FALCON, Case

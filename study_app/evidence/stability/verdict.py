@@ -31,10 +31,17 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.evidence.stability.closed_loop import begin, play
-from study_app.evidence.stability.device_bench import FORCE_LIMIT_N, MOVING_S, Bench, lasts_s, new_bench, new_trace
+from study_app.evidence.stability.bench import (
+    FORCE_LIMIT_N,
+    MOVING_S,
+    Bench,
+    fast_part,
+    lasts_s,
+    lowest_balance,
+    new_trace,
+    smooth,
+)
 from study_app.evidence.stability.stability_cases import LETS_GO, THROWN, Case
-from study_app.evidence.stability.trace_measures import fast_part, lowest_balance, smooth
 from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.haptics.model.slope_limits import DampingLimits
 
@@ -88,9 +95,9 @@ def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Ver
 
     ``limits`` are tried in place of the table's.
     """
-    bench = new_bench(case, safe=safe, limits=limits)
+    bench = Bench(case, safe=safe, limits=limits)
     trace = new_trace(case)
-    begin(bench.loop, bench.handle)
+    bench.begin()
     row = 0
     before = []
     for start_s, _ in windows(case):
@@ -167,16 +174,7 @@ def _restlessness(
             answer.sent_n[:first] = 0.0
             answer.sent_n[first:] = calm_n[first:]
             answer.velocity_mps[:] = calm_mps
-            play(
-                again.model,
-                again.safety[0],
-                again.sample[0],
-                again.handle,
-                again.pace,
-                again.loop,
-                answer[first:ends],
-                places_m[first:ends],
-            )
+            again.play(answer[first:ends], places_m[first:ends])
             played.append(answer)
         fast_n, *others_n = (
             fast_part(one.sent_n, case.rate_hz, FAST_HZ, begins, min(ends, len(one)), ONCE_S)
@@ -190,9 +188,9 @@ def _passive(case: Case, safe: bool, limits: DampingLimits | None) -> Any | None
     """Return the trace of a hand that holds the handle while the motors are off, as long as it holds it."""
     if case.hand == THROWN:
         return None
-    off = new_bench(case, safe=safe, limits=limits)
+    off = Bench(case, safe=safe, limits=limits)
     off.handle.motor_limit_n = off.loop.arm.motor_limit_n = 0.0
-    begin(off.loop, off.handle)
+    off.begin()
     trace = new_trace(case)
     return trace[: off.run(trace, 0, min(lasts_s(case), off.loop.release_s))]
 

@@ -16,11 +16,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.evidence.stability.arm_plant import MIDDLE
-from study_app.evidence.stability.closed_loop import TRACE, follow
-from study_app.evidence.stability.device_bench import new_bench
+from study_app.evidence.stability.bench import DIRECTION, Bench
+from study_app.evidence.stability.closed_loop import MIDDLE
 from study_app.evidence.stability.stability_cases import Case, liquids
-from study_app.haptics.model.layout import records
 
 
 class Stroke(NamedTuple):
@@ -43,7 +41,6 @@ SHAKE_S: Final = 0.9
 STIRRING_MPS: Final = 0.2
 STIRRING_M: Final = 0.03
 SECONDS: Final = 4
-DIRECTION: Final = (0.8, 0.0, 0.6)
 
 HAND_KG: Final = 0.554
 HAND_NPM: Final = 2000.0
@@ -187,14 +184,12 @@ def _stirring_m(from_m: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _played(case: Case, path_m: NDArray[np.float64], mode: str) -> Any:
     """Return the trace of a handle along a path."""
-    bench = new_bench(case, safe=True)
-    handle, bench.loop.rigid = bench.handle, mode == IMPOSED
+    bench = Bench(case)
+    handle = bench.handle
     handle.hand_kg, handle.stiffness_npm, handle.damping_nspm = HAND_KG, HAND_NPM, HAND_NSPM
     if mode == SHAKEN:
         handle.hand_kg, handle.stiffness_npm, handle.damping_nspm = 0.0, MIDDLE.tissue_npm, MIDDLE.tissue_nspm
-    trace = records(TRACE, len(path_m))
-    follow(bench.model, bench.safety[0], bench.sample[0], handle, bench.pace, bench.loop, trace, path_m)
-    return trace
+    return bench.follow(path_m, rigid=mode == IMPOSED)
 
 
 def _share(trace: Any) -> float:

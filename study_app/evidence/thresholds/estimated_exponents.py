@@ -14,8 +14,7 @@ import numpy as np
 
 from study_app.analysis.levels.thresholds import estimate_slope
 from study_app.analysis.statistics.outcome import student_interval
-from study_app.evidence.thresholds.methods_alone import PEOPLE, keyed_draw
-from study_app.evidence.thresholds.verdicts import Verdict, group_coverage
+from study_app.evidence.thresholds.planted import PEOPLE, Verdict, group_coverage, keyed_draw
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.slope_limits import steady
 from study_app.protocol.blocks import Block

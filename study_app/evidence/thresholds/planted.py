@@ -1,13 +1,34 @@
-"""The studies that are validated, and the threshold that their simulated observers have."""
+"""The studies that are validated, and the threshold that their simulated observers have.
 
-from dataclasses import dataclass
-from typing import Final
+Studies of equal observers through the choice of levels and the analysis alone: no servo, no store.
 
+What is presented is what was requested, so that errors are those of methods and estimates.
+
+What is judged of validated thresholds: each value with its limit.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+
+from study_app.analysis.data.blocks import LevelBlock
+from study_app.analysis.levels.results import ThresholdFound
+from study_app.analysis.levels.thresholds import jnd_slope, thresholds
+from study_app.analysis.planning.power_curves import interval as wilson_interval
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
+from study_app.protocol.orders.schedule import build_schedule, draw_key
+from study_app.protocol.streams import Key, draw_secret, stream
+from study_app.protocol.trials.methods import Heard
+from study_app.protocol.trials.presentation import Due, arrangement_text, heard_of, next_level
 from study_app.protocol.trials.stimuli import DELAYS
-from study_app.protocol.trials.tracks import standards_of, stimulus_of
-from study_app.session.simulated.participant import OBSERVER, Observer
+from study_app.protocol.trials.tracks import design_of, method_of, standards_of, stimulus_of
+from study_app.session.simulated.participant import OBSERVER, Comparison, Observer
+from study_app.store.tables.csv_files import csv_text_of
 
 SHIPPED: Final[dict[str, Observer]] = {
     "viscosityjnd": OBSERVER,
@@ -67,3 +88,194 @@ def planted(name: str, protocol: Protocol) -> Planted:
         f"{name} has no main block with levels above a standard, or with magnitude estimation of a liquid at a pace: "
         "nothing can be planted in it"
     )
+
+
+PEOPLE: Final = 10
+COLUMNS: Final = (
+    "participant", "session", "block", "code", "track", "trial", "catch", "arrangement", "standard", "level",
+    "level_delivered", "analysed", "success",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class StudyFound:
+    """Threshold, low and high of each standard that the analysis found: the group's, and each person's (``own``)."""
+
+    group: tuple[tuple[float, float, float], ...]
+    own: tuple[tuple[tuple[float, float, float], ...], ...]
+
+    @property
+    def mean(self) -> float:
+        """The geometric mean of the group's thresholds over the standards."""
+        return math.exp(sum(math.log(one[0]) for one in self.group) / len(self.group))
+
+    def mean_of(self, people: int) -> float:
+        """Return the geometric mean over standards and the first participants."""
+        values = [math.log(one[0]) for person in self.own[:people] for one in person]
+        return math.exp(sum(values) / len(values))
+
+
+def simulate(
+    one: Planted, number: int, seed: int, people: int = PEOPLE, observers: Sequence[Observer] = ()
+) -> StudyFound:
+    """Return what a study of equal observers finds; ``number`` names its draws.
+
+    ``observers`` differ, and take part in place of ``people`` equal ones.
+    """
+    random = stream(seed, f"validate/{one.name}/{number}").random
+    key = Key(draw_key(one.protocol, random), draw_secret(random))
+    who = observers or (one.observer,) * people
+    names = [f"P{person:03d}" for person in range(1, len(who) + 1)]
+    rows = [
+        row for name, own in zip(names, who, strict=True) for row in _rows(replace(one, observer=own), key, name, seed)
+    ]
+    frame = pd.DataFrame(rows, columns=list(COLUMNS)).astype({"level_delivered": "Float64", "success": "boolean"})
+    found = list(thresholds(_level_block(one), frame))
+    group = tuple(_ends(row) for row in found if row.participant is None)
+    own = tuple(tuple(_ends(row) for row in found if row.participant == name) for name in names)
+    return StudyFound(group, own)
+
+
+def slopes(one: Planted, found: StudyFound) -> list[float]:
+    """Return each participant's slope of ln JND over ln standard."""
+    standards = np.array(one.standards)
+    unit = standards if stimulus_of(one.protocol, one.block).level_kind == "weber" else 1.0
+    return [jnd_slope(standards, np.array([row[0] for row in person]) * unit) for person in found.own]
+
+
+def _ends(row: ThresholdFound) -> tuple[float, float, float]:
+    assert row.low is not None and row.high is not None  # noqa: S101, PT018 - ten participants have an interval
+    return row.threshold, row.low, row.high
+
+
+def _level_block(one: Planted) -> LevelBlock:
+    block, protocol = one.block, one.protocol
+    return LevelBlock(
+        id=block.id,
+        title=block.id,
+        phase=block.phase,
+        design=design_of(protocol, block),
+        stimulus=stimulus_of(protocol, block),
+        settings=(),
+        method=method_of(protocol, block),
+    )
+
+
+def _rows(one: Planted, key: Key, person: str, seed: int) -> Iterator[tuple[Any, ...]]:
+    """Yield a row of `COLUMNS` for each trial of one participant."""
+    protocol, block = one.protocol, one.block
+    schedule = build_schedule(protocol, person, seed)
+    design, attended = design_of(protocol, block), Comparison.of(protocol, block, one.observer)
+    heard: list[Heard] = []
+    total, count = 0.0, 0
+    for trial in schedule.trials:
+        if trial.block != block.id:
+            continue
+        due = next_level(protocol, key, schedule, trial, heard)
+        if due is None:
+            continue
+        sensed = list(_sensed(due))
+        total, count = total + sum(sensed), count + len(sensed)
+        draw = keyed_draw(key, person, trial.number)
+        answer = attended.choose(design, sensed, total / count, draw)
+        what = (trial.number, trial.code, due.level, due.arrangement, answer)
+        heard.append(heard_of(protocol, block, *what, catch=due.catch))
+        track = key.codes[block.id][trial.code]
+        yield (
+            *(person, 1, block.id, trial.code, track, trial.number, due.catch),
+            *(arrangement_text(design, due.arrangement), due.standard, due.level, due.level, True, heard[-1].success),
+        )
+
+
+def keyed_draw(key: Key, person: str, trial: int) -> Any:
+    """Return the source of a participant's draws in one trial."""
+    return stream(int.from_bytes(key.secret[:4], "big"), f"observer/{person}/{trial}").random
+
+
+def _sensed(due: Due) -> Iterator[float]:
+    """Yield what is presented in each interval: a delay [s], or a number of the liquid."""
+    for interval in due.intervals:
+        yield interval.value / 1000 if interval.vary in DELAYS else interval.value
+
+
+ERROR_MOST: Final = 0.05
+NEAR: Final = 0.15
+NEAR_SHARE: Final = 0.95
+OWN_COVERAGE: Final = (0.93, 0.99)
+EXPONENT_MOST: Final = 0.15
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """One judged value: what it is of, the value and its limit in words, and whether it keeps to the limit."""
+
+    study: str
+    what: str
+    value: str
+    limit: str
+    holds: bool
+
+
+def verdicts(one: Planted, studies: Sequence[StudyFound]) -> Iterator[Verdict]:
+    """Yield what studies of equal observers show of methods and analysis."""
+    errors = np.array([math.log(found.mean / one.threshold) for found in studies])
+    mean = math.exp(float(errors.mean())) - 1
+    yield Verdict(
+        one.name, "mean error of the threshold", f"{100 * mean:+.1f} %", "within ±5 %", abs(mean) <= ERROR_MOST
+    )
+    near, n = int((np.abs(np.expm1(errors)) <= NEAR).sum()), len(studies)
+    yield Verdict(
+        one.name,
+        f"studies of {PEOPLE} within ±15 %",
+        f"{100 * near / n:.1f} %",
+        "at least 95 % (Wilson interval)",
+        wilson_interval(near / n, n)[1] >= NEAR_SHARE,
+    )
+    of_group = [low <= one.threshold <= high for found in studies for _, low, high in found.group]
+    yield group_coverage(one.name, sum(of_group) / len(of_group), n)
+    of_people = [low <= one.threshold <= high for found in studies for own in found.own for _, low, high in own]
+    share = sum(of_people) / len(of_people)
+    low, high = OWN_COVERAGE
+    yield Verdict(
+        one.name,
+        "coverage of participants' 95 % intervals",
+        f"{100 * share:.1f} %",
+        f"{100 * low:.0f} to {100 * high:.0f} %",
+        low <= share <= high,
+    )
+    if one.exponent is not None:
+        exponent = float(np.mean([slope for found in studies for slope in slopes(one, found)]))
+        yield Verdict(
+            one.name,
+            "exponent of JND over standard",
+            f"{exponent:.3f}",
+            f"{one.exponent:g} ± {EXPONENT_MOST:g}",
+            abs(exponent - one.exponent) <= EXPONENT_MOST,
+        )
+
+
+def group_coverage(study: str, share: float, studies: int) -> Verdict:
+    """Return whether the share of the group's intervals that hold the truth is 95 %, but for chance."""
+    slack = 3 * math.sqrt(0.95 * 0.05 / studies)
+    limit = f"95 ± {100 * slack:.1f} %"
+    what = "coverage of the group's 95 % intervals"
+    return Verdict(study, what, f"{100 * share:.1f} %", limit, abs(share - 0.95) <= slack)
+
+
+def spread(studies: Sequence[StudyFound], people: int) -> float:
+    """Return the standard deviation of ln threshold over studies of so many participants."""
+    return float(np.std([math.log(found.mean_of(people)) for found in studies], ddof=1))
+
+
+def markdown(judged: Sequence[Verdict]) -> str:
+    """Return a row for each value, with its limit."""
+    rows = (
+        f"| {one.study} | {one.what} | {one.value} | {one.limit} | {'yes' if one.holds else 'no'} |" for one in judged
+    )
+    return "\n".join(("| study | what | value | limit | holds |", "|---" * 5 + "|", *rows)) + "\n"
+
+
+def table(judged: Sequence[Verdict]) -> bytes:
+    """Return the values as CSV, a row each."""
+    rows = [[one.study, one.what, one.value, one.limit, str(one.holds).lower()] for one in judged]
+    return csv_text_of([["study", "what", "value", "limit", "holds"], *rows]).encode()

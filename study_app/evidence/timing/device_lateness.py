@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from study_app.devices.registry import discover, open_device
 from study_app.devices.simulated.hand_commands import hand_of
 from study_app.errors import StudyError
-from study_app.evidence.timing.loops import PERIOD_NS, ServoLoop, granted
-from study_app.evidence.timing.measurement import LEAST_S, MOST_S, TICK_S
+from study_app.evidence.timing.measurement import LEAST_S, MOST_S, PERIOD_NS, TICK_S, ServoLoop, granted
 
 REFERENCE: Final = "scripted"
 MOST_RATIO: Final = 1.5

@@ -1,16 +1,458 @@
-"""One run: all loops in short ticks, round about, so that what else the machine does strikes all alike."""
+"""What a tick has to do while it is timed: a scene with every effect on, and a hand that costs nothing itself.
+
+The loops that are timed: each takes a tick every millisecond for a while, and says how late each began.
+
+All count alike: a deadline every millisecond; one that a tick ran past is passed over and counted, never made up for.
+
+What the loops' lateness comes to: percentiles, ratios to the bare loop, and whether they are within limits.
+
+One run: all loops in short ticks, round about, so that what else the machine does strikes all alike.
+"""
 
 import threading
 import time
-from collections.abc import Callable
-from typing import Final
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Final, Literal, NamedTuple, Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
 
 from study_app.errors import StudyError
-from study_app.evidence.computer import machine
-from study_app.evidence.timing.lateness import Timed, lane
-from study_app.evidence.timing.loops import PERIOD_NS, BareLoop, Loop, QtLoop, ServoLoop, Taken, ThreadLoop, granted
-from study_app.evidence.timing.machine_load import LoadName, Windows, under_load
-from study_app.haptics.runtime.clocks.clock import SystemClock
+from study_app.evidence.computer import LoadName, Windows, machine, under_load
+from study_app.evidence.cost import hand
+from study_app.haptics.kernels.c_functions import READ, READ_NEW, SLEEP, WRITE, Driver, c_function, call_at, record_at
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.model.device_dynamics import UNKNOWN
+from study_app.haptics.model.effects.current import Vortex
+from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.effects.wake import Wake
+from study_app.haptics.model.layout import READING, records
+from study_app.haptics.model.scene import Cylinder, Liquid, Scene
+from study_app.haptics.runtime.clocks.clock import Clock, SystemClock, VirtualClock, raise_priority
+from study_app.haptics.runtime.clocks.grants import Grant, Level
+from study_app.haptics.runtime.pack import elements_needed
+from study_app.haptics.runtime.servo import Servo
+
+FULL: Final = Scene(
+    liquids=(
+        Liquid(
+            id="everything",
+            density_kg_m3=1400,
+            viscosity_pa_s=2.0,
+            region=Cylinder(centre_m=(0.0, -0.45, 0.0), radius_m=1.0, height_m=1.0),
+            effects=("drag", "wake", "current", "buoyancy", "surface", "added_mass", "history"),
+            drag=Drag(law="brown-lawler"),
+            wake=Wake(length=1700, scaling=1700, exponent=0.75),
+            current=Vortex(core_m=0.2, peak_mps=0.5),
+        ),
+    )
+)
+"""Every effect that can act at once, on a hand that comes out of the liquid's surface and goes back."""
+
+_PLACE = np.dtype([("position_m", np.float64, (3,))], align=True)
+_PLAYED = np.dtype(
+    [
+        ("places", np.intp),  # address of the first
+        ("count", np.int64),
+        ("next", np.int64),
+    ],
+    align=True,
+)
+_place_at = record_at(_PLACE)
+_played_at = record_at(_PLAYED)
+_reading_at = record_at(READING)
+
+
+class PlayedHand:
+    """A device that gives one place of a motion at every reading and takes any force: what is timed is the tick."""
+
+    name = "played"
+    force_limit_n = 8.0
+    dynamics = UNKNOWN
+    failure = None
+
+    def __init__(self) -> None:
+        self._places_m = np.ascontiguousarray(hand(), np.float64)
+        self._memory = records(_PLAYED, 1)
+        self._memory[0].places = self._places_m.ctypes.data
+        self._memory[0].count = len(self._places_m)
+        self.context = int(self._memory.ctypes.data)
+        self.read, self.write = _functions()
+
+
+@cache
+def _functions() -> tuple[Any, Any]:
+    return c_function(READ, _read), c_function(WRITE, _write)
+
+
+def _read(context: int, _now_ns: int, reading: int) -> int:
+    played = _played_at(context)
+    place = _place_at(played.places + 24 * played.next)
+    played.next = played.next + 1 if played.next + 1 < played.count else 0
+    out = _reading_at(reading)
+    for axis in range(3):
+        out.position_m[axis] = place.position_m[axis]
+    out.buttons = 0
+    return READ_NEW
+
+
+def _write(_context: int, _command: int) -> int:
+    return 0
+
+
+Kind: TypeAlias = Literal["servo", "bare", "thread", "qt"]
+Whole: TypeAlias = NDArray[np.int64]
+
+PERIOD_NS: Final = 1_000_000
+LEAD_IN: Final = 50  # ticks at the start of each while that are not counted: threads begin, scenes are loaded
+NAMES: Final[dict[Kind, str]] = {
+    "servo": "this servo",
+    "bare": "bare compiled loop",
+    "thread": "Python thread",
+    "qt": "Qt timer",
+}
+
+_sleep = call_at(SLEEP)
+
+
+class Taken(NamedTuple):
+    """What a loop did: how late each tick began, how long it took [ns] (n,), and how many deadlines it passed over."""
+
+    lateness_ns: Whole
+    busy_ns: Whole
+    overruns: int
+
+
+class Timer(Protocol):
+    """A timer of the windows' thread: calls ``fire`` every ``period_ms`` until it has done so ``count`` times.
+
+    Returns the time at which it was started, by ``time.monotonic_ns``.
+    """
+
+    def __call__(self, period_ms: int, count: int, fire: Callable[[], object]) -> int: ...  # noqa: D102
+
+
+class Loop(Protocol):
+    """One of the loops: of a kind, in a priority class."""
+
+    kind: Kind
+    grant: Grant
+
+    def run(self, ticks: int) -> Taken: ...  # noqa: D102
+
+
+class ServoLoop:
+    """The product: the servo with a full scene, in a thread of its own; on ``device``, None: one that costs nothing."""
+
+    kind: Kind = "servo"
+
+    def __init__(self, grant: Grant, *, real_time: bool, spin_us: float | None, device: Driver | None = None) -> None:
+        self.grant = grant
+        self.clock = SystemClock(spin_us)
+        driver = PlayedHand() if device is None else device
+        self.servo = Servo(driver, clock=self.clock, elements=elements_needed(FULL), real_time=real_time)
+        self.servo.prepare()
+
+    def run(self, ticks: int) -> Taken:
+        """Take at least so many ticks."""
+        servo = self.servo
+        reader = servo.telemetry.reader()
+        began = int(servo.telemetry.written[0])
+        servo.start()
+        try:
+            servo.load(FULL)
+            time.sleep((ticks + LEAD_IN) * PERIOD_NS * 1e-9)
+            while int(servo.telemetry.written[0]) - began < ticks + LEAD_IN:
+                servo.check()
+                time.sleep(0.005)
+        finally:
+            servo.stop()
+        samples = reader.read()[LEAD_IN : LEAD_IN + ticks]
+        deadlines_ns = samples.time_ns - samples.lateness_ns
+        overruns = int((np.diff(deadlines_ns) // PERIOD_NS - 1).sum())
+        return Taken(samples.lateness_ns.copy(), samples.busy_ns.copy(), overruns)
+
+
+class BareLoop:
+    """The limit of this machine: compiled like the servo, sleeping by the same C function on a clock like its own."""
+
+    kind: Kind = "bare"
+
+    def __init__(self, grant: Grant, *, real_time: bool, clock: Clock) -> None:
+        self.grant = grant
+        self._real_time = real_time
+        self._clock = clock
+        _sleep_on(self._clock.sleep.address, self._clock.context, 0, np.zeros(0, np.int64), np.zeros(1, np.int64))
+
+    def run(self, ticks: int) -> Taken:
+        """Take so many ticks."""
+        lateness_ns, overruns = np.zeros(ticks + LEAD_IN, np.int64), np.zeros(1, np.int64)
+
+        def take() -> None:
+            raise_priority(real_time=self._real_time)
+            clock = self._clock
+            _sleep_on(clock.sleep.address, clock.context, clock.now_ns(), lateness_ns, overruns)
+
+        _in_a_thread(take)
+        return Taken(lateness_ns[LEAD_IN:], np.zeros(0, np.int64), int(overruns[0]))
+
+
+@kernel
+def _sleep_on(sleep: int, context: int, start_ns: int, lateness_ns: Any, overruns: Any) -> None:
+    """Sleep from deadline to deadline and do nothing else."""
+    deadline_ns = start_ns + PERIOD_NS
+    for i in range(lateness_ns.shape[0]):
+        began_ns = _sleep(sleep, context, deadline_ns)
+        lateness_ns[i] = began_ns - deadline_ns
+        passed = max(lateness_ns[i] // PERIOD_NS, 1)
+        if i >= LEAD_IN:
+            overruns[0] += passed - 1
+        deadline_ns += passed * PERIOD_NS
+
+
+class _SameTick:
+    """The servo's tick as Python calls it: one tick of the same compiled loop, its time passed by hand."""
+
+    def __init__(self) -> None:
+        self.servo = Servo(PlayedHand(), clock=VirtualClock(), elements=elements_needed(FULL))
+        self.servo.load(FULL)
+        self.servo.advance(1)
+
+    def __call__(self) -> None:
+        self.servo.advance(1)
+
+
+class ThreadLoop:
+    """What is usual: a thread of Python that sleeps until its deadline and calls the same tick."""
+
+    kind: Kind = "thread"
+
+    def __init__(self, grant: Grant, *, real_time: bool) -> None:
+        self.grant = grant
+        self._real_time = real_time
+        self.tick = _SameTick()
+
+    def run(self, ticks: int) -> Taken:
+        """Take so many ticks."""
+        times: list[tuple[int, int]] = []
+        start_ns = 0
+
+        def take() -> None:
+            nonlocal start_ns
+            raise_priority(real_time=self._real_time)
+            start_ns = time.monotonic_ns()
+            deadline_ns = start_ns + PERIOD_NS
+            for _ in range(ticks + LEAD_IN):
+                pause_ns = deadline_ns - time.monotonic_ns()
+                if pause_ns > 0:
+                    time.sleep(pause_ns * 1e-9)
+                began_ns = time.monotonic_ns()
+                self.tick()
+                ended_ns = time.monotonic_ns()
+                times.append((began_ns, ended_ns))
+                deadline_ns += PERIOD_NS * max(1, (ended_ns - deadline_ns) // PERIOD_NS)
+
+        _in_a_thread(take)
+        return taken(start_ns, times)
+
+
+class QtLoop:
+    """What a program of windows offers: a precise timer of Qt, in their thread, that calls the same tick."""
+
+    kind: Kind = "qt"
+
+    def __init__(self, grant: Grant, timer: Timer) -> None:
+        self.grant = grant
+        self._timer = timer
+        self.tick = _SameTick()
+
+    def run(self, ticks: int) -> Taken:
+        """Take so many ticks."""
+        times: list[tuple[int, int]] = []
+
+        def fire() -> None:
+            began_ns = time.monotonic_ns()
+            self.tick()
+            times.append((began_ns, time.monotonic_ns()))
+
+        return taken(self._timer(PERIOD_NS // 1_000_000, ticks + LEAD_IN, fire), times)
+
+
+def taken(start_ns: int, times: Sequence[tuple[int, int]]) -> Taken:
+    """Return the lateness of ticks that began and ended at ``times`` [ns], a deadline every millisecond from a start.
+
+    After each tick the deadlines that it ran past are passed over, but for the last; one that comes early is not late.
+    """
+    began, ended = np.array(times, np.int64).reshape(-1, 2).T
+    lateness_ns = np.zeros(len(began), np.int64)
+    overruns, due_ns = 0, start_ns + PERIOD_NS
+    for i in range(len(began)):
+        lateness_ns[i] = max(0, int(began[i]) - due_ns)
+        passed = max(1, (int(ended[i]) - due_ns) // PERIOD_NS)
+        overruns += passed - 1 if i >= LEAD_IN else 0
+        due_ns += passed * PERIOD_NS
+    return Taken(lateness_ns[LEAD_IN:], (ended - began)[LEAD_IN:], overruns)
+
+
+def _in_a_thread(take: Callable[[], None]) -> None:
+    thread = threading.Thread(target=take, name="timed")
+    thread.start()
+    thread.join()
+
+
+@dataclass(frozen=True, slots=True)
+class Classes:
+    """What this system grants: its best priority class, and the ordinary one."""
+
+    normal: Grant
+    best: Grant | None
+
+
+def granted() -> Classes:
+    """Return the priority classes there are to be timed; the best is None where it is the ordinary one."""
+    grants: list[Grant] = []
+
+    def ask() -> None:
+        grants.append(raise_priority(real_time=False))
+        grants.append(raise_priority())
+
+    _in_a_thread(ask)
+    normal, best = grants
+    return Classes(normal, None if best.level == "normal" else best)
+
+
+LATE_NS: Final = 1_000_000
+PERCENTILES: Final = (50.0, 90.0, 99.0, 99.9)
+
+MEDIAN_US: Final = 15.0
+TAIL_RATIO: Final = 2.5
+FEWER_LATE: Final = 5.0
+BUSY_US: Final = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """One loop in one priority class: its latenesses, and how long its ticks took (empty: nothing was to do) [ns]."""
+
+    kind: Kind
+    grant: Grant
+    lateness_ns: Whole
+    busy_ns: Whole
+    overruns: int
+
+    @property
+    def name(self) -> str:
+        """The loop in words."""
+        return NAMES[self.kind]
+
+    @property
+    def ticks(self) -> int:
+        """How many ticks were taken."""
+        return len(self.lateness_ns)
+
+    def late_us(self, percent: float) -> float:
+        """Return a percentile of the lateness [µs]; 100 is the worst."""
+        return float(np.percentile(self.lateness_ns, percent)) * 1e-3
+
+    def busy_us(self, percent: float) -> float:
+        """Return a percentile of how long a tick took [µs]."""
+        return float(np.percentile(self.busy_ns, percent)) * 1e-3
+
+    @property
+    def late(self) -> int:
+        """How many ticks began more than 1 ms late, or not at all: a deadline passed over is one of them."""
+        return int((self.lateness_ns > LATE_NS).sum()) + self.overruns
+
+    @property
+    def late_share(self) -> float:
+        """The share of deadlines that were missed by more than 1 ms."""
+        return self.late / max(self.ticks + self.overruns, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """A limit of the servo in a priority class, and what was found; ``said`` has both in words."""
+
+    level: Level
+    said: str
+    held: bool
+
+    def __str__(self) -> str:
+        return f"{self.level}: {self.said}: {'met' if self.held else 'missed'}"
+
+
+@dataclass(frozen=True, slots=True)
+class Timed:
+    """What one run found; ``lanes`` come by priority class, the best last, the servo first in each."""
+
+    machine: str
+    load: LoadName
+    seconds: float
+    spin_us: float
+    spun_share: float
+    frames_hz: float | None
+    lanes: tuple[Lane, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def levels(self) -> tuple[Level, ...]:
+        """The priority classes there are."""
+        return tuple(dict.fromkeys(lane.grant.level for lane in self.lanes))
+
+    def lane(self, kind: Kind, level: Level) -> Lane | None:
+        """Return one of the lanes, if it was timed."""
+        return next((lane for lane in self.lanes if (lane.kind, lane.grant.level) == (kind, level)), None)
+
+    def ratio(self, lane: Lane, percent: float) -> float:
+        """Return how many times as late as the bare loop of its class a lane is, at a percentile."""
+        bare = self.lane("bare", lane.grant.level)
+        return lane.late_us(percent) / max(bare.late_us(percent), 1e-3) if bare is not None else float("nan")
+
+    def limits(self) -> tuple[Limit, ...]:
+        """Return the limits and what was found, class by class."""
+        return tuple(limit for level in self.levels for limit in self._of(level))
+
+    def _of(self, level: Level) -> Sequence[Limit]:
+        servo, bare, thread = (self.lane(kind, level) for kind in ("servo", "bare", "thread"))
+        if servo is None or bare is None or thread is None:
+            return ()
+        above_us = servo.late_us(50) - bare.late_us(50)
+        ratio = self.ratio(servo, 99)
+        took_us = servo.busy_us(99)
+        late = (
+            f"{servo.late:,} ticks over 1 ms late, {_fewer(thread, servo)} than with a Python thread "
+            f"(at least {FEWER_LATE:g} times fewer; the bare loop: {_fewer(thread, bare)})"
+        )
+        return tuple(
+            Limit(level, said, held)
+            for said, held in (
+                (f"median {above_us:+.1f} µs against the bare loop (at most +{MEDIAN_US:g} µs)", above_us <= MEDIAN_US),
+                (f"p99 {ratio:.2f} times the bare loop's (at most {TAIL_RATIO:g})", ratio <= TAIL_RATIO),
+                (late, thread.late_share >= FEWER_LATE * servo.late_share),
+                (f"a tick took {took_us:.1f} µs at p99 (at most {BUSY_US:g} µs)", took_us <= BUSY_US),
+            )
+        )
+
+
+def _fewer(thread: Lane, other: Lane) -> str:
+    """Return in words how many times fewer ticks over 1 ms late one lane has than a Python thread."""
+    if other.late == 0:
+        return f"{thread.late:,} fewer"
+    return f"{thread.late_share / other.late_share:.1f} times fewer"
+
+
+def lane(kind: Kind, grant: Grant, parts: Sequence[Taken]) -> Lane:
+    """Return a lane of what its loop did in all its ticks."""
+    return Lane(
+        kind,
+        grant,
+        np.concatenate([part.lateness_ns for part in parts]),
+        np.concatenate([part.busy_ns for part in parts]),
+        sum(part.overruns for part in parts),
+    )
+
 
 TICK_S: Final = 0.25
 LEAST_S: Final = 0.5

@@ -16,7 +16,7 @@ BATCHES = 100
 NAMES = ("rek2024", "physical_liquids", "physical2", "slime")
 PROGRAM = """
 import hashlib, json, sys
-from study_app.evidence.cost import Bench
+from study_app.evidence.cost import TickTimer
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.paths import path
 from study_app.haptics.runtime.offline import simulate
@@ -30,7 +30,7 @@ for name in json.loads(sys.argv[1]):
         key = f"{name}: {title}"
         force = b"".join(axis.tobytes() for axis in (motion.fx_n, motion.fy_n, motion.fz_n))
         forces[key] = hashlib.sha256(force).hexdigest()
-        benches[key] = Bench(scene)
+        benches[key] = TickTimer(scene)
 print(json.dumps(forces), flush=True)
 for line in sys.stdin:
     benches[line.strip()].batch()

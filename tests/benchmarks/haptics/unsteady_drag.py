@@ -5,7 +5,7 @@ Run it by itself: ``python tests/benchmarks/haptics/unsteady_drag.py``.
 
 import statistics
 
-from study_app.evidence.cost import Bench
+from study_app.evidence.cost import TickTimer
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.scene import Liquid, Scene
 
@@ -16,7 +16,7 @@ GLYCERIN = Liquid(id="glycerin", density_kg_m3=1261, viscosity_pa_s=1.41, drag=D
 def costs_ns(batches: int) -> tuple[float, float]:
     """Return what the effects apart and unsteady drag take beyond a tick without effects [ns], medians of batches."""
     liquids = {name: GLYCERIN.model_copy(update={"effects": effects}) for name, effects in MODELS.items()}
-    benches = {name: Bench(Scene(scale=3, liquids=(liquid,))) for name, liquid in liquids.items()}
+    benches = {name: TickTimer(Scene(scale=3, liquids=(liquid,))) for name, liquid in liquids.items()}
     for _ in range(batches):
         for bench in benches.values():
             bench.batch()

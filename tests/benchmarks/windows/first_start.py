@@ -16,7 +16,7 @@ import tempfile
 from contextlib import nullcontext
 from pathlib import Path
 
-from study_app.evidence.timing.machine_load import busy_cores
+from study_app.evidence.computer import busy_cores
 
 BEAT_MS = 20
 LIMIT_MS = 200

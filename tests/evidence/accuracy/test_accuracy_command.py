@@ -6,7 +6,7 @@ import pytest
 from study_app.cli.evidence.accuracy import motion_along
 from study_app.errors import StudyError
 from study_app.evidence.accuracy.comparison import accuracy
-from study_app.evidence.accuracy.liquid_survey import PUBLISHED, survey
+from study_app.evidence.accuracy.survey import PUBLISHED, survey
 from study_app.haptics.model.motion import Motion
 from study_app.protocol.load import load_scenes
 from tests.evidence.accuracy.scenes import TANK, compiled

@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from study_app.evidence.accuracy import candidate_sets
+from study_app.evidence.accuracy import candidates
 from study_app.evidence.accuracy.candidates import LinearRung, TickRung
 from study_app.evidence.accuracy.comparison import Row, Time, front
-from study_app.evidence.force_error import Error, error_of
-from study_app.evidence.reference_solutions import Case, Truth
+from study_app.evidence.reference_solutions import Case, Error, Truth, error_of
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import MotionBox
 from tests.evidence.accuracy.scenes import REAL, TANK
@@ -60,8 +59,8 @@ def test_the_front_takes_rounding_errors_and_times_within_a_twentieth_as_equal()
 @pytest.mark.parametrize(("speed_mps", "expects"), [(1e-3, "no resistance"), (0.6, "+ history")])
 def test_the_ladder_has_the_gates_own_choice(speed_mps, expects):
     box = MotionBox(speed_mps=speed_mps, acceleration_mps2=10 * speed_mps)
-    rungs, choice = candidate_sets.physical(REAL.model_copy(update={"motion": box}))
+    rungs, choice = candidates.physical(REAL.model_copy(update={"motion": box}))
     assert choice in rungs
     assert expects in choice.name
     assert isinstance(rungs[0], LinearRung)
-    assert candidate_sets.numerical(TANK)[1].name == "O(1) wake"
+    assert candidates.numerical(TANK)[1].name == "O(1) wake"

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from study_app.evidence.expected_error import error_report, expected, physical_n
-from study_app.evidence.hand_motions import stroke
+from study_app.evidence.reference_solutions import stroke
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.effects.local_wake import LocalWake
 from study_app.haptics.model.scene import Ewma, Given, Kalman, Scene

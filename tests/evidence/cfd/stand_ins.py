@@ -1,7 +1,7 @@
 """Cases of the fluid solver without it: worker processes import them by name."""
 
-from study_app.evidence.cfd.cases import Case
 from study_app.evidence.cfd.flow import Grid
+from study_app.evidence.cfd.solved_cases import Case
 from study_app.evidence.cfd.stored_flows import MOTION, text
 
 

@@ -14,11 +14,10 @@ from scipy.integrate import quad
 from study_app.cli.evidence.accuracy import cfd
 from study_app.cli.options import executor_for
 from study_app.errors import StudyError
-from study_app.evidence.cfd import cases, flow, model_comparison, solver, stored_flows
 from study_app.evidence.cfd import fits as fitted
-from study_app.evidence.cfd.cases import Case
-from study_app.evidence.cfd.profiles import PROFILES, RAMP, STOP, STOPPING
-from study_app.evidence.cfd.solver_truths import solver_truths
+from study_app.evidence.cfd import flow, solved_cases, solver, stored_flows
+from study_app.evidence.cfd.solved_cases import PROFILES, RAMP, STOP, STOPPING, Case
+from study_app.evidence.cfd.stored_flows import solver_truths
 from study_app.protocol.load import load_scene
 from study_app.workers.executors import Workers
 from tests.evidence.cfd import stand_ins
@@ -26,8 +25,8 @@ from tests.haptics.scenes import COMPILED as IS_COMPILED
 
 COMPILED = pytest.mark.skipif(not IS_COMPILED, reason="fits need the compiled tick")
 PACKAGE = resources.files("study_app.evidence.cfd")
-NAMES = tuple(it.name for it in cases.cases())
-CASES = (*cases.cases(), *cases.training_cases(), *cases.held_out_cases())
+NAMES = tuple(it.name for it in solved_cases.cases())
+CASES = (*solved_cases.cases(), *solved_cases.training_cases(), *solved_cases.held_out_cases())
 COARSE = flow.Grid(ahead=15, behind=30, aside=15, ball=0.2, near=0.8, far=6)
 
 
@@ -41,7 +40,7 @@ def stored():
 def fits(stored):
     """Return the stored fits, judged anew by the tables; nothing is fitted."""
     models, found = {it.name: it for it in fitted.MODELS}, []
-    for row in csv.DictReader((PACKAGE / model_comparison.FITS_FILE).read_text("utf-8").splitlines()):
+    for row in csv.DictReader((PACKAGE / fitted.FITS_FILE).read_text("utf-8").splitlines()):
         table = stored[row["table"]]
         values = {name: float(value) for name, _, value in (it.partition("=") for it in row["parameters"].split())}
         values |= {name: round(value) for name, value in values.items() if name == "length"}
@@ -148,8 +147,8 @@ def test_steady_drag_is_what_was_published_and_independent_of_the_grid():
     reynolds, drag, coarse, narrow = stored_flows.steady().columns.values()
     np.testing.assert_allclose(coarse, drag, rtol=4e-3)
     np.testing.assert_allclose(narrow, drag, rtol=2e-3)
-    np.testing.assert_allclose([model_comparison.clift(it) for it in reynolds.tolist()], drag, rtol=0.016)
-    for at, published in model_comparison.MITTAL.items():
+    np.testing.assert_allclose([fitted.clift(it) for it in reynolds.tolist()], drag, rtol=0.016)
+    for at, published in fitted.MITTAL.items():
         assert drag[reynolds == at] == pytest.approx(published, rel=0.006)
     assert drag[reynolds == 1] > 24 * (1 + 3 / 16) * 0.9  # Oseen's correction, too large by a little
     assert drag[reynolds == 1] < 24 * (1 + 3 / 16)
@@ -201,8 +200,8 @@ def test_a_table_that_was_damaged_is_named(tmp_path):
 @pytest.mark.slow
 @COMPILED
 def test_the_stored_fits_have_the_errors_they_say(fits):
-    rows = model_comparison.fits_csv(fits).decode().splitlines()
-    said = (PACKAGE / model_comparison.FITS_FILE).read_text("utf-8").splitlines()
+    rows = fitted.fits_csv(fits).decode().splitlines()
+    said = (PACKAGE / fitted.FITS_FILE).read_text("utf-8").splitlines()
     assert len(rows) == 1 + len(NAMES) * len(fitted.MODELS)
     for row, other in zip(rows, said, strict=True):
         assert row.split(",")[:2] == other.split(",")[:2]
@@ -279,11 +278,11 @@ def test_a_coarse_flow_without_convection_is_the_exact_one(coarse):
 
 def test_a_coarse_flow_resists_as_it_should(coarse):
     (slow, fast) = coarse.steady([20.0, 50.0])
-    assert slow == pytest.approx(model_comparison.clift(20.0), rel=0.02)
-    assert fast == pytest.approx(model_comparison.clift(50.0), rel=0.02)
+    assert slow == pytest.approx(fitted.clift(20.0), rel=0.02)
+    assert fast == pytest.approx(fitted.clift(50.0), rel=0.02)
 
 
 def test_a_solution_that_misses_the_coarse_one_is_not_stored(coarse, monkeypatch):
     monkeypatch.setattr(solver, "PERMITTED", 1e-6)
     with pytest.raises(StudyError, match=r"differs from the coarse solution .* nothing is stored"):
-        solver.motion_table(cases.cases()[0], coarse, coarse, step=0.025)
+        solver.motion_table(solved_cases.cases()[0], coarse, coarse, step=0.025)

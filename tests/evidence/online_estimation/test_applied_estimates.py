@@ -4,10 +4,10 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
+from study_app.evidence.online_estimation import applied_estimates
 
 from study_app.cli import commands
-from study_app.evidence.online_estimation import applied_estimates
-from study_app.evidence.online_estimation.applied_estimates import AppliedCase, judge_applied, report
+from study_app.evidence.stability.applied_estimates import AppliedCase, judge_applied, report
 from study_app.evidence.stability.stability_cases import parse
 from study_app.lab.estimation.liquid_model import DRAG
 from tests.haptics.scenes import COMPILED

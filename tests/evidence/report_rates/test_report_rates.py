@@ -10,10 +10,18 @@ from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer
 from study_app.analysis.planning.simulated_studies import plan
 from study_app.evidence.report_rates import known_effects as studies
-from study_app.evidence.report_rates import single_test_rates
 from study_app.evidence.report_rates.known_effects import EXTENTS, GENERATORS, Generator, Simulated, answers, simulated
-from study_app.evidence.report_rates.rates import markdown, table
-from study_app.evidence.report_rates.study_rates import CLAIMED, LOST, Cell, count, truth
+from study_app.evidence.report_rates.simulation import (
+    CLAIMED,
+    LOST,
+    PRINTED,
+    Cell,
+    count_single,
+    count_studies,
+    markdown,
+    table,
+    truth,
+)
 from study_app.protocol.load import load
 from study_app.protocol.simulated_observer import TrialFeatures
 
@@ -72,7 +80,7 @@ def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Simulated, partic
 def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(studies, "TRUTH", 200)
     cells = [Cell(generator, extent, 5) for extent in EXTENTS]
-    rates = [rate for cell in cells for rate in count(rek, cell, truth(rek, cell), 1, 0, 2)]
+    rates = [rate for cell in cells for rate in count_studies(rek, cell, truth(rek, cell), 1, 0, 2)]
     assert {rate.studies for rate in rates} == {2}
     assert {rate.cell for rate in rates} == {f"{generator}, {extent}" for extent in EXTENTS}
     assert [rate.hits for rate in rates if rate.what == LOST[0]] == [0, 0, 0]
@@ -81,19 +89,14 @@ def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator, mo
     assert {"detection threshold printed (delays)", "equal liquids distinguished (liquids)"} <= {
         one.what for one in rates
     }
-    assert rates == [rate for cell in cells for rate in count(rek, cell, truth(rek, cell), 1, 0, 2)]
+    assert rates == [rate for cell in cells for rate in count_studies(rek, cell, truth(rek, cell), 1, 0, 2)]
     assert len(markdown(rates).splitlines()) == len(table(rates).splitlines()) + 1 == len(rates) + 2
 
 
 @pytest.mark.slow
 def test_single_tests_are_counted() -> None:
-    (leaning,) = single_test_rates.count(("one in five differs by 5 points, the others by 0", 24), 1, 0, 4)
+    (leaning,) = count_single(("one in five differs by 5 points, the others by 0", 24), 1, 0, 4)
     assert (leaning.studies, leaning.limit) == (4, "at most 5 %")
-    printed, covered = single_test_rates.count(("one threshold for all", 12), 1, 0, 4)
-    assert (printed.what, printed.hits, printed.studies, printed.limit) == (
-        single_test_rates.PRINTED,
-        4,
-        4,
-        "at least 93 %",
-    )
+    printed, covered = count_single(("one threshold for all", 12), 1, 0, 4)
+    assert (printed.what, printed.hits, printed.studies, printed.limit) == (PRINTED, 4, 4, "at least 93 %")
     assert covered.hits >= 2

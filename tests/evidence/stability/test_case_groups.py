@@ -6,9 +6,8 @@ import math
 import numpy as np
 import pytest
 
+from study_app.evidence.stability.bench import Bench, new_trace
 from study_app.evidence.stability.case_groups import CASES, groups
-from study_app.evidence.stability.closed_loop import begin
-from study_app.evidence.stability.device_bench import new_bench, new_trace
 from study_app.evidence.stability.stability_cases import materials, of_physical2, parse
 from study_app.evidence.stability.verdict import MISJUDGED_ALLOWANCE_J, judge
 from tests.haptics.scenes import COMPILED
@@ -49,8 +48,8 @@ def test_lines_of_earlier_versions_still_describe_the_same_case():
 
 def samples(case, ticks):
     """Return of each tick whether its sample is new, and its position."""
-    bench, trace = new_bench(case, safe=True), new_trace(case)
-    begin(bench.loop, bench.handle)
+    bench, trace = Bench(case), new_trace(case)
+    bench.begin()
     fresh, places = [], []
     for k in range(ticks):
         bench.run(trace[: k + 1], k, math.inf)

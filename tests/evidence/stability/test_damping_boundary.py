@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from study_app.evidence.stability.damping_boundary import boundary_nspm, measure_limits, passive_nspm
+from study_app.evidence.stability.damping_limits import boundary_nspm, measure_limits, passive_nspm
 from study_app.haptics.model.estimators import NAMED
 from study_app.haptics.model.scene import Ewma, Kalman, Lead, Line
 from study_app.haptics.model.slope_limits import damping_limits, table

@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from study_app.evidence.stability.closed_loop import TRACE, follow
-from study_app.evidence.stability.device_bench import new_bench
+from study_app.evidence.stability.bench import Bench
 from study_app.evidence.stability.force_delay import delayed_trace, measure
 from study_app.evidence.stability.stability_cases import Case, parse
-from study_app.haptics.model.layout import records
 from study_app.protocol.checks.delayed_force import table
 from tests.haptics.scenes import COMPILED
 
@@ -16,13 +14,10 @@ compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
 
 def imposed(case, *, safe=True):
     """Return the trace of a position that is imposed: circles of 20 mm at 0.1 m/s, begun within 0.2 s."""
-    bench, trace = new_bench(case, safe=safe), records(TRACE, 1500)
-    bench.loop.rigid = 1
     t_s = np.arange(1500) / 1000
     angle = 5 * (t_s + 0.2 * np.expm1(-t_s / 0.2))
     path_m = 0.02 * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
-    follow(bench.model, bench.safety[0], bench.sample[0], bench.handle, bench.pace, bench.loop, trace, path_m)
-    return trace
+    return Bench(case, safe=safe).follow(path_m, rigid=True)
 
 
 @compiled

@@ -5,8 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from study_app.evidence.stability.closed_loop import begin
-from study_app.evidence.stability.device_bench import lasts_s, new_bench, new_trace
+from study_app.evidence.stability.bench import Bench, lasts_s, new_trace
 from study_app.evidence.stability.stability_cases import DAMPER, DEVICE, FILTERS, Case
 from study_app.evidence.stability.verdict import judge
 from tests.haptics.scenes import COMPILED
@@ -18,8 +17,8 @@ compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
 @compiled
 def test_the_tick_uses_what_the_device_measures() -> None:
     case = Case(estimator=DEVICE, velocity_lag=2.0, hand="firm", liquid="water")
-    bench, trace = new_bench(case, safe=True), new_trace(case)
-    begin(bench.loop, bench.handle)
+    bench, trace = Bench(case), new_trace(case)
+    bench.begin()
     rows = bench.run(trace, 0, 0.2 * lasts_s(case))
     assert bench.sample[0].velocity_mps == pytest.approx(case.scale * bench.loop.velocity.seen_mps)
     assert np.linalg.norm(trace.velocity_mps[:rows], axis=1).max() > 0.1

@@ -12,9 +12,8 @@ from study_app.evidence.thresholds.estimated_exponents import (
     simulate_estimates,
     spread_of_exponents,
 )
-from study_app.evidence.thresholds.many_studies import plant
-from study_app.evidence.thresholds.verdicts import markdown
-from study_app.evidence.thresholds.whole_pipeline import judged, rehearsed
+from study_app.evidence.thresholds.many_studies import judged, plant, rehearsed
+from study_app.evidence.thresholds.planted import markdown
 from study_app.protocol.load import load, parse, source_bytes
 from tests.compiled import needs_servo
 

@@ -8,10 +8,8 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
-from study_app.evidence.thresholds.methods_alone import StudyFound, simulate
-from study_app.evidence.thresholds.planted import Planted, planted
-from study_app.evidence.thresholds.verdicts import markdown, spread, verdicts
-from study_app.evidence.thresholds.whole_pipeline import judged, rehearsed
+from study_app.evidence.thresholds.many_studies import judged, rehearsed
+from study_app.evidence.thresholds.planted import Planted, StudyFound, markdown, planted, simulate, spread, verdicts
 from study_app.protocol.load import load, parse
 from study_app.protocol.streams import stream
 from study_app.protocol.trials.designs import default_design

@@ -14,7 +14,7 @@ if numba.config.DISABLE_JIT:
 from study_app.errors import StudyError
 from study_app.evidence.timing import device_lateness
 from study_app.evidence.timing.device_lateness import emulated_devices, time_devices
-from study_app.evidence.timing.loops import Taken
+from study_app.evidence.timing.measurement import Taken
 
 pytestmark = pytest.mark.slow
 

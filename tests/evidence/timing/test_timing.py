@@ -13,11 +13,18 @@ if numba.config.DISABLE_JIT:
 
 
 from study_app.cli import main
-from study_app.evidence.timing.lateness import Lane, Timed
-from study_app.evidence.timing.loops import LEAD_IN, PERIOD_NS, granted, taken
-from study_app.evidence.timing.measurement import timing
-from study_app.evidence.timing.timed_scene import FULL, PlayedHand
-from study_app.evidence.timing.timing_report import BEGIN, END, markdown
+from study_app.evidence.timing.measurement import (
+    FULL,
+    LEAD_IN,
+    PERIOD_NS,
+    Lane,
+    PlayedHand,
+    Timed,
+    granted,
+    taken,
+    timing,
+)
+from study_app.evidence.timing.report import BEGIN, END, markdown
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.pack import elements_needed

@@ -5,10 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from study_app.evidence.stability.stability_cases import GRIPS
-from study_app.evidence.velocity import held_handle, imposed_motions
-from study_app.evidence.velocity.criteria import PARTS
-from study_app.evidence.velocity.imposed_motions import COUNT_M, Stroke, noise_mmps
+from study_app.evidence.stability.velocity import COUNT_M, PARTS, Stroke, errors, held_error, noise_mmps, plain_forces
 from study_app.haptics.model.estimator import ewma_response
 from study_app.haptics.model.scene import Ewma, Kalman, Raw
 from tests.haptics.scenes import COMPILED
@@ -20,7 +17,7 @@ compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
 @pytest.mark.slow
 @pytest.mark.parametrize("alpha", [0.05, 0.1])
 def test_error_of_ewma_is_that_of_its_frequency_response(alpha):
-    found = imposed_motions.errors(Ewma(alpha=alpha))
+    found = errors(Ewma(alpha=alpha))
     for stroke in (it for it in found if it.frequency_hz and it.amplitude_m == 0.03):
         w, t_s = 2 * math.pi * stroke.frequency_hz, np.linspace(0, 1, 10_000)
         passed = ewma_response(alpha, 1e-3, w)
@@ -44,11 +41,11 @@ def test_noise_of_the_raw_difference_is_that_of_its_counts():
 @pytest.mark.slow
 def test_a_held_handle_has_the_error_of_the_imposed_motion():
     """Quadratic drag in a firm hand, 3 Hz: the handle follows a sine closely, and EWMA lags by the same."""
-    _, quadratic = held_handle.plain_forces()
-    held = held_handle.error(quadratic, Ewma(), GRIPS["firm"], Stroke(0.02, 3.0))
+    _, quadratic = plain_forces()
+    held = held_error(quadratic, Ewma(), "firm", Stroke(0.02, 3.0))
     passed = ewma_response(0.1, 1e-3, 2 * math.pi * 3)
     assert held == pytest.approx(100 * 2 / math.sqrt(3) * abs(passed - 1), rel=0.1)
-    assert held_handle.error(quadratic, Kalman(), GRIPS["firm"], Stroke(0.02, 3.0)) < 0.25 * held
+    assert held_error(quadratic, Kalman(), "firm", Stroke(0.02, 3.0)) < 0.25 * held
 
 
 @pytest.mark.nightly

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from study_app.evidence.scene_variants import without_buoyancy
+from study_app.evidence.stability import velocity as bounds
 from study_app.evidence.stability.stability_cases import scenes
-from study_app.evidence.velocity import wiener_bound as bounds
-from study_app.evidence.velocity.wiener_bound import wiener_bound
+from study_app.evidence.stability.velocity import wiener_bound
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.scene import Knee, Liquid, Scene
 from tests.haptics.scenes import COMPILED

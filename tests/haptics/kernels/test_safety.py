@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from study_app.errors import StudyError
-from study_app.evidence.stability.damping_boundary import measured_estimators
+from study_app.evidence.stability.damping_limits import measured_estimators
 from study_app.haptics.kernels.safety import begin_scene
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.estimators import NAMED

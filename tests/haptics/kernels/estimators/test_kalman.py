@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from study_app.evidence.stability.damping_boundary import boundary_nspm
-from study_app.evidence.stability.trace_measures import fast_part
+from study_app.evidence.stability.bench import fast_part
+from study_app.evidence.stability.damping_limits import boundary_nspm
 from study_app.evidence.stability.withheld_force import measure
 from study_app.haptics.kernels.estimators import kalman
 from study_app.haptics.kernels.safety import new_safety

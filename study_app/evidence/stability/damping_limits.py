@@ -8,18 +8,16 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.evidence.stability.closed_loop import LOOP, STROKE, TRACE, begin, run
-from study_app.haptics.kernels.plant import new_handle
-from study_app.haptics.kernels.safety import new_safety
-from study_app.haptics.kernels.tick_schedule import new_schedule
-from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
+from study_app.evidence.stability.bench import Bench
+from study_app.evidence.stability.closed_loop import TRACE
+from study_app.evidence.stability.stability_cases import STROKE, THROWN, Case
+from study_app.haptics.model.device_dynamics import MOST_DELAY
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.estimators import NAMED as ESTIMATORS
 from study_app.haptics.model.estimators import lead
-from study_app.haptics.model.layout import SAMPLE, records
+from study_app.haptics.model.layout import records
 from study_app.haptics.model.scene import Body, Ewma, Foaw, Kalman, Knee, Lead, Line, Liquid, Scene, Velocity
 from study_app.haptics.model.slope_limits import INERTIA_SHARE, DampingLimits, Entry
-from study_app.haptics.runtime.pack import pack
 
 PERIODS_S: Final = (0.5e-3, 1e-3, 2e-3, 4e-3)
 DELAYS: Final = (0, 1, 2, 3, 4)
@@ -187,7 +185,16 @@ def _comes_to_rest(
 ) -> bool:
     """Return whether a handle thrown into a linear damper comes to rest; ``delays``: the loop's, the one believed."""
     counts = isinstance(velocity, Kalman)
-    dynamics = Dynamics(delay_s=delays[1] * period_s, count_m=COUNT_M, mass_kg=mass_kg)
+    case = Case(
+        rate_hz=1.0 / period_s,
+        delay=delays[0],
+        believed=delays[1],
+        hand=THROWN,
+        motion=STROKE,
+        speed_mps=_THROWN_MPS,
+        mass_kg=mass_kg,
+        viscous_nspm=friction_nspm,
+    )
     body = Body()
     stokes = Liquid(
         id="damper",
@@ -196,22 +203,11 @@ def _comes_to_rest(
         drag=Drag(law="schiller-naumann"),
     )
     scene = Scene(scale=1.0, rate_hz=1.0 / period_s, liquids=(stokes,), velocity=velocity, knee=Knee(law="none"))
-    loop = records(LOOP, 1)[0]
-    loop.motion, loop.speed_mps, loop.moving_s, loop.until_s = STROKE, _THROWN_MPS, math.inf, math.inf
-    handle = new_handle(mass_kg=mass_kg, viscous_nspm=friction_nspm, motor_limit_n=8.0, delay=delays[0])
-    handle.held = 0
-    handle.quantum_m = COUNT_M if counts else 0.0
-    begin(loop, handle)
+    bench = Bench(case, safe=False, limits=DampingLimits(damping_nspm, damping_nspm), scene=scene)
+    bench.loop.moving_s, bench.handle.motor_step_n = math.inf, 0.0
+    bench.handle.quantum_m = COUNT_M if counts else 0.0
+    bench.begin()
     trace = records(TRACE, round(_LASTS_S / period_s))
-    run(
-        pack(scene, limits=DampingLimits(damping_nspm, damping_nspm), dynamics=dynamics),
-        new_safety(delay_ticks=delays[1])[0],
-        records(SAMPLE, 1)[0],
-        handle,
-        new_schedule(period_s),
-        loop,
-        trace,
-        0,
-    )
+    bench.run(trace, 0, math.inf)
     speeds_mps = np.linalg.norm(trace.velocity_mps[-len(trace) // 10 :], axis=1)
-    return bool(not loop.broken and speeds_mps.max() < (SWING_MPS if counts else _TIRED * _THROWN_MPS))
+    return bool(not bench.loop.broken and speeds_mps.max() < (SWING_MPS if counts else _TIRED * _THROWN_MPS))

@@ -20,11 +20,9 @@ from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
 
+from study_app.evidence.stability.bench import FORCE_LIMIT_N, Bench, dynamics_of, fast_part, lowest_balance, new_trace
 from study_app.evidence.stability.case_groups import sweep
-from study_app.evidence.stability.closed_loop import TRACE, begin
-from study_app.evidence.stability.device_bench import FORCE_LIMIT_N, Bench, dynamics_of, new_bench
 from study_app.evidence.stability.stability_cases import Case, scene_of
-from study_app.evidence.stability.trace_measures import fast_part, lowest_balance
 from study_app.evidence.stability.verdict import (
     ALLOWANCE_J,
     FAST_HZ,
@@ -36,7 +34,6 @@ from study_app.evidence.stability.verdict import (
     SWING_MPS,
     TIRED,
 )
-from study_app.haptics.model.layout import records
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.offline import ModelAlong
 from study_app.haptics.runtime.pack import adjust_into
@@ -149,10 +146,10 @@ def _run(applied: AppliedCase, way: Way) -> _Run:
     case = applied.case
     scene, dynamics = scene_of(case), dynamics_of(case)
     most = most_drag_coefficient(scene, dynamics, FORCE_LIMIT_N)
-    bench = new_bench(case, safe=True, scene=_with_drag(scene, most) if way == "most" else scene)
+    bench = Bench(case, scene=_with_drag(scene, most) if way == "most" else scene)
     bench.loop.moving_s = MOVING_S
-    begin(bench.loop, bench.handle)
-    trace = records(TRACE, math.ceil((LASTS_S + 0.1) * case.rate_hz))
+    bench.begin()
+    trace = new_trace(case, LASTS_S)
     if way in {"fixed", "most"}:
         rows = bench.run(trace, 0, LASTS_S)
         return _Run(trace[:rows], bool(bench.loop.broken), 0.0, 0, identified=False)

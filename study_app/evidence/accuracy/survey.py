@@ -9,12 +9,10 @@ from typing import Final
 import numpy as np
 
 from study_app.evidence import reference_solutions as truths
-from study_app.evidence.accuracy import candidate_sets
-from study_app.evidence.cfd.solver_truths import solver_truths
-from study_app.evidence.cfd.stored_flows import held_out, stored, training
+from study_app.evidence.accuracy import candidates
+from study_app.evidence.cfd.stored_flows import held_out, solver_truths, stored, training
 from study_app.evidence.expected_error import Expected, expected
-from study_app.evidence.force_error import error_of
-from study_app.evidence.reference_solutions import measured_drag_n
+from study_app.evidence.reference_solutions import error_of, measured_drag_n
 from study_app.haptics.model.laws.drag_laws import LAWS, finite_reynolds
 from study_app.haptics.model.scene import Liquid, Scene
 from study_app.store.atomic import write_file
@@ -90,7 +88,7 @@ def survey(scenes: Mapping[str, Scene], progress: Callable[[str], None] = lambda
 
 
 def _surveyed(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) -> Surveyed:
-    rungs, model = candidate_sets.physical(scene)
+    rungs, model = candidates.physical(scene)
     alone = rungs[0].scene
 
     def share(truth: truths.Truth) -> float:

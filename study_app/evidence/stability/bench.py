@@ -1,0 +1,267 @@
+"""What a case runs on: model, safety layer, handle and hand; and what is measured on the trace of a closed loop."""
+
+from __future__ import annotations
+
+import copy
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from study_app.evidence.stability.closed_loop import ARMS, LOOP, TRACE, begin, follow, new_arm, play, run
+from study_app.evidence.stability.stability_cases import (
+    DEVICE,
+    FILTERS,
+    GRIPS,
+    LETS_GO,
+    MOTIONS,
+    SECOND,
+    THROWN,
+    Case,
+    scene_of,
+)
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.plant import new_handle
+from study_app.haptics.kernels.safety import new_safety
+from study_app.haptics.kernels.tick_schedule import new_schedule
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.layout import SAMPLE, records
+from study_app.haptics.model.motion import Floats, Motion
+from study_app.haptics.model.scene import Scene
+from study_app.haptics.model.slope_limits import DampingLimits
+from study_app.haptics.runtime.offline import simulate
+from study_app.haptics.runtime.pack import Model, pack
+
+MOVING_S: Final = 1.2
+LASTS_S: Final = 1.8
+FREE_S: Final = 1.2
+"""How long a handle that was let go is watched."""
+TREMOR_M: Final = 20e-6
+FORCE_LIMIT_N: Final = 8.0
+DIRECTION: Final = np.array([0.8, 0.0, 0.6])
+"""Of straight motions."""
+
+
+class Bench:
+    """The records of one closed loop.
+
+    Parameters
+    ----------
+    case : Case
+        What is presented, and in which loop.
+    safe : bool
+        Whether the safety layer acts.
+    limits : DampingLimits, optional
+        Tried in place of the table's.
+    scene : Scene, optional
+        Presented in place of the case's.
+    """
+
+    def __init__(
+        self, case: Case, *, safe: bool = True, limits: DampingLimits | None = None, scene: Scene | None = None
+    ) -> None:
+        self.safety = new_safety(FORCE_LIMIT_N, case.believed_delay)
+        self.safety[0].fade, self.safety[0].fade_s = 1.0, 0.0
+        self.loop = loop = records(LOOP, 1)[0]
+        loop.safe = safe
+        loop.motion = MOTIONS.index(case.motion)
+        loop.speed_mps = case.speed_mps
+        loop.way_m = case.way_mm * 1e-3
+        loop.moving_s = max(MOVING_S, case.release_s) if case.hand == LETS_GO else MOVING_S
+        loop.release_s = {THROWN: 0.0, LETS_GO: case.release_s}.get(case.hand, math.inf)
+        loop.tremor_m = 0.0 if case.hand == THROWN else TREMOR_M
+        loop.noise_m = case.noise_um * 1e-6
+        loop.lost, loop.duplicated, loop.burst_s = case.lost, case.duplicated, case.burst_ms * 1e-3
+        loop.jump_m, loop.outliers, loop.outlier_m = case.jump_mm * 1e-3, case.outliers, case.outlier_mm * 1e-3
+        loop.delay, loop.slows_to, loop.swaps = case.delay, case.slows_to, case.swaps
+        loop.mass_kg, loop.other_kg = case.mass_kg, case.other_kg
+        if case.estimator == DEVICE:
+            loop.velocity.filter = 1 + FILTERS.index(case.velocity_filter)
+            loop.velocity.lag = case.velocity_lag
+            loop.velocity.noise_mps = case.velocity_noise_mmps * 1e-3
+            loop.velocity.count_mps = case.velocity_count_mmps * 1e-3
+        device: dict[str, Any] = {
+            "viscous_nspm": case.viscous_nspm,
+            "coulomb_n": case.coulomb_n,
+            "motor_limit_n": FORCE_LIMIT_N,
+            "motor_step_n": FORCE_LIMIT_N / 2048,
+            "delay": case.delay,
+        }
+        if case.plant == SECOND:
+            loop.arm = new_arm(ARMS[case.hand], handle_kg=case.mass_kg, **device)
+        grip = GRIPS[case.hand]
+        self.handle = new_handle(
+            mass_kg=case.mass_kg,
+            hand_kg=grip.mass_kg,
+            stiffness_npm=grip.stiffness_npm,
+            damping_nspm=grip.damping_nspm,
+            quantum_m=case.quantum_um * 1e-6,
+            **device,
+        )
+        self.model: Model = pack(scene or scene_of(case), limits=limits, dynamics=dynamics_of(case))
+        self.pace = new_schedule(1.0 / case.rate_hz, jitter_s=case.jitter / case.rate_hz, missed=case.missed)
+        self.sample = records(SAMPLE, 1)
+
+    @property
+    def _records(self) -> tuple[Model, Any, Any, Any, Any, Any]:
+        return self.model, self.safety[0], self.sample[0], self.handle, self.pace, self.loop
+
+    def copy(self) -> Bench:
+        """Return a bench of its own, in the same state."""
+        other = copy.copy(self)
+        rows = type(self.model.rows)(*(array.copy() for array in self.model.rows))
+        other.model = Model._make([*(array.copy() for array in self.model[:-1]), rows])
+        for name in ("safety", "sample", "handle", "pace", "loop"):
+            setattr(other, name, getattr(self, name).copy())
+        return other
+
+    def begin(self) -> None:
+        """Put hand and handle where the motion begins, at its speed."""
+        begin(self.loop, self.handle)
+
+    def run(self, trace: Any, first: int, until_s: float) -> int:
+        """Run ticks into ``trace`` from row ``first`` on until a time [s]; return the row after the last."""
+        self.loop.until_s = until_s
+        return int(run(*self._records, trace, first))
+
+    def follow(self, path_m: Floats, *, rigid: bool = False) -> Any:
+        """Return the trace of a hand that means to be at ``path_m`` (ticks, 3) [m], one row a tick.
+
+        With ``rigid`` the handle is there, whatever the force.
+        """
+        self.loop.rigid = rigid
+        trace = records(TRACE, len(path_m))
+        follow(*self._records, trace, path_m)
+        return trace
+
+    def play(self, trace: Any, places_m: Floats) -> None:
+        """Let the tick answer a motion (rows, 3) [m] at the times of ``trace``, as `closed_loop.play` does."""
+        play(*self._records, trace, places_m)
+
+
+def lasts_s(case: Case) -> float:
+    """Return how long a case lasts [s]."""
+    return max(LASTS_S, case.release_s + FREE_S) if case.hand == LETS_GO else LASTS_S
+
+
+def new_trace(case: Case, seconds: float | None = None) -> Any:
+    """Return an empty trace that has room for a case, or for so many seconds of it."""
+    return records(TRACE, math.ceil(((seconds or lasts_s(case)) + 0.1) * case.rate_hz))
+
+
+def dynamics_of(case: Case) -> Dynamics:
+    """Return what the device states: its least mass and its delay, as they are believed, and its velocity's lag."""
+    least_kg = case.believed_kg or (min(case.mass_kg, case.other_kg) if case.other_kg else case.mass_kg)
+    lag_s = case.velocity_lag / case.rate_hz if case.estimator == DEVICE else None
+    return Dynamics(case.believed_delay / case.rate_hz, case.quantum_um * 1e-6, least_kg, lag_s)
+
+
+def sine_path(amplitude_m: float, rate_per_s: float, seconds: float, rate_hz: float) -> Floats:
+    """Return the places (ticks, 3) [m] of a hand along a straight sine, ``rate_per_s`` being its angular frequency."""
+    t_s = np.arange(round(seconds * rate_hz)) / rate_hz
+    path_m: Floats = np.outer(amplitude_m * np.sin(rate_per_s * t_s), DIRECTION)
+    return path_m
+
+
+def law_along(scene: Scene, trace: Any) -> Floats:
+    """Return the force (ticks, 3) [N] of the scene on the handle's true motion, with its velocities given."""
+    law = simulate(scene, Motion(trace.t_s, scene.scale * trace.position_m, scene.scale * trace.velocity_mps))
+    return np.column_stack([law.fx_n, law.fy_n, law.fz_n])
+
+
+@kernel
+def lowest_balance(trace: Any) -> tuple[float, float, float]:
+    """Return the lowest balance of hand and liquid [J], the strongest force [N] and the longest step [m].
+
+    From tick to tick the hand does the work -f·Δp on the liquid, with the force that acts on the handle, buoyancy and
+    weight aside, over its true step in the frame of the current. The balance begins at 0 and never exceeds what the
+    liquid could give back.
+    """
+    balance_j = lowest_j = strongest_n = longest_m = 0.0
+    for k in range(1, trace.shape[0]):
+        work_j = squares_n2 = squares_m2 = 0.0
+        before = trace[k - 1]
+        for axis in range(3):
+            sent = k - 1 - before.delay
+            lift_n = trace[sent].lift_n[axis] if sent >= 0 else 0.0
+            force_n = before.acting_n[axis] - lift_n
+            step_m = trace[k].position_m[axis] - before.position_m[axis]
+            step_m -= trace[k].drift_mps[axis] * (trace[k].t_s - before.t_s)
+            work_j -= force_n * step_m
+            squares_n2 += force_n * force_n
+            squares_m2 += step_m * step_m
+        balance_j = min(balance_j + work_j, trace[k].reserve_j)
+        lowest_j = min(lowest_j, balance_j)
+        strongest_n = max(strongest_n, math.sqrt(squares_n2))
+        longest_m = max(longest_m, math.sqrt(squares_m2))
+    return lowest_j, strongest_n, longest_m
+
+
+@kernel
+def given_out_j(trace: Any) -> float:
+    """Return the most that the force that acts gave to the handle, beyond what it took from it before [J]."""
+    energy_j = most_j = 0.0
+    for k in range(1, trace.shape[0]):
+        for axis in range(3):
+            energy_j += trace[k - 1].acting_n[axis] * (trace[k].position_m[axis] - trace[k - 1].position_m[axis])
+        most_j = max(most_j, energy_j)
+    return most_j
+
+
+@kernel
+def smooth(trace: Any, spread_s: float, out_m: Any, out_n: Any) -> None:
+    """Write motion and force without what is fast into ``out_m``, ``out_n`` (rows, 3): a Gaussian mean over time."""
+    rows = trace.shape[0]
+    first = 0
+    for k in range(rows):
+        while trace[k].t_s - trace[first].t_s > 3.5 * spread_s:
+            first += 1
+        total = 0.0
+        out_m[k] = 0.0
+        out_n[k] = 0.0
+        j = first
+        while j < rows and trace[j].t_s - trace[k].t_s <= 3.5 * spread_s:
+            distance = (trace[j].t_s - trace[k].t_s) / spread_s
+            weight = math.exp(-0.5 * distance * distance)
+            total += weight
+            for axis in range(3):
+                out_m[k, axis] += weight * trace[j].position_m[axis]
+                out_n[k, axis] += weight * trace[j].sent_n[axis]
+            j += 1
+        for axis in range(3):
+            out_m[k, axis] /= total
+            out_n[k, axis] /= total
+
+
+def fast_part(vectors: Any, rate_hz: float, corner_hz: float, first: int, last: int, aside_s: float = 0.0) -> float:
+    """Return the mean square root of vectors (rows, 3) above a frequency, over the rows from ``first`` to ``last``.
+
+    The strongest ``aside_s`` of it are left aside.
+    """
+    squares = np.zeros(max(last - first, 1))
+    _fast_squares(vectors, rate_hz, corner_hz, first, squares)
+    aside = min(int(aside_s * rate_hz), len(squares) - 1)
+    sums = np.concatenate([[0.0], np.cumsum(squares)])
+    strongest = (sums[aside:] - sums[: len(sums) - aside]).max()
+    return math.sqrt(max(sums[-1] - strongest, 0.0) / (len(squares) - aside))
+
+
+@kernel
+def _fast_squares(vectors: Any, rate_hz: float, corner_hz: float, first: int, out: Any) -> None:
+    """Add the squares of what is above the corner to ``out``, from row ``first`` on.
+
+    Butterworth of second order by the bilinear transform, begun at rest a while before.
+    """
+    w = math.tan(math.pi * corner_hz / rate_hz)
+    gain = 1.0 / (1.0 + math.sqrt(2.0) * w + w * w)
+    a1, a2 = 2.0 * (w * w - 1.0) * gain, (1.0 - math.sqrt(2.0) * w + w * w) * gain
+    begin = max(0, first - int(0.05 * rate_hz))
+    for axis in range(3):
+        x1 = x2 = vectors[begin, axis]
+        y1 = y2 = 0.0
+        for k in range(begin, first + out.shape[0]):
+            x = vectors[k, axis]
+            y = gain * (x - 2.0 * x1 + x2) - a1 * y1 - a2 * y2
+            x2, x1, y2, y1 = x1, x, y1, y
+            if k >= first:
+                out[k - first] += y * y

@@ -1,0 +1,372 @@
+"""What a participant's picture comes to: how much later than requested it was shown, delay by delay.
+
+The error of a frame is all that lies between the requested moment and what is seen: from the sample that is drawn to
+the end of its painting, or to the surface's swap, less the delay. It holds ``session.runner.SETTLED_S``, which is the
+same at every delay.
+
+Errors of the delay over the requested delay: one panel per screen, loads abreast, ½ frame and 1 frame marked.
+
+How well delays were kept, as text, Markdown, CSV and a figure.
+"""
+
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from study_app import figure_style as style
+from study_app.evidence.computer import LoadName
+from study_app.evidence.timing.report import figure_key, write_report
+from study_app.store.tables.csv_files import csv_text_of
+
+DELAYS_S: Final = (0.0, 0.05, 0.075, 0.1, 0.125, 0.15, 0.2)
+"""The delays of ``protocols/rek2024.toml``."""
+VIRTUAL_HZ: Final = (60.0, 144.0)
+
+BESIDE: Final[dict[LoadName, str]] = {
+    "none": "tank alone",
+    "gui": "with the cockpit",
+    "gui+cpu": "with the cockpit and busy cores",
+}
+
+MEAN_FRAMES: Final = 0.5
+TAIL_FRAMES: Final = 1.0
+TAIL_PERCENT: Final = 99.0
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """The frames of one trial: when they were painted or swapped, and of which moment they were [ns] (n,).
+
+    ``screen`` names the screen, ``paced`` says what its frames followed, ``load`` the concurrent load.
+    """
+
+    screen: str
+    paced: str
+    load: LoadName
+    refresh_hz: float
+    delay_s: float
+    painted_ns: NDArray[np.int64]
+    sample_ns: NDArray[np.int64]
+
+    @property
+    def frames(self) -> int:
+        """How many frames were shown."""
+        return len(self.painted_ns)
+
+    @property
+    def errors_ms(self) -> NDArray[np.float64]:
+        """Achieved less requested delay of each frame [ms] (n,)."""
+        ages_ms = np.asarray(self.painted_ns - self.sample_ns, np.float64) * 1e-6
+        return np.asarray(ages_ms - 1e3 * self.delay_s, np.float64)
+
+    @property
+    def frame_ms(self) -> float:
+        """How long a refresh of the screen lasts [ms]."""
+        return 1e3 / self.refresh_hz
+
+    @property
+    def achieved_ms(self) -> float:
+        """The mean delay of what was seen [ms]."""
+        return 1e3 * self.delay_s + self.mean_ms
+
+    @property
+    def mean_ms(self) -> float:
+        """The mean error [ms]."""
+        return float(self.errors_ms.mean())
+
+    @property
+    def worst_ms(self) -> float:
+        """The largest error [ms]."""
+        return float(self.errors_ms.max())
+
+    def percentile_ms(self, percent: float) -> float:
+        """Return a percentile of the errors [ms]."""
+        return float(np.percentile(self.errors_ms, percent))
+
+    @property
+    def late(self) -> int:
+        """How many frames were shown more than a refresh later than requested."""
+        return int((self.errors_ms > self.frame_ms).sum())
+
+    @property
+    def missed(self) -> int:
+        """How many refreshes between the first frame and the last had no frame of their own."""
+        gaps = np.rint(np.diff(self.painted_ns) * 1e-6 / self.frame_ms)
+        return int(np.maximum(gaps - 1, 0).sum())
+
+    @property
+    def held(self) -> bool:
+        """Whether the mean error is at most half a refresh, and its 99th percentile at most one."""
+        return (
+            abs(self.mean_ms) <= MEAN_FRAMES * self.frame_ms
+            and self.percentile_ms(TAIL_PERCENT) <= TAIL_FRAMES * self.frame_ms
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Delayed:
+    """What one run found, trial by trial; ``size_px`` is that of the participant's window on a virtual screen."""
+
+    machine: str
+    seconds: float
+    size_px: tuple[int, int]
+    shown: tuple[Shown, ...]
+
+    @property
+    def screens(self) -> tuple[str, ...]:
+        """The screens there are, in their order."""
+        return tuple(dict.fromkeys(one.screen for one in self.shown))
+
+    @property
+    def loads(self) -> tuple[LoadName, ...]:
+        """The concurrent loads, in their order."""
+        return tuple(dict.fromkeys(one.load for one in self.shown))
+
+    def on(self, screen: str, load: LoadName) -> tuple[Shown, ...]:
+        """Return the trials on a screen under a load, from the shortest delay to the longest."""
+        here = (one for one in self.shown if (one.screen, one.load) == (screen, load))
+        return tuple(sorted(here, key=lambda one: one.delay_s))
+
+    def limits(self) -> tuple[str, ...]:
+        """Return the limits on each screen under each load, and whether they were met."""
+        return tuple(self._of(screen, load) for screen in self.screens for load in self.loads)
+
+    def _of(self, screen: str, load: LoadName) -> str:
+        trials = self.on(screen, load)
+        mean = max(abs(one.mean_ms) / one.frame_ms for one in trials)
+        tail = max(one.percentile_ms(TAIL_PERCENT) / one.frame_ms for one in trials)
+        means_ms = [one.mean_ms for one in trials]
+        return (
+            f"{screen}, {BESIDE[load]}: mean error at most {mean:.2f} of a frame (limit: {MEAN_FRAMES:g}), "
+            f"99th percentile at most {tail:.2f} (limit: {TAIL_FRAMES:g}), "
+            f"means within {max(means_ms) - min(means_ms):.2f} ms of each other: "
+            f"{'met' if all(one.held for one in trials) else 'missed'}"
+        )
+
+
+HEIGHT_PT: Final = 212.0
+TOP_PT: Final = 46.0
+FOOT_PT: Final = 62.0
+LEFT_PT: Final = 34.0
+GAP_PT: Final = 46.0
+RIGHT_PT: Final = 44.0
+LETTERS: Final = 132
+MOST_FRAMES: Final = 1.5  # of the axis: what lies beyond is written at its top
+APART: Final = 0.34
+
+LOOKS: Final[dict[LoadName, dict[str, Any]]] = {
+    "none": {"color": "#0b65a3", "marker": "o", "markerfacecolor": "#0b65a3"},
+    "gui": {"color": "#b35600", "marker": "^", "markerfacecolor": "white"},
+    "gui+cpu": {"color": "#7a3e8f", "marker": "D", "markerfacecolor": "white"},
+}
+
+
+@style.own_settings(style.PLOT_SETTINGS)
+def draw(found: Delayed) -> Figure:
+    """Draw what was found."""
+    figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, HEIGHT_PT / 72), facecolor="white")
+    screens = found.screens
+    width_pt = (style.PAGE_WIDTH_PT - LEFT_PT - RIGHT_PT - GAP_PT * (len(screens) - 1)) / len(screens)
+    for number, screen in enumerate(screens):
+        left = (LEFT_PT + number * (width_pt + GAP_PT)) / style.PAGE_WIDTH_PT
+        tall = (HEIGHT_PT - TOP_PT - FOOT_PT) / HEIGHT_PT
+        axes = figure.add_axes((left, FOOT_PT / HEIGHT_PT, width_pt / style.PAGE_WIDTH_PT, tall))
+        _panel(axes, found, screen, first=number == 0)
+    _key(figure, found)
+    text = "\n".join(textwrap.wrap(_caption(found), LETTERS))
+    figure.text(4 / style.PAGE_WIDTH_PT, 29 / HEIGHT_PT, text, va="top", fontsize=6.6, color=style.TEXT_SOFT)
+    return figure
+
+
+def _panel(axes: Axes, found: Delayed, screen: str, *, first: bool) -> None:
+    """Draw every trial on a screen: a sign at the mean, a line from there to the 99th percentile."""
+    frame_ms = found.on(screen, found.loads[0])[0].frame_ms
+    top_ms = MOST_FRAMES * frame_ms
+    for number, load in enumerate(found.loads):
+        aside = APART * (number - (len(found.loads) - 1) / 2)
+        for place, trial in enumerate(found.on(screen, load)):
+            _trial(axes, trial, place + aside, top_ms)
+    for share, words in ((0.5, "½ frame"), (1.0, "1 frame")):
+        axes.axhline(share * frame_ms, color=style.ZERO, linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1)
+        axes.annotate(
+            words,
+            (1.0, share * frame_ms),
+            (3, 0),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            va="center",
+            fontsize=6.6,
+        )
+    delays_ms = [1e3 * trial.delay_s for trial in found.on(screen, found.loads[0])]
+    axes.set_xticks(range(len(delays_ms)), [f"{delay_ms:g}" for delay_ms in delays_ms])
+    axes.set_xlim(-0.6, len(delays_ms) - 0.4)
+    axes.set_ylim(0, top_ms)
+    axes.tick_params(labelsize=6.6)
+    axes.set_xlabel("requested delay [ms]", fontsize=7, labelpad=2)
+    if first:
+        axes.set_ylabel("later than requested [ms]", fontsize=7, labelpad=2)
+    paced = found.on(screen, found.loads[0])[0].paced
+    axes.set_title(f"{screen[0].upper()}{screen[1:]}, {paced}", pad=13, color=style.TEXT)
+
+
+def _trial(axes: Axes, trial: Shown, at: float, top_ms: float) -> None:
+    look = LOOKS[trial.load]
+    tail_ms = trial.percentile_ms(TAIL_PERCENT)
+    axes.plot([at, at], [trial.mean_ms, min(tail_ms, top_ms)], color=look["color"], linewidth=1.3, zorder=4)
+    if tail_ms < top_ms:
+        axes.plot([at - 0.09, at + 0.09], [tail_ms, tail_ms], color=look["color"], linewidth=1.3, zorder=4)
+    else:
+        axes.annotate(
+            f"{tail_ms:.0f}",
+            (at, top_ms),
+            (0, 1),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            fontsize=6.0,
+            color=look["color"],
+            annotation_clip=False,
+        )
+    axes.plot([at], [np.clip(trial.mean_ms, 0, top_ms)], markersize=4.5, zorder=5, clip_on=False, **look)
+
+
+def _key(figure: Figure, found: Delayed) -> None:
+    """Name the loads above the panels."""
+    handles = [
+        Line2D([], [], markersize=4.5, linewidth=1.3, label=BESIDE[load].capitalize(), **LOOKS[load])
+        for load in found.loads
+    ]
+    figure_key(figure, handles, LEFT_PT - 6, handlelength=2.6)
+
+
+def _caption(found: Delayed) -> str:
+    width, height = found.size_px
+    return (
+        f"Marks: mean of all frames; lines reach up to the {TAIL_PERCENT:g}th percentile, which is written if it is "
+        f"off the scale. {found.seconds:g} s of reaching at each delay with the tank at {width} × {height}, from "
+        "the "
+        f"sample that is drawn to the end of its painting. {found.machine}."
+    )
+
+
+BEGIN: Final = "<!-- delays: printed by liquid-study timing --delays --to DIR -->"
+END: Final = "<!-- end of delays -->"
+
+COLUMNS: Final = (
+    "screen", "frames_follow", "load", "requested_ms", "achieved_ms", "frames", "error_mean_ms", "error_p50_ms",
+    "error_p95_ms", "error_p99_ms", "error_max_ms", "error_mean_frames", "error_p50_frames", "error_p95_frames",
+    "error_p99_frames", "error_max_frames", "late", "refreshes_missed",
+)  # fmt: skip
+PERCENTILES: Final = (50.0, 95.0, 99.0)
+_HEADINGS: Final = (
+    "requested",
+    "achieved",
+    "mean",
+    "p95",
+    "p99",
+    "worst",
+    "mean",
+    "p95",
+    "p99",
+    "worst",
+    "late",
+    "missed",
+)
+
+
+def write(found: Delayed, to: Path) -> tuple[Path, ...]:
+    """Write text, tables (Markdown, CSV) and figure (PNG, SVG) into the folder ``to``; return the files.
+
+    Raises
+    ------
+    StoreError
+        A file cannot be written.
+    """
+    texts = {"txt": text(found), "md": markdown(found), "csv": csv_text(found)}
+    return write_report(to, "delays", texts, draw(found), "Accuracy of visual delays")
+
+
+def text(found: Delayed) -> str:
+    """Return the report for a terminal."""
+    lines = [_head(found)]
+    for screen in found.screens:
+        for load in found.loads:
+            trials = found.on(screen, load)
+            lines += ["", f"{screen} ({trials[0].paced}), {BESIDE[load]}: errors in ms, then in frames", ""]
+            rows = [_HEADINGS, *map(_row, trials)]
+            widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+            lines += ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
+    return "\n".join((*lines, "", *found.limits())) + "\n"
+
+
+def markdown(found: Delayed) -> str:
+    """Return the report as Markdown, between comments, ready for docs/timing.md: a row per screen and delay."""
+    one = ("mean", "p95", "p99", "worst", "late")
+    heads = [f"{BESIDE[load]}: mean" if name == "mean" else name for load in found.loads for name in one]
+    rows = [["screen", "requested", *heads], ["---", *["--:"] * (1 + len(heads))]]
+    for screen in found.screens:
+        for abreast in zip(*(found.on(screen, load) for load in found.loads), strict=True):
+            cells = [cell for trial in abreast for cell in (*_errors(trial), f"{trial.late} of {trial.frames}")]
+            rows.append([screen, f"{1e3 * abreast[0].delay_s:g}", *cells])
+    table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    limits = "\n".join(f"- {limit}" for limit in found.limits())
+    return f"{BEGIN}\n\n{_head(found)} Errors in ms.\n\n{table}\n\n{limits}\n\n{END}\n"
+
+
+def csv_text(found: Delayed) -> str:
+    """Return the table for machines: CSV, named `COLUMNS`."""
+    rows: list[Sequence[object]] = [COLUMNS]
+    for trial in found.shown:
+        errors_ms = (trial.mean_ms, *map(trial.percentile_ms, PERCENTILES), trial.worst_ms)
+        rows.append(
+            (
+                trial.screen,
+                trial.paced,
+                trial.load,
+                f"{1e3 * trial.delay_s:g}",
+                f"{trial.achieved_ms:.3f}",
+                trial.frames,
+                *(f"{error_ms:.3f}" for error_ms in errors_ms),
+                *(f"{error_ms / trial.frame_ms:.4f}" for error_ms in errors_ms),
+                trial.late,
+                trial.missed,
+            )
+        )
+    return csv_text_of(rows)
+
+
+def _head(found: Delayed) -> str:
+    width, height = found.size_px
+    return (
+        f"{found.seconds:g} s of reaching at each delay, the tank at {width} × {height}; error: achieved minus "
+        "requested delay, from the sample drawn to the end of its painting; late: by more than a frame. "
+        f"{found.machine}."
+    )
+
+
+def _row(trial: Shown) -> tuple[str, ...]:
+    return (
+        f"{1e3 * trial.delay_s:g}",
+        f"{trial.achieved_ms:.1f}",
+        *_errors(trial),
+        *(f"{error_ms / trial.frame_ms:.2f}" for error_ms in _measures_ms(trial)),
+        f"{trial.late} of {trial.frames}",
+        f"{trial.missed}",
+    )
+
+
+def _errors(trial: Shown) -> tuple[str, ...]:
+    return tuple(f"{error_ms:.1f}" for error_ms in _measures_ms(trial))
+
+
+def _measures_ms(trial: Shown) -> tuple[float, ...]:
+    """Return mean, 95th and 99th percentile and the worst [ms]."""
+    return trial.mean_ms, trial.percentile_ms(95), trial.percentile_ms(99), trial.worst_ms
