@@ -4,10 +4,10 @@ from typing import Annotated, ClassVar, Final, Literal, Self, TypeAlias
 
 from pydantic import Field, StringConstraints, model_validator
 
-from study_app.haptics.model.ranges import within
+from study_app.haptics.model.ranges import later, within
 from study_app.ids import MAX_ID
 from study_app.protocol.orders.sequences import Constraint
-from study_app.protocol.table import ExtendedTable, Id, Localised, Table, invalid
+from study_app.protocol.table import Id, Localised, Table, invalid
 
 Phase: TypeAlias = Literal["main", "practice", "baseline"]
 Order: TypeAlias = Literal["fixed", "shuffled", "constrained", "williams", "latin"]
@@ -56,16 +56,12 @@ class Catch(Table):
         return range(max(begin, 1), end + 1)
 
 
-class Block(ExtendedTable):
+class Block(Table):
     """Trials that share a task and a questionnaire.
 
     Tables name a condition of a main block by a code, such as L1 with ``code_prefix`` L; which condition a code stands
     for is drawn at random. Practice and baseline blocks have one condition and are announced as such.
     """
-
-    LATER: ClassVar[frozenset[str]] = frozenset(
-        {"standard", "stimulus", "standards", "design", "method", "until", "catch"}
-    )
 
     ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = (("conditions", "stimulus"),)
     NOT_WITH: ClassVar[tuple[tuple[tuple[str, ...], tuple[str, ...]], ...]] = (
@@ -97,21 +93,21 @@ class Block(ExtendedTable):
     conditions: tuple[Id, ...] = Field(
         default=(), description="The conditions that are presented; left out with a stimulus."
     )
-    standard: Id | None = Field(
+    standard: Id | None = later(
         default=None, description="The condition that a design compares the block's other conditions with."
     )
-    stimulus: Id | None = Field(default=None, description="The number that is varied, in place of conditions.")
-    standards: tuple[float, ...] = Field(
+    stimulus: Id | None = later(default=None, description="The number that is varied, in place of conditions.")
+    standards: tuple[float, ...] = later(
         default=(), max_length=8, description="The stimulus' standards that the block presents; left out: all."
     )
-    design: Kind | None = Field(
+    design: Kind | None = later(
         default=None, description="How a trial is built: a table of [designs], or a kind with all its defaults."
     )
-    method: Kind | None = Field(
+    method: Kind | None = later(
         default=None, description="How levels are chosen: a table of [methods], or a kind with all its defaults."
     )
-    until: Criterion | None = Field(default=None, description="When the block ends early; left out: never.")
-    catch: Catch | None = Field(default=None, description="Easy trials, and the rule that excludes; left out: none.")
+    until: Criterion | None = later(default=None, description="When the block ends early; left out: never.")
+    catch: Catch | None = later(default=None, description="Easy trials, and the rule that excludes; left out: none.")
     compares: Compared | None = Field(
         default=None,
         description="liquids: the conditions of a main block differ in their liquids; delays: in their delays, the "

@@ -15,6 +15,7 @@ from study_app.protocol.model import Analysis
 from study_app.protocol.questions import POINTS
 from study_app.protocol.source.document import entries, names
 from study_app.protocol.source.problems import Fault
+from study_app.protocol.table import Table
 from study_app.protocol.trials.stimuli import OF_LINK
 from study_app.protocol.wording.languages import LANGUAGES, words
 
@@ -22,6 +23,13 @@ LATEST: Final = 2
 TABLES: Final = ("stimuli", "designs", "methods", "groups", "sequences")
 LEVEL_LIMITS: Final = {"level_error_percent": 2, "level_error_ms": 2, "pace_error_percent": 40, "attempts": 3}
 """Limits of what an interval delivers, with their defaults."""
+
+
+def _later(table: type[Table]) -> list[str]:
+    """Return the keys of a table that format 1 lacks, sorted."""
+    return sorted(name for name, field in table.model_fields.items() if field.exclude_if is not None)
+
+
 NEW_KEYS: Final = (
     "study.credits",
     "questionnaires.*.instrument",
@@ -37,8 +45,8 @@ NEW_KEYS: Final = (
     *(f"conditions.*.{key}" for key in OF_LINK),
     *TABLES,
     *(f"limits.{key}" for key in LEVEL_LIMITS),
-    *(f"blocks.*.{key}" for key in sorted(Block.LATER)),
-    *(f"analysis.{key}" for key in sorted(Analysis.LATER)),
+    *(f"blocks.*.{key}" for key in _later(Block)),
+    *(f"analysis.{key}" for key in _later(Analysis)),
 )
 """Keys that belong to format 2, as patterns of places in the file."""
 NEW_VALUES: Final = {

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Annotated, Any, ClassVar, Final, Protocol, Self, TypeAlias
+from typing import Annotated, Any, Final, Protocol, Self, TypeAlias
 
 from pydantic import Field, model_validator
 
 from study_app.errors import StudyError
-from study_app.haptics.model.ranges import within
+from study_app.haptics.model.ranges import later, within
 from study_app.protocol.source.document import Path, entries
-from study_app.protocol.table import ExtendedTable, Id, invalid
+from study_app.protocol.table import Id, Table, invalid
 
 MOST_SHARE: Final = 20
 SEQUENCES: Final = ("sequence", "sequences.*", "groups.*.sequence", "groups.*.sequences.*")
@@ -20,16 +20,14 @@ Steps: TypeAlias = tuple[Id, ...]
 Sequences: TypeAlias = tuple[Annotated[Steps, Field(min_length=1)], ...]
 
 
-class Group(ExtendedTable):
+class Group(Table):
     """A group of participants; a group without a sequence has that of the study."""
-
-    LATER: ClassVar[frozenset[str]] = frozenset({"sequence", "sequences"})
 
     share: Annotated[int, within(1, MOST_SHARE, "a share is a small whole number")] = Field(
         default=1, description="How many participants of each round of allocations come into this group."
     )
-    sequence: Steps = Field(default=(), min_length=1, description="Its pages, blocks and forms, in every session.")
-    sequences: Sequences = Field(default=(), min_length=1, description="Its steps of session 1, 2 …")
+    sequence: Steps = later(default=(), min_length=1, description="Its pages, blocks and forms, in every session.")
+    sequences: Sequences = later(default=(), min_length=1, description="Its steps of session 1, 2 …")
 
     @model_validator(mode="after")
     def _one_of(self) -> Self:

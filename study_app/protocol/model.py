@@ -6,11 +6,11 @@ can decide by itself is checked by its class; what needs two tables is in ``chec
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
-from study_app.haptics.model.ranges import DensityKgM3, DiameterM, DragCoefficient, FadeS, Metres, within
+from study_app.haptics.model.ranges import DensityKgM3, DiameterM, DragCoefficient, FadeS, Metres, later, within
 from study_app.haptics.model.scene import (
     FADE_S,
     Accuracy,
@@ -28,18 +28,7 @@ from study_app.protocol.groups import Group, Sequences, Steps, every_step
 from study_app.protocol.questionnaires import Questionnaire
 from study_app.protocol.questions import Scale
 from study_app.protocol.table import Body as PageBody
-from study_app.protocol.table import (
-    Brief,
-    Description,
-    ExtendedTable,
-    Id,
-    Language,
-    Localised,
-    Printable,
-    Table,
-    invalid,
-    text_in,
-)
+from study_app.protocol.table import Brief, Description, Id, Language, Localised, Printable, Table, invalid, text_in
 from study_app.protocol.trials.designs import AnyDesign, asked, default_design
 from study_app.protocol.trials.methods import AnyMethod
 from study_app.protocol.trials.stimuli import Condition, Stimulus
@@ -89,10 +78,8 @@ class Credits(Table):
     url: Printable | None = Field(default=None, description="Address of the study, such as its preregistration.")
 
 
-class StudyHead(ExtendedTable):
+class StudyHead(Table):
     """Name, version and languages of the study."""
-
-    LATER: ClassVar[frozenset[str]] = frozenset({"credits"})
 
     name: str = Field(pattern=r"^[a-z][a-z0-9]*$", max_length=40, description="Short name, used in folders and files.")
     title: Localised = Field(description="Title as people read it.")
@@ -112,7 +99,7 @@ class StudyHead(ExtendedTable):
         description="double: neither participant nor operator knows the condition; single: the operator sees force and "
         "wake while the session runs, the participant does not know the condition.",
     )
-    credits: Credits | None = Field(default=None, description="Authors, licence and citation that exports state.")
+    credits: Credits | None = later(default=None, description="Authors, licence and citation that exports state.")
 
 
 class DeviceNeeds(Table):
@@ -139,10 +126,8 @@ class DeviceNeeds(Table):
         return self
 
 
-class SceneDefaults(ExtendedTable):
+class SceneDefaults(Table):
     """The part of the scene that all conditions share: everything but the liquids."""
-
-    LATER: ClassVar[frozenset[str]] = frozenset({"fade_s"})
 
     scale: SceneScale = Field(default=10, description="Metres in the scene per metre of the hand.")
     origin_m: Metres = Field(default=(0, 0, 0), description="Point in the scene at the zero of the hand frame [m].")
@@ -151,7 +136,7 @@ class SceneDefaults(ExtendedTable):
     knee: Knee = Field(default_factory=Knee, description="How high speeds are reduced before forces are computed.")
     motion: MotionBox = Field(default_factory=MotionBox, description="How the ball is expected to move in the scene.")
     accuracy: Accuracy = Field(default_factory=Accuracy, description='What effects = "auto" may leave out.')
-    fade_s: FadeS = Field(default=FADE_S, description="Time over which the force fades in [s].")
+    fade_s: FadeS = later(default=FADE_S, description="Time over which the force fades in [s].")
 
 
 def compared(conditions: Sequence[Condition]) -> Compared:
@@ -197,9 +182,7 @@ class StudyLiquid(Liquid):
 
     model_config = ConfigDict(title="Liquid")
 
-    LATER: ClassVar[frozenset[str]] = Liquid.LATER | {"body"}
-
-    body: OwnBody | None = Field(default=None, description="The ball in this liquid, if it differs from scene.body.")
+    body: OwnBody | None = later(default=None, description="The ball in this liquid, if it differs from scene.body.")
 
     @property
     def alone(self) -> Liquid:
@@ -224,12 +207,8 @@ def scene_with(scene: SceneDefaults, device: DeviceNeeds, liquids: Sequence[Stud
     )
 
 
-class Limits(ExtendedTable):
+class Limits(Table):
     """Limits within which a trial is valid."""
-
-    LATER: ClassVar[frozenset[str]] = frozenset(
-        {"targets_percent", "level_error_percent", "level_error_ms", "pace_error_percent", "attempts"}
-    )
 
     lateness_ms: Annotated[float, within(0.01, 1000, "no servo is more punctual, and 1 s is a failure")] = Field(
         default=2, description="99th percentile of the lateness of ticks [ms]."
@@ -247,18 +226,18 @@ class Limits(ExtendedTable):
         default=5, description="Share of the force that slope limits, passivity controller and slew limit withhold [%]."
     )
     targets_percent: Annotated[float, within(0.01, 100, "a share of the targets; left out, any is enough")] | None = (
-        Field(default=None, description="Least share of a reaching task's targets that must be reached [%].")
+        later(default=None, description="Least share of a reaching task's targets that must be reached [%].")
     )
-    level_error_percent: Annotated[float, within(0.1, 100, "encoder counts alone give 0.2 %")] | None = Field(
+    level_error_percent: Annotated[float, within(0.1, 100, "encoder counts alone give 0.2 %")] | None = later(
         default=None, description="Error of an interval's delivered level [%]; default: 2."
     )
-    level_error_ms: Annotated[float, within(0.1, 100, "frames of 120 Hz last 8 ms")] | None = Field(
+    level_error_ms: Annotated[float, within(0.1, 100, "frames of 120 Hz last 8 ms")] | None = later(
         default=None, description="Error of a trial's delivered difference of delays [ms]; default: 2."
     )
-    pace_error_percent: Annotated[float, within(1, 1000, "no hand keeps a pace to 1 %")] | None = Field(
+    pace_error_percent: Annotated[float, within(1, 1000, "no hand keeps a pace to 1 %")] | None = later(
         default=None, description="Error of the hand's RMS speed against a followed target's [%]; default: 40."
     )
-    attempts: Annotated[int, Field(ge=1, le=100)] | None = Field(
+    attempts: Annotated[int, Field(ge=1, le=100)] | None = later(
         default=None, description="How often a trial of intervals is presented until it is delivered; default: 3."
     )
 
@@ -297,10 +276,8 @@ class Published(Table):
         return f"{self.block}: {self.measure} {self.value:g}{''.join(about)}"
 
 
-class Analysis(ExtendedTable):
+class Analysis(Table):
     """Decisions about the analysis; without this table the report calls all its results exploratory."""
-
-    LATER: ClassVar[frozenset[str]] = frozenset({"participants", "precision", "published"})
 
     alpha: Annotated[float, within(0.0001, 0.2, "no study of people shows less than 0.0001")] = Field(
         default=0.05, description="Largest p that counts as significant."
@@ -324,13 +301,13 @@ class Analysis(ExtendedTable):
     noticed: Id | None = Field(
         default=None, description="Item for which agreement (5 to 7) means that a delay was noticed."
     )
-    participants: Annotated[int, Field(ge=1, le=100_000)] | None = Field(
+    participants: Annotated[int, Field(ge=1, le=100_000)] | None = later(
         default=None, description="How many participants are planned."
     )
-    precision: Annotated[float, within(0.001, 10, "a share of the group's mean")] | None = Field(
+    precision: Annotated[float, within(0.001, 10, "a share of the group's mean")] | None = later(
         default=None, description="Half the 95 % interval of the group's mean that is planned, as a share of the mean."
     )
-    published: tuple[Published, ...] = Field(default=(), description="Published values to compare with.")
+    published: tuple[Published, ...] = later(default=(), description="Published values to compare with.")
 
     def described(self, named_by: Sequence[str]) -> Iterator[tuple[str, str]]:
         """Yield a row in words for each decision; ``named_by`` says which item names each condition."""
@@ -369,10 +346,8 @@ def _named(tables: Any) -> Any:
 Named: TypeAlias = Annotated[dict[Id, T], BeforeValidator(_named)]
 
 
-class Protocol(ExtendedTable):
+class Protocol(Table):
     """The whole file."""
-
-    LATER: ClassVar[frozenset[str]] = frozenset({"stimuli", "designs", "methods", "sequences", "groups"})
 
     format: Format = Field(description="Version of this file format.")
     study: StudyHead
@@ -384,13 +359,13 @@ class Protocol(ExtendedTable):
     scales: dict[Id, Scale] = Field(default_factory=dict)
     questionnaires: dict[Id, Questionnaire] = Field(default_factory=dict)
     pages: dict[Id, PageText] = Field(default_factory=dict)
-    stimuli: dict[Id, Stimulus] = Field(default_factory=dict)
-    designs: dict[Kind, AnyDesign] = Field(default_factory=dict, description="How trials with intervals are built.")
-    methods: dict[Kind, AnyMethod] = Field(default_factory=dict, description="How the levels of a stimulus are chosen.")
+    stimuli: dict[Id, Stimulus] = later(default_factory=dict)
+    designs: dict[Kind, AnyDesign] = later(default_factory=dict, description="How trials with intervals are built.")
+    methods: dict[Kind, AnyMethod] = later(default_factory=dict, description="How the levels of a stimulus are chosen.")
     blocks: Named[Block] = Field(min_length=1)
     sequence: Steps = Field(default=(), min_length=1, description="Pages, blocks and forms in order, in every session.")
-    sequences: Sequences = Field(default=(), min_length=1, description="The steps of session 1, 2 … where they differ.")
-    groups: dict[Id, Group] = Field(default_factory=dict)
+    sequences: Sequences = later(default=(), min_length=1, description="The steps of session 1, 2 … where they differ.")
+    groups: dict[Id, Group] = later(default_factory=dict)
     limits: Limits = Field(default_factory=Limits)
     analysis: Analysis | None = Field(
         default=None, description="Decisions about the analysis, made before the first session."

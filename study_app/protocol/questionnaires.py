@@ -6,15 +6,15 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from study_app.haptics.model.ranges import within
+from study_app.haptics.model.ranges import later, within
 from study_app.protocol.questions import KINDS, STATEMENT, AnyQuestion, Context, Question, Scale, Statement
 from study_app.protocol.source.document import entries
 from study_app.protocol.source.problems import Fault, unknown
-from study_app.protocol.table import ExtendedTable, Id, Localised, Table, invalid
+from study_app.protocol.table import Id, Localised, Table, invalid
 
 Weight = Annotated[float, within(-1e6, 1e6, "no instrument has larger weights")]
 
@@ -73,10 +73,8 @@ def score(
     return asked.factor * total + asked.offset
 
 
-class Questionnaire(ExtendedTable):
+class Questionnaire(Table):
     """Questions that are answered after a trial, or on their own where ``sequence`` names the questionnaire."""
-
-    LATER: ClassVar[frozenset[str]] = frozenset({"instrument", "scores"})
 
     title: Localised | None = Field(default=None, description="Heading; left out: the name of the setting.")
     intro: Localised = Field(description="The question above the statements.")
@@ -87,10 +85,10 @@ class Questionnaire(ExtendedTable):
     items: tuple[AnyQuestion, ...] = Field(
         min_length=1, description="The questions; one without kind is a statement on the questionnaire's scale."
     )
-    instrument: str | None = Field(
+    instrument: str | None = later(
         default=None, description="The standard questionnaire whose items and scoring are used."
     )
-    scores: dict[Id, Score] = Field(default_factory=dict, description="Numbers computed from the answers.")
+    scores: dict[Id, Score] = later(default_factory=dict, description="Numbers computed from the answers.")
 
     @property
     def statements(self) -> tuple[Question, ...]:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import ConfigDict, Discriminator, Field, SerializeAsAny, Tag, WrapValidator, model_validator
 
-from study_app.haptics.model.ranges import within
-from study_app.protocol.table import UNPRINTABLE, ExtendedTable, Id, Localised, Printable, Table, invalid, text_in
+from study_app.haptics.model.ranges import later, within
+from study_app.protocol.table import UNPRINTABLE, Id, Localised, Printable, Table, invalid, text_in
 
 POINTS = 7
 """Of the scale of statements."""
@@ -141,10 +141,8 @@ class Context:
 V = TypeVar("V", bound=ItemView)
 
 
-class Question(ExtendedTable):
+class Question(Table):
     """One question."""
-
-    LATER: ClassVar[frozenset[str]] = frozenset({"show_if"})
 
     widget: ClassVar[str]
     measure: ClassVar[str]
@@ -155,7 +153,7 @@ class Question(ExtendedTable):
     text: Localised = Field(description="The statement as the participant reads it.")
     short: Localised = Field(description="One to three words for figures and tables.")
     required: bool = Field(default=True, description="Whether an answer is needed to continue.")
-    show_if: ShowIf | None = Field(
+    show_if: ShowIf | None = later(
         default=None, description="The answer to an earlier item that shows this one; left out: always shown."
     )
 

@@ -19,9 +19,7 @@ from pydantic import (
     ConfigDict,
     Field,
     GetJsonSchemaHandler,
-    SerializerFunctionWrapHandler,
     StringConstraints,
-    model_serializer,
     model_validator,
 )
 from pydantic.json_schema import JsonSchemaValue
@@ -156,21 +154,3 @@ class Table(BaseModel):
         if cls.NOT_WITH:
             handler.resolve_ref_schema(node)[NOT_WITH] = [[list(given), list(keys)] for given, keys in cls.NOT_WITH]
         return node
-
-
-class ExtendedTable(Table):
-    """A table with keys that format 1 does not have.
-
-    They are not written at their defaults: receipts and sealed keys of format 1 keep their bytes.
-    """
-
-    LATER: ClassVar[frozenset[str]] = frozenset()
-    """The keys that format 1 does not have."""
-
-    @model_serializer(mode="wrap")
-    def _omit_unused_keys(self, serialized: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        fields = type(self).model_fields
-        unused = {
-            name for name in self.LATER if getattr(self, name) == fields[name].get_default(call_default_factory=True)
-        }
-        return {name: value for name, value in serialized(self).items() if name not in unused}

@@ -6,21 +6,13 @@ file in ``haptics.kernels.effects``.
 """
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias
 
-from pydantic import (
-    Discriminator,
-    Field,
-    SerializerFunctionWrapHandler,
-    Tag,
-    create_model,
-    model_serializer,
-    model_validator,
-)
+from pydantic import Discriminator, Field, Tag, create_model, model_validator
 
 from study_app.haptics.model.effect import Effect as EffectDescriptor
 from study_app.haptics.model.effects import EFFECTS, NAMED
-from study_app.haptics.model.ranges import DensityKgM3, Extent, Frozen, Metres, ViscosityPaS
+from study_app.haptics.model.ranges import DensityKgM3, Extent, Frozen, Metres, ViscosityPaS, later
 from study_app.ids import MAX_ID
 
 if TYPE_CHECKING:
@@ -67,8 +59,6 @@ Region: TypeAlias = Annotated[
 class _Liquid(Frozen):
     """The fields that are no effect's table."""
 
-    LATER: ClassVar[frozenset[str]] = frozenset(it.name for it in EFFECTS if it.format > 1)
-
     id: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=MAX_ID)
     density_kg_m3: DensityKgM3
     viscosity_pa_s: ViscosityPaS | None = None
@@ -108,11 +98,6 @@ class _Liquid(Frozen):
             if problem is not None:
                 raise ValueError(problem)
 
-    @model_serializer(mode="wrap")
-    def _without_later_tables(self, serialized: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out what earlier versions did not know, where it says nothing: sealed keys keep their bytes."""
-        return {name: it for name, it in serialized(self).items() if it is not None or name not in self.LATER}
-
 
 _DOC = """A region with a fluid, and the effects it calls for; ``"auto"`` lets ``haptics.model.gate`` choose them.
 
@@ -134,7 +119,10 @@ else:
         __module__=__name__,
         __doc__=_DOC,
         **{
-            effect.name: (effect.model if effect.default is not None else effect.model | None, effect.default)
+            effect.name: (
+                effect.model if effect.default is not None else effect.model | None,
+                effect.default if effect.format == 1 else later(),
+            )
             for effect in EFFECTS
             if effect.model is not None
         },

@@ -14,6 +14,12 @@ class Frozen(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
 
+def later(default: Any = None, **about: Any) -> Any:
+    """Return a field that format 1 lacks: it is not written at its default, so that older files keep their bytes."""
+    usual = {} if "default_factory" in about else {"default": default}
+    return Field(**usual, **about, exclude_if=lambda value: value == usual.get("default", {}))
+
+
 def within(least: float, most: float, why: str, usual: float | None = None, what: str | None = None) -> Any:
     """Return the annotation of a number from ``least`` to ``most``, both included.
 

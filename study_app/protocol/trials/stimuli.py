@@ -7,23 +7,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, Self, TypeAlias, TypeVar
+from typing import Annotated, ClassVar, Final, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import Field, model_validator
 from pydantic.json_schema import SkipJsonSchema
 
 from study_app.haptics.model import scene
-from study_app.haptics.model.ranges import within
+from study_app.haptics.model.ranges import later, within
 from study_app.haptics.model.scene import ForceLink
-from study_app.protocol.table import ExtendedTable, Id, Table, invalid
+from study_app.protocol.table import Id, Table, invalid
 from study_app.protocol.trials.designs import Design
+from study_app.psychophysics.families import Family, Floats
+from study_app.psychophysics.grid import FREE_GUESSES, Grid, evenly, geometric
 
-if TYPE_CHECKING:
-    from study_app.psychophysics.families import Floats
-    from study_app.psychophysics.grid import Grid
-
-
-Level = TypeVar("Level", float, "Floats")
+Level = TypeVar("Level", float, Floats)
 """One level or value, or an array of them."""
 LevelKind: TypeAlias = Literal["weber", "difference", "value"]
 
@@ -42,10 +39,8 @@ CONSTANT_LEVELS: Final = 7
 LEVELS_MOST: Final = 201
 
 
-class Condition(ExtendedTable):
+class Condition(Table):
     """A named combination of a liquid (or several with regions), what the tank shows, and delays."""
-
-    LATER: ClassVar[frozenset[str]] = frozenset({"ball", *OF_LINK, "view", "overlay", "footage_sha256"})
 
     ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = (("liquid", "liquids"),)
 
@@ -57,29 +52,29 @@ class Condition(ExtendedTable):
     label: Id | None = Field(
         default=None, description="The item of analysis.names that names it correctly; left out: none does."
     )
-    ball: Literal["shown", "hidden"] = Field(
+    ball: Literal["shown", "hidden"] = later(
         default="shown", description="shown: the ball is always drawn; hidden: it is drawn only during a task's lead."
     )
-    force_delay_ms: Annotated[float, within(0, scene.MOST_DELAY_MS, "a later force pushes the hand")] = Field(
+    force_delay_ms: Annotated[float, within(0, scene.MOST_DELAY_MS, "a later force pushes the hand")] = later(
         default=0, description="Delay of the force [ms]; what is drawn is not delayed by it."
     )
-    force_jitter_ms: Annotated[float, within(0, scene.MOST_JITTER_MS, "networks deviate less")] = Field(
+    force_jitter_ms: Annotated[float, within(0, scene.MOST_JITTER_MS, "networks deviate less")] = later(
         default=0, description="Largest additional delay of the force, drawn at random at every tick [ms]."
     )
-    force_loss: Annotated[float, within(0, scene.MOST_LOSS, "beyond, most forces are held ones")] = Field(
+    force_loss: Annotated[float, within(0, scene.MOST_LOSS, "beyond, most forces are held ones")] = later(
         default=0, description="Share of ticks whose force is lost; the last one is held."
     )
-    view: str = Field(
+    view: str = later(
         default="tank",
         pattern=r"^(tank|camera|[^\x00]+\.[0-9A-Za-z]+)$",
         description="tank: the drawn tank; camera: the live picture of this machine's camera; or a video file, its "
         "path relative to this file.",
     )
-    overlay: Literal["shown", "hidden"] = Field(
+    overlay: Literal["shown", "hidden"] = later(
         default="shown",
         description="shown: ball and targets are drawn over a video; hidden: the video is shown instead of them.",
     )
-    footage_sha256: SkipJsonSchema[str | None] = None
+    footage_sha256: SkipJsonSchema[str | None] = later()
     """That of the video file; ``load`` fills it in."""
 
     @property
@@ -212,8 +207,6 @@ class Stimulated:
     value: float = 0.0
 
 
-Family: TypeAlias = Literal["weibull", "normal", "logistic"]
-
 RUNNING_THRESHOLDS: Final = 41
 RUNNING_WIDTHS: Final = 9
 WIDTHS: Final = (0.5, 4.0)
@@ -269,8 +262,6 @@ def rises(stimulus: Stimulus, design: Design) -> bool:
 
 def guesses_of(stimulus: Stimulus, design: Design) -> tuple[float, ...] | None:
     """Return the guess rates of a design; None where no answer is correct: the guess rate is the lapse rate."""
-    from study_app.psychophysics.grid import FREE_GUESSES  # noqa: PLC0415 - loads numpy, where levels are chosen
-
     if design.has_standard and not is_distance(stimulus):
         return None
     return FREE_GUESSES if design.guess_rate is None else (design.guess_rate,)
@@ -278,8 +269,6 @@ def guesses_of(stimulus: Stimulus, design: Design) -> tuple[float, ...] | None:
 
 def running_grid(stimulus: Stimulus, design: Design, assumed: Assumed, lapses: tuple[float, ...]) -> Grid:
     """Return the grid over which levels are chosen during a session."""
-    from study_app.psychophysics.grid import Grid, evenly, geometric  # noqa: PLC0415 - loads numpy
-
     return Grid(
         family=assumed.family,
         thresholds=evenly(*stimulus.domain, RUNNING_THRESHOLDS),
@@ -293,8 +282,6 @@ def running_grid(stimulus: Stimulus, design: Design, assumed: Assumed, lapses: t
 
 def analysis_grid(stimulus: Stimulus, design: Design, assumed: Assumed) -> Grid:
     """Return the grid over which thresholds are estimated: finer, and beyond both ends of the levels."""
-    from study_app.psychophysics.grid import Grid, evenly, geometric  # noqa: PLC0415 - loads numpy
-
     low, high = stimulus.domain
     log = stimulus.spacing == "log"
     beyond = BEYOND_DECADES if log else (high - low) / 10

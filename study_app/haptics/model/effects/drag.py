@@ -4,11 +4,11 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Self, TypeAlias
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, model_validator
 
 from study_app.haptics.model.effect import FLOAT, INT, Effect, ExtremesLike, Fields, LiquidLike, Parameter, SceneLike
 from study_app.haptics.model.laws.drag_laws import LAWS, Law, drag_n
-from study_app.haptics.model.ranges import Frozen, within
+from study_app.haptics.model.ranges import Frozen, later, within
 
 BIT = 1 << 0
 
@@ -54,7 +54,7 @@ class Drag(Frozen):
         description="constant: a constant drag coefficient; schiller-naumann: Schiller & Naumann 1933; "
         "haider-levenspiel: Haider & Levenspiel 1989; brown-lawler: Brown & Lawler 2003; linear: a damper.",
     )
-    damping_nspm: DampingNspm | None = None
+    damping_nspm: DampingNspm | None = later()
 
     @model_validator(mode="after")
     def _damping_of_the_linear_law(self) -> Self:
@@ -62,11 +62,6 @@ class Drag(Frozen):
             needs = "belongs to" if self.damping_nspm is not None else "is missing: it is needed by"
             raise ValueError(f'damping_nspm {needs} the drag law "linear"')
         return self
-
-    @model_serializer(mode="wrap")
-    def _without_no_damping(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Omit an unset damping, so that files of format 1 stay identical byte by byte."""
-        return {name: value for name, value in plain(self).items() if name != "damping_nspm" or value is not None}
 
 
 def resistance_n(scene: SceneLike, liquid: LiquidLike, relative_mps: float, law: Law | None = None) -> float:
