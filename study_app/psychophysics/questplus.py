@@ -46,25 +46,31 @@ class Search:
         """The probability of success at each level of each cell, of shape (levels, …)."""
         return tables(self.grid, self.levels)[0]
 
-    def expected_entropy(self, posterior: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the entropy [nat] expected after an answer to each level, of shape (levels,)."""
+    def expected_entropy(self, posteriors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the entropy [nat] expected after an answer, (tracks, levels), of posteriors (tracks, …)."""
+        cells = posteriors.reshape(len(posteriors), len(self.grid.thresholds), -1)
+        psi = self.psi.reshape(len(self.levels), *cells.shape[1:])
         if self.learn == "threshold":
-            succeeded = np.einsum("kabcd,abcd->ka", self.psi, posterior)
-            before = np.einsum("abcd->a", posterior)[None, :]
+            succeeded = np.matmul(cells.transpose(1, 0, 2), psi.transpose(1, 2, 0))  # (thresholds, tracks, levels)
+            before, axis = cells.sum(axis=2).T[:, :, None], 0
         else:
-            before = posterior.reshape(1, -1)
-            succeeded = self.psi.reshape(len(self.levels), -1) * before
-        return _weighted_entropy(succeeded) + _weighted_entropy(before - succeeded)
+            succeeded = (psi[None] * cells[:, None]).reshape(len(cells), len(psi), -1)
+            before, axis = cells.reshape(len(cells), 1, -1), -1
+        return _weighted_entropy(succeeded, axis) + _weighted_entropy(before - succeeded, axis)
+
+    def next_of(self, posteriors: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Return the index of the next level of each track, (tracks,): the lowest of equal ones."""
+        first = int(self.noise)
+        entropy = self.expected_entropy(posteriors)[:, first:]
+        return first + np.asarray((entropy <= entropy.min(axis=1, keepdims=True) + TIE_NATS).argmax(axis=1), np.int64)
 
     def next(self, successes: ArrayLike, failures: ArrayLike) -> int:
-        """Return the index of the next level to present: the lowest of equal ones."""
-        first = int(self.noise)
-        entropy = self.expected_entropy(fit(self.levels, successes, failures, self.grid).weights)[first:]
-        return first + int(np.flatnonzero(entropy <= entropy.min() + TIE_NATS)[0])
+        """Return the index of the next level to present, from counts of answers to each level."""
+        return int(self.next_of(fit(self.levels, successes, failures, self.grid).weights[None])[0])
 
 
-def _weighted_entropy(joint: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return p × the entropy of joint/p, for the sum p of each row of ``joint``."""
-    total = np.einsum("kc->k", joint)
-    kept = np.maximum(joint, 1e-300)
-    return np.asarray(total * np.log(total) - np.einsum("kc,kc->k", joint, np.log(kept)), float)
+def _weighted_entropy(joint: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+    """Return p × the entropy of joint/p, for the sum p over an axis of ``joint``."""
+    total, terms = joint.sum(axis=axis), np.log(np.maximum(joint, 1e-300))
+    terms *= joint
+    return np.asarray(total * np.log(total) - terms.sum(axis=axis), float)

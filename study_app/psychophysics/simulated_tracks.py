@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from study_app.psychophysics.families import Family, Floats, success
 from study_app.psychophysics.grid import quantile
-from study_app.psychophysics.questplus import TIE_NATS, Search
+from study_app.psychophysics.questplus import Search
 from study_app.psychophysics.updown import Staircase
 
 Counts: TypeAlias = tuple[Floats, Floats]
@@ -181,33 +181,12 @@ def search_tracks(
         posterior /= posterior.sum(axis=(1, 2), keepdims=True)
         if stop is not None and trial >= stop[1]:
             running &= _interval_widths(search, posterior) > stop[0]
-        place = _next(search, posterior) if trial or begin is None else np.full(tracks, begin)
+        place = search.next_of(posterior) if trial or begin is None else np.full(tracks, begin)
         right = draws[:, trial] < observers.probability(at[place])
         levels[running, trial], successes[:, trial] = at[place[running]], right & running
         answered = psi[place]
         posterior *= np.where(right[:, None, None], answered, 1.0 - answered)
     return Answers(levels, successes)
-
-
-def _next(search: Search, posterior: Floats) -> NDArray[np.int64]:
-    """Return the index of the next level of each track; `Search.next` of many tracks."""
-    first = int(search.noise)
-    psi = search.psi.reshape(len(search.levels), *posterior.shape[1:])[first:]
-    if search.learn == "threshold":
-        succeeded = np.matmul(posterior.transpose(1, 0, 2), psi.transpose(1, 2, 0))  # (thresholds, tracks, levels)
-        before, axis = posterior.sum(axis=2).T[:, :, None], 0
-    else:
-        succeeded = (psi[None] * posterior[:, None]).reshape(len(posterior), len(psi), -1)
-        before, axis = posterior.reshape(len(posterior), 1, -1), -1
-    entropy = _weighted_entropy(succeeded, axis) + _weighted_entropy(before - succeeded, axis)
-    return first + np.asarray((entropy <= entropy.min(axis=1, keepdims=True) + TIE_NATS).argmax(axis=1), np.int64)
-
-
-def _weighted_entropy(joint: Floats, axis: int) -> Floats:
-    """Return p × the entropy of joint/p, for the sum p over an axis of ``joint``."""
-    total, terms = joint.sum(axis=axis), np.log(np.maximum(joint, 1e-300))
-    terms *= joint
-    return np.asarray(total * np.log(total) - terms.sum(axis=axis), float)
 
 
 def _interval_widths(search: Search, posterior: Floats) -> Floats:

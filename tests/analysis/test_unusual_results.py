@@ -8,7 +8,7 @@ import pytest
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.export.export import export
 from study_app.protocol.load import load, parse
-from study_app.protocol.simulated_observer import NO_FEATURES
+from study_app.protocol.simulated import NO_FEATURES
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind, unblind_folder
 from study_app.store.sites.merge import merge

@@ -17,7 +17,7 @@ import study_app.protocol
 pytestmark = pytest.mark.slow
 
 FIND_THEIR_MODULES = ("study_app.haptics.model.effects", "study_app.haptics.model.estimators")
-HEAVY = ("numba", "llvmlite", "PySide6", "pyqtgraph", "pandas", "scipy", "matplotlib", "numpy")
+HEAVY = ("numba", "llvmlite", "PySide6", "pyqtgraph", "pandas", "scipy", "matplotlib")
 EXTRAS = {"analysis", "cfd", "cluster", "lsl", "spss", "triggers", "video"}
 ROOT = Path(__file__).resolve().parents[2] / "study_app"
 

@@ -36,7 +36,7 @@ def test_the_expected_entropy_is_that_of_both_posteriors_weighted_by_their_proba
     successes, failures = np.zeros(31), np.zeros(31)
     successes[[10, 20]], failures[[10, 5]] = 3, 2
     before = fit(LEVELS, successes, failures, RUNNING).weights
-    found = search.expected_entropy(before)
+    (found,) = search.expected_entropy(before[None])
     for level in (0, 7, 16, 30):
         probability = float((RUNNING.success([LEVELS[level]])[0] * before).sum())
         expected = 0.0
@@ -55,7 +55,7 @@ def test_of_levels_that_promise_the_same_the_lowest_is_taken():
 
 
 def test_entropies_that_differ_by_rounding_are_equal(monkeypatch):
-    monkeypatch.setattr(Search, "expected_entropy", lambda *_: np.array([2.0, 1.0 + 1e-12, 1.0, 1.0 + 1e-6]))
+    monkeypatch.setattr(Search, "expected_entropy", lambda *_: np.array([[2.0, 1.0 + 1e-12, 1.0, 1.0 + 1e-6]]))
     assert Search(RUNNING, LEVELS[:4]).next((0,) * 4, (0,) * 4) == 1
 
 

@@ -50,9 +50,8 @@ def lines() -> Iterator[str]:
             search = questplus.Search(SMALL, LEVELS, learn, noise)
             counts = [(*one, 0) if noise else one for one in (right, wrong)]
             try:
-                told_ = (
-                    f"{search.next(*counts)} {told(search.expected_entropy(grid.fit(LEVELS, *counts, SMALL).weights))}"
-                )
+                posteriors = grid.fit(LEVELS, *counts, SMALL).weights[None]
+                told_ = f"{search.next(*counts)} {told(search.expected_entropy(posteriors)[0])}"
             except ValueError as error:
                 told_ = str(error)
             yield f"  {learn} {noise}: {told_}"

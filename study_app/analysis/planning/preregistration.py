@@ -20,8 +20,9 @@ from study_app.protocol.describe import describe, limit_rows
 from study_app.protocol.model import Analysis, Protocol
 from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.table import text_in
-from study_app.protocol.trials.stimuli import Family, assumed_for
+from study_app.protocol.trials.stimuli import assumed_for
 from study_app.protocol.trials.tracks import design_of, method_of, standards_of, stimulus_of
+from study_app.psychophysics.families import Family
 from study_app.psychophysics.precision import BETWEEN_PEOPLE
 from study_app.store.atomic import parse_json
 from study_app.store.exclusions import named

@@ -27,7 +27,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.groups import groups_with
 from study_app.protocol.model import Protocol
 from study_app.protocol.questions import POINTS, Question
-from study_app.protocol.simulated_observer import OPINIONS, Rater, TrialFeatures, opinions, rater
+from study_app.protocol.simulated import OPINIONS, TrialFeatures, rater, simulate_ratings
 from study_app.protocol.table import text_in
 
 ConditionFeatures: TypeAlias = Mapping[tuple[str, str], Sequence[TrialFeatures]]
@@ -141,10 +141,6 @@ def _statements(protocol: Protocol, block: Block) -> tuple[Question, ...]:
 LOWEST, HIGHEST = 1, POINTS
 
 
-UNIFORM = 12
-"""The answer model's noise is the sum of so many uniform numbers, less six."""
-
-
 @dataclass(frozen=True)
 class Opinions:
     """What people think in a block, and what else is in their answers (participants, repetitions, settings, items)."""
@@ -170,25 +166,12 @@ def people(plan: Plan, participants: int, seed: int, study: int) -> tuple[Opinio
     for _ in range(participants):
         person = rater(rng.random)
         for place, block in enumerate(plan.blocks):
-            found[place].append(_person(block, person, rng))
+            items = [item.id for item in block.items]
+            found[place].append(simulate_ratings(items, block.felt, block.repetitions, person, rng))
     return tuple(
         Opinions(np.array([thought for thought, _ in block]), np.array([noise for _, noise in block]))
         for block in found
     )
-
-
-def _person(block: Planned, person: Rater, rng: np.random.Generator) -> tuple[Array, Array]:
-    items = [item.id for item in block.items]
-    drawn = rng.random((block.repetitions, block.k))
-    thought = [
-        [
-            opinions(items, felt[int(len(felt) * part)], person)
-            for felt, part in zip(block.felt, parts.tolist(), strict=True)
-        ]
-        for parts in drawn
-    ]
-    noise = rng.random((block.repetitions, block.k, len(items), UNIFORM)).sum(axis=-1) - UNIFORM / 2
-    return np.array(thought), person.leaning + person.noise * noise
 
 
 def together(studies: Sequence[tuple[Opinions, ...]], place: int, effects: Sequence[float]) -> Array:

@@ -11,21 +11,19 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
+import pandas as pd
 
 from study_app.analysis.levels.thresholds import estimate_slope
 from study_app.analysis.statistics.outcome import student_interval
-from study_app.evidence.thresholds.planted import PEOPLE, Verdict, group_coverage, keyed_draw
+from study_app.evidence.thresholds.planted import PEOPLE, Verdict, group_coverage
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.slope_limits import steady
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol
-from study_app.protocol.orders.schedule import build_schedule, draw_key
-from study_app.protocol.streams import Key, draw_secret, stream
-from study_app.protocol.trials.presentation import next_level
+from study_app.protocol.simulated import OBSERVER, Observer, simulate_study
 from study_app.protocol.trials.stimuli import DELAYS
 from study_app.protocol.trials.tracks import condition_of, design_of, method_of, stimulus_of
 from study_app.psychophysics.precision import ESTIMATE_NOISE
-from study_app.session.simulated.participant import OBSERVER, Observer, estimate
 
 EXPONENT: Final = 0.44
 """Of perceived thickness over viscosity (Stevens & Guirao 1964)."""
@@ -100,10 +98,17 @@ class ExponentsFound:
 
 
 def simulate_estimates(one: PlantedExponent, number: int, seed: int, people: int = PEOPLE) -> ExponentsFound:
-    """Return what a study of ``people`` equal observers finds; ``number`` names its draws."""
-    random = stream(seed, f"validate/{one.name}/{number}").random
-    key = Key(draw_key(one.protocol, random), draw_secret(random))
-    return found_of([_exponent(one, key, f"P{person:03d}", seed) for person in range(1, people + 1)])
+    """Return what a study of ``people`` equal observers finds; ``number`` names its draws.
+
+    They estimate what would reach the hand at the pace.
+    """
+    reached = dict(zip(one.levels, one.resistances, strict=True))
+    who = dict.fromkeys((f"P{person:03d}" for person in range(1, people + 1)), one.observer)
+    study = f"validate/{one.name}/{number}"
+    rows = simulate_study(one.protocol, who, seed, study, lambda presented: reached.get(presented.value, math.nan))
+    frame = pd.DataFrame(row for row in rows if row.block == one.block.id)
+    own = [estimate_slope(own["level"], own["answer"]) for _, own in frame.groupby("participant")]
+    return found_of(own)
 
 
 def found_of(own: Sequence[float]) -> ExponentsFound:
@@ -112,24 +117,6 @@ def found_of(own: Sequence[float]) -> ExponentsFound:
     low, high = student_interval(values)
     assert low is not None and high is not None  # noqa: S101, PT018 - several participants have an interval
     return ExponentsFound(tuple(own), float(values.mean()), low, high)
-
-
-def _exponent(one: PlantedExponent, key: Key, person: str, seed: int) -> float:
-    """Return the exponent of one participant, who estimates what would reach the hand at the pace."""
-    protocol, block = one.protocol, one.block
-    reached = dict(zip(one.levels, one.resistances, strict=True))
-    schedule, first = build_schedule(protocol, person, seed), 0.0
-    levels, answers = [], []
-    for trial in schedule.trials:
-        if trial.block != block.id or (due := next_level(protocol, key, schedule, trial, ())) is None:
-            continue
-        asked = due.level
-        assert asked is not None  # noqa: S101 - a block of levels
-        resistance = reached[asked]
-        first = first or resistance
-        levels.append(asked)
-        answers.append(estimate(one.observer, resistance / first, keyed_draw(key, person, trial.number)))
-    return estimate_slope(levels, answers)
 
 
 def exponent_verdicts(one: PlantedExponent, studies: Sequence[ExponentsFound]) -> Iterator[Verdict]:

@@ -22,11 +22,10 @@ from study_app.analysis.statistics.thresholds import Threshold, noticed
 from study_app.evidence.thresholds.planted import planted, simulate
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
-from study_app.protocol.simulated_observer import NO_FEATURES, Draw, Rater, rate, rater
-from study_app.protocol.streams import stream
+from study_app.protocol.simulated import NO_FEATURES, Observer, Rater, normal, rate, rater
+from study_app.protocol.streams import Draw, stream
 from study_app.protocol.trials.stimuli import LINEAR_OBSERVER
 from study_app.psychophysics.families import success
-from study_app.session.simulated.participant import Observer
 from study_app.store.output_files import write_files
 
 JND_S: Final = 0.045
@@ -99,7 +98,7 @@ def people_of(count: int, seed: int) -> tuple[Person, ...]:
     found = []
     for number in range(1, count + 1):
         draw = stream(seed, f"noticed/person/{number}").random
-        jnd_s = JND_S * BETWEEN_PEOPLE ** _normal(draw)
+        jnd_s = JND_S * BETWEEN_PEOPLE ** normal(draw)
         found.append(Person(Observer(delay_jnd_s=jnd_s), rater(draw)))
     return tuple(found)
 
@@ -146,12 +145,8 @@ def delays_of(protocol: Protocol) -> tuple[float, ...]:
 
 
 def _rating(person: Person, delay_s: float, draw: Draw) -> int:
-    perceived_s = delay_s + person.observer.delay_noise_s * _normal(draw)
+    perceived_s = delay_s + person.observer.delay_noise_s * normal(draw)
     return rate([STATEMENT], replace(NO_FEATURES, delay_s=perceived_s), person.rater, draw)[STATEMENT]
-
-
-def _normal(draw: Draw) -> float:
-    return sum(draw() for _ in range(12)) - 6
 
 
 def markdown(found: Compared) -> str:

@@ -9,8 +9,8 @@ What is judged of validated thresholds: each value with its limit.
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import pandas as pd
@@ -21,13 +21,9 @@ from study_app.analysis.levels.thresholds import jnd_slope, thresholds
 from study_app.analysis.planning.power_curves import interval as wilson_interval
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import build_schedule, draw_key
-from study_app.protocol.streams import Key, draw_secret, stream
-from study_app.protocol.trials.methods import Heard
-from study_app.protocol.trials.presentation import Due, arrangement_text, heard_of, next_level
+from study_app.protocol.simulated import OBSERVER, Observer, simulate_study
 from study_app.protocol.trials.stimuli import DELAYS
 from study_app.protocol.trials.tracks import design_of, method_of, standards_of, stimulus_of
-from study_app.session.simulated.participant import OBSERVER, Comparison, Observer
 from study_app.store.tables.csv_files import csv_text_of
 
 SHIPPED: Final[dict[str, Observer]] = {
@@ -91,10 +87,6 @@ def planted(name: str, protocol: Protocol) -> Planted:
 
 
 PEOPLE: Final = 10
-COLUMNS: Final = (
-    "participant", "session", "block", "code", "track", "trial", "catch", "arrangement", "standard", "level",
-    "level_delivered", "analysed", "success",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,17 +114,12 @@ def simulate(
 
     ``observers`` differ, and take part in place of ``people`` equal ones.
     """
-    random = stream(seed, f"validate/{one.name}/{number}").random
-    key = Key(draw_key(one.protocol, random), draw_secret(random))
-    who = observers or (one.observer,) * people
-    names = [f"P{person:03d}" for person in range(1, len(who) + 1)]
-    rows = [
-        row for name, own in zip(names, who, strict=True) for row in _rows(replace(one, observer=own), key, name, seed)
-    ]
-    frame = pd.DataFrame(rows, columns=list(COLUMNS)).astype({"level_delivered": "Float64", "success": "boolean"})
-    found = list(thresholds(_level_block(one), frame))
+    who = {f"P{at:03d}": observer for at, observer in enumerate(observers or (one.observer,) * people, start=1)}
+    rows = pd.DataFrame(simulate_study(one.protocol, who, seed, f"validate/{one.name}/{number}"))
+    frame = rows[rows["block"] == one.block.id].assign(session=1, level_delivered=rows["level"], analysed=True)
+    found = list(thresholds(_level_block(one), frame.astype({"level_delivered": "Float64", "success": "boolean"})))
     group = tuple(_ends(row) for row in found if row.participant is None)
-    own = tuple(tuple(_ends(row) for row in found if row.participant == name) for name in names)
+    own = tuple(tuple(_ends(row) for row in found if row.participant == name) for name in who)
     return StudyFound(group, own)
 
 
@@ -159,43 +146,6 @@ def _level_block(one: Planted) -> LevelBlock:
         settings=(),
         method=method_of(protocol, block),
     )
-
-
-def _rows(one: Planted, key: Key, person: str, seed: int) -> Iterator[tuple[Any, ...]]:
-    """Yield a row of `COLUMNS` for each trial of one participant."""
-    protocol, block = one.protocol, one.block
-    schedule = build_schedule(protocol, person, seed)
-    design, attended = design_of(protocol, block), Comparison.of(protocol, block, one.observer)
-    heard: list[Heard] = []
-    total, count = 0.0, 0
-    for trial in schedule.trials:
-        if trial.block != block.id:
-            continue
-        due = next_level(protocol, key, schedule, trial, heard)
-        if due is None:
-            continue
-        sensed = list(_sensed(due))
-        total, count = total + sum(sensed), count + len(sensed)
-        draw = keyed_draw(key, person, trial.number)
-        answer = attended.choose(design, sensed, total / count, draw)
-        what = (trial.number, trial.code, due.level, due.arrangement, answer)
-        heard.append(heard_of(protocol, block, *what, catch=due.catch))
-        track = key.codes[block.id][trial.code]
-        yield (
-            *(person, 1, block.id, trial.code, track, trial.number, due.catch),
-            *(arrangement_text(design, due.arrangement), due.standard, due.level, due.level, True, heard[-1].success),
-        )
-
-
-def keyed_draw(key: Key, person: str, trial: int) -> Any:
-    """Return the source of a participant's draws in one trial."""
-    return stream(int.from_bytes(key.secret[:4], "big"), f"observer/{person}/{trial}").random
-
-
-def _sensed(due: Due) -> Iterator[float]:
-    """Yield what is presented in each interval: a delay [s], or a number of the liquid."""
-    for interval in due.intervals:
-        yield interval.value / 1000 if interval.vary in DELAYS else interval.value
 
 
 ERROR_MOST: Final = 0.05

@@ -11,7 +11,11 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, ClassVar, Final, TypeAlias
+from typing import ClassVar, Final, TypeAlias
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
 
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
@@ -28,16 +32,11 @@ from study_app.protocol.trials.tracks import (
     stimulus_of,
     tracks_of,
 )
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.random import Generator
-    from numpy.typing import NDArray
-
-    from study_app.psychophysics.families import Floats
-    from study_app.psychophysics.precision import Estimates, Expected
-    from study_app.psychophysics.simulated_tracks import Answers, Observers
-
+from study_app.psychophysics.detection import NORMAL, rating
+from study_app.psychophysics.families import Floats
+from study_app.psychophysics.grid import fit
+from study_app.psychophysics.precision import ESTIMATE_NOISE, Estimates, Expected
+from study_app.psychophysics.simulated_tracks import Answers, Observers
 
 D_PRIME: Final = 1.0
 """Of simulated participants. [choice]"""
@@ -50,18 +49,10 @@ Z_95: Final = 1.959964
 
 @dataclass(frozen=True)
 class SensitivityPlan:
-    """What decides how precise d′ is: of one compared condition, or of one standard.
+    """What decides how precise d′ is: of one compared condition, or of one standard (``of_each``).
 
-    Attributes
-    ----------
-    design : Design
-        How trials are built; answers to it can be correct.
-    trials : int
-        Of each condition or standard.
-    roving : bool
-        Whether standards alternate, so that intervals can only be compared with each other.
-    of_each : str
-        What has so many trials: "comparison" or "standard".
+    Answers to the design can be correct. If standards alternate (``roving``), intervals can only be compared with each
+    other.
     """
 
     design: Design
@@ -69,34 +60,26 @@ class SensitivityPlan:
     roving: bool
     of_each: str
     value: ClassVar[float] = D_PRIME
-
-    @property
-    def words(self) -> str:
-        """What is assumed, in words."""
-        return f"at d′ = {self.value:g}: "
-
-    @property
-    def per(self) -> str:
-        """The words for what the number of trials counts for."""
-        return f" per {self.of_each}"
+    words: ClassVar[str] = f"at d′ = {D_PRIME:g}: "
+    """What is assumed, in words."""
+    per = property(lambda self: f" per {self.of_each}")
+    """The words for what the number of trials counts for."""
 
     def with_trials(self, trials: int) -> SensitivityPlan:
-        """Return the plan with so many trials."""
+        """Return the plan with so many trials, as near as they can be divided."""
         return replace(self, trials=trials)
 
     def estimates(self, truth: Floats, random: Generator) -> Floats:
         """Return d′ as the report estimates it, of unbiased observers with a true d′ each, both (observers,) arrays."""
-        import numpy as np  # noqa: PLC0415
-
         design, count = self.design, len(self.design.arrangements)
         trials = [self.trials // count + (place < self.trials % count) for place in range(count)]
         correct = [str(design.correct(place)) for place in range(count)]
         wrong = [next(one for one in design.answers if one != right) for right in correct]
         found = []
         for d_prime in truth:
-            rights = random.binomial(trials, design.proportion_correct(float(d_prime), roving=self.roving))
-            answers = {(place, correct[place]): int(right) for place, right in enumerate(rights)}
-            answers |= {(place, wrong[place]): trials[place] - int(right) for place, right in enumerate(rights)}
+            rights = random.binomial(trials, design.proportion_correct(float(d_prime), roving=self.roving)).tolist()
+            answers = {(place, correct[place]): right for place, right in enumerate(rights)}
+            answers |= {(place, wrong[place]): trials[place] - right for place, right in enumerate(rights)}
             sensitivity = design.sensitivity(answers, roving=self.roving)
             found.append(math.nan if sensitivity is None else sensitivity.d_prime)
         return np.array(found)
@@ -113,58 +96,30 @@ class EstimationPlan:
     repetitions: int
     value: float
     per: ClassVar[str] = ""
+    words = property(lambda self: f"exponent of {self.value:g}: ")
+    trials = property(lambda self: len(self.levels) * self.repetitions)
 
-    @property
-    def trials(self) -> int:
-        """Trials of a participant that are analysed."""
-        return len(self.levels) * self.repetitions
-
-    @property
-    def words(self) -> str:
-        """What is assumed, in words."""
-        return f"exponent of {self.value:g}: "
-
-    def with_trials(self, trials: int) -> EstimationPlan:
-        """Return the plan with so many trials, rounded to repetitions of all levels."""
+    def with_trials(self, trials: int) -> EstimationPlan:  # noqa: D102 - as above
         return replace(self, repetitions=max(1, round(trials / len(self.levels))))
 
     def estimates(self, truth: Floats, random: Generator) -> Floats:
         """Return exponents as the report estimates them: least-squares slopes of mean ln answers on ln level."""
-        import numpy as np  # noqa: PLC0415
-
-        from study_app.psychophysics.precision import ESTIMATE_NOISE  # noqa: PLC0415
-
-        x = np.log(self.levels)
-        means = truth[:, None] * x + random.normal(
-            0.0, ESTIMATE_NOISE / math.sqrt(self.repetitions), (len(truth), len(x))
-        )
+        x, noise = np.log(self.levels), ESTIMATE_NOISE / math.sqrt(self.repetitions)
+        means = truth[:, None] * x + random.normal(0.0, noise, (len(truth), len(x)))
         return np.asarray((means @ (x - x.mean())) / ((x - x.mean()) ** 2).sum(), float)
 
 
 @dataclass(frozen=True)
 class RatingPlan:
-    """What decides how precise d_a of one level against the lowest is.
-
-    Attributes
-    ----------
-    points : int
-        Of the scale.
-    trials : int
-        Ratings of each level.
-    """
+    """What decides how precise d_a is of one level against the lowest, each rated in so many trials."""
 
     points: int
     trials: int
     per: ClassVar[str] = " per level"
     value: ClassVar[float] = D_PRIME
+    words: ClassVar[str] = f"at d_a = {D_PRIME:g}: "
 
-    @property
-    def words(self) -> str:
-        """What is assumed, in words."""
-        return f"at d_a = {self.value:g}: "
-
-    def with_trials(self, trials: int) -> RatingPlan:
-        """Return the plan with so many trials."""
+    def with_trials(self, trials: int) -> RatingPlan:  # noqa: D102 - as above
         return replace(self, trials=trials)
 
     def estimates(self, truth: Floats, random: Generator) -> Floats:
@@ -173,10 +128,6 @@ class RatingPlan:
         A rating is the number of criteria that a normal observation exceeds. The criteria divide a normal distribution
         with the mean and the standard deviation of both levels' observations at `value` into equal shares.
         """
-        import numpy as np  # noqa: PLC0415
-
-        from study_app.psychophysics.detection import NORMAL, rating  # noqa: PLC0415
-
         spread = math.sqrt(1.0 + (self.value / 2.0) ** 2)
         shares = [point / self.points for point in range(1, self.points)]
         criteria = [self.value / 2.0 + spread * NORMAL.inv_cdf(share) for share in shares]
@@ -218,10 +169,6 @@ def mean_plan(protocol: Protocol, block: Block) -> MeanPlan | None:
 
 def expected_mean(plan: MeanPlan) -> Expected:
     """Return how precise the d′, d_a or exponent of one participant, and their mean, are expected to be."""
-    import numpy as np  # noqa: PLC0415
-
-    from study_app.psychophysics.precision import Expected  # noqa: PLC0415
-
     found = plan.estimates(np.full(MEAN_OBSERVERS, plan.value), np.random.default_rng(SEED))
     spread = float(found.std())
     return Expected("linear", plan.trials, standards=1, half=Z_95 * spread, spread=spread, threshold=plan.value)
@@ -244,18 +191,10 @@ MOST_TRIALS: Final = 200
 
 @dataclass(frozen=True, eq=False)
 class Answered:
-    """What observers answered in a block, one each.
+    """What observers answered in a block, one each: the ``tracks`` of one standard, and counts of other answers.
 
-    Attributes
-    ----------
-    observers : Observers
-        Who answered.
-    tracks : tuple of Answers
-        The tracks of one standard.
-    catch : (2, observers) array
-        Correct and incorrect answers to catch trials, which present the highest level.
-    noise : (2, observers) array or None
-        Successes and failures in trials that present the standard alone; None: there are none.
+    ``catch`` (2, observers) are correct and incorrect answers to catch trials, which present the highest level,
+    ``noise`` (2, observers) successes and failures where the standard alone was presented, None where it never was.
     """
 
     observers: Observers
@@ -268,16 +207,8 @@ class Answered:
 class ThresholdPlan:
     """What decides how precise the threshold of one standard is.
 
-    Attributes
-    ----------
-    stimulus, design, method : Stimulus, Design, Method
-        What is varied, how it is asked, and how levels are chosen.
-    catch : int
-        Catch trials of each track.
-    standards : int
-        How many standards the block has.
-    clipping : Clipping or None
-        How limits clip the levels of the highest standard that observers answer to; None: they are presented in full.
+    Each track has ``catch`` catch trials; the block has ``standards`` standards. ``clipping`` says how limits clip the
+    levels of the highest standard that observers answer to; None: they are presented in full.
     """
 
     stimulus: Stimulus
@@ -288,11 +219,8 @@ class ThresholdPlan:
     clipping: Clipping | None = None
 
     per: ClassVar[str] = " per standard"
-
-    @property
-    def trials(self) -> int:
-        """Comparisons of each standard, at most."""
-        return self.method.presentations(self.stimulus) * self.method.tracks
+    trials = property(lambda self: self.method.presentations(self.stimulus) * self.method.tracks)
+    """Comparisons of each standard, at most."""
 
     def with_trials(self, trials: int) -> ThresholdPlan:
         """Return the plan with so many trials for each standard, rounded to what its method divides them into."""
@@ -322,8 +250,6 @@ class ThresholdPlan:
 
     def presented(self, levels: Floats) -> Floats:
         """Return levels as they are presented, both in u."""
-        import numpy as np  # noqa: PLC0415
-
         if self.clipping is None:
             return levels
         log = self.stimulus.spacing == "log"
@@ -333,27 +259,11 @@ class ThresholdPlan:
 
     def middle_half(self, count: int) -> Floats:
         """Return thresholds [u], evenly spaced over the middle half of the levels."""
-        import numpy as np  # noqa: PLC0415
-
         low, high = self.stimulus.domain
         return low + (high - low) * (0.25 + 0.5 * (np.arange(count) + 0.5) / count)
 
     def answered(self, thresholds: Floats, random: Generator, lapses: float = LAPSES) -> Answered | None:
-        """Return what observers with these thresholds [u] answer; None: the method's tracks are not simulated.
-
-        Parameters
-        ----------
-        thresholds : (observers,) array
-            In u.
-        random : random.Generator
-            Where answers are drawn from.
-        lapses : float
-            Lapse rate of the observers.
-        """
-        import numpy as np  # noqa: PLC0415
-
-        from study_app.psychophysics.simulated_tracks import Observers  # noqa: PLC0415
-
+        """Return what observers with thresholds (n,) [u] answer; None: the method's tracks are not simulated."""
         stimulus, design = self.stimulus, self.design
         assumed, guess = self.method.assumed(stimulus, design), design.guess_rate
         if guess is None:
@@ -378,11 +288,6 @@ class ThresholdPlan:
 
     def estimates(self, answered: Answered, most: int | None = None) -> Estimates:
         """Return what the analysis estimates from answers, of each track the first ``most`` if that is given."""
-        import numpy as np  # noqa: PLC0415
-
-        from study_app.psychophysics.grid import fit  # noqa: PLC0415
-        from study_app.psychophysics.precision import Estimates  # noqa: PLC0415
-
         stimulus, design = self.stimulus, self.design
         tracks = [one if most is None else one.first(most) for one in answered.tracks]
         high = stimulus.domain[1]
@@ -428,10 +333,6 @@ def expected(plan: ThresholdPlan) -> Expected | None:
     Only thresholds below the highest level that is presented in full have estimates; where those are not the larger
     half of all, none is expected.
     """
-    import numpy as np  # noqa: PLC0415
-
-    from study_app.psychophysics.precision import Expected  # noqa: PLC0415
-
     simulated, observers = _affordable(plan)
     truth = plan.middle_half(observers)
     halves, variances = [], []

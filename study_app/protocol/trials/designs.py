@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from functools import reduce
 from operator import or_
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Protocol, TypeAlias, get_args
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, Protocol, TypeAlias, get_args
 
 from pydantic import Field
 
@@ -18,10 +18,8 @@ from study_app.protocol.questionnaires import Questionnaire
 from study_app.protocol.questions import Choice, Number, Option, Question, Rating
 from study_app.protocol.table import Id, Localised, Table
 from study_app.protocol.wording.languages import words
-
-if TYPE_CHECKING:
-    from study_app.psychophysics.detection import Sensitivity
-
+from study_app.psychophysics import detection
+from study_app.psychophysics.detection import Sensitivity
 
 Feedback: TypeAlias = Literal["never", "practice", "always"]
 Reply: TypeAlias = Literal["choice", "rating", "number", "setting"]
@@ -141,18 +139,13 @@ class Design(Table):
 
     def sensitivity(self, answers: AnswerCounts, *, roving: bool) -> Sensitivity | None:
         """Return d′ and bias of one observer; None where the answers do not give them."""
-        from study_app.psychophysics import detection  # noqa: PLC0415 - loads numpy
+        return self._sensitivity(answers, "differencing" if roving else "independent")
 
-        found: Sensitivity | None = self._sensitivity(detection, answers, "differencing" if roving else "independent")
-        return found
-
-    def _sensitivity(self, detection: Any, answers: AnswerCounts, model: Model) -> Any:
+    def _sensitivity(self, answers: AnswerCounts, model: Model) -> Sensitivity | None:
         return detection.from_correct(self.kind, *self.correct_of(answers)) if self.has_correct_answer else None
 
     def proportion_correct(self, d_prime: float, *, roving: bool) -> float:
         """Return P(correct) of an unbiased observer at a d′ of 0 or more, where answers can be correct."""
-        from study_app.psychophysics import detection  # noqa: PLC0415 - loads numpy
-
         model = f" {'differencing' if roving else 'independent'}" if self.kind in {"abx", "samedifferent"} else ""
         return detection.proportion_correct(f"{self.kind}{model}", d_prime)
 
@@ -197,10 +190,10 @@ class ForcedChoice(Design):
     def correct(self, arrangement: int) -> str:
         return ORDINALS[self.arrangements[arrangement].index(True)]
 
-    def _sensitivity(self, detection: Any, answers: AnswerCounts, model: Model) -> Any:
+    def _sensitivity(self, answers: AnswerCounts, model: Model) -> Sensitivity | None:
         """Return d′ of the intervals, and of two intervals the criterion: above 0 the second is preferred."""
         if self.kind != "2ifc":
-            return super()._sensitivity(detection, answers, model)
+            return super()._sensitivity(answers, model)
         return detection.two_intervals(*_counts(answers, {0}, "first"), *_counts(answers, {1}, "first"))
 
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
@@ -240,7 +233,7 @@ class Abx(Design):
         first, _, third = self.arrangements[arrangement]
         return self.answers[first != third]
 
-    def _sensitivity(self, detection: Any, answers: AnswerCounts, model: Model) -> Any:
+    def _sensitivity(self, answers: AnswerCounts, model: Model) -> Sensitivity | None:
         return detection.abx(*self.correct_of(answers), model)
 
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
@@ -261,7 +254,7 @@ class SameDifferent(Design):
         first, second = self.arrangements[arrangement]
         return self.answers[first != second]
 
-    def _sensitivity(self, detection: Any, answers: AnswerCounts, model: Model) -> Any:
+    def _sensitivity(self, answers: AnswerCounts, model: Model) -> Sensitivity | None:
         hits, false_alarms = _counts(answers, {2, 3}, "different"), _counts(answers, {0, 1}, "different")
         return detection.same_different(*hits, *false_alarms, model)
 
@@ -293,7 +286,7 @@ class YesNo(Design):
         """Return whether the answer was yes, whatever was presented."""
         return answer == "yes"
 
-    def _sensitivity(self, detection: Any, answers: AnswerCounts, model: Model) -> Any:
+    def _sensitivity(self, answers: AnswerCounts, model: Model) -> Sensitivity | None:
         return detection.yes_no(*_counts(answers, {0}, "yes"), *_counts(answers, {1}, "yes"))
 
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:

@@ -14,6 +14,7 @@ from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, TypeAlias
 
+from numpy.random import Generator
 from pydantic import Field
 
 from study_app.haptics.model.ranges import within
@@ -26,21 +27,22 @@ from study_app.protocol.trials.stimuli import (
     LAPSES,
     LEVELS_MOST,
     Assumed,
-    Family,
     Stimulus,
     assumed_for,
     ratio_in_u,
     running_grid,
 )
+from study_app.psychophysics.families import Family, Floats
+from study_app.psychophysics.grid import fit
+from study_app.psychophysics.questplus import Search
+from study_app.psychophysics.simulated_tracks import (
+    Answers,
+    Observers,
+    constant_tracks,
+    search_tracks,
+    staircase_tracks,
+)
 from study_app.psychophysics.updown import RATIOS, Staircase, converges_to
-
-if TYPE_CHECKING:
-    from numpy.random import Generator
-
-    from study_app.psychophysics.families import Floats
-    from study_app.psychophysics.questplus import Search
-    from study_app.psychophysics.simulated_tracks import Answers, Observers
-
 
 TrackOrder: TypeAlias = Literal["interleaved", "blocked"]
 Answer: TypeAlias = tuple[float, bool]
@@ -337,8 +339,6 @@ class Constant(Method):
         return shuffle(levels, draws[number // len(levels)])[number % len(levels)]
 
     def simulated(self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None) -> Answers:
-        from study_app.psychophysics.simulated_tracks import constant_tracks  # noqa: PLC0415 - loads numpy
-
         levels = [track.stimulus.coordinate(level) for level in self.asked(track.stimulus)]
         draws = random.random((len(observers.thresholds), len(levels) * self.repetitions))
         return constant_tracks(levels, self.repetitions, observers, draws)
@@ -398,8 +398,6 @@ class QuestPlus(Adaptive):
     def ended(self, track: TrackSetting, heard: Sequence[Heard]) -> bool:
         if self.stop is None or sum(not one.noise for one in heard) < self.stop.after:
             return False
-        from study_app.psychophysics.grid import fit  # noqa: PLC0415 - loads numpy
-
         search, counts = self._search(track), self._counts(track, heard)
         interval = fit(search.levels, *counts, search.grid).interval
         return ratio_in_u(track.stimulus, *interval) <= self.stop.ratio
@@ -413,8 +411,6 @@ class QuestPlus(Adaptive):
 
     def simulated(self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None) -> Answers:
         """Return the tracks of simulated observers; a track ends early only where levels have logarithms."""
-        from study_app.psychophysics.simulated_tracks import search_tracks  # noqa: PLC0415 - loads numpy
-
         draws = random.random((len(observers.thresholds), self.presentations(track.stimulus)))
         first, log = self.first(track.number), track.stimulus.spacing == "log"
         begin = None if first is None else _nearest(_coordinates(track), track.stimulus.coordinate(first))
@@ -429,8 +425,6 @@ class QuestPlus(Adaptive):
         )
 
     def _search(self, track: TrackSetting) -> Search:
-        from study_app.psychophysics.questplus import Search  # noqa: PLC0415 - loads numpy
-
         stimulus, design = track.stimulus, track.design
         grid = running_grid(stimulus, design, self.assumed(stimulus, design), self.lapses)
         return Search(grid, _coordinates(track), self.learn, design.has_noise)
@@ -531,8 +525,6 @@ class UpDown(Adaptive):
         return min(max(track.stimulus.level_of(u), low), high)
 
     def simulated(self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None) -> Answers:
-        from study_app.psychophysics.simulated_tracks import staircase_tracks  # noqa: PLC0415 - loads numpy
-
         draws = random.random((len(observers.thresholds), self.presentations(track.stimulus)))
         stop = None if self.stop is None else (self.stop.reversals, self.stop.after)
         return staircase_tracks(self.staircase(track.stimulus, track.number), observers, draws, stop)

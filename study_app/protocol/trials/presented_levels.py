@@ -6,7 +6,9 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
+
+import numpy as np
 
 from study_app.errors import StudyError
 from study_app.haptics.model.overrides import override
@@ -16,10 +18,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulus
 from study_app.protocol.trials.tracks import condition_of, method_of, standards_of, stimulus_of
-
-if TYPE_CHECKING:
-    from study_app.psychophysics.families import Floats
-
+from study_app.psychophysics.families import Floats
 
 FASTER: Final = 1.2
 """A hand exceeds the pace of its target by up to a fifth. [choice]"""
@@ -96,8 +95,6 @@ class Clipping:
 
     def presented(self, stimulus: Stimulus, levels: Floats) -> Floats:
         """Return levels (n,) as they are presented: between what limits leave of the standard and of the comparison."""
-        import numpy as np  # noqa: PLC0415 - protocols do not load it
-
         standard = None if self.standard is None else min(self.standard, self.limit)
         comparisons = np.minimum(stimulus.comparison(self.standard, levels), self.limit)
         return stimulus.level_between(standard, comparisons)

@@ -23,13 +23,13 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Explore, Follow, Protocol
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.simulated_observer import NO_FEATURES, TrialFeatures
-from study_app.protocol.trials.stimuli import DELAYS, Stimulated
+from study_app.protocol.simulated import NO_FEATURES, OBSERVER, Comparison, TrialFeatures, as_requested
+from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tasks import AnyTask
 from study_app.session.pages import DesignPage, FeedbackPage, Interval, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import REHEARSED_SCREENS
 from study_app.session.simulated.observers import reading_s
-from study_app.session.simulated.participant import LOOK_AT_SETTING_S, OBSERVER, Comparison, SimulatedParticipant
+from study_app.session.simulated.participant import LOOK_AT_SETTING_S, SimulatedParticipant
 from study_app.session.simulated.rehearsal import REHEARSED_PEOPLE, ConditionFeatures, condition_features
 from study_app.session.transitions.events import (
     Adjust,
@@ -213,8 +213,7 @@ class Answering(SimulatedParticipant):
         """Take what a trial presents: a varied number exactly as it was requested, a condition as it was felt."""
         block = self.state.trial.block
         if presented.vary is not None:
-            sensed = presented.value / 1000 if presented.vary in DELAYS else presented.value
-            self._sensed_in.setdefault(trial, []).append(sensed)
+            self._sensed_in.setdefault(trial, []).append(as_requested(presented))
             return
         felt = self._felt_in(block, presented.condition)
         self._feels = felt[int(len(felt) * self._stream(f"{trial}/felt")())]

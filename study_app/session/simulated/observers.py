@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from study_app.devices.simulated.hand_commands import HandOrders
 from study_app.protocol.orders.schedule import shuffle, stream
 from study_app.protocol.questions import ItemView, Value, shown
-from study_app.protocol.simulated_observer import Rater, TrialFeatures, judgements
+from study_app.protocol.simulated import Rater, TrialFeatures, judgements
 from study_app.protocol.trials.tasks import AnyTask, Explore, Follow, Reach
 from study_app.psychophysics.delivery import lag
 from study_app.session.pages import DesignPage, QuestionnairePage, TextPage

@@ -30,7 +30,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule, draw_key, stream
-from study_app.protocol.simulated_observer import NO_FEATURES, TrialFeatures
+from study_app.protocol.simulated import NO_FEATURES, OBSERVER, Comparison, Observer, TrialFeatures
 from study_app.protocol.streams import Key as LevelKey
 from study_app.protocol.trials.presentation import delays_force, next_level
 from study_app.session.pages import (
@@ -47,14 +47,7 @@ from study_app.session.ports import KeptSession, Ports
 from study_app.session.resume import FIRST, REHEARSED_SCREENS, Start, find_protocol, resume_at, source_to_resume
 from study_app.session.runner import Runner
 from study_app.session.simulated.observers import Draw, SensedTrial, hand_for, reading_s, rest
-from study_app.session.simulated.participant import (
-    LOOK_AT_SETTING_S,
-    OBSERVER,
-    AdjustingObserver,
-    Comparison,
-    Observer,
-    SimulatedParticipant,
-)
+from study_app.session.simulated.participant import LOOK_AT_SETTING_S, AdjustingObserver, SimulatedParticipant
 from study_app.session.transitions.events import Begin, Continue, Event, ResumeAsked, Stepped, Submitted
 from study_app.session.trial import TankView
 from study_app.store.blinded.allocation import session_protocol

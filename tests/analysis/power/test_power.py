@@ -22,7 +22,7 @@ from study_app.analysis.statistics.trend import step_down
 from study_app.cli import commands
 from study_app.errors import AnalysisError
 from study_app.protocol.load import load, parse
-from study_app.protocol.simulated_observer import NO_FEATURES, TrialFeatures
+from study_app.protocol.simulated import NO_FEATURES, TrialFeatures
 from study_app.workers.executors import Workers
 from tests.analysis.conftest import SMALL
 from tests.protocol.groups.grouped import grouped

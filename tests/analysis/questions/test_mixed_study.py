@@ -11,7 +11,7 @@ from study_app.analysis.report.write_report import report
 from study_app.analysis.study_worker import carry_out
 from study_app.analysis.worker_messages import FigureDrawn, ReadStudy
 from study_app.protocol.load import load
-from study_app.protocol.simulated_observer import TrialFeatures
+from study_app.protocol.simulated import TrialFeatures
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import exclude
 from study_app.store.folders import StudyFolder

@@ -11,7 +11,7 @@ from study_app.analysis.report.sentences import methods
 from study_app.analysis.report.write_report import report
 from study_app.errors import AnalysisError
 from study_app.protocol.load import parse, source_bytes
-from study_app.protocol.simulated_observer import NO_FEATURES
+from study_app.protocol.simulated import NO_FEATURES
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
 from tests.analysis.conftest import Results, make_results, twelve

@@ -23,7 +23,7 @@ from study_app.evidence.report_rates.simulation import (
     truth,
 )
 from study_app.protocol.load import load
-from study_app.protocol.simulated_observer import TrialFeatures
+from study_app.protocol.simulated import TrialFeatures
 
 
 @pytest.fixture(scope="module")

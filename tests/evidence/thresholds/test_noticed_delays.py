@@ -13,9 +13,9 @@ from study_app.evidence.thresholds.noticed_delays import (
     people_of,
     rated,
 )
+from study_app.protocol.simulated import OBSERVER, Comparison
 from study_app.protocol.streams import stream
 from study_app.protocol.trials.designs import default_design
-from study_app.session.simulated.participant import OBSERVER, Comparison
 
 pytestmark = pytest.mark.slow
 

@@ -11,9 +11,9 @@ from study_app.cli import commands
 from study_app.evidence.thresholds.many_studies import judged, rehearsed
 from study_app.evidence.thresholds.planted import Planted, StudyFound, markdown, planted, simulate, spread, verdicts
 from study_app.protocol.load import load, parse
+from study_app.protocol.simulated import OBSERVER, Comparison, Observer
 from study_app.protocol.streams import stream
 from study_app.protocol.trials.designs import default_design
-from study_app.session.simulated.participant import OBSERVER, Comparison, Observer
 from tests.compiled import needs_servo
 from tests.protocol.trials.level_studies import text_of_damper
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import stream
-from study_app.protocol.simulated_observer import TrialFeatures, rate, rater
+from study_app.protocol.simulated import TrialFeatures, rate, rater
 
 REK = load("rek2024")
 LIQUID = tuple(item.id for item in REK.questionnaires["liquid"].items)

@@ -10,7 +10,7 @@ from study_app.analysis.data.study_tables import load_study
 from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.protocol.load import load
-from study_app.protocol.simulated_observer import TrialFeatures
+from study_app.protocol.simulated import TrialFeatures
 from study_app.session.simulated import answers_only
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import ConditionFeatures, condition_features, rehearse

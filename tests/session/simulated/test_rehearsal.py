@@ -19,9 +19,9 @@ from study_app.protocol import formats
 from study_app.protocol.load import load, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
+from study_app.protocol.simulated import OBSERVER, Comparison
 from study_app.session.simulated import rehearsal
 from study_app.session.simulated.observers import RATE_HZ, SensedTrial, exploration
-from study_app.session.simulated.participant import OBSERVER, Comparison
 from study_app.session.simulated.rehearsal import RehearsedSession, condition_features
 from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView

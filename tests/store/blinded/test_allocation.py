@@ -13,7 +13,7 @@ import pytest
 from study_app.errors import StoreError, StudyError
 from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import build_schedule, stream
-from study_app.protocol.simulated_observer import NO_FEATURES
+from study_app.protocol.simulated import NO_FEATURES
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import ConditionFeatures
 from study_app.store.blinded import allocation

@@ -1,0 +1,400 @@
+"""SIMULATED answers: people who know what was felt and seen in a trial, never which condition or level it was.
+
+For rehearsals, power analysis and validation; never evidence about people, and marked as simulated wherever stored.
+
+*Statements* are answered by a `Rater`, who turns a few features of the trial into an opinion from 1 to 7 for the
+statements it knows, and adds the person's own leaning and some noise. To others it answers near the middle. Where the
+thesis reports something (Rek 2024, §5: honey and water recognised, honey confused with tar, light oil not recognised;
+delays noticed from about 125 ms) the opinions agree with it.
+
+*Trials of intervals* are answered by an `Observer`, who compares resistances (mean force over speed) or delays, with
+Gaussian noise: in proportion to the resistance (Weber's law), of constant spread for a delay. Estimates follow a power
+law with exponent 1/2 (Stevens 1957, Psychological Review 64, 153) unless another is planted.
+
+Shapes and constants are plausible, not measured **[choice]**. Only sums, products, quotients and square roots of
+uniform numbers are used, but for planted exponents, so that answers are the same on every machine.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.random import Generator
+
+from study_app.protocol.blocks import Block
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.schedule import build_schedule, draw_key
+from study_app.protocol.questions import POINTS
+from study_app.protocol.streams import Draw, Key, draw_secret, stream
+from study_app.protocol.trials.designs import Design, Rated
+from study_app.protocol.trials.methods import Heard
+from study_app.protocol.trials.presentation import arrangement_text, heard_of, next_level
+from study_app.protocol.trials.stimuli import DELAYS, FORCE_DELAY, OF_LINK, Stimulated
+from study_app.protocol.trials.tracks import design_of, stimulus_of
+from study_app.psychophysics.families import Floats
+
+UNIFORM: Final = 12
+"""A nearly normal number is the sum of so many uniform ones, less six."""
+NO_OPINION: Final = 4.0
+LEAST_SPEED_MPS: Final = 0.01
+MODULUS: Final = 10.0
+"""The number that the first stimulus is given."""
+_Z_75: Final = 0.6745
+
+
+def normal(draw: Draw) -> float:
+    """Return a nearly normal number, mean 0, deviation 1."""
+    return sum(draw() for _ in range(UNIFORM)) - UNIFORM / 2
+
+
+@dataclass(frozen=True, slots=True)
+class TrialFeatures:
+    """What reached the senses in one trial; all of it at the hand.
+
+    Attributes
+    ----------
+    force_mean_n, force_peak_n
+        Mean and largest norm of the force sent [N].
+    speed_rms_mps
+        Root mean square of the hand's (estimated, not differenced) speed [m/s].
+    push_share
+        Share, 0 to 1, of the force's power that went along the motion: Σ of positive F·v over Σ |F·v|. Drag alone gives
+        0, a wake that carries the hand more.
+    roughness_n
+        Root mean square of the change of the force from one tick to the next [N].
+    delay_s
+        Mean age of what was drawn, when it was drawn [s].
+    force_delay_s
+        How late the force was sent [s]; 0 in studies that do not delay it.
+    """
+
+    force_mean_n: float
+    force_peak_n: float
+    speed_rms_mps: float
+    push_share: float
+    roughness_n: float
+    delay_s: float
+    force_delay_s: float = 0.0
+
+
+NO_FEATURES: Final = TrialFeatures(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Rater:
+    """How one simulated person differs from the next.
+
+    ``leaning`` shifts every answer [points], ``noise`` is the spread between equal trials [points], ``strength`` is how
+    strong forces seem, 1 on average, and ``threshold_s`` the delay that is noticed half of the time [s].
+    """
+
+    leaning: float
+    noise: float
+    strength: float
+    threshold_s: float
+
+
+def rater(draw: Draw) -> Rater:
+    """Return a person, drawn with ``draw`` (uniform numbers in [0, 1))."""
+    return Rater(
+        leaning=0.4 * normal(draw),
+        noise=0.5 + 0.3 * draw(),
+        strength=max(0.5, 1 + 0.1 * normal(draw)),
+        threshold_s=max(0.06, 0.13 + 0.015 * normal(draw)),
+    )
+
+
+def rate(items: Iterable[str], felt: TrialFeatures, person: Rater, draw: Draw) -> dict[str, int]:
+    """Return an answer from 1 to 7 for each item id, in the order given."""
+    judged = judgements(items, felt, person, draw)
+    return {item: min(POINTS, max(1, math.floor(points + 0.5))) for item, points in judged.items()}
+
+
+def judgements(items: Iterable[str], felt: TrialFeatures, person: Rater, draw: Draw) -> dict[str, float]:
+    """Return what a person would answer to each item id, in the order given: from 1 to 7, or a little beyond."""
+    asked = tuple(items)
+    thought = zip(asked, opinions(asked, felt, person), strict=True)
+    return {item: opinion + person.leaning + person.noise * normal(draw) for item, opinion in thought}
+
+
+def opinions(items: Iterable[str], felt: TrialFeatures, person: Rater) -> list[float]:
+    """Return what a person thinks of each item, from 1 to 7, before leaning and noise make an answer of it."""
+    impression = _impression(felt, person)
+    return [OPINIONS[item](impression) if item in OPINIONS else NO_OPINION for item in items]
+
+
+@dataclass(frozen=True, slots=True)
+class _Impression:
+    """The trial in the rater's own terms, each from 0 to 1."""
+
+    present: float
+    resisting: float
+    thick: float
+    carried: float
+    abrupt: float
+    rough: float
+    noticed: float
+    bothered: float
+    lost: float
+
+
+def _rise(value: float, middle: float, width: float) -> float:
+    """Return 0 … 1, one half at ``middle``, 0.15 and 0.85 one ``width`` away from it."""
+    x = (value - middle) / width
+    return 0.5 + 0.5 * x / math.sqrt(1 + x * x)
+
+
+def _impression(felt: TrialFeatures, person: Rater) -> _Impression:
+    force = felt.force_mean_n * person.strength
+    resistance = force / max(felt.speed_rms_mps, LEAST_SPEED_MPS) ** 2  # quadratic drag: the same however fast the hand
+    peak = felt.force_peak_n / max(felt.force_mean_n, 0.05)
+    return _Impression(
+        present=_rise(force, 0.15, 0.1),
+        resisting=_rise(resistance, 25.0, 10.0),
+        thick=_rise(resistance, 98.0, 14.0),
+        carried=_rise(felt.push_share, 0.08, 0.04),
+        abrupt=_rise(peak, 8.0, 2.0),
+        rough=_rise(felt.roughness_n, 0.15, 0.05),
+        noticed=_rise(felt.delay_s, person.threshold_s, 0.015),
+        bothered=_rise(felt.delay_s, person.threshold_s + 0.03, 0.03),
+        lost=_rise(felt.delay_s, person.threshold_s + 0.08, 0.04),
+    )
+
+
+OPINIONS: Final[dict[str, Callable[[_Impression], float]]] = {
+    # what was felt
+    "feels_liquid": lambda felt: 2.0 + 3.8 * felt.present - 1.5 * felt.rough,
+    "immersive": lambda felt: 3.0 + 2.4 * felt.present - 1.5 * felt.rough,
+    "strength": lambda felt: 2.5 + 3.0 * felt.present - 0.8 * felt.abrupt - 0.5 * felt.rough,
+    "expected": lambda felt: 2.8 + 2.6 * felt.present - 1.2 * felt.abrupt - felt.rough,
+    "like_honey": lambda felt: 1.6 + 4.2 * felt.thick * (1 - felt.carried),
+    "like_water": lambda felt: 1.6 + 4.2 * felt.resisting * (1 - felt.thick) * (1 - 0.4 * felt.carried),
+    "like_slime": lambda felt: 2.2 + 1.8 * felt.thick,
+    "like_oil": lambda felt: 2.6 + 1.2 * (1 - felt.thick),
+    "like_tar": lambda felt: 1.4 + 3.4 * felt.thick * (1 - felt.carried),
+    # what was seen
+    "different": lambda felt: 1.8 + 4.4 * felt.noticed,
+    "harder": lambda felt: 1.7 + 3.8 * felt.bothered,
+    "detracts": lambda felt: 1.7 + 3.2 * felt.bothered,
+    "unusable": lambda felt: 1.4 + 2.6 * felt.lost,
+    "comfortable": lambda felt: 6.0 - 1.4 * felt.lost - 0.4 * felt.bothered,
+}
+"""Item id → the opinion from 1 to 7; statements that people add get `NO_OPINION`."""
+
+
+def simulate_ratings(
+    items: Sequence[str], felt: Sequence[Sequence[TrialFeatures]], repetitions: int, person: Rater, random: Generator
+) -> tuple[Floats, Floats]:
+    """Return what one person thinks of each item in a block, and what else is in the answers.
+
+    Parameters
+    ----------
+    items : sequence of str
+        Ids of the statements.
+    felt : sequence of sequence of TrialFeatures
+        What was felt in each condition, of which one trial is drawn each time.
+    repetitions : int
+        Of each condition.
+    person : Rater
+        Who answers.
+    random : numpy.random.Generator
+        Where trials and noise are drawn from.
+
+    Returns
+    -------
+    tuple of array
+        Opinions, and leaning with noise, both (repetitions, conditions, items) [points].
+    """
+    drawn = random.random((repetitions, len(felt))).tolist()
+    thought = [
+        [opinions(items, known[int(len(known) * part)], person) for known, part in zip(felt, parts, strict=True)]
+        for parts in drawn
+    ]
+    noise = random.random((repetitions, len(felt), len(items), UNIFORM)).sum(axis=-1) - UNIFORM / 2
+    return np.array(thought), person.leaning + person.noise * noise
+
+
+@dataclass(frozen=True, slots=True)
+class Observer:
+    """What a simulated participant can discriminate.
+
+    Attributes
+    ----------
+    weber_fraction : float
+        Of resistance, at 75 % correct in two intervals without lapses.
+    delay_jnd_s : float
+        Of a delay, likewise [s].
+    lapses : float
+        So often an answer is given at random.
+    estimates : tuple of float, optional
+        Exponent of estimates over resistance, and the standard deviation of their logarithm; None: 1/2 of the noisy
+        resistance.
+    """
+
+    weber_fraction: float = 0.24
+    delay_jnd_s: float = 0.025
+    lapses: float = 0.02
+    estimates: tuple[float, float] | None = None
+
+    @property
+    def resistance_noise(self) -> float:
+        """The standard deviation of what a resistance is taken for, as a share of it."""
+        return self.weber_fraction / (_Z_75 * math.sqrt(1 + (1 + self.weber_fraction) ** 2))
+
+    @property
+    def delay_noise_s(self) -> float:
+        """The standard deviation of what a delay is taken for [s]."""
+        return self.delay_jnd_s / (math.sqrt(2) * _Z_75)
+
+
+OBSERVER: Final = Observer()
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """What an observer attends to in a block, and whether the smaller one is asked for.
+
+    These are delays, or resistances; of a force that is sent with jitter or loss how rough it is.
+    """
+
+    delays: bool
+    smallest: bool
+    observer: Observer
+    vary: str | None = None
+
+    @classmethod
+    def of(cls, protocol: Protocol, block: Block, observer: Observer) -> Comparison:
+        """Return what the question of a block is about."""
+        if block.stimulus is not None:
+            stimulus = stimulus_of(protocol, block)
+            return cls(stimulus.vary in DELAYS, stimulus.direction == "down", observer, stimulus.vary)
+        delays = {protocol.conditions[name].delay_ms for name in block.conditions}
+        return cls(len(delays) > 1, smallest=False, observer=observer)
+
+    def sensed(self, felt: TrialFeatures) -> float:
+        """Return what is attended to: a delay [s], a roughness [N], or a resistance [N·s/m]."""
+        if self.vary == FORCE_DELAY:
+            return felt.force_delay_s
+        if self.vary in OF_LINK:
+            return felt.roughness_n
+        return felt.delay_s if self.delays else felt.force_mean_n / max(felt.speed_rms_mps, LEAST_SPEED_MPS)
+
+    def noisy(self, sensed: float, draw: Draw) -> float:
+        """Return what the observer takes it for."""
+        noise, observer = normal(draw), self.observer
+        return (
+            sensed + observer.delay_noise_s * noise if self.delays else sensed * (1 + observer.resistance_noise * noise)
+        )
+
+    def distinct(self, difference: float, about: float) -> bool:
+        """Return whether a difference is taken for one."""
+        observer = self.observer
+        return abs(difference) > (observer.delay_jnd_s if self.delays else observer.weber_fraction * abs(about))
+
+    def choose(self, design: Design, sensed: Sequence[float], mean: float, draw: Draw) -> str:
+        """Return the answer of a design with choices to what was sensed; ``mean`` is that of the block so far."""
+        taken = [self.noisy(one, draw) for one in sensed]
+        if draw() < self.observer.lapses:
+            return design.answers[int(len(design.answers) * draw())]
+        return design.simulated(taken, mean, self)
+
+    def answer(
+        self, protocol: Protocol, design: Design, sensed: Sequence[float], before: Sequence[float], draw: Draw
+    ) -> str | int | float:
+        """Return the answer to a trial: one of the design's answers, a point of its scale, or a number.
+
+        ``sensed`` is what was attended to in each interval, ``before`` the same of the block's trials before.
+        """
+        known = [*before, *sensed]
+        mean, first = sum(known) / len(known), known[0]
+        if design.reply == "choice":
+            return self.choose(design, sensed, mean, draw)
+        if isinstance(design, Rated):
+            taken, points = self._taken(sensed, draw), protocol.scales[design.scale].points
+            ratio = taken / mean if mean > 0 and first > 0 else 1.0
+            return min(points, max(1, math.floor((points + 1) / 2 + (ratio - 1) * (points - 1) + 0.5)))
+        if self.observer.estimates is not None and first > 0 and sensed[-1] > 0:
+            exponent, spread = self.observer.estimates
+            return MODULUS * math.exp(exponent * math.log(sensed[-1] / first) + spread * normal(draw))
+        taken = self._taken(sensed, draw)
+        return MODULUS * math.sqrt(max(taken / first if mean > 0 and first > 0 else 1.0, 0.0))
+
+    def _taken(self, sensed: Sequence[float], draw: Draw) -> float:
+        """Return what the last interval is taken for; noise is drawn for every one."""
+        return [self.noisy(one, draw) for one in sensed][-1]
+
+
+class SimulatedTrial(NamedTuple):
+    """One answered trial of a block with a design; ``track`` is what its ``code`` stands for.
+
+    ``level`` is in the unit of the stimulus' levels, None where conditions are compared; ``success`` is what the answer
+    counts as for a psychometric function.
+    """
+
+    participant: str
+    block: str
+    code: str
+    track: str
+    trial: int
+    catch: bool
+    arrangement: str
+    standard: float | None
+    level: float | None
+    answer: str | int | float
+    success: bool | None
+
+
+def as_requested(presented: Stimulated) -> float:
+    """Return what is attended to where exactly the requested number is presented: a delay [s], or the number."""
+    return presented.value / 1000 if presented.vary in DELAYS else presented.value
+
+
+def simulate_study(
+    protocol: Protocol,
+    people: Mapping[str, Observer],
+    seed: int,
+    study: str = "simulated",
+    sense: Callable[[Stimulated], float] = as_requested,
+) -> Iterator[SimulatedTrial]:
+    """Yield the answers of participants to the blocks of levels, as the methods of the protocol choose these.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The study.
+    people : mapping of str to Observer
+        Who answers, by the participant's id.
+    seed : int
+        Orders, the sealed key and answers follow from it.
+    study : str
+        Names the draws, so that one seed gives many independent studies.
+    sense : callable
+        Returns what an observer attends to in an interval.
+    """
+    random = stream(seed, study).random
+    key = Key(draw_key(protocol, random), draw_secret(random))
+    for person, observer in people.items():
+        schedule = build_schedule(protocol, person, seed)
+        heard: dict[str, list[Heard]] = {}
+        sensed_in: dict[str, list[float]] = {}
+        for trial in schedule.trials:
+            block = protocol.blocks[trial.block]
+            if block.stimulus is None:
+                continue
+            answered, before = heard.setdefault(block.id, []), sensed_in.setdefault(block.id, [])
+            if (due := next_level(protocol, key, schedule, trial, answered)) is None:
+                continue
+            design, sensed = design_of(protocol, block), [sense(one) for one in due.intervals]
+            draw = stream(int.from_bytes(key.secret[:4], "big"), f"observer/{person}/{trial.number}").random
+            given = Comparison.of(protocol, block, observer).answer(protocol, design, sensed, before, draw)
+            before += sensed
+            what = (trial.number, trial.code, due.level, due.arrangement, str(given))
+            answered.append(heard_of(protocol, block, *what, catch=due.catch))
+            yield SimulatedTrial(
+                person, block.id, trial.code, key.codes[block.id][trial.code], trial.number, due.catch,
+                arrangement_text(design, due.arrangement), due.standard, due.level, given, answered[-1].success,
+            )  # fmt: skip
