@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 
@@ -14,7 +15,7 @@ from study_app.number_text import counted
 from study_app.protocol.checks.expected_precision import precision_rows
 from study_app.protocol.checks.warnings import warnings
 from study_app.protocol.groups import sessions_differ
-from study_app.protocol.model import Block, Condition, Protocol
+from study_app.protocol.model import Block, Condition, Limits, Protocol
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
 from study_app.protocol.orders.durations import Variant, block_duration_s, expected_duration_s, variants
 from study_app.protocol.orders.sequences import row_count
@@ -38,19 +39,6 @@ from study_app.protocol.trials.tracks import (
 )
 
 LEVELS = {"weber": "Weber fraction", "difference": "difference", "value": "value"}
-LIMITS = {
-    "lateness_ms": "lateness of ticks (99th percentile)",
-    "worst_gap_ms": "between two ticks",
-    "delay_error_ms": "error of the delay (95th percentile)",
-    "frame_gap_ms": "before the first frame, and between two",
-    "withheld_percent": "of the force withheld by slope limits, passivity controller and slew limit",
-    "targets_percent": "of the targets reached, at least",
-    "level_error_percent": "error of an interval's delivered level",
-    "level_error_ms": "error of a trial's delivered difference of delays",
-    "pace_error_percent": "error of the hand's RMS speed against the target's",
-    "attempts": "attempts at a trial of intervals, until it is delivered as requested",
-}
-"""What each key of the table of limits is a limit of."""
 BLINDINGS = {
     "double": "double-blind: the operator sees no force",
     "single": "single-blind: the operator sees force and wake",
@@ -336,6 +324,9 @@ def _kind(item: Question, context: Context) -> str:
 
 def limit_rows(protocol: Protocol) -> list[tuple[str, str]]:
     """Return the limits up to which a trial is valid: each value, and what it is of."""
-    units = {"ms": " ms", "percent": " %"}
-    values = ((key, getattr(protocol.limits, key), of) for key, of in LIMITS.items())
-    return [(f"{value:g}{units.get(key.rpartition('_')[2], '')}", of) for key, value, of in values if value is not None]
+    units, rows = {"ms": " ms", "percent": " %"}, []
+    for key, field in Limits.model_fields.items():
+        words = re.sub(r" \[.*|; .*|\.$", "", field.description or "")
+        if (value := getattr(protocol.limits, key)) is not None:
+            rows.append((f"{value:g}{units.get(key.rpartition('_')[2], '')}", words[:1].lower() + words[1:]))
+    return rows

@@ -12,7 +12,6 @@ from typing import Any, Final
 from study_app.haptics.model.scene import FADE_S, Scene
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Analysis
-from study_app.protocol.questions import POINTS
 from study_app.protocol.source.document import entries, names
 from study_app.protocol.source.problems import Fault
 from study_app.protocol.table import Table
@@ -82,18 +81,10 @@ def newer_keys(document: Mapping[str, Any]) -> Iterator[Fault]:
         for path, stated in entries(document, pattern):
             if stated in values:
                 yield Fault(path, f'"{stated}" belongs to format 2', HINT)
-    for path, labels in entries(document, "scales.*.labels.*"):
-        if isinstance(labels, tuple) and len(labels) != POINTS:
-            bound = "needs at least" if len(labels) < POINTS else "more than"
-            message = f"has {len(labels)} entries, {bound} {POINTS}"
-            yield Fault(path, message, f"other scales belong to format 2: {HINT}")
     known = {*names(document, "pages"), *names(document, "blocks")}
     for path, name in entries(document, "sequence.*"):
         if name in names(document, "questionnaires") and name not in known:
             yield Fault(path, "a questionnaire on its own belongs to format 2", HINT)
-    for path, table in entries(document, "questionnaires.*"):
-        if isinstance(table, Mapping) and "scale" not in table:
-            yield Fault((*path, "scale"), "is missing")
 
 
 def completed(document: Mapping[str, Any]) -> dict[str, Any]:

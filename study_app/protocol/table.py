@@ -23,7 +23,7 @@ from pydantic import (
     model_validator,
 )
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, PydanticCustomError
+from pydantic_core import CoreSchema, PydanticCustomError, to_jsonable_python
 
 from study_app.ids import MAX_ID
 
@@ -147,10 +147,6 @@ class Table(BaseModel):
     def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Return the schema with the pairs of which one is given, and the sections of its form."""
         node = handler(core_schema)
-        if cls.ONE_OF:
-            handler.resolve_ref_schema(node)[ALTERNATIVES] = [list(pair) for pair in cls.ONE_OF]
-        if cls.SECTIONS:
-            handler.resolve_ref_schema(node)[SECTIONS] = [[words, list(keys)] for words, keys in cls.SECTIONS]
-        if cls.NOT_WITH:
-            handler.resolve_ref_schema(node)[NOT_WITH] = [[list(given), list(keys)] for given, keys in cls.NOT_WITH]
+        stated: Any = ((ALTERNATIVES, cls.ONE_OF), (SECTIONS, cls.SECTIONS), (NOT_WITH, cls.NOT_WITH))
+        handler.resolve_ref_schema(node).update((key, to_jsonable_python(value)) for key, value in stated if value)
         return node

@@ -217,11 +217,8 @@ def _oddity(d_prime: float) -> float:
 
 def _same_different_differencing(d_prime: float) -> float:
     """Return P(correct) of the criterion k at which "same" is as often correct as "different"."""
-    low, high = 0.0, MOST
-    while high - low > TOLERANCE:
-        k = 0.5 * (low + high)
-        low, high = (k, high) if different_rate(d_prime, k) + different_rate(0.0, k) > 1.0 else (low, k)
-    return 0.5 * (1.0 + different_rate(d_prime, low) - different_rate(0.0, low))
+    k = _inverse(lambda k: -different_rate(d_prime, k) - different_rate(0.0, k), -1.0)
+    return 0.5 * (1.0 + different_rate(d_prime, k) - different_rate(0.0, k))
 
 
 PROPORTIONS: Final[Mapping[str, Callable[[float], float]]] = {

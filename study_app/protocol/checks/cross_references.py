@@ -11,7 +11,6 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from study_app.protocol import formats
 from study_app.protocol.groups import SEQUENCES, sequences_in
 from study_app.protocol.questions import POINTS, Context, Question, Scale, ShowIf, Statement, question_of
 from study_app.protocol.source.document import Path, entries, names, value_at
@@ -259,9 +258,8 @@ def questions(document: Document) -> Iterator[Fault]:
         for path, table in entries(document, "scales.*")
         if (scale := _sound(Scale.model_validate, table)) is not None
     }
-    second = formats.is_second(document)  # format 1 has one length of scales, checked before
     for name, scale in scales.items():
-        if second and len(counts := {len(labels) for labels in scale.labels.values()}) > 1:
+        if len(counts := {len(labels) for labels in scale.labels.values()}) > 1:
             listed = " and ".join(map(str, sorted(counts)))
             yield Fault(("scales", name, "labels"), f"has {listed} points", "every language has the same points")
     language = next((name for _, name in entries(document, "study.languages.*") if isinstance(name, str)), "en")
@@ -275,7 +273,7 @@ def questions(document: Document) -> Iterator[Fault]:
             if "scale" not in table:
                 message = "statements are rated on it; other items have a kind"
                 yield Fault((*path, "scale"), "is missing", message)
-            elif second and (scale := scales.get(str(table["scale"]))) is not None and scale.points != POINTS:
+            elif (scale := scales.get(str(table["scale"]))) is not None and scale.points != POINTS:
                 message = f"has {scale.points} points, and statements need {POINTS}"
                 hint = f'write kind = "rating" and scale = "{table["scale"]}" in the items'
                 yield Fault((*path, "scale"), message, hint)

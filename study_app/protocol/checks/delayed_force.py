@@ -14,6 +14,8 @@ from itertools import takewhile
 from operator import attrgetter
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from study_app.haptics.model.slope_limits import steady
 from study_app.protocol.checks.consistency import numbers
 from study_app.protocol.checks.force_limits import LIMIT_J, damping_nspm, returned_j
@@ -107,12 +109,7 @@ def _of_table(protocol: Protocol, name: str, liquid: str, delay_ms: float) -> st
 def _withheld_percent(liquid: str, estimator: str, delay_ms: float) -> float:
     """Return the share that is withheld [%], interpolated in the stored table."""
     rows = _rows(liquid, estimator, "light")
-    before = [it for it in rows if it.delay_ms <= delay_ms][-1]
-    after = next((it for it in rows if it.delay_ms >= delay_ms), before)
-    if after.delay_ms == before.delay_ms:
-        return before.withheld_percent
-    share = (delay_ms - before.delay_ms) / (after.delay_ms - before.delay_ms)
-    return before.withheld_percent + share * (after.withheld_percent - before.withheld_percent)
+    return float(np.interp(delay_ms, [it.delay_ms for it in rows], [it.withheld_percent for it in rows]))
 
 
 def _of_energy(protocol: Protocol, name: str, delay_ms: float) -> str | None:

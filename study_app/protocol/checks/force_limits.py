@@ -9,6 +9,7 @@ Of other liquids b is the force at V over V.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import Final
@@ -194,11 +195,9 @@ def clipped_at_pace(protocol: Protocol, block: Block, scene: Scene, what: str, p
     pace_mps = task.fastest_stroke((0.0, 0.0, 0.0)).speed_mps
     if len(scene.liquids) != 1 or (drag_n := steady(scene, FASTER * pace_mps).drag_n) <= scene.force_limit_n:
         return
-    least, most = 0.0, 1.0
-    while most - least > 1e-6:
-        share = (least + most) / 2
-        fits = steady(scene, FASTER * share * pace_mps).drag_n <= scene.force_limit_n
-        least, most = (share, most) if fits else (least, share)
+    pace = FASTER * pace_mps
+    beyond = bisect_left(range(10**6), True, key=lambda n: steady(scene, n * 1e-6 * pace).drag_n > scene.force_limit_n)
+    least = (beyond - 1) * 1e-6
     yield Fault(
         place,
         f"{what} {drag_n:.1f} N at {FASTER:g} times the paced {pace_mps:.3g} m/s; device.force_limit_n is "
@@ -282,13 +281,8 @@ def passed_share(velocity: Velocity, rate_hz: float, frequency_hz: float) -> flo
 
 def fastest_hz(velocity: Velocity, rate_hz: float, share: float) -> float:
     """Return the highest frequency [Hz] up to which an estimator passes this share, to 1 mHz; at most 20 Hz."""
-    low_hz, high_hz = 0.0, 20.0
-    while high_hz - low_hz > 1e-3:
-        middle_hz = (low_hz + high_hz) / 2
-        low_hz, high_hz = (
-            (middle_hz, high_hz) if passed_share(velocity, rate_hz, middle_hz) >= share else (low_hz, middle_hz)
-        )
-    return low_hz
+    mhz = range(1, 20_000)
+    return bisect_left(mhz, True, key=lambda one: passed_share(velocity, rate_hz, one / 1000) < share) / 1000
 
 
 def returned(protocol: Protocol) -> Iterator[Fault]:
@@ -337,6 +331,5 @@ def returned_j(damping: float, stroke: Stroke, delay_s: float) -> float:
 
 def longest_ms(damping: float, stroke: Stroke) -> float:
     """Return the longest delay at which a damper [N·s/m] returns no more than the limit [whole ms]."""
-    delays_ms = range(MOST_DELAY_MS + 1)
-    beyond = (one for one in delays_ms if returned_j(damping, stroke, one / 1000) > LIMIT_J)
+    beyond = (one for one in range(MOST_DELAY_MS + 1) if returned_j(damping, stroke, one / 1000) > LIMIT_J)
     return next(beyond, MOST_DELAY_MS + 1) - 1

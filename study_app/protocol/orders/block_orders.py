@@ -22,26 +22,33 @@ CodeOrder: TypeAlias = Literal[Order, TrackOrder]
 """How the codes of a block are ordered: conditions, or the tracks of a design."""
 
 
-@dataclass(frozen=True, slots=True)
-class BlockOrder:
+class _Kept(BaseModel):
+    """The base of what is read from a receipt, which holds more than is asked for here."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore", defer_build=True)
+
+
+class BlockOrder(_Kept):
     """A block as scheduling sees it: its codes, how they are ordered, and the ids of what is asked.
 
-    ``slots`` says per code how long its track is; empty in a block without a design.
+    ``slots`` says per code how long its track is; empty in a block without a design. ``questionnaire`` is where a
+    receipt has the ids of what is asked.
     """
 
-    id: str
+    id: str = ""
     phase: Phase
     part: int | None
-    codes: tuple[str, ...]
+    codes: tuple[str, ...] = Field(min_length=1)
     order: CodeOrder
-    max_repeats: int | None
-    min_distance: int | None
-    repetitions: int
-    break_every: int | None
-    break_page: str | None
-    items: tuple[str, ...]
-    item_order: Literal["fixed", "shuffled"]
-    slots: tuple[int, ...] = ()
+    max_repeats: int | None = Field(default=None, ge=1)
+    min_distance: int | None = Field(default=None, ge=1)
+    repetitions: int = Field(ge=1)
+    break_every: int | None = Field(default=None, ge=1)
+    break_page: str | None = None
+    items: tuple[str, ...] = ()
+    item_order: Literal["fixed", "shuffled"] = "fixed"
+    slots: tuple[Annotated[int, Field(ge=1)], ...] = ()
+    questionnaire: str | None = None
 
     @property
     def trials(self) -> int:
@@ -113,29 +120,8 @@ def order_of(protocol: Protocol, block: Block) -> BlockOrder:
     keys = ("phase", "part", "max_repeats", "min_distance", "repetitions", "break_every", "break_page")
     same = {key: getattr(block, key) for key in keys}
     asked = protocol.questionnaire_of(block.id)
-    return BlockOrder(
-        id=block.id, codes=block_codes(protocol, block), order=order, slots=slots, **same, **_items(asked)
-    )
-
-
-class _Kept(BaseModel):
-    """The base of what is read from a receipt, which holds more than is asked for here."""
-
-    model_config = ConfigDict(frozen=True, extra="ignore", defer_build=True)
-
-
-class _KeptBlock(_Kept):
-    phase: Phase
-    part: int | None
-    codes: tuple[str, ...] = Field(min_length=1)
-    order: CodeOrder
-    repetitions: int = Field(ge=1)
-    slots: tuple[Annotated[int, Field(ge=1)], ...] = ()
-    questionnaire: str | None
-    max_repeats: int | None = Field(default=None, ge=1)
-    min_distance: int | None = Field(default=None, ge=1)
-    break_every: int | None = Field(default=None, ge=1)
-    break_page: str | None = None
+    codes, about = block_codes(protocol, block), same | _items(asked)
+    return BlockOrder(id=block.id, codes=codes, order=order, slots=slots, **about)
 
 
 class _KeptItem(_Kept):
@@ -159,7 +145,7 @@ class _KeptSteps(_Kept):
 
 class _KeptProtocol(_KeptSteps):
     study: _KeptStudy
-    blocks: dict[str, _KeptBlock]
+    blocks: dict[str, BlockOrder]
     questionnaires: dict[str, _KeptQuestionnaire]
 
 
@@ -187,14 +173,10 @@ def orders_of_receipt(protocol: Mapping[str, Any], *, group: str | None = None, 
             }
             kept = kept.model_copy(update={"blocks": own})
         forms = kept.questionnaires
-        blocks = {
-            name: BlockOrder(
-                name,
-                **block.model_dump(exclude={"questionnaire"}),
-                **_items(None if block.questionnaire is None else forms[block.questionnaire]),
-            )
-            for name, block in kept.blocks.items()
-        }
+        blocks = {}
+        for name, block in kept.blocks.items():
+            asked = _items(None if block.questionnaire is None else forms[block.questionnaire])
+            blocks[name] = block.model_copy(update={"id": name, "questionnaire": None, **asked})
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         raise _untold(".".join(str(step) for step in first["loc"]), first["msg"]) from error

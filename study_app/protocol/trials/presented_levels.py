@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product
@@ -26,7 +27,8 @@ UNPACED_MPS: Final = 0.3
 """A hand that is free moves as fast. [choice]"""
 BEYOND: Final = (4.0, 2.0, 1.0)
 """So far beyond the largest value a limit is looked for, less where a liquid cannot have such a number."""
-_HALVINGS: Final = 32
+STEPS: Final = 2**32
+"""Of the search for a limit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,11 +168,8 @@ def _last(beyond: Callable[[float], bool], most: float) -> float | None:
     high = next((factor * most for factor in BEYOND if holds(factor * most)), None)
     if high is None:
         return None
-    low = 0.0
-    for _ in range(_HALVINGS):
-        middle = (low + high) / 2
-        low, high = (low, middle) if holds(middle) else (middle, high)
-    return low
+    step = high / STEPS
+    return bisect_left(range(1, STEPS), True, key=lambda number: holds(number * step)) * step
 
 
 def clipping(protocol: Protocol, block: Block, limits: LevelLimits | None = None) -> Clipping | None:
