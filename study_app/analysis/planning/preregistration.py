@@ -37,17 +37,7 @@ _BLOCK: Final = re.compile(r"^```json\n(\{.*?\})\n```$", re.MULTILINE | re.DOTAL
 
 @dataclass(frozen=True, slots=True)
 class Commitment:
-    """What was committed to.
-
-    Attributes
-    ----------
-    participants : int or None
-        How many are planned.
-    precision : float or None
-        Half the 95 % interval of the group's mean that is planned, as a share of the mean.
-    rules : tuple of str
-        Names of the rules that exclude sessions.
-    """
+    """What was committed to: participants, precision of the group's mean, and the rules that exclude sessions."""
 
     study: str
     version: str
@@ -222,10 +212,7 @@ def analyses(protocol: Protocol) -> Iterator[str]:
 def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = None) -> str:
     """Return the text: hypotheses, design, sample size, exclusions, analysis, the protocol in words.
 
-    Parameters
-    ----------
-    power : str, optional
-        The Markdown that ``liquid-study power`` wrote.
+    ``power`` is the Markdown that ``liquid-study power`` wrote.
     """
     one = commitment(protocol, protocol_hash)
     study = protocol.study

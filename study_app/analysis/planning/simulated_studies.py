@@ -17,7 +17,8 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.analysis.data.blocks import Decided, Item, Kind, read_decided, spoken
+from study_app.analysis.data.blocks import Block as AskedBlock
+from study_app.analysis.data.blocks import Decided, Item, Setting, read_decided, spoken
 from study_app.analysis.data.measures import Array
 from study_app.analysis.statistics.equivalence import equivalent as shows_equivalence
 from study_app.analysis.statistics.equivalence import sizes
@@ -30,32 +31,33 @@ from study_app.protocol.questions import POINTS, Question
 from study_app.protocol.simulated import OPINIONS, TrialFeatures, rater, simulate_ratings
 from study_app.protocol.table import text_in
 
+LOWEST, HIGHEST = 1, POINTS
 ConditionFeatures: TypeAlias = Mapping[tuple[str, str], Sequence[TrialFeatures]]
 """(Block, condition) → what was felt there in rehearsed trials."""
 
 
-@dataclass(frozen=True)
-class Planned:
-    """A main block that asks something.
+@dataclass(frozen=True, slots=True)
+class Planned(AskedBlock):
+    """A main block that asks something: its settings in the order of the tests, delays ascending.
 
-    ``names`` are of its settings, in the order of the tests: delays ascending. ``delays_ms`` is None where liquids are
-    compared. ``felt`` has what was felt in each setting. ``groups`` are those that have the block, where not all do.
+    ``felt`` has what was felt in each setting. ``groups`` are those that have the block, where not all do.
     """
 
-    id: str
-    title: str
-    kind: Kind
-    names: tuple[str, ...]
-    delays_ms: tuple[float, ...] | None
-    items: tuple[Item, ...]
     felt: tuple[tuple[TrialFeatures, ...], ...]
     repetitions: int
-    groups: tuple[str, ...] = ()
+    groups: tuple[str, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The delays, or the conditions, of its settings in words."""
+        if self.kind == "delays":
+            return tuple(f"{setting.delay_ms:g} ms" for setting in self.settings)
+        return tuple(str(setting.condition).replace("_", " ") for setting in self.settings)
 
     @property
     def k(self) -> int:
         """How many settings there are."""
-        return len(self.names)
+        return len(self.settings)
 
 
 @dataclass(frozen=True)
@@ -75,13 +77,7 @@ class Plan:
 
 
 def plan(protocol: Protocol, felt: ConditionFeatures) -> Plan:
-    """Return what can be planned of a protocol.
-
-    Raises
-    ------
-    AnalysisError
-        No block of it compares settings and asks about them.
-    """
+    """Return what can be planned of a protocol; AnalysisError says that no block compares settings and asks of them."""
     language = spoken({"study": {"languages": protocol.study.languages}})
     asked = _compared(protocol)
     if not asked:
@@ -109,24 +105,27 @@ def _compared(protocol: Protocol) -> list[Block]:
 
 
 def _planned(protocol: Protocol, block: Block, felt: ConditionFeatures, language: str) -> Planned:
-    conditions = list(block.conditions)
-    delays = {name: protocol.conditions[name].delay_ms for name in conditions}
+    conditions = {name: protocol.conditions[name] for name in block.conditions}
     kind = protocol.compared_in(block.id)
     assert kind is not None  # noqa: S101 - a main block
     having = groups_with(protocol, block.id)
-    if kind == "delays":
-        conditions.sort(key=delays.__getitem__)
+    names = sorted(conditions, key=lambda name: conditions[name].delay_ms) if kind == "delays" else list(conditions)
     return Planned(
         id=block.id,
         title=text_in(block.title, language),
         kind=kind,
-        names=tuple(f"{delays[name]:g} ms" if kind == "delays" else name.replace("_", " ") for name in conditions),
-        delays_ms=tuple(delays[name] for name in conditions) if kind == "delays" else None,
+        settings=tuple(
+            Setting(f"S{number}", name, " + ".join(one.liquid_ids), one.delay_ms, one.label)
+            for number, name in enumerate(names, start=1)
+            for one in (conditions[name],)
+        ),
         items=tuple(
             Item(item.id, text_in(item.text, language), text_in(item.short, language))
             for item in _statements(protocol, block)
         ),
-        felt=tuple(tuple(felt[block.id, name]) for name in conditions),
+        labels=tuple(map(str, range(LOWEST, HIGHEST + 1))),
+        cannot_judge=None,
+        felt=tuple(tuple(felt[block.id, name]) for name in names),
         repetitions=block.repetitions,
         groups=having if len(having) < len(protocol.groups) else (),
     )
@@ -136,9 +135,6 @@ def _statements(protocol: Protocol, block: Block) -> tuple[Question, ...]:
     """Return the statements that a block asks about; power is planned for no other questions."""
     questionnaire = protocol.questionnaire_of(block.id)
     return () if questionnaire is None else questionnaire.statements
-
-
-LOWEST, HIGHEST = 1, POINTS
 
 
 @dataclass(frozen=True)
@@ -195,15 +191,9 @@ def ranks(answers: Array) -> Single:
 
 
 def friedman(ranked: Single, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Return Friedman's p of every item, and of the sum of their statistics over all items (global test).
+    """Return Friedman's p of every item (studies, items), and of the sum of their statistics (studies,): a global test.
 
-    Parameters
-    ----------
-    ranked : (studies, participants, settings, items) array
-
-    Returns
-    -------
-    (studies, items), (studies,) array
+    The ranks are of (studies, participants, settings, items).
     """
     studies, n, k, items = ranked.shape
     orders = rng.random((PLANNED_DRAWS, n, k)).argsort(axis=-1)
@@ -256,12 +246,7 @@ def _p(drawn: Single, seen: Single) -> Array:
 
 
 def equivalent(differences: Array, bound: float, alpha: float, rng: np.random.Generator) -> NDArray[np.bool_]:
-    """Return whether equivalence within ± ``bound`` is shown as in the report.
-
-    Parameters
-    ----------
-    differences : (studies, participants, …) array
-    """
+    """Return whether equivalence of differences (studies, people, …) within ± ``bound`` is shown as in the report."""
     rows = np.moveaxis(differences, 1, -1)
     shown = shows_equivalence(rows.reshape(-1, rows.shape[-1]), bound, alpha, rng, PLANNED_DRAWS)
     return np.asarray(shown.reshape(rows.shape[:-1]))
@@ -285,13 +270,7 @@ settings, items) are sums of mean answers.
 
 
 def count(plan: Plan, sizes: Sequence[int], seed: int, batch: int, studies: int) -> Counts:
-    """Simulate the studies of one batch and count what is found at every size.
-
-    Parameters
-    ----------
-    batch : number of the batch, from 0
-    studies : how many of its studies, at most ``BATCH``
-    """
+    """Simulate ``studies`` of the studies of a batch (from 0, of `BATCH`) and count what is found at every size."""
     held = [people(plan, max(sizes), seed, batch * BATCH + number) for number in range(studies)]
     counts: Counts = {}
     for place, block in enumerate(plan.blocks):

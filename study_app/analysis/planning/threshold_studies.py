@@ -55,14 +55,10 @@ class Case:
 class Found:
     """What studies of one block found with so many trials for each standard.
 
-    Attributes
-    ----------
-    errors : list of array
-        Of each study the errors of the participants' thresholds, (people, standards), in natural logarithms; as shares
-        of the threshold on linear spacing, of the mean d′, d_a or exponent.
-    halves : list of array
-        Of each study half the group's 95 % interval as a share of the mean, (sizes,); NaN below three participants,
-        infinite where limits clip the levels above the mean threshold.
+    ``errors`` are of each study the errors of the participants' thresholds, (people, standards), in natural logarithms;
+    as shares of the threshold on linear spacing, of the mean d′, d_a or exponent. ``halves`` are half the group's 95 %
+    interval as a share of the mean, (sizes,); NaN below three participants, infinite where limits clip the levels above
+    the mean threshold.
     """
 
     errors: list[Array] = field(default_factory=list)
@@ -84,14 +80,9 @@ class Found:
 
 
 def plans(protocol: Protocol, trials: Sequence[int]) -> PrecisionPlans:
-    """Return for each block of thresholds, d′, d_a or exponents the plan for each number of trials.
+    """Return for each block of thresholds, d′, d_a or exponents the plan for each number of trials, by default its own.
 
-    Without numbers it is the protocol's.
-
-    Raises
-    ------
-    AnalysisError
-        A method cannot have so few trials.
+    AnalysisError says that a method cannot have so few trials.
     """
     found = {}
     for block in protocol.main_blocks:

@@ -16,16 +16,8 @@ SEED: Final = 1
 class Balanced:
     """How even a block's orders are.
 
-    Attributes
-    ----------
-    order : str
-        How it is ordered.
-    evenness : Evenness
-        Positions and carry-over, counted.
-    rows : int or None
-        How many participants fill a round of its square; None where it has none.
-    session : str
-        Whose orders, where sessions differ.
+    A round of its square takes so many participants (``rows``), None where it has none; ``session`` says whose orders,
+    where sessions differ.
     """
 
     order: str

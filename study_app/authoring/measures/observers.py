@@ -55,30 +55,12 @@ class Asked:
 class Observed:
     """What observers with one threshold showed; levels are those of the stimulus, not comparisons.
 
-    Attributes
-    ----------
-    threshold, lapses : float
-        What was planted: a level, and the lapse rate.
-    observers : int
-        How many there were.
-    at_threshold : float
-        Share of successes at the threshold.
-    levels : tuple of float
-        Where the functions are given.
-    planted : tuple of float
-        Share of successes of the planted function at each of them.
-    found : tuple of tuple of float
-        The functions through the quantiles (`SHARES`) of the thresholds that were found.
-    asked : tuple of (float, float)
-        Each level with the share of trials that presented it.
-    course : tuple of (int, tuple of float)
-        Quantiles of the estimates after so many trials of the standard.
-    one : tuple of Asked
-        The trials of the first observer.
-    error : float
-        Standard deviation of the estimates as a share of the threshold; infinite where limits clip the levels above it.
-    trials : int
-        Comparisons of each standard, at most.
+    Planted were ``threshold``, a level, and ``lapses``; ``at_threshold`` is the share of successes there. At each of
+    ``levels`` the planted function has the share ``planted``, and those through the quantiles (`SHARES`) of the
+    thresholds that were found have ``found``. ``asked`` are levels with the share of trials that presented them,
+    ``course`` quantiles of the estimates after so many trials of the standard, ``one`` the trials of the first
+    observer. ``error`` is the standard deviation of the estimates as a share of the threshold, infinite where limits
+    clip the levels above it, ``trials`` the comparisons of each standard, at most.
     """
 
     threshold: float
@@ -120,10 +102,7 @@ class Measurable:
 def observe(plan: ThresholdPlan, threshold: float, lapses: float, watch: Watch = unwatched) -> Observed | None:
     """Return what observers with a threshold (a level) show; None where tracks of the method are not simulated.
 
-    Raises
-    ------
-    GivenUp
-        By ``watch``.
+    ``watch`` may raise `GivenUp`.
     """
     stimulus, random = plan.stimulus, np.random.default_rng(SEED)
     u = stimulus.coordinate(threshold)
@@ -164,23 +143,8 @@ def measurable(
 ) -> Measurable | None:
     """Return which thresholds a block can measure; None where tracks of the method are not simulated.
 
-    Parameters
-    ----------
-    plan : ThresholdPlan
-        The block.
-    lapses : float
-        Lapse rate of the observers.
-    least : float
-        No threshold below this level counts: twice the largest error of a valid trial.
-    watch : callable
-        Called with the number of finished simulations and of all.
-    most : float
-        No threshold above this level counts: the highest one that is presented in full.
-
-    Raises
-    ------
-    GivenUp
-        By ``watch``.
+    ``lapses`` is the lapse rate of the observers. No threshold counts below the level ``least``, twice the largest
+    error of a valid trial, or above ``most``, the highest one that is presented in full. ``watch`` may raise `GivenUp`.
     """
     stimulus, random = plan.stimulus, np.random.default_rng(SEED)
     found: list[Planted] = []

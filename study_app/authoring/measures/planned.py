@@ -11,20 +11,9 @@ ENOUGH: Final = 0.8
 class GroupPrecision:
     """How many simulated studies know the group's mean threshold as precisely as planned.
 
-    Attributes
-    ----------
-    participants, studies : int
-        Of each study, and how many studies there were.
-    precision : float
-        Half the group's 95 % interval that is wanted, as a share of the mean.
-    trials, more_trials : int
-        Of each standard, as planned and a third more.
-    share, more_share : float
-        Of the studies within the precision, with as many trials.
-    most : int
-        Up to so many participants it was looked for how many are enough.
-    enough : int or None
-        How many participants are enough; None: more than ``most``.
+    ``precision`` is half the group's 95 % interval that is wanted, as a share of the mean. With ``trials`` of each
+    standard ``share`` of the studies reach it, with ``more_trials``, a third more, ``more_share``. ``enough`` is how
+    many participants are enough, None if more than ``most``.
     """
 
     participants: int
@@ -48,16 +37,9 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Detectable:
-    """The smallest differences that simulated studies of a block show.
+    """The smallest differences that simulated studies of a block show, of each statement that the answer model knows.
 
-    Attributes
-    ----------
-    participants, studies : int
-        Of each study, and how many studies there were.
-    points : int
-        Of the scale.
-    findings : tuple of Finding
-        Each statement that the answer model knows, the smallest difference first.
+    The smallest difference comes first; the scale has so many ``points``.
     """
 
     participants: int

@@ -33,16 +33,10 @@ _APART: Final = (*_LEFT_OUT, *_OF_FORCES)
 
 @dataclass(frozen=True, slots=True)
 class ValidPart:
-    """What can be measured of a study.
+    """The study without its broken elements, None where everything depends on what is broken.
 
-    Attributes
-    ----------
-    protocol : Protocol or None
-        The study without its broken elements; None where everything depends on what is broken.
-    whole : bool
-        Whether no element was left out, so that sums over the session are known.
-    forces : bool
-        Whether forces are known: no value of device and scene was left out.
+    It is ``whole`` where no element was left out, so that sums over the session are known; ``forces`` are known where
+    no value of device and scene was left out.
     """
 
     protocol: Protocol | None

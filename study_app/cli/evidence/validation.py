@@ -34,7 +34,6 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     there are too few studies to decide about a rate.
     """
     from study_app.analysis.planning.simulated_studies import plan
-    from study_app.evidence.report_rates.known_effects import simulated
     from study_app.evidence.report_rates.simulation import Rate, markdown, table, validate
     from study_app.protocol.load import load
     from study_app.session.simulated.rehearsal import condition_features
@@ -51,7 +50,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
         with progress() as show, executor_for(workers) as executor:
             show("rehearsing every condition")
             protocol = load("rek2024")
-            studied = simulated(protocol, plan(protocol, condition_features(protocol, seed=seed)))
+            studied = plan(protocol, condition_features(protocol, seed=seed))
             begun = time.monotonic()
             for done, so_far in validate(studied, studies, executor, seed=seed, progress=say):
                 rates = so_far

@@ -6,15 +6,13 @@ first, and delays of the lower half equal the shortest; a full one has all effec
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias, get_args
 
 import numpy as np
 
-from study_app.analysis.data.blocks import Block, Decided, Setting
+from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.measures import Array
 from study_app.analysis.planning.simulated_studies import Opinions, Plan, people
-from study_app.protocol.model import Protocol
 
 Generator: TypeAlias = Literal["answer model", "ordinal probit"]
 Extent: TypeAlias = Literal["empty", "partial", "full"]
@@ -32,37 +30,6 @@ TRUTH: Final = 4000
 """The true differences of means are those of so many simulated people."""
 
 
-@dataclass(frozen=True)
-class Simulated:
-    """The simulated design: the blocks as in the report, and the plan for the answer model."""
-
-    plan: Plan
-    blocks: tuple[Block, ...]
-
-    @property
-    def decided(self) -> Decided:
-        """What the protocol decided about the analysis."""
-        return self.plan.decided
-
-
-def simulated(protocol: Protocol, plan: Plan) -> Simulated:
-    """Return what is simulated of a protocol."""
-    return Simulated(plan, tuple(_block(protocol, place, plan) for place in range(len(plan.blocks))))
-
-
-def _block(protocol: Protocol, place: int, plan: Plan) -> Block:
-    planned = plan.blocks[place]
-    conditions = list(protocol.blocks[planned.id].conditions)
-    if planned.kind == "delays":
-        conditions.sort(key=lambda name: protocol.conditions[name].delay_ms)
-    settings = tuple(
-        Setting(f"S{number}", name, " + ".join(one.liquid_ids), one.delay_ms, one.label)
-        for number, name in enumerate(conditions, start=1)
-        for one in (protocol.conditions[name],)
-    )
-    return Block(planned.id, planned.title, planned.kind, settings, planned.items, tuple("1234567"), None)
-
-
 def alike(block: Block, extent: Extent) -> Mapping[int, int]:
     """Return which settings (places) are equal in truth to which earlier one."""
     k = len(block.settings)
@@ -74,11 +41,11 @@ def alike(block: Block, extent: Extent) -> Mapping[int, int]:
 
 
 def answers(
-    simulation: Simulated, generator: Generator, extent: Extent, participants: int, seed: int, study: int
+    simulation: Plan, generator: Generator, extent: Extent, participants: int, seed: int, study: int
 ) -> tuple[Array, ...]:
     """Return the answers (participants, settings, items) of one simulated study, block by block."""
     if generator == "answer model":
-        thought = people(simulation.plan, participants, seed, study)
+        thought = people(simulation, participants, seed, study)
         return tuple(_opined(block, one, extent) for block, one in zip(simulation.blocks, thought, strict=True))
     rng = np.random.default_rng([seed, study])
     leaning, slope = LEANING * rng.normal(size=participants), 1 + SLOPE * rng.normal(size=participants)
@@ -96,7 +63,7 @@ def _opined(block: Block, opinions: Opinions, extent: Extent) -> Array:
 
 
 def _probit(
-    simulation: Simulated, block: Block, extent: Extent, leaning: Array, slope: Array, rng: np.random.Generator
+    simulation: Plan, block: Block, extent: Extent, leaning: Array, slope: Array, rng: np.random.Generator
 ) -> Array:
     effects = _effects(simulation, block)
     for place, other in alike(block, extent).items():
@@ -105,7 +72,7 @@ def _probit(
     return np.add(np.searchsorted(LEVELS, latent), 1, dtype=np.float64)
 
 
-def _effects(simulation: Simulated, block: Block) -> Array:
+def _effects(simulation: Plan, block: Block) -> Array:
     """Return the latent effect of each setting on each item (settings, items)."""
     k, items = len(block.settings), len(block.items)
     if block.kind == "delays":
@@ -122,7 +89,7 @@ def _effects(simulation: Simulated, block: Block) -> Array:
     return np.asarray(found)
 
 
-def true_differences(simulation: Simulated, generator: Generator, extent: Extent) -> tuple[Array, ...]:
+def true_differences(simulation: Plan, generator: Generator, extent: Extent) -> tuple[Array, ...]:
     """Return the true differences of mean answers to the first setting (settings, items), block by block."""
     found = []
     for block, given in zip(simulation.blocks, answers(simulation, generator, extent, TRUTH, 0, 0), strict=True):

@@ -28,6 +28,7 @@ from study_app.analysis.findings.finding import FOUND
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, OverAll, Pairs, SettingsDiffer, over_all
 from study_app.analysis.planning.power_curves import interval
+from study_app.analysis.planning.simulated_studies import Plan
 from study_app.analysis.report.sections import answers as answered
 from study_app.analysis.results import BlockFound, Failures, Results
 from study_app.analysis.statistics.equivalence import participants_needed, tost
@@ -37,7 +38,6 @@ from study_app.evidence.report_rates.known_effects import (
     GENERATORS,
     Extent,
     Generator,
-    Simulated,
     alike,
     answers,
     true_differences,
@@ -166,14 +166,12 @@ class Cell:
         return f"{self.generator}, {self.extent}"
 
 
-def truth(simulation: Simulated, cell: Cell) -> Truth:
+def truth(simulation: Plan, cell: Cell) -> Truth:
     """Return the true effects in the studies of a cell, which do not depend on their size."""
     return true_differences(simulation, cell.generator, cell.extent)
 
 
-def count_studies(
-    simulation: Simulated, cell: Cell, truth: Truth, seed: int, batch: int, studies: int
-) -> tuple[Rate, ...]:
+def count_studies(simulation: Plan, cell: Cell, truth: Truth, seed: int, batch: int, studies: int) -> tuple[Rate, ...]:
     """Return the rates of so many studies of a cell, those of batch number ``batch``."""
     events: dict[Event, int] = {}
     for study in range(batch * BATCH, batch * BATCH + studies):
@@ -184,7 +182,7 @@ def count_studies(
     )
 
 
-def _study(simulation: Simulated, cell: Cell, truth: Truth, seed: int, study: int) -> dict[Event, bool]:
+def _study(simulation: Plan, cell: Cell, truth: Truth, seed: int, study: int) -> dict[Event, bool]:
     failures = Failures()
     given = answers(simulation, cell.generator, cell.extent, cell.participants, seed, study)
     people = tuple(f"P{number:03d}" for number in range(cell.participants))
@@ -402,7 +400,7 @@ def cells(sizes: Sequence[int] = SIZES) -> tuple[Cell, ...]:
 
 
 def validate(
-    simulation: Simulated,
+    simulation: Plan,
     studies: int,
     executor: Executor,
     *,
@@ -440,7 +438,7 @@ def validate(
                 progress(f"continued: {rate}")
 
 
-def cell_counts(simulation: Simulated, sizes: Sequence[int]) -> Mapping[Key, Count]:
+def cell_counts(simulation: Plan, sizes: Sequence[int]) -> Mapping[Key, Count]:
     """Return how the rates of every cell are counted."""
     every = cells(sizes)
     kinds = {(cell.generator, cell.extent): cell for cell in every}

@@ -8,9 +8,9 @@ from study_app.analysis.findings.delays import ContrastsWithControl, DetectionTh
 from study_app.analysis.findings.other_assumptions import SameWithOtherAssumptions
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer
-from study_app.analysis.planning.simulated_studies import plan
+from study_app.analysis.planning.simulated_studies import Plan, plan
 from study_app.evidence.report_rates import known_effects as studies
-from study_app.evidence.report_rates.known_effects import EXTENTS, GENERATORS, Generator, Simulated, answers, simulated
+from study_app.evidence.report_rates.known_effects import EXTENTS, GENERATORS, Generator, answers
 from study_app.evidence.report_rates.simulation import (
     CLAIMED,
     LOST,
@@ -27,7 +27,7 @@ from study_app.protocol.simulated import TrialFeatures
 
 
 @pytest.fixture(scope="module")
-def rek() -> Simulated:
+def rek() -> Plan:
     """The thesis' study as if each liquid had its own force, without any rehearsal."""
     protocol = load("rek2024")
     force_n = {"water": 0.3, "honey": 1.2, "light_oil": 0.6}
@@ -38,10 +38,10 @@ def rek() -> Simulated:
         for block in protocol.main_blocks
         for name in block.conditions
     }
-    return simulated(protocol, plan(protocol, felt))
+    return plan(protocol, felt)
 
 
-def test_each_generator_answers_in_its_own_way(rek: Simulated) -> None:
+def test_each_generator_answers_in_its_own_way(rek: Plan) -> None:
     one, other = (answers(rek, generator, "full", 20, 3, 1) for generator in GENERATORS)
     assert all((first != second).any() for first, second in zip(one, other, strict=True))
 
@@ -49,7 +49,7 @@ def test_each_generator_answers_in_its_own_way(rek: Simulated) -> None:
 @pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("participants", [5, 15])
-def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Simulated, participants: int) -> None:
+def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Plan, participants: int) -> None:
     people = tuple(f"P{number}" for number in range(participants))
     for extent in EXTENTS:
         given = answers(rek, "ordinal probit", extent, participants, 5, 2)
@@ -77,7 +77,7 @@ def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Simulated, partic
 
 @pytest.mark.slow
 @pytest.mark.parametrize("generator", GENERATORS)
-def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_kind_of_study_is_counted(rek: Plan, generator: Generator, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(studies, "TRUTH", 200)
     cells = [Cell(generator, extent, 5) for extent in EXTENTS]
     rates = [rate for cell in cells for rate in count_studies(rek, cell, truth(rek, cell), 1, 0, 2)]

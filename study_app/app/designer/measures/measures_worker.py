@@ -57,18 +57,9 @@ class Grouping:
 
 @dataclass(frozen=True, slots=True)
 class Detecting:
-    """Ask for `Detectable`.
+    """Ask for `Detectable` of a block.
 
-    Attributes
-    ----------
-    depends : str
-        What of the study the answer depends on: two questions that agree in it have one answer.
-    block : str
-        The block.
-    participants : int
-        Of each study.
-    protocol : Protocol
-        The study.
+    Two questions that agree in ``depends``, what of the study the answer depends on, have one answer.
     """
 
     depends: str
