@@ -12,7 +12,8 @@ from study_app.authoring.writer.refused import Refused
 from study_app.cli import commands, main
 from study_app.cli.devices import _ask_operator
 from study_app.errors import OutletError, ProtocolError, StudyError
-from study_app.evidence.accuracy import liquid_survey
+from study_app.evidence.accuracy import survey
+from study_app.evidence.table import Evidence
 from study_app.store.workstation import DEFAULTS, load
 from tests.compiled import needs_servo
 
@@ -143,16 +144,10 @@ def test_bad_input_is_one_short_line_and_nothing_is_written(
 
 
 def test_a_survey_of_liquids_is_written_into_a_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    written: list[tuple[Any, ...]] = []
-
-    def write(*what: Any) -> Path:
-        written.append(what)
-        return tmp_path / "survey.md"
-
-    monkeypatch.setattr(liquid_survey, "survey", lambda _scenes, _show: ("compared",))
-    monkeypatch.setattr(liquid_survey, "write_survey", write)
+    monkeypatch.setattr(survey, "survey", lambda _scenes, _show: ("compared",))
+    monkeypatch.setattr(survey, "evidence", lambda found: Evidence("", {"survey.md": found[0]}))
     done = CliRunner().invoke(commands, ["accuracy", "--liquids", "--to", str(tmp_path)])
-    assert (done.exit_code, written) == (0, [(("compared",), tmp_path)]), done.output
+    assert (done.exit_code, (tmp_path / "survey.md").read_text()) == (0, "compared"), done.output
     assert done.stdout.strip() == str(tmp_path / "survey.md")
 
 

@@ -13,10 +13,11 @@ import pytest
 from matplotlib.figure import Figure
 
 from study_app.evidence.accuracy import accuracy_report, candidates, survey
-from study_app.evidence.outlets import outlet_report
+from study_app.evidence.outlets import streams, triggers
 from study_app.evidence.report_rates import simulation
 from study_app.evidence.soak import soak
 from study_app.evidence.stability import delivered_force, force_delay, stability_report, velocity, withheld_force
+from study_app.evidence.table import Evidence
 from study_app.evidence.thresholds import noticed_delays, planted
 from study_app.evidence.timing import delays, device_lateness, report
 from study_app.evidence.timing.delays import Shown
@@ -33,11 +34,11 @@ def shown(rng: np.random.Generator) -> tuple[Any, ...]:
     return tuple(filled(Shown, rng, screen=screen, load=load, delay_s=late) for screen, load, late in places)
 
 
-def rung(rng: np.random.Generator) -> Any:
-    """Return what a report reads of a rung."""
-    family = filled(typing.get_type_hints(candidates.Rung)["family"], rng)
+def candidate(rng: np.random.Generator) -> Any:
+    """Return what a report reads of a candidate."""
+    family = filled(typing.get_type_hints(candidates.Candidate)["family"], rng)
     name, rate = filled(str, rng), float(rng.choice([250, 1000]))
-    return namedtuple("Rung", "name label family rate_hz counted")(name, name[:4], family, rate, bool(rate < 500))
+    return namedtuple("Candidate", "name label family rate_hz counted")(name, name[:4], family, rate, bool(rate < 500))
 
 
 FAULTS = sys.modules[soak.FaultyDevice.__module__].FAULTS
@@ -66,7 +67,8 @@ def soaked(to: Path) -> tuple[Path, ...]:
 
 GIVEN: dict[str, Any] = {
     "acted": lambda rng: tuple(rng.choice([0.0, 0.03, 0.4], len(stability_report.LIMITER_NAMES)).tolist()),
-    "shown": shown, "rung": rung, "truths": (), "studies": 400, "hits": lambda rng: int(rng.choice([0, 12, 24, 390])),
+    "shown": shown, "candidate": candidate, "truths": (), "studies": 400,
+    "hits": lambda rng: int(rng.choice([0, 12, 24, 390])),
     "delay": lambda rng: int(rng.integers(1, 4)),
     "device": lambda rng: str(rng.choice(list(delivered_force.DEVICES))),
     "strokes": lambda rng: tuple(rng.choice([0.0, 0.03, 0.2], len(withheld_force.STROKES)).tolist()),
@@ -74,25 +76,26 @@ GIVEN: dict[str, Any] = {
     "reasons": lambda rng: tuple(rng.choice(["not finite", "swing"], int(rng.integers(0, 3)), replace=False)),
 }  # fmt: skip
 QUICK = {
-    "timing_report-text": report.text, "delay_report-text": delays.text, "device_lateness-text": device_lateness.text,
-    "outlet_report-stream_text": outlet_report.stream_text, "outlet_report-trigger_text": outlet_report.trigger_text,
-    "verdicts-markdown": planted.markdown, "verdicts-table": planted.table,
-    "noticed_delays-markdown": noticed_delays.markdown,
-    "rates-markdown": simulation.markdown, "rates-table": simulation.table,
+    "timing_report-text": report.evidence, "delay_report-text": delays.evidence,
+    "device_lateness-text": device_lateness.evidence, "outlet_report-stream_text": streams.evidence,
+    "outlet_report-trigger_text": triggers.evidence,
+    "verdicts-write": planted.evidence,
+    "noticed_delays-markdown": noticed_delays.evidence,
+    "rates-write": simulation.evidence,
     "stability_report-group_table": stability_report.group_table,
     "stability_report-in_words": stability_report.in_words, "stability_report-summary": stability_report.summary,
-    "force_delay-report": force_delay.report, "criteria-report": velocity.report,
-    "withheld_force-report": withheld_force.report, "delivered_force-report": delivered_force.report,
+    "force_delay-report": force_delay.evidence, "criteria-report": velocity.evidence,
+    "withheld_force-report": withheld_force.evidence, "delivered_force-report": delivered_force.evidence,
 }  # fmt: skip
 SLOW = {
-    "timing_report-write": report.write, "delay_report-write": delays.write,
-    "accuracy_report-write": accuracy_report.write, "liquid_survey-survey_markdown": survey.survey_markdown,
+    "timing_report-write": report.evidence, "delay_report-write": delays.evidence,
+    "accuracy_report-write": accuracy_report.evidence, "liquid_survey-survey_markdown": survey.evidence,
     "test_reports_of_results-soaked": soaked,
 }  # fmt: skip
 REPORTS = (*QUICK.items(), *(pytest.param(*one, marks=pytest.mark.slow) for one in SLOW.items()))
 
 
-def lines_of(make: Callable[..., Any], seed: int, folder: Path) -> Iterator[str]:
+def lines_of(make: Callable[..., Any], seed: int, folder: Path, *, files: bool) -> Iterator[str]:
     """Yield what a function returns or writes of results."""
     rng = np.random.default_rng(seed)
     hints = typing.get_type_hints(make)
@@ -100,6 +103,8 @@ def lines_of(make: Callable[..., Any], seed: int, folder: Path) -> Iterator[str]
         folder if kind is Path else filled(kind, rng, **GIVEN) for name, kind in hints.items() if name != "return"
     ]
     made = make(*written)
+    if isinstance(made, Evidence):
+        made = made.write(folder) if files else made.text
     if not isinstance(made, tuple):
         yield made.decode() if isinstance(made, bytes) else str(made)
         return
@@ -114,6 +119,7 @@ def test_reports_of_results(
     name: str, make: Callable[..., Any], tmp_path: Path, pytestconfig: pytest.Config, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(Figure, "savefig", lambda figure, to, **_: to.write(stub_png(figure)))
+    files = name.endswith("write")
     seeds = 1 if make is soaked else 2 if name.endswith("write") else 4
-    found = [line for seed in range(seeds) for line in (f"##### {seed}", *lines_of(make, seed, tmp_path))]
+    found = [line for seed in range(seeds) for line in (f"##### {seed}", *lines_of(make, seed, tmp_path, files=files))]
     compare(GOLDEN / f"{name}.txt", found, pytestconfig, mask=CHANGING)

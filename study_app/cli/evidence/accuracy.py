@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from study_app.cli.evidence import present
 from study_app.cli.options import Target, echo_files, exclude_each_other, executor_for, prepare, progress, takes_workers
 from study_app.workers.executors import Workers
 
@@ -47,8 +48,7 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
         exclude_each_other(liquids=every, path=None if path == DEFAULT_PATH else path)
         _survey(scene, to)
         return
-    from study_app.evidence.accuracy.accuracy_report import markdown
-    from study_app.evidence.accuracy.accuracy_report import write as write_all
+    from study_app.evidence.accuracy.accuracy_report import evidence
     from study_app.evidence.accuracy.comparison import accuracy as measure
 
     numerical, physical, notes = _subjects(scene, liquid)
@@ -60,15 +60,12 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
     named = "stirring" if path == DEFAULT_PATH else path
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
         found = measure(numerical, physical, motion, named=named, notes=notes, progress=show)
-    if to is None:
-        click.echo(markdown(found), nl=False)
-        return
-    echo_files(write_all(found, to))
+    present(evidence(found), to, with_text=False)
 
 
 def _survey(file: str | None, to: Path | None) -> None:
     """Print or write the error of the force of every liquid of a file."""
-    from study_app.evidence.accuracy.survey import survey, survey_markdown, write_survey
+    from study_app.evidence.accuracy.survey import evidence, survey
     from study_app.protocol.load import load_scenes
 
     prepare(to)
@@ -76,7 +73,7 @@ def _survey(file: str | None, to: Path | None) -> None:
         found = survey(load_scenes(file or REAL), show)
     if not found:
         raise click.UsageError(f"{file}: no liquid has a viscosity, so there is no physical reference to compare with")
-    click.echo(survey_markdown(found) if to is None else write_survey(found, to))
+    present(evidence(found), to, with_text=False)
 
 
 def _subjects(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scene | None, tuple[str, ...]]:
@@ -142,9 +139,7 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
     A ball of 68 mm starts, moves at constant speed and stops abruptly, at 0.2 and 0.6 m/s. Fitting takes about a
     minute. Further motions, such as oscillations and a reversal, are used by --refit.
     """
-    from study_app.evidence.cfd.fits import fit_all, fits_markdown, steady_markdown, write
-    from study_app.evidence.cfd.law_fit import refit as refit_all
-    from study_app.evidence.cfd.law_fit import refit_markdown, write_refit
+    from study_app.evidence.cfd import fits, law_fit
     from study_app.evidence.cfd.solver import solve as solve_all
     from study_app.evidence.cfd.stored_flows import held_out, steady, stored, training
 
@@ -162,21 +157,19 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
                 solved = solve_all(to, executor, show)
         source = to if solve else None
         tables, drag = stored(source), steady(source)
-        found = refit_all((*tables, *training(source)), held_out(source), show) if refit else None
-        fits = fit_all(tables, show) if found is None else ()
+        if refit:
+            found = law_fit.evidence(law_fit.refit((*tables, *training(source)), held_out(source), show))
+        else:
+            found = fits.evidence(tables, drag, fits.fit_all(tables, show))
     echo_files(solved)
-    if to is None:
-        click.echo(f"{steady_markdown(drag)}\n\n{fits_markdown(fits)}" if found is None else refit_markdown(found))
-    else:
-        echo_files(write(tables, drag, fits, to) if found is None else write_refit(found, to))
+    present(found, to, with_text=False)
 
 
 def _materials(to: Path | None, workers: Workers, *, solve: bool) -> None:
     """Print or write the law's error in Herschel–Bulkley liquids, with the stored table or a new one."""
-    from study_app.evidence.cfd.yield_flow import materials_markdown, solve_materials, stored_materials, write_materials
+    from study_app.evidence.cfd.yield_flow import evidence, solve_materials, stored_materials
 
     if solve and to is not None:
         with progress(lambda text: click.echo(text, err=True)) as show, executor_for(workers) as executor:
             click.echo(solve_materials(to, executor, show))
-    columns = stored_materials(to if solve else None)
-    click.echo(materials_markdown(columns) if to is None else write_materials(columns, to))
+    present(evidence(stored_materials(to if solve else None)), to, with_text=False)

@@ -3,12 +3,29 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from study_app.cli.options import Target, end_if, exclude_each_other, executor_for, prepare, progress, takes_workers
+from study_app.cli.evidence import present
+from study_app.cli.options import (
+    ShowProgress,
+    Target,
+    echo_files,
+    end_if,
+    exclude_each_other,
+    executor_for,
+    prepare,
+    progress,
+    takes_workers,
+)
 from study_app.errors import StudyError
 from study_app.workers.executors import Workers
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from study_app.evidence.table import Evidence
 
 
 @click.command()
@@ -68,8 +85,8 @@ def stability(
     from study_app.evidence.stability.fidelity import fidelities
     from study_app.evidence.stability.stability_cases import parse
 
-    instead = {"withheld": withheld, "delivered": delivered, "velocity": velocity, "delayed": delayed}
-    exclude_each_other(to=to, case=line, table=table, **instead, estimation=estimated, only=only)
+    parts = {"withheld": withheld, "delivered": delivered, "velocity": velocity, "estimation": estimated}
+    exclude_each_other(to=to, case=line, table=table, delayed=delayed, only=only, **parts)
     prepare(to)
     if line is not None:
         case = parse(line)
@@ -80,18 +97,21 @@ def stability(
         return
     if table is not None:
         with progress() as show, executor_for(workers) as executor:
-            found.write_limits(table, executor, lambda done, of: show(f"{done} of {of} limits", done / of))
-        click.echo(table)
-        return
-    if withheld or delivered or velocity or estimated is not None:
-        _print_one(workers, withheld=withheld, delivered=delivered, velocity=velocity, estimated=estimated or 0)
+            limits = found.limits(executor, lambda done, of: show(f"{done} of {of} limits", done / of), table.name)
+        present(limits, table.parent)
         return
     if delayed is not None:
         from study_app.evidence.stability import force_delay
 
         with progress() as show:
-            shares = force_delay.write(delayed, lambda done, of: show(f"{done} of {of} delays", done / of))
-        click.echo(f"{force_delay.report(shares)}\n{delayed}")
+            entries = force_delay.measure(progress=lambda done: show(f"{done} delays"))
+        present(force_delay.evidence(entries, delayed.name), delayed.parent)
+        return
+    if any(parts.values()):
+        part = next(name for name, chosen in parts.items() if chosen)
+        with progress() as show, executor_for(workers) as executor:
+            measured = _measure(part, estimated or 0, executor, show)
+        present(measured, None)
         return
     chosen = groups(seed, cases) if only is None else tuple(it for it in groups(seed, cases) if only in it.name)
     if not chosen:
@@ -106,38 +126,29 @@ def stability(
         )
         show("comparing forces")
         compared = fidelities(executor=executor) if only is None else ()
-    click.echo(found.summary(swept, compared) if only is None else found.group_table(swept))
+    shown = found.evidence(swept, compared)
+    click.echo(shown.text, nl=False)
     if to is not None:
-        click.echo("\n" + "\n".join(str(file) for file in found.write(to, swept, compared)))
+        click.echo()
+        echo_files(shown.write(to))
     if swept.unstable:
         click.echo("\nunstable with safety on; repeat one with --case:", err=True)
         click.echo("\n".join(str(verdict.case) for verdict in swept.unstable), err=True)
     end_if(swept.unstable)
 
 
-def _print_one(workers: Workers, *, withheld: bool, delivered: bool, velocity: bool, estimated: int) -> None:
-    """Print one measurement of its own; end with 3 if a goal is not met, or a loop became unstable."""
-    from study_app.evidence.stability import applied_estimates, delivered_force, withheld_force
-    from study_app.evidence.stability import velocity as criteria
+def _measure(part: str, estimated: int, executor: Executor, show: ShowProgress) -> Evidence:
+    """Return the evidence of one measurement of its own."""
+    from study_app.evidence.stability import applied_estimates, delivered_force, velocity, withheld_force
+    from study_app.evidence.table import run
 
-    if velocity:
-        with progress() as show:
-            rows = criteria.measure(lambda what: show(f"measuring {what}"))
-        click.echo(criteria.report(rows))
-        end_if(not all(row.met for row in rows))
-        return
-    with progress() as show, executor_for(workers) as executor:
-        if estimated:
-            show("applying estimates in closed loops")
-            verdicts = applied_estimates.judge_all(applied_estimates.applied_cases(estimated), executor)
-            text, missed = applied_estimates.report(verdicts), any(it.harmed for it in verdicts)
-        elif withheld:
-            show("measuring the force withheld")
-            shares = withheld_force.measure(executor=executor)
-            text, missed = withheld_force.report(shares), not all(share.met for share in shares)
-        else:
-            show("measuring the force delivered")
-            errors = delivered_force.measure(executor=executor)
-            text, missed = delivered_force.report(errors), not all(it.met for it in errors)
-    click.echo(text)
-    end_if(missed)
+    if part == "velocity":
+        return velocity.evidence(velocity.measure(lambda what: show(f"measuring {what}")))
+    if part == "estimation":
+        show("applying estimates in closed loops")
+        cases = [(one,) for one in applied_estimates.applied_cases(estimated)]
+        return applied_estimates.evidence(run(applied_estimates.judge_applied, cases, executor))
+    show(f"measuring the force {part}")
+    if part == "withheld":
+        return withheld_force.evidence(withheld_force.measure(executor=executor))
+    return delivered_force.evidence(delivered_force.measure(executor=executor))

@@ -6,15 +6,16 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import click
 
+from study_app.cli.evidence import present
 from study_app.cli.options import ShowProgress, Target, echo_files, end_if, exclude_each_other, prepare, progress
 from study_app.errors import DisplayError, StudyError
 
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
     from study_app.app.windows_load import WindowsThread
     from study_app.evidence.computer import LoadName
 
-Result: TypeAlias = tuple[str, str, bool]
-"""A text, the name of its file, and whether a limit is missed."""
 MOST_COMPARED_S = 300.0
 LOAD = click.Choice(("none", "gui", "gui+cpu"))
 
@@ -76,100 +75,61 @@ def timing(
 
     With --triggers a byte is sent to a port for each event, and its delay is measured.
     """
-    exclude_each_other(delays=of_delays, devices=of_devices, lsl=lsl, triggers=triggers)
-    outlets = lsl or triggers is not None
-    for options, chosen in (("lsl and --triggers", outlets), ("devices", of_devices), ("delays", of_delays)):
-        if chosen and spin_us is not None:
-            raise StudyError(f"--spin applies to the servo's loops: omit it with --{options}")
-    if outlets:
-        check_seconds(seconds)
-    if of_delays:
-        time_delays(seconds, load, to)
-    elif of_devices:
-        measured(partial(compare_devices, seconds), load, to)
-    elif lsl:
-        from study_app.evidence.outlets.localhost import localhost_only
+    from study_app.evidence.computer import under_load
+    from study_app.evidence.table import Evidence, check_seconds
 
-        localhost_only()
-        measured(partial(measure_streams, seconds), load, to)
-    elif triggers is not None:
-        measured(partial(measure_triggers, triggers, seconds), load, to)
+    others = {"delays": of_delays, "devices": of_devices, "lsl": lsl, "triggers": triggers}
+    exclude_each_other(**others)
+    other = next((name for name, given in others.items() if given), "")
+    if other and spin_us is not None:
+        raise StudyError(f"--spin applies to the servo's loops: omit it with --{other}")
+    if other in {"lsl", "triggers"}:
+        check_seconds(seconds, "outlets are measured")
+    if other == "delays":
+        _choose_display()
+    prepare(to)
+
+    def measured(ending: threading.Event, show: ShowProgress) -> Evidence:
+        if other == "devices":
+            from study_app.evidence.timing import device_lateness as devices
+
+            names = devices.emulated_devices()
+            return devices.evidence(devices.time_devices(seconds, names, ending=ending, progress=show))
+        if other == "lsl":
+            from study_app.evidence.outlets import streams
+            from study_app.evidence.outlets.localhost import localhost_only
+
+            localhost_only()
+            found = streams.stream(seconds, ending=ending, progress=show)
+            compared = streams.compare(min(seconds, MOST_COMPARED_S), ending=ending, progress=show)
+            return streams.evidence(found, compared)
+        from study_app.evidence.outlets import triggers as ports
+
+        return ports.evidence(ports.measure(triggers or "", seconds, ending=ending, progress=show))
+
+    if other == "delays":
+        from study_app.app.delay_session import delays
+        from study_app.evidence.timing.delays import evidence
+
+        with progress(partial(click.echo, err=True)) as show:
+            found = evidence(delays(seconds, load, progress=show))
     else:
-        from study_app.evidence.timing.measurement import timing as time_loops
-        from study_app.evidence.timing.report import text, write
-
-        prepare(to)
+        windows = windows_thread(load) if load != "none" or not other else None
         with ending_by_signal() as (ending, _), progress(partial(click.echo, err=True)) as show:
-            found = time_loops(seconds, load, windows_thread(load), spin_us=spin_us, ending=ending, progress=show)
-        click.echo(text(found), nl=False)
-        echo_files(write(found, to) if to is not None else ())
+            if other:
+                found = under_load(load, windows, partial(measured, ending, show))
+            else:
+                from study_app.evidence.timing import measurement, report
+
+                timed = measurement.timing(seconds, load, windows, spin_us=spin_us, ending=ending, progress=show)
+                found = report.evidence(timed)
+    present(found, to)
 
 
-def time_delays(seconds: float, load: LoadName, to: Path | None) -> None:
-    """Print how well delays are kept; without a display, on none."""
-    from study_app.evidence.timing.delays import text, write
-
+def _choose_display() -> None:
+    """Without a display, show on none."""
     if sys.platform == "linux" and not any(map(os.environ.get, ("QT_QPA_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY"))):
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
-    prepare(to)
-    from study_app.app.delay_session import delays
-
-    with progress(partial(click.echo, err=True)) as show:
-        found = delays(seconds, load, progress=show)
-    click.echo(text(found), nl=False)
-    echo_files(write(found, to) if to is not None else ())
-
-
-def measured(measure: Callable[[threading.Event, ShowProgress], Result], load: LoadName, to: Path | None) -> None:
-    """Print and keep what is measured under load, until Ctrl+C; end with 3 where a limit is missed."""
-    from study_app.evidence.computer import under_load
-    from study_app.store.atomic import write_file
-
-    prepare(to)
-    windows = windows_thread(load) if load != "none" else None
-    with ending_by_signal() as (ending, _), progress(partial(click.echo, err=True)) as show:
-        text, name, missed = under_load(load, windows, lambda: measure(ending, show))
-    click.echo(text, nl=False)
-    if to is not None:
-        write_file(to / name, text.encode())
-        click.echo(to / name)
-    end_if(missed)
-
-
-def compare_devices(seconds: float, ending: threading.Event, show: ShowProgress) -> Result:
-    """Return how late ticks begin with each emulated device."""
-    from study_app.evidence.timing.device_lateness import emulated_devices, text, time_devices
-
-    found = time_devices(seconds, emulated_devices(), ending=ending, progress=show)
-    return text(found), "devices.txt", any(one.missed for one in found)
-
-
-def measure_streams(seconds: float, ending: threading.Event, show: ShowProgress) -> Result:
-    """Return what another process receives, and what that costs the servo."""
-    from study_app.evidence.outlets.outlet_report import stream_text
-    from study_app.evidence.outlets.streams import compare, stream
-
-    found = stream(seconds, ending=ending, progress=show)
-    ratios = compare(min(seconds, MOST_COMPARED_S), ending=ending, progress=show)
-    missed = not found.met or any(one.percentile == 50 and one.verdict == "missed" for one in ratios)
-    return stream_text(found, ratios), "streams.txt", missed
-
-
-def measure_triggers(port: str, seconds: float, ending: threading.Event, show: ShowProgress) -> Result:
-    """Return how long events take to their bytes on a port."""
-    from study_app.evidence.outlets.outlet_report import trigger_text
-    from study_app.evidence.outlets.trigger_delays import measure
-
-    found = measure(port, seconds, ending=ending, progress=show)
-    return trigger_text(found), "triggers.txt", bool(found.wrong)
-
-
-def check_seconds(seconds: float) -> None:
-    """Refuse seconds out of range."""
-    from study_app.evidence.timing.measurement import LEAST_S, MOST_S
-
-    if not LEAST_S <= seconds <= MOST_S:
-        raise StudyError(f"outlets are measured for {LEAST_S:g} to {MOST_S:g} s, not {seconds:g}")
 
 
 def windows_thread(load: LoadName) -> WindowsThread | None:

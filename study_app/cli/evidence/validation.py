@@ -2,11 +2,13 @@
 
 import os
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import click
 
-from study_app.cli.options import Target, echo_files, end_if, executor_for, prepare, progress, takes_workers
+from study_app.cli.evidence import present
+from study_app.cli.options import Target, end_if, executor_for, prepare, progress, takes_workers
 from study_app.workers.executors import Workers
 
 EXIT_UNDECIDED = 4
@@ -34,10 +36,9 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     there are too few studies to decide about a rate.
     """
     from study_app.analysis.planning.simulated_studies import plan
-    from study_app.evidence.report_rates.simulation import Rate, markdown, table, validate
+    from study_app.evidence.report_rates.simulation import Rate, evidence, validate
     from study_app.protocol.load import load
     from study_app.session.simulated.rehearsal import condition_features
-    from study_app.store.output_files import write_files
 
     prepare(to)
     rates: tuple[Rate, ...] = ()
@@ -57,10 +58,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
                 show(f"{done} studies")
     except KeyboardInterrupt:
         click.echo("ended early", err=True)
-    words = f"{done} studies in {time.monotonic() - begun:.0f} s\n\n{markdown(rates)}"
-    click.echo(words, nl=False)
-    if to is not None:
-        echo_files(write_files(to, {"rates.md": words.encode(), "rates.csv": table(rates)}))
+    present(evidence(rates, f"{done} studies in {time.monotonic() - begun:.0f} s"), to)
     beyond, undecided = (sum(one.holds == verdict for one in rates) for verdict in ("no", "too few studies"))
     limited = sum(one.holds != "counted" for one in rates)
     verdict = "every rate is within its limit"
@@ -97,9 +95,8 @@ def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, 
     with exit code 3 if a value exceeds its limit.
     """
     from study_app.evidence.thresholds.many_studies import NAMES, PEOPLE, judged, methods_alone, plant, rehearsed
-    from study_app.evidence.thresholds.planted import Verdict, markdown, table
+    from study_app.evidence.thresholds.planted import Verdict, evidence
     from study_app.protocol.load import load, source_bytes
-    from study_app.store.output_files import write_files
 
     try:
         chosen = [(source_bytes(name), plant(Path(name).stem, load(name))) for name in files or NAMES]
@@ -120,10 +117,8 @@ def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, 
             judgements += [*of_methods, *judged(one, rehearsal.result(), spread)]
     used_s = sum(os.times()[:4])  # with the workers', which have ended
     took = f"{time.monotonic() - begun:.0f} s, {used_s:.0f} s of processor time"
-    words = f"{studies} studies of each protocol, seed {seed}, in {took}\n\n{markdown(judgements)}"
-    click.echo(words, nl=False)
-    if to is not None:
-        echo_files(write_files(to, {"thresholds.md": words.encode(), "thresholds.csv": table(judgements)}))
+    found = evidence(judgements, f"{studies} studies of each protocol, seed {seed}, in {took}")
+    present(replace(found, missed=False), to)
     beyond = sum(not one.holds for one in judgements)
     click.echo(
         f"{beyond} of {len(judgements)} values exceed their limits" if beyond else "every value is within its limit"
@@ -140,11 +135,9 @@ def delay_thresholds(people: int, seed: int, to: Path | None) -> None:
 
     The forced choice does not depend on a person's criterion; the rating does.
     """
-    from study_app.evidence.thresholds.noticed_delays import compare, markdown, write
+    from study_app.evidence.thresholds.noticed_delays import compare, evidence
 
     with progress() as show:
         show("simulating people")
         found = compare(people, seed)
-    click.echo(markdown(found), nl=False)
-    if to is not None:
-        echo_files(write(found, to))
+    present(evidence(found), to)

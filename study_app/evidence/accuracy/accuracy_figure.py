@@ -93,7 +93,7 @@ class _Panel:
         rows = found.of(kind)
         self._points = worst(rows)
         self._rows = rows
-        self._front = [self._points[rung] for rung in front(self._points)]
+        self._front = [self._points[candidate] for candidate in front(self._points)]
         self._solved = [it.computing_s * 1e6 for it in found.truths if it.computing_s]
         self._numerical = kind == "numerical"
         self._strip = [row for row in self._points.values() if row.error.rms < ROUNDED]
@@ -166,7 +166,7 @@ class _Panel:
         axes.annotate("1 ms", (BUDGET_NS, axes.get_ylim()[1]), (2, 0), va="top", **offset)
         for row in shown:
             self._point(axes, row)
-            least = min(100 * it.error.rms for it in self._rows if it.rung is row.rung)
+            least = min(100 * it.error.rms for it in self._rows if it.candidate is row.candidate)
             axes.plot([row.ns_per_ms] * 2, [least, 100 * row.error.rms], color=style.TEXT_SOFT, linewidth=0.6, zorder=3)
         self._label(axes, shown)
         if self._solved and not self._numerical:
@@ -186,7 +186,7 @@ class _Panel:
             self._point(axes, row)
             weight = "bold" if row.chosen else "normal"
             at = (row.ns_per_ms, 100 * row.error.rms)
-            axes.annotate(row.rung.label, at, fontsize=SMALL, fontweight=weight, **self._beside(row))
+            axes.annotate(row.candidate.label, at, fontsize=SMALL, fontweight=weight, **self._beside(row))
         for it, edge in ((main, 0.0), (axes, 1.0)):
             slash: dict[str, Any] = {"transform": it.transAxes, "color": style.AXIS, "clip_on": False, "linewidth": 0.6}
             it.plot([-0.012, 0.012], [edge - 0.01, edge + 0.01], **slash)
@@ -202,7 +202,7 @@ class _Panel:
         return {"xytext": (4 if side == "right" else 0, 4), "textcoords": "offset points", "ha": side, "va": "bottom"}
 
     def _point(self, axes: Axes, row: Row) -> None:
-        look = LOOKS[row.rung.family]
+        look = LOOKS[row.candidate.family]
         at = (row.ns_per_ms, 100 * row.error.rms)
         if row.chosen:
             axes.scatter(*at, s=74, marker="o", facecolor="none", edgecolor=style.TEXT, linewidth=1.1, zorder=5)
@@ -211,10 +211,10 @@ class _Panel:
     def _label(self, axes: Axes, shown: Sequence[Row]) -> None:
         """Name the points: those of lower rates next to them, the others in a column, joined by hairlines."""
         low, high = np.log(axes.get_ylim())
-        near = [row for row in shown if row.rung.family == "rate"]
+        near = [row for row in shown if row.candidate.family == "rate"]
         for row in near:
             at = (row.ns_per_ms, 100 * row.error.rms)
-            axes.annotate(row.rung.label, at, (5, 0), textcoords="offset points", va="center", fontsize=SMALL)
+            axes.annotate(row.candidate.label, at, (5, 0), textcoords="offset points", va="center", fontsize=SMALL)
         place_pt = {row: (np.log(_height(row)) - low) / (high - low) * PANEL_PT for row in shown if row not in near}
         listed = sorted(place_pt, key=lambda row: place_pt[row] + SLANT_PT * np.log10(row.ns_per_ms))
         wanted = [place_pt[row] for row in listed]
@@ -222,7 +222,7 @@ class _Panel:
         for row, label_pt in zip(listed, spread(wanted, LABEL_PT, PANEL_PT), strict=True):
             height = float(np.exp(low + label_pt / PANEL_PT * (high - low)))
             axes.annotate(
-                row.rung.label,
+                row.candidate.label,
                 (row.ns_per_ms, _height(row)),
                 (column_ns, height),
                 va="center",

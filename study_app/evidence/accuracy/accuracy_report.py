@@ -2,14 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Final
 
 from study_app.evidence.accuracy.accuracy_figure import draw
 from study_app.evidence.accuracy.comparison import Accuracy, Row
-from study_app.figure_style import PLOT_SETTINGS, file_bytes
-from study_app.store.atomic import write_file
-from study_app.store.tables.csv_files import csv_text_of
+from study_app.evidence.table import Evidence, Table, plot_files
 
 COLUMNS: Final = (
     "kind", "liquid", "truth", "model", "median_ns", "p99_ns", "ns_per_ms", "rms_error_n", "max_error_n",
@@ -22,45 +19,26 @@ def _values(row: Row) -> tuple[str | float, ...]:
     ticks_per_s = 1e9 / row.time.median_ns
     error = row.error
     return (
-        *(row.kind, row.liquid, row.truth, row.rung.name),
+        *(row.kind, row.liquid, row.truth, row.candidate.name),
         *(row.time.median_ns, row.time.p99_ns, row.ns_per_ms),
         *(error.rms_n, error.most_n, 100 * error.rms, 100 * error.most, error.direction_deg, 100 * error.target),
-        *(row.memory_bytes, row.rung.rate_hz, ticks_per_s, ticks_per_s / row.rung.rate_hz, row.time.batches),
+        *(row.memory_bytes, row.candidate.rate_hz, ticks_per_s, ticks_per_s / row.candidate.rate_hz, row.time.batches),
         *(int(row.on_front), int(row.chosen)),
     )
 
 
-def csv_text(found: Accuracy) -> str:
-    """Return the table as CSV, with the columns `COLUMNS`."""
-    rows = ([f"{it:.6g}" if isinstance(it, float) else it for it in _values(row)] for row in found.rows)
-    return csv_text_of([COLUMNS, *rows])
-
-
-def write(found: Accuracy, to: Path) -> tuple[Path, ...]:
-    """Write table (CSV, Markdown) and figure (PNG, SVG) into the folder ``to``; return the files.
-
-    Raises
-    ------
-    StoreError
-        A file cannot be written.
-    """
-    figure = draw(found)
-    files = {"csv": csv_text(found).encode(), "md": markdown(found).encode()}
-    files |= {kind: file_bytes(figure, kind, "What accuracy costs in time", PLOT_SETTINGS) for kind in ("png", "svg")}
-    for kind, content in files.items():
-        write_file(to / f"accuracy.{kind}", content)
-    return tuple(to / f"accuracy.{kind}" for kind in files)
-
-
-def markdown(found: Accuracy) -> str:
-    """Return the tables as Markdown, with the source of each reference."""
+def evidence(found: Accuracy) -> Evidence:
+    """Return the tables, as Markdown with the source of each reference and as CSV, and the figure."""
     parts = [f"Machine: {found.machine}.", f"Motion: {found.motion}.", _WHAT]
     parts += [f"**{truth.name}**: {truth.source}." for truth in found.truths]
     parts += [f"Note: {note}." for note in found.notes]
     for truth in found.truths:
         rows = [row for row in found.rows if row.truth == truth.name]
         parts.append(f"## Against the {truth.name} ({rows[0].kind}), {rows[0].liquid}\n\n" + _markdown_table(rows))
-    return "\n\n".join(parts) + "\n"
+    text = "\n\n".join(parts) + "\n"
+    cells = [[f"{it:.6g}" if isinstance(it, float) else it for it in _values(row)] for row in found.rows]
+    files = {"accuracy.csv": Table(COLUMNS, cells).csv(), "accuracy.md": text}
+    return Evidence(text, files, plot_files("accuracy", "What accuracy costs in time", draw, found))
 
 
 _WHAT: Final = (
@@ -86,14 +64,14 @@ def _markdown_table(rows: Sequence[Row]) -> str:
         table.append(
             (
                 mark,
-                row.rung.name.replace("C_d", "C<sub>d</sub>"),
+                row.candidate.name.replace("C_d", "C<sub>d</sub>"),
                 _count(row.time.median_ns),
                 _count(row.time.p99_ns),
                 *(_digits(it) for it in (error.rms_n, error.most_n, 100 * error.rms, 100 * error.most)),
                 _digits(error.direction_deg),
                 _digits(row.memory_bytes / 1e3),
                 _count(ticks_per_s),
-                _count(ticks_per_s / row.rung.rate_hz),
+                _count(ticks_per_s / row.candidate.rate_hz),
             )
         )
     return "\n".join(f"| {' | '.join(cells)} |" for cells in table)

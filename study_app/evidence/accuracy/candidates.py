@@ -1,26 +1,16 @@
-"""The wake as a list that is processed entirely at every tick, the naive implementation: compiled, numpy, Python.
+"""Candidates: models and methods to compute a force from a motion, each measured for error and time.
 
-They are alternatives to ``haptics.kernels.effects.wake`` whose computation time grows with the length of the
-list. Each keeps the elements in a ring and answers two questions a tick: `wake` and, after the force, `follow`.
-
-The candidates: methods to compute a force from a motion, each measured for error and time.
-
-A rung takes ticks, one after another: `Rung.forces` takes a whole motion at once, `Rung.begin` and `Rung.take` let the
-ticks be timed in batches. Compiled rungs all run the servo's own tick, door and safety included, so that what differs
-between their times is the model alone.
-
-The candidates to compare: from the most to the least expensive, and from the most accurate to the cheapest.
+All run the servo's own tick, sample validation and safety layer included, so that what differs between their times is
+the model alone. The wake as a list, which is processed entirely at every tick, is the naive implementation: its
+computation time grows with its length.
 """
 
 import math
-import sys
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final, Literal, TypeAlias
 
 import numpy as np
 
-from study_app.evidence.reference_model import lowered
 from study_app.evidence.reference_solutions import COUNT_M, Truth
 from study_app.evidence.scene_variants import _only, with_effects, with_wake
 from study_app.evidence.unsteady_law import unsteady_n
@@ -30,7 +20,7 @@ from study_app.haptics.kernels.effects.wake import REST_MPS, response
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.kernels.tick import tick
 from study_app.haptics.kernels.vector import norm, subtract
-from study_app.haptics.model.effects.drag import REFERENCE, resistance_n
+from study_app.haptics.model.effects.drag import REFERENCE
 from study_app.haptics.model.estimators.given import CODE as GIVEN
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.laws.drag_laws import Law
@@ -130,148 +120,14 @@ def list_follow(
         tail.stored_at_m[axis] = place_m[axis]
 
 
-class NumpyTail:
-    """The list as numpy arrays, newest first; every tick moves all of it on by one."""
-
-    def __init__(self, wake: Record) -> None:
-        rows = int(wake.length)
-        self._constants = wake
-        self._element, self._arc, self._segment = np.zeros((rows, 3)), np.zeros(rows), np.full(rows, -1)
-        self._held = self._current = 0
-        self._arc_m = 0.0
-        self._stored_at_m: Floats | None = None
-
-    @property
-    def memory_bytes(self) -> int:
-        """Size of the arrays."""
-        return self._element.nbytes + self._arc.nbytes + self._segment.nbytes
-
-    def wake(self) -> Floats:
-        """Return v_wake (3,)."""
-        moving = self._segment >= 0
-        if not moving.any():
-            return np.zeros(3)
-        element, segment = self._element[moving], self._segment[moving]
-        speed = np.sqrt((element**2).sum(axis=1))
-        starts = np.flatnonzero(np.diff(segment, prepend=-1))
-        directions = element[starts] / speed[starts, np.newaxis]
-        tail = np.add.reduceat(speed, starts) @ directions / float(self._constants.scaling)
-        fill = float(np.sqrt(tail @ tail)) * float(speed.sum()) / float((speed**2).sum())
-        felt: Floats = tail * (_response(fill, float(self._constants.exponent)) if fill > 0 else 0.0)
-        return felt
-
-    def follow(self, h: Floats, place_m: Floats, interval_s: float) -> None:
-        """Take one tick in."""
-        constants = self._constants
-        self._element *= math.exp(constants.log_decay_per_s * interval_s)
-        h = h * np.array([1.0, constants.vertical, 1.0])
-        speed = float(np.sqrt(h @ h))
-        self._arc_m += speed * interval_s
-        rests = speed < REST_MPS
-        if not rests and self._stored_at_m is not None:
-            way_m = place_m - self._stored_at_m
-            if float(np.sqrt(way_m @ way_m)) < constants.resolution_m:
-                return
-        if not rests and self._breaks(h, speed):
-            self._current += 1
-        for rows in (self._element, self._arc, self._segment):
-            rows[1:] = rows[:-1].copy()
-        self._element[0], self._arc[0], self._segment[0] = h, self._arc_m, -1 if rests else self._current
-        self._stored_at_m = place_m
-
-    def _breaks(self, h: Floats, speed: float) -> bool:
-        same = np.flatnonzero(self._segment == self._current)
-        if len(same) == 0:
-            return True
-        far = same[self._arc_m - self._arc[same] >= self._constants.breaking_span_m]
-        reference = self._element[far[0] if len(far) else same[-1]]
-        least = (self._constants.breaking_cosine - 1e-12) * speed * math.sqrt(reference @ reference)
-        return bool(h @ reference < least)
-
-
-class PlainTail:
-    """The list as a list of tuples (x, y, z, arc, segment), newest first: no library at all."""
-
-    def __init__(self, wake: Record) -> None:
-        self._length, self._scaling, self._exponent = int(wake.length), float(wake.scaling), float(wake.exponent)
-        self._cosine, self._span_m = float(wake.breaking_cosine) - 1e-12, float(wake.breaking_span_m)
-        self._log_decay, self._resolution_m = float(wake.log_decay_per_s), float(wake.resolution_m)
-        self._vertical = float(wake.vertical)
-        self._tail: list[tuple[float, float, float, float, int]] = []
-        self._current, self._arc_m = 0, 0.0
-        self._stored_at_m: tuple[float, ...] | None = None
-
-    @property
-    def memory_bytes(self) -> int:
-        """Size of a full list: a row is a tuple of five, of which four are number objects."""
-        row = (0.0, 0.0, 0.0, 0.0, 0)
-        return sys.getsizeof([row] * self._length) + self._length * (sys.getsizeof(row) + 4 * sys.getsizeof(0.0))
-
-    def wake(self) -> tuple[float, float, float]:
-        """Return v_wake."""
-        tx = ty = tz = dx = dy = dz = summed = speeds = squares = 0.0
-        inside = -1
-        for x, y, z, _, segment in self._tail:
-            if segment < 0:
-                continue
-            speed = math.sqrt(x * x + y * y + z * z)
-            if segment != inside:
-                tx, ty, tz = tx + dx * summed, ty + dy * summed, tz + dz * summed
-                dx, dy, dz = x / speed, y / speed, z / speed
-                summed, inside = 0.0, segment
-            summed += speed
-            speeds += speed
-            squares += speed * speed
-        tx, ty, tz = tx + dx * summed, ty + dy * summed, tz + dz * summed
-        size = math.sqrt(tx * tx + ty * ty + tz * tz) / self._scaling
-        if size == 0.0:
-            return 0.0, 0.0, 0.0
-        gain = _response(size * speeds / squares, self._exponent) / self._scaling
-        return gain * tx, gain * ty, gain * tz
-
-    def follow(self, h: Floats, place_m: Floats, interval_s: float) -> None:
-        """Take one tick in."""
-        keep = math.exp(self._log_decay * interval_s)
-        self._tail = [(keep * x, keep * y, keep * z, arc, segment) for x, y, z, arc, segment in self._tail]
-        hx, hy, hz = float(h[0]), float(h[1]) * self._vertical, float(h[2])
-        at = tuple(place_m.tolist())
-        speed = math.sqrt(hx * hx + hy * hy + hz * hz)
-        self._arc_m += speed * interval_s
-        rests = speed < REST_MPS
-        if not rests and self._stored_at_m is not None and math.dist(at, self._stored_at_m) < self._resolution_m:
-            return
-        if not rests and self._breaks(hx, hy, hz, speed):
-            self._current += 1
-        self._tail.insert(0, (hx, hy, hz, self._arc_m, -1 if rests else self._current))
-        del self._tail[self._length :]
-        self._stored_at_m = at
-
-    def _breaks(self, hx: float, hy: float, hz: float, speed: float) -> bool:
-        reference = None
-        for element in self._tail:
-            if element[4] == self._current:
-                reference = element
-                if self._arc_m - element[3] >= self._span_m:
-                    break
-        if reference is None:
-            return True
-        x, y, z = reference[:3]
-        return hx * x + hy * y + hz * z < self._cosine * speed * math.sqrt(x * x + y * y + z * z)
-
-
-def _response(fill: float, exponent: float) -> float:
-    """Return the factor of the tail at a fill, by the definition."""
-    return float(fill ** (exponent - 1) if exponent >= 1 else (fill**2 + 0.05**2) ** ((exponent - 1) / 2))
-
-
 UNLIMITED: Final = DampingLimits(1e9, 1e9)
 """Forces are compared without slope limit, which the table lacks for the slowest candidates."""
 Family: TypeAlias = Literal["tick", "list", "rate", "estimator", "law", "effects"]
 
 
 @dataclass(eq=False)
-class Rung(ABC):
-    """One way to get the force: ``name`` on tables, ``label`` on figures, ``scene`` of one liquid, everywhere.
+class Candidate:
+    """A way to get the force, here by the servo's tick: ``name`` on tables, ``label`` on figures, of one liquid.
 
     ``every`` takes one tick where the motion has so many, and holds the force between; ``counted`` gives positions in
     whole counts of an encoder, in place of exact ones.
@@ -290,25 +146,40 @@ class Rung(ABC):
     def begin(self, motion: Motion) -> None:
         """Reset, and prepare for the ticks of a motion with velocities."""
         rows = slice(None, None, self.every)
-        self._t_ns = np.rint(motion.t_s[rows] * 1e9).astype(np.int64)
-        self._place_m = motion.position_m[rows]
-        self._velocity_mps = np.zeros_like(self._place_m)
-        if motion.velocity_mps is not None:
-            self._velocity_mps = np.ascontiguousarray(motion.velocity_mps[rows])
-        hand_m = (self._place_m - np.array(self.scene.origin_m)) / self.scene.scale
-        self._hand_m = np.rint(hand_m / COUNT_M) * COUNT_M if self.counted else hand_m
-        self.force_n = np.zeros_like(self._place_m)
-        self._begin()
+        places_m = motion.position_m[rows]
+        velocity_mps = np.zeros_like(places_m) if motion.velocity_mps is None else motion.velocity_mps[rows]
+        hand_m = (places_m - np.array(self.scene.origin_m)) / self.scene.scale
+        self._motion = (
+            np.rint(motion.t_s[rows] * 1e9).astype(np.int64),
+            np.rint(hand_m / COUNT_M) * COUNT_M if self.counted else hand_m,
+            np.ascontiguousarray(velocity_mps),
+        )
+        self.force_n = np.zeros_like(places_m)
+        self._model, self._safety, self._sample = _packed(self._run_scene), new_safety(), records(SAMPLE, 1)
+
+    @property
+    def _run_scene(self) -> Scene:
+        """The scene that the tick runs."""
+        return self.scene
 
     @property
     def ticks(self) -> int:
         """The number of ticks of the motion for this candidate."""
-        return len(self._t_ns)
+        return len(self.force_n)
 
     @property
     def rate_hz(self) -> float:
         """Ticks per second of the motion."""
         return self.scene.rate_hz
+
+    @property
+    def memory_bytes(self) -> int:
+        """The size of the model's state between ticks."""
+        return sum(rows.nbytes for rows in _packed(self._run_scene).arrays)
+
+    def take(self, start: int, stop: int) -> None:
+        """Run these ticks and set their rows of ``force_n``."""
+        _by_the_tick(self._model, self._safety[0], self._sample[0], self._motion, self.force_n, start, stop)
 
     def forces(self, motion: Motion) -> Floats:
         """Return the force at every row of the motion, (n, 3) [N]."""
@@ -320,127 +191,70 @@ class Rung(ABC):
         """Return the forces along the motions of a reference, each (n, 3) [N]."""
         return [self.forces(case.motion) for case in truth.cases]
 
-    @abstractmethod
-    def _begin(self) -> None:
-        """Allocate the memory of a run."""
 
-    @abstractmethod
-    def take(self, start: int, stop: int) -> None:
-        """Run these ticks and set their rows of ``force_n``."""
-
-    @property
-    @abstractmethod
-    def memory_bytes(self) -> int:
-        """The size of the model's state between ticks."""
-
-
-class TickRung(Rung):
-    """The program itself: the scene computed by the servo's tick."""
-
-    def _begin(self) -> None:
-        self._model, self._safety, self._sample = _packed(self.scene), new_safety(), records(SAMPLE, 1)
-
-    def take(self, start: int, stop: int) -> None:
-        """Take ticks, as `Rung.take`."""
-        motion = (self._t_ns, self._hand_m, self._velocity_mps)
-        _by_the_tick(self._model, self._safety[0], self._sample[0], motion, self.force_n, start, stop)
-
-    @property
-    def memory_bytes(self) -> int:
-        """Size of the model."""
-        return sum(rows.nbytes for rows in _packed(self.scene).arrays)
-
-
-class UnsteadyRung(TickRung):
+class UnsteadyDrag(Candidate):
     """Unsteady drag; against a solved motion of the fit, with constants that are fitted without that motion."""
 
     def forces_against(self, truth: Truth) -> list[Floats]:
-        """Return the forces, as `Rung.forces_against`; by the equations where a motion is left out of the fit."""
+        """Return the forces; by the equations where a motion is left out of the fit."""
         if truth.left_out is None:
             return super().forces_against(truth)
         found = []
         for case in truth.cases:
             self.begin(case.motion)
-            w, interval_s = self._velocity_mps, np.full(self.ticks, 1 / self.rate_hz)
+            w, interval_s = self._motion[2], np.full(self.ticks, 1 / self.rate_hz)
             dw = np.diff(w, axis=0, prepend=w[:1]) * self.rate_hz
             found.append(unsteady_n(self.scene, w, dw, interval_s, truth.left_out))
         return found
 
 
-class LinearRung(Rung):
+class LinearViscosity(Candidate):
     """Linear viscosity, F = −6πµR v: all that general libraries ship.
 
     HAPI's and H3D's ``HapticViscosity`` is this; CHAI3D's ``cEffectViscosity`` leaves the factor to the user.
     """
 
-    def _begin(self) -> None:
-        rest = self.scene.model_copy(update={"liquids": ()})
-        self._model, self._safety, self._sample = _packed(rest), new_safety(), records(SAMPLE, 1)
+    @property
+    def _run_scene(self) -> Scene:
+        return self.scene.model_copy(update={"liquids": ()})
 
     def take(self, start: int, stop: int) -> None:
-        """Take ticks, as `Rung.take`."""
-        viscosity_pa_s = self.scene.liquids[0].viscosity_pa_s or math.nan
-        damping_nspm = 3 * math.pi * viscosity_pa_s * self.scene.body.diameter_m
-        motion = (self._t_ns, self._hand_m, self._velocity_mps)
-        _by_damping(self._model, self._safety[0], self._sample[0], motion, damping_nspm, self.force_n, start, stop)
-
-    @property
-    def memory_bytes(self) -> int:
-        """Size of a model without liquids."""
-        return sum(rows.nbytes for rows in _packed(self.scene.model_copy(update={"liquids": ()})).arrays)
+        """Run these ticks and set their rows of ``force_n``."""
+        damping_nspm = 3 * math.pi * (self.scene.liquids[0].viscosity_pa_s or math.nan) * self.scene.body.diameter_m
+        _by_damping(
+            self._model, self._safety[0], self._sample[0], self._motion, damping_nspm, self.force_n, start, stop
+        )
 
 
 @dataclass(eq=False)
-class ListRung(Rung):
-    """The wake as a compiled list, float64 or float32."""
+class WakeList(Candidate):
+    """The wake as a list, float64 or float32."""
 
     precision: type[np.floating[Any]] = np.float64
 
-    def _begin(self) -> None:
-        rest = self.scene.model_copy(update={"liquids": ()})
-        self._model, self._safety, self._sample = _packed(rest), new_safety(), records(SAMPLE, 1)
+    def begin(self, motion: Motion) -> None:
+        """Reset, and prepare for the ticks of a motion with velocities."""
+        super().begin(motion)
         self._liquid = _packed(self.scene).liquids[0]
-        self._list = new_list(int(self._liquid.wake.length), self.precision)
+        self._list = self._new_list()
+
+    @property
+    def _run_scene(self) -> Scene:
+        return self.scene.model_copy(update={"liquids": ()})
+
+    def _new_list(self) -> tuple[Any, Any, Any, Any]:
+        return new_list(int(_packed(self.scene).liquids[0].wake.length), self.precision)
+
+    @property
+    def memory_bytes(self) -> int:
+        """The size of the list."""
+        return sum(rows.nbytes for rows in self._new_list())
 
     def take(self, start: int, stop: int) -> None:
-        """Take ticks, as `Rung.take`."""
-        motion = (self._t_ns, self._hand_m, self._velocity_mps)
+        """Run these ticks and set their rows of ``force_n``."""
         tail, element, arc, segment = self._list
-        tick = (self._model, self._safety[0], self._sample[0], motion)
+        tick = (self._model, self._safety[0], self._sample[0], self._motion)
         _by_the_list(tick, self._liquid, (tail[0], element, arc, segment), self.force_n, start, stop)
-
-    @property
-    def memory_bytes(self) -> int:
-        """Size of the list."""
-        return sum(rows.nbytes for rows in new_list(int(_packed(self.scene).liquids[0].wake.length), self.precision))
-
-
-@dataclass(eq=False)
-class InterpretedRung(Rung):
-    """The wake as a list without the compiler, with numpy or in plain Python; no sample validation, no safety layer."""
-
-    tail: type[NumpyTail] | type[PlainTail] = PlainTail
-
-    def _begin(self) -> None:
-        self._tail = self.tail(_packed(self.scene).liquids[0].wake)
-
-    def take(self, start: int, stop: int) -> None:
-        """Take ticks, as `Rung.take`."""
-        liquid = self.scene.liquids[0]
-        period_s = 1 / self.scene.rate_hz
-        for k in range(start, stop):
-            v = lowered(self._velocity_mps[k], self.scene.knee)
-            w = v - np.array(self._tail.wake())
-            speed = float(np.sqrt(w @ w))
-            if speed > 0:
-                self.force_n[k] = -resistance_n(self.scene, liquid, speed, liquid.drag.law) / speed * w
-            interval_s = (self._t_ns[k] - self._t_ns[k - 1]) * 1e-9 if k > 0 else period_s
-            self._tail.follow(v, self._place_m[k], interval_s)
-
-    @property
-    def memory_bytes(self) -> int:
-        """Size of the list."""
-        return self.tail(_packed(self.scene).liquids[0].wake).memory_bytes
 
 
 def _packed(scene: Scene) -> Model:
@@ -532,48 +346,46 @@ def drag_and_wake(scene: Scene) -> Scene:
     return _only(scene, liquid.model_copy(update={"effects": effects}))
 
 
-def numerical(scene: Scene) -> tuple[tuple[Rung, ...], Rung]:
+def numerical(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
     """Return implementations of one definition, or of parts of it; and the one used in the program.
 
     ``scene`` is of one liquid, by `drag_and_wake`. What is about the wake is left out where there is none.
     """
     exact = given(scene)
     name = "O(1) wake" if _has_wake(scene) else "drag"
-    program = TickRung(name, name, "tick", exact)
-    rungs: list[Rung] = [program]
+    program = Candidate(name, name, "tick", exact)
+    candidates: list[Candidate] = [program]
     if _has_wake(scene):
-        rungs += _lists(exact)
+        candidates += _lists(exact)
     for every in SLOWER:
         if scene.rate_hz / every >= LEAST_RATE_HZ:
             slower = exact.model_copy(update={"rate_hz": scene.rate_hz / every})
             hertz = f"{slower.rate_hz:g} Hz"
-            rungs.append(TickRung(f"{program.name}, {hertz}", hertz, "rate", slower, every=every))
+            candidates.append(Candidate(f"{program.name}, {hertz}", hertz, "rate", slower, every=every))
     for estimator in _estimators(scene):
         name = f"{program.name}, velocity by {estimator.kind} from encoder counts"
         noisy = scene.model_copy(update={"velocity": estimator})
-        rungs.append(TickRung(name, f"velocity: {estimator.kind}", "estimator", noisy, counted=True))
-    return tuple(rungs), program
+        candidates.append(Candidate(name, f"velocity: {estimator.kind}", "estimator", noisy, counted=True))
+    return tuple(candidates), program
 
 
-def _lists(exact: Scene) -> list[Rung]:
+def _lists(exact: Scene) -> list[Candidate]:
     """Return alternatives to the wake: lists, shorter or coarser ones, none."""
     length = exact.liquids[0].wake.length
     half, quarter = max(1, length // 2), max(1, length // 4)
-    rungs: list[Rung] = [
-        ListRung("O(N) compiled", "O(N) compiled", "list", exact),
-        ListRung("O(N) compiled, float32", "O(N) float32", "list", exact, precision=np.float32),
-        InterpretedRung("O(N) numpy", "numpy", "list", exact, tail=NumpyTail),
-        InterpretedRung("O(N) plain Python", "Python", "list", exact, tail=PlainTail),
-        ListRung("O(N) compiled, tail N/2", "O(N), N/2", "list", with_wake(exact, length=half)),
-        ListRung("O(N) compiled, tail N/4", "O(N), N/4", "list", with_wake(exact, length=quarter)),
-        TickRung("O(1) wake, tail N/4", "tail N/4", "tick", with_wake(exact, length=quarter)),
+    candidates: list[Candidate] = [
+        WakeList("O(N) compiled", "O(N) compiled", "list", exact),
+        WakeList("O(N) compiled, float32", "O(N) float32", "list", exact, precision=np.float32),
+        WakeList("O(N) compiled, tail N/2", "O(N), N/2", "list", with_wake(exact, length=half)),
+        WakeList("O(N) compiled, tail N/4", "O(N), N/4", "list", with_wake(exact, length=quarter)),
+        Candidate("O(1) wake, tail N/4", "tail N/4", "tick", with_wake(exact, length=quarter)),
     ]
     for step_m in RESOLUTIONS_M:
         step = f"{1e3 * step_m:g} mm"
         coarse = with_wake(exact, resolution_m=step_m)
-        rungs.append(TickRung(f"O(1) wake, resolution {step}", f"resolution {step}", "tick", coarse))
-    rungs.append(TickRung("drag alone", "drag alone", "tick", with_effects(exact, "drag")))
-    return rungs
+        candidates.append(Candidate(f"O(1) wake, resolution {step}", f"resolution {step}", "tick", coarse))
+    candidates.append(Candidate("drag alone", "drag alone", "tick", with_effects(exact, "drag")))
+    return candidates
 
 
 def _estimators(scene: Scene) -> tuple[Estimator, ...]:
@@ -583,35 +395,38 @@ def _estimators(scene: Scene) -> tuple[Estimator, ...]:
     return tuple(own if not isinstance(own, Given) and own.kind == it.kind else it for it in kinds)
 
 
-def physical(scene: Scene) -> tuple[tuple[Rung, ...], Rung]:
+def physical(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
     """Return models of a liquid with a viscosity, in order of accuracy; and the one that the gate would choose."""
     exact = given(_only(scene, scene.liquids[0]))
-    rungs: list[Rung] = [LinearRung("linear viscosity", "linear viscosity", "law", exact)]
-    rungs += [
-        TickRung(_PLAIN[law], label, "law", with_effects(exact, "drag", law=law)) for law, label in _SHORT.items()
+    candidates: list[Candidate] = [LinearViscosity("linear viscosity", "linear viscosity", "law", exact)]
+    candidates += [
+        Candidate(_PLAIN[law], label, "law", with_effects(exact, "drag", law=law)) for law, label in _SHORT.items()
     ]
     carried: tuple[Effect, ...] = ()
     for effect in ("added_mass", "history"):
         carried = (*carried, effect)
-        rungs.append(_carrying(exact, REFERENCE, carried))
-    rungs.append(UnsteadyRung("unsteady drag", "unsteady drag", "effects", with_effects(exact, "unsteady_drag")))
+        candidates.append(_carrying(exact, REFERENCE, carried))
+    candidates.append(UnsteadyDrag("unsteady drag", "unsteady drag", "effects", with_effects(exact, "unsteady_drag")))
     gated = resolve(_only(scene, scene.liquids[0].model_copy(update={"effects": "auto"}))).liquids[0]
     carried = tuple(it for it in _WORDS if it in gated.effects)
     if "unsteady_drag" in gated.effects:
-        return tuple(rungs), rungs[-1]
+        return tuple(candidates), candidates[-1]
     if "drag" not in gated.effects:
-        choice: Rung = TickRung("no resistance", "no resistance", "effects", with_effects(exact, *carried))
+        choice: Candidate = Candidate("no resistance", "no resistance", "effects", with_effects(exact, *carried))
     else:
         choice = _carrying(exact, gated.drag.law, carried)
-    same = next((rung for rung in rungs if type(rung) is TickRung and rung.scene == choice.scene), None)
-    return (tuple(rungs), same) if same is not None else ((*rungs, choice), choice)
+    same = next(
+        (candidate for candidate in candidates if type(candidate) is Candidate and candidate.scene == choice.scene),
+        None,
+    )
+    return (tuple(candidates), same) if same is not None else ((*candidates, choice), choice)
 
 
-def _carrying(exact: Scene, law: Law, carried: tuple[Effect, ...]) -> Rung:
+def _carrying(exact: Scene, law: Law, carried: tuple[Effect, ...]) -> Candidate:
     """Return drag with added mass and history as applicable."""
     words = [_WORDS[it] for it in carried]
     of = with_effects(exact, "drag", *carried, law=law)
-    return TickRung(" + ".join([_PLAIN[law], *words]), " + ".join([_INITIALS[law], *words]), "effects", of)
+    return Candidate(" + ".join([_PLAIN[law], *words]), " + ".join([_INITIALS[law], *words]), "effects", of)
 
 
 def _has_wake(scene: Scene) -> bool:

@@ -11,8 +11,8 @@ import numpy as np
 
 from study_app.errors import StudyError
 from study_app.evidence import reference_solutions as truths
-from study_app.evidence.accuracy import candidates
-from study_app.evidence.accuracy.candidates import Rung, given
+from study_app.evidence.accuracy import candidates as models
+from study_app.evidence.accuracy.candidates import Candidate, given
 from study_app.evidence.cfd.stored_flows import solver_truths
 from study_app.evidence.computer import machine
 from study_app.evidence.reference_solutions import ROUNDING, Error, Truth, error_of, with_velocity
@@ -55,7 +55,7 @@ class Row:
     kind: Kind
     liquid: str
     truth: str
-    rung: Rung
+    candidate: Candidate
     error: Error
     time: Time
     memory_bytes: int
@@ -65,7 +65,7 @@ class Row:
     @property
     def ns_per_ms(self) -> float:
         """Computation time per millisecond of motion [ns]: at 1 kHz, that of a tick."""
-        return self.time.median_ns * self.rung.rate_hz / 1000
+        return self.time.median_ns * self.candidate.rate_hz / 1000
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def accuracy(
 ) -> Accuracy:
     """Measure the candidates of one scene against its definition, and those of another against physics.
 
-    ``motion`` is at the scenes' rate; it is what the definition is followed along, and what all rungs are timed along.
+    ``motion`` is at the scenes' rate: the definition is followed along it, and all candidates are timed along it.
 
     Raises
     ------
@@ -108,29 +108,29 @@ def accuracy(
     if motion.velocity_mps is None:
         said.append("the motion brings no velocities: central differences of its places count as the true ones")
         motion = with_velocity(motion)
-    fewest = len(motion.t_s) // max(candidates.SLOWER)
-    if fewest < Rung.BATCH:
+    fewest = len(motion.t_s) // max(models.SLOWER)
+    if fewest < Candidate.BATCH:
         said.append(f"the motion is short: calls, of some µs, count in times of {fewest} ticks a batch, not 1,000")
     measured: list[Row] = []
     found: list[Truth] = []
     if numerical is not None:
-        scene = candidates.drag_and_wake(numerical)
-        rungs, choice = candidates.numerical(scene)
+        scene = models.drag_and_wake(numerical)
+        candidates, choice = models.numerical(scene)
         truth = truths.definition(given(scene), motion)
         if not truth.cases[0].force_n.any():
             raise StudyError(
                 f"along {named} {scene.liquids[0].id} exerts no force: there is no share of it to be wrong by"
             )
-        measured += _rows("numerical", scene, rungs, choice, (truth,), progress)
+        measured += _rows("numerical", scene, candidates, choice, (truth,), progress)
         found.append(truth)
     if physical is not None:
-        rungs, choice = candidates.physical(physical)
-        real = _physical_truths(rungs[0].scene, said)
-        measured += _rows("physical", physical, rungs, choice, real, progress)
+        candidates, choice = models.physical(physical)
+        real = _physical_truths(candidates[0].scene, said)
+        measured += _rows("physical", physical, candidates, choice, real, progress)
         found += real
     progress("timing")
-    times = race(tuple(dict.fromkeys(row.rung for row in measured)), motion, repeats, batches, allowance_s)
-    rows = tuple(replace(row, time=times[row.rung]) for row in measured)
+    times = race(tuple(dict.fromkeys(row.candidate for row in measured)), motion, repeats, batches, allowance_s)
+    rows = tuple(replace(row, time=times[row.candidate]) for row in measured)
     return Accuracy(_with_fronts(rows), tuple(found), tuple(said), machine(), named)
 
 
@@ -148,27 +148,29 @@ def _physical_truths(scene: Scene, notes: list[str]) -> tuple[Truth, ...]:
 def _rows(
     kind: Kind,
     scene: Scene,
-    rungs: Sequence[Rung],
-    choice: Rung,
+    candidates: Sequence[Candidate],
+    choice: Candidate,
     against: Sequence[Truth],
     progress: Callable[[str], None],
 ) -> list[Row]:
     unknown = Time(math.nan, math.nan, 0)
     rows = []
-    for rung in rungs:
-        progress(f"{kind}: {rung.name}")
+    for candidate in candidates:
+        progress(f"{kind}: {candidate.name}")
         for truth in against:
-            error = error_of(rung.forces_against(truth), truth)
-            chosen = rung is choice
-            rows.append(Row(kind, scene.liquids[0].id, truth.name, rung, error, unknown, rung.memory_bytes, chosen))
+            error = error_of(candidate.forces_against(truth), truth)
+            chosen = candidate is choice
+            rows.append(
+                Row(kind, scene.liquids[0].id, truth.name, candidate, error, unknown, candidate.memory_bytes, chosen)
+            )
     return rows
 
 
 class _Bench:
     """One candidate along the motion, repeatedly, with its memory filled before the timing."""
 
-    def __init__(self, rung: Rung, motion: Motion) -> None:
-        self._rung, self._motion, self._clock_ns = rung, motion, _clock()
+    def __init__(self, candidate: Candidate, motion: Motion) -> None:
+        self._candidate, self._motion, self._clock_ns = candidate, motion, _clock()
         self._begin()
         self.forget()
 
@@ -178,35 +180,37 @@ class _Bench:
         self.passed_s = 0.0
 
     def _begin(self) -> None:
-        self._rung.begin(self._motion)
-        liquid = self._rung.scene.liquids[0]
+        self._candidate.begin(self._motion)
+        liquid = self._candidate.scene.liquids[0]
         length = liquid.wake.length if liquid.wake is not None and "wake" in liquid.effects else 0
-        filled = min(round(length * self._rung.rate_hz / 1000), self._rung.ticks - self._size)
-        self._rung.take(0, filled)
+        filled = min(round(length * self._candidate.rate_hz / 1000), self._candidate.ticks - self._size)
+        self._candidate.take(0, filled)
         self._at = filled
 
     @property
     def _size(self) -> int:
-        return min(self._rung.BATCH, self._rung.ticks)
+        return min(self._candidate.BATCH, self._candidate.ticks)
 
     def batch(self) -> None:
         """Run one batch and store its time."""
-        if self._at + self._size > self._rung.ticks:
+        if self._at + self._size > self._candidate.ticks:
             self._begin()
         began_s, began = time.perf_counter(), self._clock_ns()
-        self._rung.take(self._at, self._at + self._size)
+        self._candidate.take(self._at, self._at + self._size)
         self.costs_ns.append((self._clock_ns() - began) / self._size)
         self.passed_s += time.perf_counter() - began_s
         self._at += self._size
 
 
-def race(rungs: Sequence[Rung], motion: Motion, repeats: int, batches: int, allowance_s: float) -> dict[Rung, Time]:
+def race(
+    candidates: Sequence[Candidate], motion: Motion, repeats: int, batches: int, allowance_s: float
+) -> dict[Candidate, Time]:
     """Return the times of all candidates, in alternating batches, so that slow phases of the machine affect all alike.
 
     What other programs take is not counted: it would strike a batch of 10 ms each time, and one of 100 µs hardly ever.
     """
-    benches = {rung: _Bench(rung, motion) for rung in rungs}
-    costs: dict[Rung, list[list[float]]] = {rung: [] for rung in rungs}
+    benches = {candidate: _Bench(candidate, motion) for candidate in candidates}
+    costs: dict[Candidate, list[list[float]]] = {candidate: [] for candidate in candidates}
     for _ in range(repeats):
         for bench in benches.values():
             bench.forget()
@@ -214,28 +218,28 @@ def race(rungs: Sequence[Rung], motion: Motion, repeats: int, batches: int, allo
             for bench in benches.values():
                 if bench.passed_s < allowance_s:
                     bench.batch()
-        for rung, bench in benches.items():
-            costs[rung].append(bench.costs_ns)
+        for candidate, bench in benches.items():
+            costs[candidate].append(bench.costs_ns)
     return {
-        rung: Time(
+        candidate: Time(
             statistics.median(statistics.median(one) for one in taken),
             statistics.median(float(np.percentile(one, 99)) for one in taken),
             sum(len(one) for one in taken),
         )
-        for rung, taken in costs.items()
+        for candidate, taken in costs.items()
     }
 
 
-def worst(rows: Sequence[Row]) -> dict[Rung, Row]:
+def worst(rows: Sequence[Row]) -> dict[Candidate, Row]:
     """Return each candidate's row against the reference with its greatest error."""
-    found: dict[Rung, Row] = {}
+    found: dict[Candidate, Row] = {}
     for row in rows:
-        if row.rung not in found or row.error.rms > found[row.rung].error.rms:
-            found[row.rung] = row
+        if row.candidate not in found or row.error.rms > found[row.candidate].error.rms:
+            found[row.candidate] = row
     return found
 
 
-def front(points: dict[Rung, Row]) -> tuple[Rung, ...]:
+def front(points: dict[Candidate, Row]) -> tuple[Candidate, ...]:
     """Return the Pareto-optimal candidates in time and error, cheapest first.
 
     Rounding errors count as equal, and so do times that differ by less than clocks and neighbours can tell.
@@ -250,10 +254,10 @@ def front(points: dict[Rung, Row]) -> tuple[Rung, ...]:
         return error(other) < error(row) and other.ns_per_ms <= row.ns_per_ms * ALIKE
 
     best = [row for row in points.values() if not any(beats(other, row) for other in points.values())]
-    return tuple(row.rung for row in sorted(best, key=lambda row: row.ns_per_ms))
+    return tuple(row.candidate for row in sorted(best, key=lambda row: row.ns_per_ms))
 
 
 def _with_fronts(rows: tuple[Row, ...]) -> tuple[Row, ...]:
     kinds = {kind: [row for row in rows if row.kind == kind] for kind in ("numerical", "physical")}
-    on_it = {rung for of in kinds.values() for rung in front(worst(of))}
-    return tuple(replace(row, on_front=row.rung in on_it) for row in rows)
+    on_it = {candidate for of in kinds.values() for candidate in front(worst(of))}
+    return tuple(replace(row, on_front=row.candidate in on_it) for row in rows)

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -13,9 +12,9 @@ from study_app.evidence.accuracy import candidates
 from study_app.evidence.cfd.stored_flows import held_out, solver_truths, stored, training
 from study_app.evidence.expected_error import Expected, expected
 from study_app.evidence.reference_solutions import error_of, measured_drag_n
+from study_app.evidence.table import Evidence
 from study_app.haptics.model.laws.drag_laws import LAWS, finite_reynolds
 from study_app.haptics.model.scene import Liquid, Scene
-from study_app.store.atomic import write_file
 
 NO_REFERENCE_REYNOLDS: Final = 1000.0
 """Greatest Reynolds number with a solution or measurement of an unsteady motion in this program."""
@@ -88,8 +87,8 @@ def survey(scenes: Mapping[str, Scene], progress: Callable[[str], None] = lambda
 
 
 def _surveyed(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) -> Surveyed:
-    rungs, model = candidates.physical(scene)
-    alone = rungs[0].scene
+    models, model = candidates.physical(scene)
+    alone = models[0].scene
 
     def share(truth: truths.Truth) -> float:
         return error_of(model.forces_against(truth), truth).rms
@@ -119,19 +118,7 @@ def spread(reynolds: float) -> float:
     return (max(ratios) - min(ratios)) * len(ratios) / sum(ratios)
 
 
-def write_survey(found: tuple[Surveyed, ...], to: Path) -> Path:
-    """Write the survey as Markdown into the folder ``to``; return the file.
-
-    Raises
-    ------
-    StoreError
-        The file cannot be written.
-    """
-    write_file(to / FILE, f"{survey_markdown(found)}\n".encode())
-    return to / FILE
-
-
-def survey_markdown(found: tuple[Surveyed, ...]) -> str:
+def evidence(found: tuple[Surveyed, ...]) -> Evidence:
     """Return liquids, and drag laws over the Reynolds number, as Markdown."""
     highest = max(it.case.reynolds for it in (*stored(), *training(), *held_out()))
     lines = [f"| {' | '.join(_HEADINGS)} |", f"|---|---:|---|{'---:|' * (len(_HEADINGS) - 3)}"]
@@ -158,7 +145,8 @@ def survey_markdown(found: tuple[Surveyed, ...]) -> str:
         drags = [law(reynolds) for law in (*PUBLISHED.values(), finite_reynolds)]
         values = " | ".join(f"{24 / reynolds * ratio:.3g}" for ratio in (*drags, _measured(reynolds)))
         lines.append(f"| {reynolds:,g} | {values} | {_percent(spread(reynolds))} |")
-    return "\n".join(lines)
+    text = "\n".join(lines) + "\n"
+    return Evidence(text, {FILE: text})
 
 
 _HEADINGS: Final = (

@@ -1,17 +1,12 @@
-"""Fits of models to the fluid solver's force on the ball: the best parameters and the remaining errors.
+"""Fits of models to the fluid solver's force on the ball, and the solver against published drag: tables and a figure.
 
 Every model is fitted to every motion by ``identify.fit``; what it found is then tried on the same liquid at the other
 speed, where nothing is fitted any more: a parameter of a liquid must not change with the hand.
-
-The forces of the solver and of models as a figure: one column of a page, readable in grey.
-
-The fluid solver against published drag and our laws, and models against the solver, as text tables and as CSV.
 """
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -23,7 +18,7 @@ from study_app import figure_style as style
 from study_app.evidence.cfd.solved_cases import RAMP, STOP, Case
 from study_app.evidence.cfd.stored_flows import Table
 from study_app.evidence.reference_solutions import measured_drag_n
-from study_app.figure_style import PLOT_SETTINGS, file_bytes
+from study_app.evidence.table import Evidence, plot_files
 from study_app.haptics.model.effects.local_wake import LocalWake
 from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.laws.drag_laws import LAWS
@@ -34,7 +29,6 @@ from study_app.haptics.runtime.offline import simulate
 from study_app.lab.identify.fit import fit
 from study_app.lab.identify.measured_force import along_a_line
 from study_app.lab.identify.parameters import find
-from study_app.store.atomic import write_file
 from study_app.store.tables.csv_files import csv_text_of
 
 RATE_HZ: Final = 1000.0
@@ -287,34 +281,21 @@ def fits_markdown(fits: Sequence[Fitted]) -> str:
     return "\n\n".join([*parts, "\\* at the edge of what a scene permits: the best value may lie beyond."])
 
 
-def fits_csv(fits: Sequence[Fitted]) -> bytes:
+def fits_csv(fits: Sequence[Fitted]) -> str:
     """Return the fits as CSV, named `COLUMNS`; parameters as ``name=value`` apart by blanks."""
     rows: list[Sequence[str]] = [COLUMNS]
     for it in fits:
         numbers = (it.rms_n, it.worst_n, it.share, it.within, it.push, it.carried)
         given = " ".join(f"{name}={value!r}" for name, value in it.values.items())
         rows.append([it.case.name, it.model.name, given, *(f"{number:.6g}" for number in numbers)])
-    return csv_text_of(rows).encode()
+    return csv_text_of(rows)
 
 
-def write(tables: Sequence[Table], drag: Table, fits: Sequence[Fitted], to: Path) -> tuple[Path, ...]:
-    """Write the fits as CSV, both tables as Markdown and the figure as PNG and SVG into a folder; return the files.
-
-    Raises
-    ------
-    StoreError
-        A file cannot be written.
-    """
-    figure = draw(tables, fits)
-    said = f"{steady_markdown(drag)}\n\n{fits_markdown(fits)}\n"
-    files = {FITS_FILE: fits_csv(fits), "cfd.md": said.encode()}
-    files |= {
-        f"cfd.{kind}": file_bytes(figure, kind, "Models against a fluid solver", PLOT_SETTINGS)
-        for kind in ("png", "svg")
-    }
-    for name, content in files.items():
-        write_file(to / name, content)
-    return tuple(to / name for name in files)
+def evidence(tables: Sequence[Table], drag: Table, fits: Sequence[Fitted]) -> Evidence:
+    """Return the fits as CSV, both tables as Markdown, and the figure."""
+    text = f"{steady_markdown(drag)}\n\n{fits_markdown(fits)}\n"
+    files = {FITS_FILE: fits_csv(fits), "cfd.md": text}
+    return Evidence(text, files, plot_files("cfd", "Models against a fluid solver", draw, tables, fits))
 
 
 def _row(it: Fitted) -> str:

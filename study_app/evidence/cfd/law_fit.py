@@ -7,7 +7,6 @@ then those of the flow, and no delay of a tick or of a velocity estimator is fit
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -16,9 +15,9 @@ from scipy.optimize import least_squares
 from study_app.errors import StudyError
 from study_app.evidence.cfd.fits import MODELS, judge
 from study_app.evidence.cfd.stored_flows import LEFT_OUT, LEFT_OUT_FILE, Table
+from study_app.evidence.table import Evidence
 from study_app.evidence.unsteady_law import CONSTANTS, Constants, late_mps
 from study_app.haptics.model.motion import Floats
-from study_app.store.atomic import write_file
 from study_app.store.tables.csv_files import csv_text_of
 
 STEP: Final = 0.005
@@ -144,23 +143,8 @@ def _fit(solved: Sequence[_Solved], begin: Constants) -> Constants:
     return Constants(*np.exp(found.x).tolist())
 
 
-def write_refit(found: Refit, to: Path) -> tuple[Path, ...]:
-    """Write constants and errors as Markdown, and the constants without each motion as CSV, into a folder.
-
-    Raises
-    ------
-    StoreError
-        A file cannot be written.
-    """
-    rows = [[it.table.case.name, *(f"{value:.6g}" for value in it.others)] for it in found.errors if it.fitted]
-    files = {LEFT_OUT_FILE: csv_text_of([LEFT_OUT, *rows]), "refit.md": f"{refit_markdown(found)}\n"}
-    for name, text in files.items():
-        write_file(to / name, text.encode())
-    return tuple(to / name for name in files)
-
-
-def refit_markdown(found: Refit) -> str:
-    """Return the constants and the errors as Markdown."""
+def evidence(found: Refit) -> Evidence:
+    """Return constants and errors as Markdown, and the constants without each motion as CSV."""
     lines = ["| constant | fitted | in the program |", "|---|---:|---:|"]
     lines += [
         f"| {name} | {fitted:.3g} | {own:g} |"
@@ -178,4 +162,6 @@ def refit_markdown(found: Refit) -> str:
         shares = " | ".join("held out" if one is None else f"{one[0]:.1%} ({one[1]:.1%})" for one in errors)
         case = it.table.case
         lines.append(f"| {case.title} | {case.liquid_id} | {case.reynolds:.3g} | {shares} |")
-    return "\n".join(lines)
+    text = "\n".join(lines) + "\n"
+    rows = [[it.table.case.name, *(f"{value:.6g}" for value in it.others)] for it in found.errors if it.fitted]
+    return Evidence(text, {LEFT_OUT_FILE: csv_text_of([LEFT_OUT, *rows]), "refit.md": text})

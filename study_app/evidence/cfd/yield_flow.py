@@ -10,7 +10,7 @@ Newtonian liquid with the viscosity K (U/D)^(n−1). The liquid is unbounded: it
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -22,6 +22,7 @@ from study_app.errors import StudyError
 from study_app.evidence.cfd.flow import ORDER, Flow, Grid, library
 from study_app.evidence.cfd.solver import made
 from study_app.evidence.cfd.stored_flows import package, read, text
+from study_app.evidence.table import Evidence
 from study_app.haptics.model.laws.rheology import HerschelBulkley, creeping_n
 from study_app.haptics.model.motion import Floats
 from study_app.store.atomic import write_file
@@ -161,7 +162,7 @@ def errors(columns: dict[str, Floats]) -> Floats:
     return found
 
 
-def materials_markdown(columns: dict[str, Floats]) -> str:
+def evidence(columns: dict[str, Floats]) -> Evidence:
     """Return the comparison as a table."""
     wrong = errors(columns)
     grid, smooth = (float(np.abs(columns[name] / columns["drag"] - 1).max()) for name in COLUMNS[3:])
@@ -170,30 +171,17 @@ def materials_markdown(columns: dict[str, Floats]) -> str:
         "",
         "| Bi | " + " | ".join(f"n {index:g}" for index in INDICES) + " |",
         "|---:|" + "---:|" * len(INDICES),
-        *_rows(columns, wrong),
+    ]
+    for bingham in BINGHAM:
+        here = columns["bingham"] == bingham
+        cells = [
+            f"{drag:.3f} ({100 * error:+.1f} %)" for drag, error in zip(columns["drag"][here], wrong[here], strict=True)
+        ]
+        lines.append(f"| {bingham:g} | " + " | ".join(cells) + " |")
+    lines += [
         "",
         f"The law errs by at most {np.abs(wrong).max():.1%} (permitted: {PERMITTED:.0%}). Edges twice as long change "
         f"the drag by at most {grid:.2%}, 3.3 times the ε by {smooth:.2%}.",
     ]
-    return "\n".join(lines)
-
-
-def write_materials(columns: dict[str, Floats], to: Path) -> Path:
-    """Write the comparison as Markdown into the folder ``to``; return the file.
-
-    Raises
-    ------
-    StoreError
-        The file cannot be written.
-    """
-    write_file(to / COMPARISON_FILE, f"{materials_markdown(columns)}\n".encode())
-    return to / COMPARISON_FILE
-
-
-def _rows(columns: dict[str, Floats], wrong: Floats) -> Iterable[str]:
-    for bingham in BINGHAM:
-        here = columns["bingham"] == bingham
-        cells = (
-            f"{drag:.3f} ({100 * error:+.1f} %)" for drag, error in zip(columns["drag"][here], wrong[here], strict=True)
-        )
-        yield f"| {bingham:g} | " + " | ".join(cells) + " |"
+    text = "\n".join(lines) + "\n"
+    return Evidence(text, {COMPARISON_FILE: text})

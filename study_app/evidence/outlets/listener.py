@@ -1,15 +1,18 @@
-"""A separate program (``python -m``) that receives both streams like a recorder.
+"""A separate program (``python -m``) that receives what goes to other programs, like a recorder.
 
-It prints "ready" once both streams are open, receives until its input ends, and then prints what it found as JSON: the
-samples (count, SHA-256 of their channels, longest gap between their times), and of each marker its text, its time on
-the servo's clock and the time of its arrival [ns].
+Without arguments it receives both streams of the Lab Streaming Layer until its input ends: the samples (count, SHA-256
+of their channels, longest gap between their times), and of each marker its text, its time on the servo's clock and the
+time of its arrival [ns]. With the number of a file descriptor it reads that until its other end is closed: each byte
+with the time on the servo's clock [ns]. It prints "ready" once it receives, and at the end what it found as JSON.
 """
 
 import hashlib
 import json
+import os
 import sys
 import threading
 import time
+from contextlib import suppress
 from typing import Any, Final
 
 import numpy as np
@@ -77,5 +80,19 @@ def listen() -> dict[str, Any]:
     }
 
 
+def read(file: int) -> list[tuple[int, int]]:
+    """Return the bytes that come, each with the time at which it was read [ns]."""
+    clock = SystemClock()
+    clock.now_ns()
+    sys.stdout.write("ready\n")
+    sys.stdout.flush()
+    found: list[tuple[int, int]] = []
+    with suppress(OSError):  # a virtual port whose other end is closed
+        while came := os.read(file, 64):
+            now_ns = clock.now_ns()
+            found += [(byte, now_ns) for byte in came]
+    return found
+
+
 if __name__ == "__main__":
-    json.dump(listen(), sys.stdout)
+    json.dump(read(int(sys.argv[1])) if len(sys.argv) > 1 else listen(), sys.stdout)

@@ -1,28 +1,24 @@
-"""The listener's process and what it received, and a stream of samples that is compared with that.
-
-Progress of a measurement that lasts so many seconds.
-
-Reception of a session's streams in another process: accuracy of the markers' times, and losses.
-
-The effect of outlets on the servo: its lateness with and without them, in alternating quarter seconds.
-"""
+"""Streams to another process: accuracy of the markers' times, losses, and the effect on the servo's lateness."""
 
 import hashlib
+import itertools
 import json
+import math
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from functools import partial
+from typing import Any, Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study_app.errors import WorkerError
-from study_app.evidence.timing.measurement import FULL, PERIOD_NS, TICK_S, PlayedHand, ServoLoop, granted
+from study_app.evidence.table import TURN_S, Evidence, paced, take_turns
+from study_app.evidence.timing.measurement import FULL, PERIOD_NS, PlayedHand, ServoLoop, granted
 from study_app.haptics.runtime.servo import Servo
 from study_app.outlets.markers import Marker, SinkThread, marker_of
 from study_app.outlets.session_outlets import open_sink
@@ -31,45 +27,32 @@ from study_app.outlets.streams import SampleStream
 PATIENCE_S: Final = 60.0
 
 
-@dataclass(frozen=True, slots=True)
-class Received:
-    """What a listener received.
-
-    ``samples`` counts them, ``sha256`` is that of their channels, ``worst_gap_ms`` the longest time between two.
-    ``markers`` are (text, time on the servo's clock [ns], time of arrival [ns]).
-    """
-
-    samples: int
-    sha256: str
-    worst_gap_ms: float
-    markers: tuple[tuple[str, int, int], ...]
-
-
 class Listener:
-    """The listener's process; `ready` waits until it receives both streams, `end` ends it."""
+    """The process of ``outlets.listener``; as a context it ends at the latest at the end."""
 
-    def __init__(self) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "study_app.evidence.outlets.listener"],
+    def __init__(self, *arguments: str, pass_fds: Sequence[int] = ()) -> None:
+        self._process = subprocess.Popen(  # noqa: S603 - our own words
+            [sys.executable, "-m", "study_app.evidence.outlets.listener", *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
+            pass_fds=pass_fds,
         )
 
     def ready(self) -> None:
-        """Wait until both streams are received.
+        """Wait until it receives.
 
         Raises
         ------
         WorkerError
-            They are not.
+            It does not.
         """
         assert self._process.stdout is not None  # noqa: S101 - asked for above
         if self._process.stdout.readline() != "ready\n":
-            raise WorkerError(f"the listener does not receive the streams: {self._process.communicate()[1].strip()}")
+            raise WorkerError(f"the listener receives nothing: {self._process.communicate()[1].strip()}")
 
-    def end(self) -> Received:
+    def end(self) -> Any:
         """End the listener and return what it received.
 
         Raises
@@ -80,12 +63,12 @@ class Listener:
         said, error = self._process.communicate(timeout=PATIENCE_S)
         if self._process.returncode != 0:
             raise WorkerError(f"the listener ended: {error.strip()}")
-        found: dict[str, Any] = json.loads(said)
-        markers = tuple((one["text"], one["time_ns"], one["arrived_ns"]) for one in found["markers"])
-        return Received(found["samples"], found["sha256"], found["worst_gap_ms"], markers)
+        return json.loads(said)
 
-    def kill(self) -> None:
-        """End it without a result."""
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
         self._process.kill()
         self._process.communicate()
 
@@ -113,38 +96,6 @@ class MeasuredStream(SampleStream):
         """Send the remaining samples, and end the stream."""
         self.running.set()
         super().close()
-
-
-@contextmanager
-def listening() -> Iterator[Listener]:
-    """Start a listener, and end it at the latest at the end."""
-    listener = Listener()
-    try:
-        yield listener
-    finally:
-        listener.kill()
-
-
-def paced(
-    seconds: float, every_s: float, *, ending: threading.Event, progress: Callable[[str], object]
-) -> Iterator[int]:
-    """Yield 0, 1, 2 … for so many seconds, with a pause after each, and report each per cent once.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        ``ending`` was set.
-    """
-    began_s, shown, number = time.monotonic(), -1, 0
-    while (share := (time.monotonic() - began_s) / seconds) < 1:
-        if ending.is_set():
-            raise KeyboardInterrupt
-        if int(100 * share) > shown:
-            shown = int(100 * share)
-            progress(f"{shown:3} %")
-        yield number
-        number += 1
-        time.sleep(every_s)
 
 
 MOST_ERROR_MS: Final = 1.0
@@ -190,7 +141,7 @@ def stream(
     samples = MeasuredStream(servo.telemetry, servo.rate_hz, servo.now_ns)
     sent: list[Marker] = []
     try:
-        with listening() as listener:
+        with Listener() as listener:
             listener.ready()
             origin_ns = servo.now_ns()
             servo.start()
@@ -218,18 +169,19 @@ def numbered(number: int, now_ns: int, origin_ns: int) -> Marker:
     return marker
 
 
-def _found(seconds: float, samples: MeasuredStream, sent: list[Marker], received: Received) -> Streamed:
+def _found(seconds: float, samples: MeasuredStream, sent: list[Marker], received: dict[str, Any]) -> Streamed:
     times_ns = {marker.text: marker.time_ns for marker in sent}
-    arrived = [(time_ns - times_ns[text], at_ns - times_ns[text]) for text, time_ns, at_ns in received.markers]
-    errors_ns, took_ns = np.array(arrived, np.float64).reshape(-1, 2).T
+    markers = received["markers"]
+    since_ns = [[it[key] - times_ns[it["text"]] for key in ("time_ns", "arrived_ns")] for it in markers]
+    errors_ns, took_ns = np.array(since_ns, np.float64).reshape(-1, 2).T
     return Streamed(
         seconds=seconds,
         samples_sent=samples.sent,
-        samples_lost=samples.sent - received.samples,
-        intact=received.sha256 == samples.hashed.hexdigest() and not samples.lost,
-        worst_gap_ms=received.worst_gap_ms,
+        samples_lost=samples.sent - received["samples"],
+        intact=received["sha256"] == samples.hashed.hexdigest() and not samples.lost,
+        worst_gap_ms=received["worst_gap_ms"],
         markers_sent=len(sent),
-        markers_lost=len(sent) - len({json.loads(text)["trial"] for text, _, _ in received.markers}),
+        markers_lost=len(sent) - len({json.loads(it["text"])["trial"] for it in markers}),
         errors_us=np.abs(errors_ns) * 1e-3,
         arrivals_ms=took_ns * 1e-6,
     )
@@ -274,37 +226,32 @@ def compare(
     ending : is set by whoever wants no more
     """
     grants = granted()
-    grant = grants.best or grants.normal
-    loop = ServoLoop(grant, real_time=True, spin_us=None)
-    servo = loop.servo
-    ticks, rounds = round(TICK_S * 1e9) // PERIOD_NS, max(round(seconds / TICK_S), 2)
-    late_ns: dict[bool, list[NDArray[np.int64]]] = {True: [], False: []}
+    loop = ServoLoop(grants.best or grants.normal, real_time=True, spin_us=None)
+    servo, ticks = loop.servo, round(TURN_S * 1e9) // PERIOD_NS
     sink = SinkThread(open_sink("lsl", servo.now_ns))
     samples = MeasuredStream(servo.telemetry, servo.rate_hz, servo.now_ns)
-    marking = threading.Event()
-    over = threading.Event()
+    marking, over = threading.Event(), threading.Event()
 
     def mark() -> None:
-        number = 0
-        while not over.is_set():
+        for number in itertools.count():
             marking.wait()
+            if over.is_set():
+                return
             sink.mark(numbered(number, servo.now_ns(), 0))
-            number += 1
             time.sleep(MARKER_EVERY_S)
 
-    marker = threading.Thread(target=mark, name="markers", daemon=True)
+    def lateness_ns(active: bool, _round: int) -> NDArray[np.int64]:
+        for switch in (samples.running, marking):
+            (switch.set if active else switch.clear)()
+        return loop.run(ticks).lateness_ns
+
+    arms = {active: partial(lateness_ns, active) for active in (False, True)}
+    rounds = max(round(seconds / TURN_S), 2)
     try:
-        with listening() as listener:
+        with Listener() as listener:
             listener.ready()
-            marker.start()
-            for number in range(rounds):
-                for active in (True, False) if number % 2 else (False, True):
-                    if ending.is_set():
-                        raise KeyboardInterrupt
-                    for switch in (samples.running, marking):
-                        (switch.set if active else switch.clear)()
-                    late_ns[active].append(loop.run(ticks).lateness_ns)
-                progress(f"{100 * (number + 1) // rounds:3} %")
+            threading.Thread(target=mark, name="markers", daemon=True).start()
+            late_ns = take_turns(arms, rounds, ending=ending, progress=progress, alternating=True)
     finally:
         over.set()
         marking.set()
@@ -329,3 +276,31 @@ def ratio_of(active: Sequence[NDArray[np.int64]], rest: Sequence[NDArray[np.int6
         float(low),
         float(high),
     )
+
+
+def evidence(found: Streamed, ratios: Sequence[Ratio]) -> Evidence:
+    """Return the results as text."""
+    p50_us, p50_ms, p99_ms = (
+        float(np.percentile(values, share)) if len(values) else math.nan
+        for values, share in ((found.errors_us, 50), (found.arrivals_ms, 50), (found.arrivals_ms, 99))
+    )
+    lines = [
+        f"streams received by another process for {found.seconds:g} s",
+        f"  samples of 10 channels: {found.samples_sent} sent, {found.samples_lost} lost, "
+        f"{'intact' if found.intact else 'NOT intact'}",
+        f"  longest gap between their times: {found.worst_gap_ms:.2f} ms",
+        f"  markers: {found.markers_sent} sent, {found.markers_lost} lost",
+        f"  marker's time against the servo's clock: p50 {p50_us:.1f} us, p99 {1e3 * found.error_p99_ms:.1f} us, "
+        f"limit {1e3 * MOST_ERROR_MS:g} us",
+        f"  from event to arrival: p50 {p50_ms:.2f} ms, p99 {p99_ms:.2f} ms",
+        f"  {'met' if found.met else 'missed'}",
+        "lateness of the servo, with both streams and without, alternating every 0.25 s",
+    ]
+    lines += [
+        f"  p{one.percentile}: {one.with_us:.0f} us with, {one.without_us:.0f} us without, ratio {one.ratio:.3f} "
+        f"({one.low:.3f} to {one.high:.3f}), limit {MOST_RATIO:g}: {one.verdict}"
+        for one in ratios
+    ]
+    text = "\n".join(lines) + "\n"
+    missed = not found.met or any(one.percentile == 50 and one.verdict == "missed" for one in ratios)
+    return Evidence(text, {"streams.txt": text}, missed=missed)

@@ -1,10 +1,6 @@
-"""Rates of simulated studies: counting, comparison with limits, and tables (Markdown, CSV).
+"""Error rates of the report's verdicts: studies and single tests simulated in batches, counted, compared with limits.
 
-One batch of simulated studies evaluated by the report's own tests, and the errors of their verdicts.
-
-Rates of single tests: equivalence where a few notice strongly, coverage of thresholds, planned sizes.
-
-Simulates all cells by an executor: batches of the cells alternate, so that partial results are balanced.
+Batches of the cells alternate, so that partial results are balanced.
 """
 
 from __future__ import annotations
@@ -42,7 +38,7 @@ from study_app.evidence.report_rates.known_effects import (
     answers,
     true_differences,
 )
-from study_app.store.tables.csv_files import csv_text_of
+from study_app.evidence.table import Evidence, Table
 
 Limit: TypeAlias = Literal["none", "at most 5 %", "at least 93 %", "at least 77 %", "at most 83 %", "counted"]
 
@@ -115,27 +111,25 @@ class Rate:
         return "yes" if reaches and low >= least and high <= most else "too few studies"
 
 
-def markdown(rates: Sequence[Rate]) -> str:
-    """Return the rates, each with its Wilson interval and whether its limit holds."""
-    lines = ["| studies | n | what happened | share | 95 % interval | of | limit | holds |", "|---" * 8 + "|"]
+def evidence(rates: Sequence[Rate], heading: str) -> Evidence:
+    """Return the rates, each with its Wilson interval and whether its limit holds, as Markdown and as CSV."""
+    rows = []
     for rate in sorted(rates, key=lambda one: (one.cell, one.what, one.participants)):
         low, high = (f"{100 * end:.1f}" for end in rate.interval)
-        lines.append(
-            f"| {rate.cell} | {rate.participants} | {rate.what} | {100 * rate.share:.1f} % | {low} to {high} % | "
-            f"{rate.studies} | {rate.limit} | {rate.holds} |"
+        share = (f"{100 * rate.share:.1f} %", f"{low} to {high} %", rate.studies)
+        rows.append((rate.cell, rate.participants, rate.what, *share, rate.limit, rate.holds))
+    table = Table(("studies", "n", "what happened", "share", "95 % interval", "of", "limit", "holds"), rows, left=8)
+    text = f"{heading}\n\n{table.markdown()}\n"
+    cells = [
+        (
+            *(one.cell, one.participants, one.what, one.limit, one.hits, one.studies),
+            *(f"{number:.6f}" for number in (one.share, *one.interval)),
+            one.holds,
         )
-    return "\n".join(lines) + "\n"
-
-
-def table(rates: Sequence[Rate]) -> bytes:
-    """Return the rates as CSV, a row each."""
-    rows: list[list[object]] = [
-        ["studies", "participants", "what", "limit", "hits", "of", "share", "low", "high", "holds"]
+        for one in rates
     ]
-    for one in rates:
-        share = (f"{number:.6f}" for number in (one.share, *one.interval))
-        rows.append([one.cell, one.participants, one.what, one.limit, one.hits, one.studies, *share, one.holds])
-    return csv_text_of(rows).encode()
+    names = ("studies", "participants", "what", "limit", "hits", "of", "share", "low", "high", "holds")
+    return Evidence(text, {"rates.md": text, "rates.csv": Table(names, cells).csv()})
 
 
 BATCH: Final = 25

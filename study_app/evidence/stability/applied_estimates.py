@@ -13,7 +13,6 @@ above 40 Hz that exceeds that of the loop with either fixed setting by more than
 import itertools
 import math
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from random import Random
 from typing import Any, Final, Literal, TypeAlias
@@ -34,6 +33,7 @@ from study_app.evidence.stability.verdict import (
     SWING_MPS,
     TIRED,
 )
+from study_app.evidence.table import Evidence
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.offline import ModelAlong
 from study_app.haptics.runtime.pack import adjust_into
@@ -102,11 +102,6 @@ def applied_cases(count: int, seed: str = "estimation") -> tuple[AppliedCase, ..
     return tuple(AppliedCase(case, math.exp(draw.uniform(low, high))) for case in found[:count])
 
 
-def judge_all(cases: Sequence[AppliedCase], executor: Executor) -> tuple[AppliedVerdict, ...]:
-    """Return the verdict on each case."""
-    return tuple(executor.map(judge_applied, cases))
-
-
 def judge_applied(applied: AppliedCase) -> AppliedVerdict:
     """Run a case with fixed settings and with applied estimates."""
     runs = {way: _run(applied, way) for way in ("fixed", "most", *WAYS)}
@@ -122,7 +117,7 @@ def judge_applied(applied: AppliedCase) -> AppliedVerdict:
     )
 
 
-def report(verdicts: Sequence[AppliedVerdict]) -> str:
+def evidence(verdicts: Sequence[AppliedVerdict]) -> Evidence:
     """Return the results as text."""
     stable = [it for it in verdicts if it.stable_before]
     identified = sum(it.identified for it in stable)
@@ -138,7 +133,8 @@ def report(verdicts: Sequence[AppliedVerdict]) -> str:
     lines += [
         f"unstable: planted={it.applied.planted:.4g} {it.applied.case} {it.reasons}" for it in stable if it.harmed
     ]
-    return "\n".join(lines)
+    text = "\n".join(lines) + "\n"
+    return Evidence(text, {"estimation.txt": text}, missed=any(it.harmed for it in verdicts))
 
 
 def _run(applied: AppliedCase, way: Way) -> _Run:

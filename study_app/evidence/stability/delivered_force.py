@@ -26,6 +26,7 @@ from study_app.evidence.stability.case_groups import peak_mps
 from study_app.evidence.stability.stability_cases import DAMPER, FIRST, LETS_GO, SECOND, SINE, Case, scene_of, scenes
 from study_app.evidence.stability.velocity import WHOLE, wiener_bound
 from study_app.evidence.stability.verdict import judge
+from study_app.evidence.table import Evidence, run
 
 
 class Limit(NamedTuple):
@@ -117,11 +118,6 @@ class Delivered(NamedTuple):
         most = limit.error * self.bound if self.group == BOUNDED else limit.error
         return self.error / most, self.withheld / limit.withheld
 
-    @property
-    def met(self) -> bool:
-        """Whether both limits are kept, and no case is unstable."""
-        return max(self.share_of_limits) <= 1.0 and not self.unstable
-
 
 @cache
 def shipped_liquids() -> Mapping[str, tuple[str, ...]]:
@@ -145,8 +141,7 @@ def measure(
 ) -> tuple[Delivered, ...]:
     """Return what arrives of liquids (by default all), by an executor or here."""
     planned = itertools.product(devices, estimators, names or shipped_liquids(), delays)
-    in_turn = map if executor is None else executor.map
-    return tuple(in_turn(_measured, *zip(*planned, strict=True)))
+    return run(_measured, planned, executor)
 
 
 def _measured(device: str, estimator: str, liquid: str, delay: int) -> Delivered:
@@ -191,9 +186,12 @@ def _strokes(case: Case) -> Iterator[Case]:
         yield replace(case, hand=LETS_GO, plant=plant, release_s=released_s)
 
 
-def report(found: Sequence[Delivered]) -> str:
+def evidence(found: Sequence[Delivered]) -> Evidence:
     """Return the table, and whether each limit is met."""
-    return "\n".join(_lines(found))
+    lines = tuple(_lines(found))
+    missed = any("not met" in line for line in lines) or any(one.unstable for one in found)
+    text = "\n".join(lines) + "\n"
+    return Evidence(text, {"delivered.txt": text}, missed=missed)
 
 
 def _lines(found: Sequence[Delivered]) -> Iterator[str]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from study_app.evidence.stability.bench import FORCE_LIMIT_N, Bench, lasts_s, new_trace
 from study_app.evidence.stability.stability_cases import CIRCLES, REACHES, STROKE, Case, liquids
+from study_app.evidence.table import run
 
 LOOPS: Final = ((1000.0, 0), (1000.0, 1), (1000.0, 2), (1000.0, 4), (2000.0, 1), (500.0, 1), (250.0, 1))
 """Ticks a second and ticks of delay; the first two are those of a study."""
@@ -60,8 +61,7 @@ def fidelities(
     names: Sequence[str] | None = None, loops: Sequence[tuple[float, int]] = LOOPS, *, executor: Executor | None = None
 ) -> tuple[Fidelity, ...]:
     """Measure liquids (by default all) in each of the loops, by an executor or here."""
-    in_turn = map if executor is None else executor.map
-    return tuple(in_turn(_worst, *zip(*itertools.product(names or liquids(), loops), strict=True)))
+    return run(_worst, itertools.product(names or liquids(), loops), executor)
 
 
 def by_liquid(found: Sequence[Fidelity]) -> Mapping[str, tuple[Fidelity, ...]]:

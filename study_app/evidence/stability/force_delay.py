@@ -8,9 +8,9 @@ Buoyancy is left out: it is constant. Counted is from the second second on.
 - *withheld*: Σ|F_a - F_b| / Σ|F_a| of the two, as ``withheld_share`` of a trial.
 """
 
+import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator
-from pathlib import Path
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -18,9 +18,8 @@ import numpy as np
 from study_app.evidence.scene_variants import without_buoyancy
 from study_app.evidence.stability.bench import Bench, sine_path
 from study_app.evidence.stability.stability_cases import Case, scene_of, scenes
+from study_app.evidence.table import Evidence, Table, run
 from study_app.protocol.checks.delayed_force import Entry
-from study_app.store.atomic import write_file
-from study_app.store.tables.csv_files import csv_text_of
 
 LIQUIDS: Final = (
     "water",
@@ -43,47 +42,25 @@ def measure(
     estimators: Iterable[str] = ESTIMATORS,
     hands: Iterable[str] = HANDS,
     delays_ms: Iterable[float] = DELAYS_MS,
-) -> Iterator[Entry]:
-    """Yield the table, line by line."""
-    hands, delays_ms, estimators = tuple(hands), tuple(delays_ms), tuple(estimators)
-    for liquid in liquids:
-        for estimator in estimators:
-            for hand in hands:
-                for delay_ms in delays_ms:
-                    yield _entry(liquid, estimator, hand, delay_ms)
+    progress: Callable[[int], object] = lambda _done: None,
+) -> tuple[Entry, ...]:
+    """Return the table, line by line; ``progress`` is called with the number of lines so far."""
+    return run(_entry, itertools.product(liquids, estimators, hands, delays_ms), None, progress)
 
 
-def write(file: Path, progress: Callable[[int, int], None]) -> tuple[Entry, ...]:
-    """Measure the table, write it as ``protocol.checks.delayed_force`` reads it, and return it.
+def evidence(entries: Sequence[Entry], file: str) -> Evidence:
+    """Return the shares left [%] as a table, and the file that ``protocol.checks.delayed_force`` reads.
 
-    ``progress`` is called with the number of lines done and of all.
-
-    Raises
-    ------
-    StoreError
-        The file cannot be written.
+    The table has a line for each liquid, estimator and hand, a column for each delay.
     """
-    found: list[Entry] = []
-    lines = len(LIQUIDS) * len(ESTIMATORS) * len(HANDS) * len(DELAYS_MS)
-    for entry in measure():
-        found.append(entry)
-        progress(len(found), lines)
-    rows: list[tuple[Any, ...]] = [Entry._fields]
-    rows += [(*entry[:3], *(f"{value:g}" for value in entry[3:])) for entry in found]
-    write_file(file, csv_text_of(rows).encode())
-    return tuple(found)
-
-
-def report(entries: Iterable[Entry]) -> str:
-    """Return the shares left [%] as a table: a line for each liquid, estimator and hand, a column for each delay."""
-    entries = tuple(entries)
     delays_ms = sorted({it.delay_ms for it in entries})
     kept = {it[:4]: it.left_percent for it in entries}
     lines = [f"{'force left [%], delayed by [ms]':40}" + "".join(f"{delay:6g}" for delay in delays_ms)]
     for liquid, estimator, hand in dict.fromkeys(it[:3] for it in entries):
         shares = (kept.get((liquid, estimator, hand, delay), math.nan) for delay in delays_ms)
         lines.append(f"{f'{liquid}, {estimator}, {hand}':40}" + "".join(f"{share:6.0f}" for share in shares))
-    return "\n".join(lines)
+    rows = [(*entry[:3], *(f"{value:g}" for value in entry[3:])) for entry in entries]
+    return Evidence("\n".join(lines) + "\n", {file: Table(Entry._fields, rows).csv()})
 
 
 def delayed_trace(case: Case) -> Any:

@@ -2,7 +2,7 @@
 
 import collections
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -23,7 +23,6 @@ from study_app.evidence.stability.verdict import Verdict
 from study_app.haptics.model.scene import Ewma
 from study_app.haptics.model.slope_limits import slope_limit
 
-FORMATS: Final = ("png", "svg")
 HEIGHT_PT: Final = 256.0
 PLOT_PT: Final = 146.0
 FOOT_PT: Final = 62.0
@@ -40,32 +39,20 @@ CAPTION_LETTERS: Final = 112
 MARKS: Final = dict(zip(MAP_DELAYS, "osD^", strict=True))
 
 
-def draw_map(off: Sequence[Verdict]) -> Mapping[str, bytes]:
-    """Return the map as the bytes of each of `FORMATS`; ``off`` are the verdicts of a sweep without safety."""
-    figure = _figure(off)
-    return {
-        kind: style.file_bytes(figure, kind, "Where a liquid stays stable", style.PLOT_SETTINGS) for kind in FORMATS
-    }
-
-
 @style.own_settings(style.PLOT_SETTINGS)
-def _figure(off: Sequence[Verdict]) -> Figure:
+def draw_map(off: Sequence[Verdict]) -> Figure:
+    """Draw the map; ``off`` are the verdicts of a sweep without safety."""
     figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, HEIGHT_PT / 72), facecolor="white")
-
-    def place(left_pt: float, width_pt: float) -> Axes:
-        height, foot = PLOT_PT / HEIGHT_PT, FOOT_PT / HEIGHT_PT
-        return figure.add_axes((left_pt / style.PAGE_WIDTH_PT, foot, width_pt / style.PAGE_WIDTH_PT, height))
-
-    _boundary(place(34, 150))
-    _limits(place(232, 118))
-    _found(place(400, 105), off)
-    figure.text(
-        34 / style.PAGE_WIDTH_PT,
-        6 / HEIGHT_PT,
-        textwrap.fill(CAPTION, CAPTION_LETTERS),
-        color=style.TEXT_SOFT,
-        linespacing=1.25,
-    )
+    width_pt = style.PAGE_WIDTH_PT
+    axes = [
+        figure.add_axes((left_pt / width_pt, FOOT_PT / HEIGHT_PT, wide_pt / width_pt, PLOT_PT / HEIGHT_PT))
+        for left_pt, wide_pt in ((34, 150), (232, 118), (400, 105))
+    ]
+    _boundary(axes[0])
+    _limits(axes[1])
+    _found(axes[2], off)
+    caption = textwrap.fill(CAPTION, CAPTION_LETTERS)
+    figure.text(34 / width_pt, 6 / HEIGHT_PT, caption, color=style.TEXT_SOFT, linespacing=1.25)
     return figure
 
 

@@ -1,7 +1,8 @@
 """The stability of hard cases: the sweep with the safety layer off and on, the other groups with it, as text and files.
 
-What a case is made of is said in `cases`, which cases there are in `groups`, when one counts as unstable in `verdict`,
-what safety takes away where it is not needed in `fidelity`, the maximum stable damping in `boundary`.
+What a case is made of is said in `stability_cases`, which cases there are in `case_groups`, when one counts as unstable
+in `verdict`, what safety takes away where it is not needed in `fidelity`, the maximum stable damping in
+`damping_limits`.
 """
 
 import collections
@@ -11,7 +12,6 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import astuple, dataclass, fields
-from pathlib import Path
 from typing import Any, Final
 
 from study_app.evidence.stability.case_groups import Group
@@ -21,12 +21,9 @@ from study_app.evidence.stability.fidelity import LOOPS, Fidelity, by_liquid
 from study_app.evidence.stability.stability_cases import FALCON, Case
 from study_app.evidence.stability.stability_map import draw_map
 from study_app.evidence.stability.verdict import REASONS, Verdict, judge
+from study_app.evidence.table import Evidence, Table, plot_files, run
 from study_app.haptics.model.layout import LIMITER_NAMES
-from study_app.store.atomic import write_file
-from study_app.store.output_files import make_folder
 from study_app.store.tables.csv_files import csv_text_of
-
-Progress = Callable[[int, int], None]
 
 MEASURES: Final = ("balance_j", "permitted_j", "swing_mps", "fast_n", "played_n")
 
@@ -65,7 +62,10 @@ class Swept:
 
 
 def run_sweep(
-    cases: Sequence[Case], others: Sequence[Group], executor: Executor, progress: Progress | None = None
+    cases: Sequence[Case],
+    others: Sequence[Group],
+    executor: Executor,
+    progress: Callable[[int, int], object] = lambda _done, _of: None,
 ) -> Swept:
     """Judge the sweep's cases with safety off and on, and the other groups with it, by an executor.
 
@@ -74,12 +74,7 @@ def run_sweep(
     began = time.perf_counter()
     planned = [(case, safe) for safe in (False, True) for case in cases]
     planned += [(case, True) for group in others for case in group.cases]
-    found = []
-    for verdict in executor.map(_judge, planned):
-        found.append(verdict)
-        if progress is not None:
-            progress(len(found), len(planned))
-    verdicts = iter(found)
+    verdicts = iter(run(_judge, planned, executor, lambda done: progress(done, len(planned))))
     off, on = [tuple(itertools.islice(verdicts, len(cases))) for _ in range(2)]
     judged = [Judged(group.name, tuple(itertools.islice(verdicts, len(group.cases)))) for group in others]
     return Swept(off, on, time.perf_counter() - began, tuple(judged))
@@ -87,11 +82,10 @@ def run_sweep(
 
 def verdicts_on(case: Case) -> tuple[Verdict, ...]:
     """Judge a case with safety off and on; through the Falcon's driver, which knows no other loop, with it alone."""
-    return tuple(_judge((case, safe)) for safe in ((True,) if case.plant == FALCON else (False, True)))
+    return tuple(_judge(case, safe) for safe in ((True,) if case.plant == FALCON else (False, True)))
 
 
-def _judge(planned: tuple[Case, bool]) -> Verdict:
-    case, safe = planned
+def _judge(case: Case, safe: bool) -> Verdict:
     return judge_driven(case) if case.plant == FALCON else judge(case, safe=safe)
 
 
@@ -164,40 +158,29 @@ def _fidelity(fidelities: Sequence[Fidelity]) -> Iterator[str]:
         yield f"  {liquid:20}" + "".join(f"{cell:>16}" for cell in cells)
 
 
-def write(to: Path, swept: Swept, fidelities: Sequence[Fidelity]) -> tuple[Path, ...]:
-    """Write table, failing cases, map and summary into the folder ``to``; return the files.
-
-    Raises
-    ------
-    StoreError
-        The folder or a file cannot be written.
-    """
-    make_folder(to)
-    files = {"cases.csv": _cases_csv(swept).encode(), "stability.md": _markdown(swept, fidelities).encode()}
-    for name, verdicts in (("unstable-safety-off.txt", swept.off), ("unstable-safety-on.txt", swept.unstable)):
-        files[name] = "".join(f"{verdict.case}\n" for verdict in verdicts if not verdict.stable).encode()
-    files |= {f"map.{kind}": content for kind, content in draw_map(swept.off).items()}
-    for name, content in files.items():
-        write_file(to / name, content)
-    return tuple(to / name for name in files)
+def evidence(swept: Swept, fidelities: Sequence[Fidelity]) -> Evidence:
+    """Return the summary, or of groups alone their table; the cases as CSV, the unstable ones as text, and the map."""
+    text = summary(swept, fidelities) if swept.on else group_table(swept)
+    lines = ("# When the simulation is stable", "", "```", text, "```", "", "![Map](map.png)", "")
+    unstable = (*(f"- unstable with safety on: `{verdict.case}`" for verdict in swept.unstable), "")
+    files = {"cases.csv": _cases_csv(swept), "stability.md": "\n".join((*lines, *unstable))}
+    for safety, verdicts in (("off", swept.off), ("on", swept.unstable)):
+        lines_of_cases = (f"{verdict.case}\n" for verdict in verdicts if not verdict.stable)
+        files[f"unstable-safety-{safety}.txt"] = "".join(lines_of_cases)
+    figures = plot_files("map", "Where a liquid stays stable", draw_map, swept.off)
+    return Evidence(f"{text}\n", files, figures, missed=bool(swept.unstable))
 
 
-def write_limits(file: Path, executor: Executor, progress: Progress | None = None) -> None:
-    """Measure the table of limits that `haptics.model.slope_limits` reads by an executor, and write it.
-
-    Raises
-    ------
-    StoreError
-        The file cannot be written.
-    """
-    rows: list[Sequence[Any]] = [("estimator", "parameter", "period_ms", "delay_ticks", "drag_nspm", "inertia_nspm")]
+def limits(executor: Executor, progress: Callable[[int, int], object], file: str) -> Evidence:
+    """Measure the table of limits that `haptics.model.slope_limits` reads, by an executor."""
     lines = len(measured_estimators()) * len(PERIODS_S) * len(DELAYS[1:])
+    rows = []
     for name, value, period_s, delay, (drag, inertia) in measure_limits(executor=executor):
         parameter = "" if value is None else f"{value:g}"
         rows.append((name, parameter, f"{period_s * 1e3:g}", delay, f"{drag:g}", f"{inertia:g}"))
-        if progress is not None:
-            progress(len(rows) - 1, lines)
-    write_file(file, csv_text_of(rows).encode())
+        progress(len(rows), lines)
+    names = ("estimator", "parameter", "period_ms", "delay_ticks", "drag_nspm", "inertia_nspm")
+    return Evidence("", {file: Table(names, rows).csv()})
 
 
 def _cases_csv(swept: Swept) -> str:
@@ -209,8 +192,3 @@ def _cases_csv(swept: Swept) -> str:
             row += ["; ".join(verdict.reasons), *(f"{getattr(verdict, name):.4g}" for name in MEASURES)]
         rows.append((*row, *(f"{share:.4g}" for share in on.acted)))
     return csv_text_of(rows)
-
-
-def _markdown(swept: Swept, fidelities: Sequence[Fidelity]) -> str:
-    lines = ("# When the simulation is stable", "", "```", summary(swept, fidelities), "```", "", "![Map](map.png)", "")
-    return "\n".join((*lines, *(f"- unstable with safety on: `{verdict.case}`" for verdict in swept.unstable), ""))

@@ -28,6 +28,7 @@ from study_app.evidence.scene_variants import without_buoyancy
 from study_app.evidence.stability.bench import Bench, fast_part, law_along, sine_path
 from study_app.evidence.stability.damping_limits import boundary_nspm
 from study_app.evidence.stability.stability_cases import Case, scenes
+from study_app.evidence.table import Evidence
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.motion import Floats, Motion
@@ -287,9 +288,10 @@ def measure(progress: Progress) -> tuple[Row, ...]:
     return tuple(found)
 
 
-def report(rows: Sequence[Row]) -> str:
+def evidence(rows: Sequence[Row]) -> Evidence:
     """Return the rows as a table."""
-    return "\n".join(_lines(rows))
+    text = "\n".join(_lines(rows)) + "\n"
+    return Evidence(text, {"velocity.txt": text}, missed=not all(row.met for row in rows))
 
 
 def _lines(rows: Sequence[Row]) -> Iterator[str]:

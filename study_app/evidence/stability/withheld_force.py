@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from study_app.evidence.stability.bench import DIRECTION, Bench
 from study_app.evidence.stability.closed_loop import MIDDLE
 from study_app.evidence.stability.stability_cases import Case, liquids
+from study_app.evidence.table import Evidence, run
 
 
 class Stroke(NamedTuple):
@@ -116,32 +117,27 @@ def measure(
         )
         for estimator, mode, liquid in itertools.product(estimators, MODES, names or shipped)
     ]
-    in_turn = map if executor is None else executor.map
-    return tuple(in_turn(_measured, *zip(*planned, strict=True)))
+    return run(_measured, planned, executor)
 
 
-def report(found: Sequence[Withheld]) -> str:
+def evidence(found: Sequence[Withheld]) -> Evidence:
     """Return the table of shares in percent, and whether each goal is met."""
-    return "\n".join(_lines(found))
+    text = "\n".join(_lines(found)) + "\n"
+    return Evidence(text, {"withheld.txt": text}, missed=not all(one.met for one in found))
 
 
 def _lines(found: Sequence[Withheld]) -> Iterator[str]:
     yield "force withheld by passivity controller and slew limit [%]: Σ|F_a - F_b| / Σ|F_a|; strokes in mm"
     for (estimator, mode), rows in itertools.groupby(found, key=lambda one: (one.estimator, one.mode)):
         yield ""
-        yield (
-            f"{f'{estimator}, {mode}':21}"
-            + "".join(f"{stroke!s:>11}" for stroke in STROKES)
-            + (f"   in second 1 to {SECONDS} after {SHOWN_SHAKE}, most after one second")
-        )
+        strokes = "".join(f"{stroke!s:>11}" for stroke in STROKES)
+        after = f"   in second 1 to {SECONDS} after {SHOWN_SHAKE}, most after one second"
+        yield f"{f'{estimator}, {mode}':21}{strokes}{after}"
         for row in rows:
             after = "".join(f"{100 * share:7.1f}" for share in row.after[QUICK.index(SHOWN_SHAKE)])
             goals = "no goal" if row.liquid in EXEMPT else "met" if row.met else "not met"
-            yield (
-                f"  {row.liquid:19}"
-                + "".join(f"{100 * share:11.1f}" for share in row.strokes)
-                + (f"  {after}{100 * row.lasting:10.1f}   {goals}")
-            )
+            strokes = "".join(f"{100 * share:11.1f}" for share in row.strokes)
+            yield f"  {row.liquid:19}{strokes}  {after}{100 * row.lasting:10.1f}   {goals}"
     counted = [one for one in found if one.liquid not in EXEMPT]
     lasting = max(one.lasting for one in counted)
     yield ""
@@ -149,9 +145,8 @@ def _lines(found: Sequence[Withheld]) -> Iterator[str]:
         quick = max(one.quick for one in counted if one.most == most)
         which = "tar aside" if most == MOST else " with ".join(REVERSED)
         yield f"at most {most:.0%} in every stroke, {which}: {_goal(quick <= most)} ({quick:.1%})"
-    yield f"nothing (< {MOST_AFTER:.1%}) from one second after a shake on, tar aside: " + (
-        f"{_goal(lasting < MOST_AFTER)} ({lasting:.1%})"
-    )
+    met = _goal(lasting < MOST_AFTER)
+    yield f"nothing (< {MOST_AFTER:.1%}) from one second after a shake on, tar aside: {met} ({lasting:.1%})"
 
 
 def _goal(met: bool) -> str:

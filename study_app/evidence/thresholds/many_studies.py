@@ -1,6 +1,6 @@
-"""Three participants with a planted threshold through servo, store, unblinding and analysis.
+"""What is planted in a study, many simulated studies of it on an executor, and three participants of the whole program.
 
-What is planted in a study, and many simulated studies of it on an executor.
+These pass through servo, store, unblinding and analysis.
 """
 
 import math
@@ -10,10 +10,11 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.levels.thresholds import estimated_exponents, thresholds, tracks
+from study_app.evidence.table import run
 from study_app.evidence.thresholds.estimated_exponents import (
     PlantedExponent,
     exponent_verdicts,
@@ -113,8 +114,6 @@ def _unit(one: Planted) -> Any:
 NAMES: Final = (*SHIPPED, "thickness")
 """The shipped studies that are validated."""
 
-Found = TypeVar("Found")
-
 
 def plant(name: str, protocol: Protocol) -> Planted | PlantedExponent:
     """Return what is planted in a study.
@@ -134,16 +133,9 @@ def methods_alone(
 
     ``progress`` is called with the number of finished studies.
     """
-
-    def counted(of_executor: Iterator[Found]) -> list[Found]:
-        found = []
-        for study in of_executor:
-            found.append(study)
-            progress(len(found))
-        return found
-
+    numbers = [(number,) for number in range(studies)]
     if isinstance(one, PlantedExponent):
-        exponents = counted(executor.map(partial(simulate_estimates, one, seed=seed), range(studies)))
+        exponents = run(partial(simulate_estimates, one, seed=seed), numbers, executor, progress)
         return list(exponent_verdicts(one, exponents)), spread_of_exponents(exponents, PEOPLE)
-    thresholds = counted(executor.map(partial(simulate, one, seed=seed), range(studies)))
+    thresholds = run(partial(simulate, one, seed=seed), numbers, executor, progress)
     return list(verdicts(one, thresholds)), spread(thresholds, PEOPLE)

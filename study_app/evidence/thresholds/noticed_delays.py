@@ -3,14 +3,12 @@
 A delay reaches a person with Gaussian noise, whose spread follows from the person's just-noticeable difference. In
 ``delaydetect`` the person chooses the interval that seems more delayed. In ``rek2024`` the person rates the statement
 ``different`` after each delay: the noisy delay is compared with a criterion of the person's own, as in the answer model
-of rehearsals. Both sets of answers are analysed as in the report.
-
-The figure of detected and of rated delays: the shares over the delay, and both thresholds over the criterion.
+of rehearsals. Both sets of answers are analysed as in the report. The figure has the shares over the delay, and both
+thresholds over the criterion.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -19,6 +17,7 @@ from matplotlib.axes import Axes
 from study_app import figure_style as style
 from study_app.analysis.figures.page_layout import MARGIN_PT, Mark, Sheet
 from study_app.analysis.statistics.thresholds import Threshold, noticed
+from study_app.evidence.table import Evidence, Table
 from study_app.evidence.thresholds.planted import planted, simulate
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
@@ -26,7 +25,6 @@ from study_app.protocol.simulated import NO_FEATURES, Observer, Rater, normal, r
 from study_app.protocol.streams import Draw, stream
 from study_app.protocol.trials.stimuli import LINEAR_OBSERVER
 from study_app.psychophysics.families import success
-from study_app.store.output_files import write_files
 
 JND_S: Final = 0.045
 """Of a delay, at 75 % correct in two intervals (Vogels 2004)."""
@@ -149,28 +147,6 @@ def _rating(person: Person, delay_s: float, draw: Draw) -> int:
     return rate([STATEMENT], replace(NO_FEATURES, delay_s=perceived_s), person.rater, draw)[STATEMENT]
 
 
-def markdown(found: Compared) -> str:
-    """Return both thresholds as a table."""
-    return "\n".join(_lines(found)) + "\n"
-
-
-def _lines(found: Compared) -> Iterator[str]:
-    yield f"**SIMULATED.** The same {found.people} people in both procedures, seed {found.seed}."
-    yield ""
-    yield "| procedure | criterion | threshold | 95 % interval |"
-    yield "|---|---:|---:|---:|"
-    middle, low, high = found.detected_ms
-    yield f"| {FORCED_CHOICE}: forced choice, 75 % correct | – | {middle:.0f} ms | {low:.0f} to {high:.0f} ms |"
-    for one in found.rated:
-        adapted = f", adapted to {1000 * one.adapted_s:.0f} ms" if one.adapted_s else ""
-        name = f"{LIKERT}: rating of “{STATEMENT}”, half agree{adapted}"
-        effect, threshold = one.found.effect, one.found
-        value = "none" if effect is None else f"{effect:.0f} ms"
-        known = threshold.lower is not None and threshold.upper is not None
-        ends = f"{threshold.lower:.0f} to {threshold.upper:.0f} ms" if known else "–"
-        yield f"| {name} | {1000 * one.criterion_s:.0f} ms | {value} | {ends} |"
-
-
 HEIGHT_PT: Final = 236.0
 TOP_PT: Final = 60.0
 FOOT_PT: Final = 34.0
@@ -286,16 +262,24 @@ CAPTION: Final = (
 )
 
 
-def write(found: Compared, to: Path) -> tuple[Path, ...]:
-    """Write the table, the figure (PNG, SVG, PDF) and its caption into the folder ``to``; return the files.
+def evidence(found: Compared) -> Evidence:
+    """Return both thresholds as a table, and the figure (PNG, SVG, PDF) with its caption."""
+    middle, low, high = found.detected_ms
+    rows = [(f"{FORCED_CHOICE}: forced choice, 75 % correct", "–", f"{middle:.0f} ms", f"{low:.0f} to {high:.0f} ms")]
+    for one in found.rated:
+        adapted = f", adapted to {1000 * one.adapted_s:.0f} ms" if one.adapted_s else ""
+        name = f"{LIKERT}: rating of “{STATEMENT}”, half agree{adapted}"
+        effect, threshold = one.found.effect, one.found
+        value = "none" if effect is None else f"{effect:.0f} ms"
+        known = threshold.lower is not None and threshold.upper is not None
+        ends = f"{threshold.lower:.0f} to {threshold.upper:.0f} ms" if known else "–"
+        rows.append((name, f"{1000 * one.criterion_s:.0f} ms", value, ends))
+    table = Table(("procedure", "criterion", "threshold", "95 % interval"), rows, left=1)
+    head = f"**SIMULATED.** The same {found.people} people in both procedures, seed {found.seed}."
+    text = f"{head}\n\n{table.markdown()}\n"
 
-    Raises
-    ------
-    AnalysisError
-        The folder cannot be written; nothing was.
-    """
-    files = {"delay-thresholds.md": markdown(found).encode(), "delay-thresholds.txt": f"{CAPTION}\n".encode()}
-    for form in style.FORMATS:
-        drawn = draw(found, style.fonts_for(form)).figure
-        files[f"delay-thresholds.{form}"] = style.file_bytes(drawn, form, TITLE)
-    return write_files(to, files)
+    def figures() -> dict[str, bytes]:
+        drawn = {form: draw(found, style.fonts_for(form)).figure for form in style.FORMATS}
+        return {f"delay-thresholds.{form}": style.file_bytes(it, form, TITLE) for form, it in drawn.items()}
+
+    return Evidence(text, {"delay-thresholds.md": text, "delay-thresholds.txt": f"{CAPTION}\n"}, figures)

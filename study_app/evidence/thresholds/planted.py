@@ -1,10 +1,7 @@
-"""The studies that are validated, and the threshold that their simulated observers have.
+"""Studies of equal observers with a known threshold, by the choice of levels and the analysis alone, and verdicts.
 
-Studies of equal observers through the choice of levels and the analysis alone: no servo, no store.
-
-What is presented is what was requested, so that errors are those of methods and estimates.
-
-What is judged of validated thresholds: each value with its limit.
+No servo and no store take part: what is presented is what was requested, so that errors are those of methods and
+estimates.
 """
 
 import math
@@ -19,12 +16,12 @@ from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.levels.results import ThresholdFound
 from study_app.analysis.levels.thresholds import jnd_slope, thresholds
 from study_app.analysis.planning.power_curves import interval as wilson_interval
+from study_app.evidence.table import Evidence, Table
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.simulated import OBSERVER, Observer, simulate_study
 from study_app.protocol.trials.stimuli import DELAYS
 from study_app.protocol.trials.tracks import design_of, method_of, standards_of, stimulus_of
-from study_app.store.tables.csv_files import csv_text_of
 
 SHIPPED: Final[dict[str, Observer]] = {
     "viscosityjnd": OBSERVER,
@@ -217,15 +214,12 @@ def spread(studies: Sequence[StudyFound], people: int) -> float:
     return float(np.std([math.log(found.mean_of(people)) for found in studies], ddof=1))
 
 
-def markdown(judged: Sequence[Verdict]) -> str:
-    """Return a row for each value, with its limit."""
-    rows = (
-        f"| {one.study} | {one.what} | {one.value} | {one.limit} | {'yes' if one.holds else 'no'} |" for one in judged
-    )
-    return "\n".join(("| study | what | value | limit | holds |", "|---" * 5 + "|", *rows)) + "\n"
-
-
-def table(judged: Sequence[Verdict]) -> bytes:
-    """Return the values as CSV, a row each."""
-    rows = [[one.study, one.what, one.value, one.limit, str(one.holds).lower()] for one in judged]
-    return csv_text_of([["study", "what", "value", "limit", "holds"], *rows]).encode()
+def evidence(judged: Sequence[Verdict], heading: str) -> Evidence:
+    """Return a row for each value, with its limit, as Markdown below a heading and as CSV."""
+    names = ("study", "what", "value", "limit", "holds")
+    rows = [(one.study, one.what, one.value, one.limit, one.holds) for one in judged]
+    table = Table(names, [(*row, "yes" if holds else "no") for *row, holds in rows], left=5)
+    csv = Table(names, [(*row, str(holds).lower()) for *row, holds in rows]).csv()
+    text = f"{heading}\n\n{table.markdown()}\n"
+    beyond = any(not one.holds for one in judged)
+    return Evidence(text, {"thresholds.md": text, "thresholds.csv": csv}, missed=beyond)

@@ -1,18 +1,12 @@
-"""What a participant's picture comes to: how much later than requested it was shown, delay by delay.
+"""How much later than requested a participant's picture was shown, delay by delay: text, Markdown, CSV and a figure.
 
 The error of a frame is all that lies between the requested moment and what is seen: from the sample that is drawn to
 the end of its painting, or to the surface's swap, less the delay. It holds ``session.runner.SETTLED_S``, which is the
-same at every delay.
-
-Errors of the delay over the requested delay: one panel per screen, loads abreast, ½ frame and 1 frame marked.
-
-How well delays were kept, as text, Markdown, CSV and a figure.
+same at every delay. The figure has one panel per screen, loads abreast; ½ frame and 1 frame are marked.
 """
 
-import textwrap
-from collections.abc import Sequence
+import itertools
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -23,8 +17,8 @@ from numpy.typing import NDArray
 
 from study_app import figure_style as style
 from study_app.evidence.computer import LoadName
-from study_app.evidence.timing.report import figure_key, write_report
-from study_app.store.tables.csv_files import csv_text_of
+from study_app.evidence.table import Evidence, Table, plot_files
+from study_app.evidence.timing.report import Layout, panels_abreast
 
 DELAYS_S: Final = (0.0, 0.05, 0.075, 0.1, 0.125, 0.15, 0.2)
 """The delays of ``protocols/rek2024.toml``."""
@@ -152,13 +146,7 @@ class Delayed:
         )
 
 
-HEIGHT_PT: Final = 212.0
-TOP_PT: Final = 46.0
-FOOT_PT: Final = 62.0
-LEFT_PT: Final = 34.0
-GAP_PT: Final = 46.0
-RIGHT_PT: Final = 44.0
-LETTERS: Final = 132
+LAYOUT: Final = Layout(height_pt=212, top_pt=46, left_pt=34, gap_pt=46, right_pt=44)
 MOST_FRAMES: Final = 1.5  # of the axis: what lies beyond is written at its top
 APART: Final = 0.34
 
@@ -172,17 +160,19 @@ LOOKS: Final[dict[LoadName, dict[str, Any]]] = {
 @style.own_settings(style.PLOT_SETTINGS)
 def draw(found: Delayed) -> Figure:
     """Draw what was found."""
-    figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, HEIGHT_PT / 72), facecolor="white")
-    screens = found.screens
-    width_pt = (style.PAGE_WIDTH_PT - LEFT_PT - RIGHT_PT - GAP_PT * (len(screens) - 1)) / len(screens)
-    for number, screen in enumerate(screens):
-        left = (LEFT_PT + number * (width_pt + GAP_PT)) / style.PAGE_WIDTH_PT
-        tall = (HEIGHT_PT - TOP_PT - FOOT_PT) / HEIGHT_PT
-        axes = figure.add_axes((left, FOOT_PT / HEIGHT_PT, width_pt / style.PAGE_WIDTH_PT, tall))
-        _panel(axes, found, screen, first=number == 0)
-    _key(figure, found)
-    text = "\n".join(textwrap.wrap(_caption(found), LETTERS))
-    figure.text(4 / style.PAGE_WIDTH_PT, 29 / HEIGHT_PT, text, va="top", fontsize=6.6, color=style.TEXT_SOFT)
+    width, height = found.size_px
+    caption = (
+        f"Marks: mean of all frames; lines reach up to the {TAIL_PERCENT:g}th percentile, which is written if it is "
+        f"off the scale. {found.seconds:g} s of reaching at each delay with the tank at {width} × {height}, from the "
+        f"sample that is drawn to the end of its painting. {found.machine}."
+    )
+    handles = [
+        Line2D([], [], markersize=4.5, linewidth=1.3, label=BESIDE[load].capitalize(), **LOOKS[load])
+        for load in found.loads
+    ]
+    figure, panels = panels_abreast(LAYOUT, len(found.screens), handles, 2.6, caption)
+    for axes, screen in zip(panels, found.screens, strict=True):
+        _panel(axes, found, screen, first=axes is panels[0])
     return figure
 
 
@@ -238,25 +228,6 @@ def _trial(axes: Axes, trial: Shown, at: float, top_ms: float) -> None:
     axes.plot([at], [np.clip(trial.mean_ms, 0, top_ms)], markersize=4.5, zorder=5, clip_on=False, **look)
 
 
-def _key(figure: Figure, found: Delayed) -> None:
-    """Name the loads above the panels."""
-    handles = [
-        Line2D([], [], markersize=4.5, linewidth=1.3, label=BESIDE[load].capitalize(), **LOOKS[load])
-        for load in found.loads
-    ]
-    figure_key(figure, handles, LEFT_PT - 6, handlelength=2.6)
-
-
-def _caption(found: Delayed) -> str:
-    width, height = found.size_px
-    return (
-        f"Marks: mean of all frames; lines reach up to the {TAIL_PERCENT:g}th percentile, which is written if it is "
-        f"off the scale. {found.seconds:g} s of reaching at each delay with the tank at {width} × {height}, from "
-        "the "
-        f"sample that is drawn to the end of its painting. {found.machine}."
-    )
-
-
 BEGIN: Final = "<!-- delays: printed by liquid-study timing --delays --to DIR -->"
 END: Final = "<!-- end of delays -->"
 
@@ -267,88 +238,61 @@ COLUMNS: Final = (
 )  # fmt: skip
 PERCENTILES: Final = (50.0, 95.0, 99.0)
 _HEADINGS: Final = (
-    "requested",
-    "achieved",
-    "mean",
-    "p95",
-    "p99",
-    "worst",
-    "mean",
-    "p95",
-    "p99",
-    "worst",
-    "late",
-    "missed",
-)
+    "requested", "achieved", *("mean", "p95", "p99", "worst") * 2, "late", "missed",
+)  # fmt: skip
 
 
-def write(found: Delayed, to: Path) -> tuple[Path, ...]:
-    """Write text, tables (Markdown, CSV) and figure (PNG, SVG) into the folder ``to``; return the files.
-
-    Raises
-    ------
-    StoreError
-        A file cannot be written.
-    """
-    texts = {"txt": text(found), "md": markdown(found), "csv": csv_text(found)}
-    return write_report(to, "delays", texts, draw(found), "Accuracy of visual delays")
-
-
-def text(found: Delayed) -> str:
-    """Return the report for a terminal."""
-    lines = [_head(found)]
-    for screen in found.screens:
-        for load in found.loads:
-            trials = found.on(screen, load)
-            lines += ["", f"{screen} ({trials[0].paced}), {BESIDE[load]}: errors in ms, then in frames", ""]
-            rows = [_HEADINGS, *map(_row, trials)]
-            widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-            lines += ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
-    return "\n".join((*lines, "", *found.limits())) + "\n"
-
-
-def markdown(found: Delayed) -> str:
-    """Return the report as Markdown, between comments, ready for docs/timing.md: a row per screen and delay."""
-    one = ("mean", "p95", "p99", "worst", "late")
-    heads = [f"{BESIDE[load]}: mean" if name == "mean" else name for load in found.loads for name in one]
-    rows = [["screen", "requested", *heads], ["---", *["--:"] * (1 + len(heads))]]
-    for screen in found.screens:
-        for abreast in zip(*(found.on(screen, load) for load in found.loads), strict=True):
-            cells = [cell for trial in abreast for cell in (*_errors(trial), f"{trial.late} of {trial.frames}")]
-            rows.append([screen, f"{1e3 * abreast[0].delay_s:g}", *cells])
-    table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
-    limits = "\n".join(f"- {limit}" for limit in found.limits())
-    return f"{BEGIN}\n\n{_head(found)} Errors in ms.\n\n{table}\n\n{limits}\n\n{END}\n"
-
-
-def csv_text(found: Delayed) -> str:
-    """Return the table for machines: CSV, named `COLUMNS`."""
-    rows: list[Sequence[object]] = [COLUMNS]
-    for trial in found.shown:
-        errors_ms = (trial.mean_ms, *map(trial.percentile_ms, PERCENTILES), trial.worst_ms)
-        rows.append(
-            (
-                trial.screen,
-                trial.paced,
-                trial.load,
-                f"{1e3 * trial.delay_s:g}",
-                f"{trial.achieved_ms:.3f}",
-                trial.frames,
-                *(f"{error_ms:.3f}" for error_ms in errors_ms),
-                *(f"{error_ms / trial.frame_ms:.4f}" for error_ms in errors_ms),
-                trial.late,
-                trial.missed,
-            )
-        )
-    return csv_text_of(rows)
-
-
-def _head(found: Delayed) -> str:
+def evidence(found: Delayed) -> Evidence:
+    """Return the report for a terminal, as Markdown between comments for docs/timing.md, as CSV, and the figure."""
     width, height = found.size_px
-    return (
+    head = (
         f"{found.seconds:g} s of reaching at each delay, the tank at {width} × {height}; error: achieved minus "
         "requested delay, from the sample drawn to the end of its painting; late: by more than a frame. "
         f"{found.machine}."
+    )
+    lines = [head]
+    for screen, load in itertools.product(found.screens, found.loads):
+        trials = found.on(screen, load)
+        lines += ["", f"{screen} ({trials[0].paced}), {BESIDE[load]}: errors in ms, then in frames", ""]
+        lines.append(Table(_HEADINGS, [_row(trial) for trial in trials]).text())
+    text = "\n".join((*lines, "", *found.limits())) + "\n"
+    abreast = [
+        trials
+        for screen in found.screens
+        for trials in zip(*(found.on(screen, load) for load in found.loads), strict=True)
+    ]
+    heads = [
+        f"{BESIDE[load]}: mean" if name == "mean" else name
+        for load in found.loads
+        for name in ("mean", "p95", "p99", "worst", "late")
+    ]
+    rows = [
+        (
+            trials[0].screen,
+            f"{1e3 * trials[0].delay_s:g}",
+            *(cell for it in trials for cell in (*_errors(it), _late(it))),
+        )
+        for trials in abreast
+    ]
+    table = Table(("screen", "requested", *heads), rows, left=1).markdown()
+    limits = "\n".join(f"- {limit}" for limit in found.limits())
+    files = {
+        "delays.txt": text,
+        "delays.md": f"{BEGIN}\n\n{head} Errors in ms.\n\n{table}\n\n{limits}\n\n{END}\n",
+        "delays.csv": Table(COLUMNS, [_values(trial) for trial in found.shown]).csv(),
+    }
+    return Evidence(text, files, plot_files("delays", "Accuracy of visual delays", draw, found))
+
+
+def _values(trial: Shown) -> tuple[object, ...]:
+    """Return the row of a trial in the CSV."""
+    errors_ms = (trial.mean_ms, *map(trial.percentile_ms, PERCENTILES), trial.worst_ms)
+    return (
+        *(trial.screen, trial.paced, trial.load),
+        *(f"{1e3 * trial.delay_s:g}", f"{trial.achieved_ms:.3f}", trial.frames),
+        *(f"{error_ms:.3f}" for error_ms in errors_ms),
+        *(f"{error_ms / trial.frame_ms:.4f}" for error_ms in errors_ms),
+        *(trial.late, trial.missed),
     )
 
 
@@ -358,9 +302,13 @@ def _row(trial: Shown) -> tuple[str, ...]:
         f"{trial.achieved_ms:.1f}",
         *_errors(trial),
         *(f"{error_ms / trial.frame_ms:.2f}" for error_ms in _measures_ms(trial)),
-        f"{trial.late} of {trial.frames}",
+        _late(trial),
         f"{trial.missed}",
     )
+
+
+def _late(trial: Shown) -> str:
+    return f"{trial.late} of {trial.frames}"
 
 
 def _errors(trial: Shown) -> tuple[str, ...]:

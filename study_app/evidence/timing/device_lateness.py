@@ -4,9 +4,10 @@ All take quarter seconds in turn, as the loops of `measurement` do, so that the 
 """
 
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -14,8 +15,8 @@ from numpy.typing import NDArray
 
 from study_app.devices.registry import discover, open_device
 from study_app.devices.simulated.hand_commands import hand_of
-from study_app.errors import StudyError
-from study_app.evidence.timing.measurement import LEAST_S, MOST_S, PERIOD_NS, TICK_S, ServoLoop, granted
+from study_app.evidence.table import TURN_S, Evidence, check_seconds, take_turns
+from study_app.evidence.timing.measurement import PERIOD_NS, ServoLoop, granted
 
 REFERENCE: Final = "scripted"
 MOST_RATIO: Final = 1.5
@@ -78,23 +79,21 @@ def time_devices(
     ServoFault, DeviceLost
         A servo stopped itself.
     """
-    if not LEAST_S <= seconds <= MOST_S:
-        raise StudyError(f"each device is timed for {LEAST_S:g} to {MOST_S:g} s, not {seconds:g}")
-    rounds, ticks = max(round(seconds / TICK_S), 2), round(TICK_S * 1e9) // PERIOD_NS
+    check_seconds(seconds, "each device is timed")
+    ticks = round(TURN_S * 1e9) // PERIOD_NS
     grant = granted().best or granted().normal
-    late_ns: dict[str, list[NDArray[np.int64]]] = {name: [] for name in names}
+
     with ExitStack() as stack:
         devices = {name: stack.enter_context(open_device(name)) for name in names}
         loops = {name: ServoLoop(grant, real_time=True, spin_us=None, device=devices[name]) for name in names}
-        for number in range(rounds):
-            for name in names:
-                if ending.is_set():
-                    raise KeyboardInterrupt
-                hand = hand_of(devices[name])
-                if hand is not None:
-                    hand.reach_to(_REACH_M * (-1) ** number, 0.0, 0.0)
-                late_ns[name].append(loops[name].run(ticks).lateness_ns)
-            progress(f"{100 * (number + 1) // rounds:3} %")
+
+        def lateness_ns(name: str, number: int) -> NDArray[np.int64]:
+            if (hand := hand_of(devices[name])) is not None:
+                hand.reach_to(_REACH_M * (-1) ** number, 0.0, 0.0)
+            return loops[name].run(ticks).lateness_ns
+
+        arms = {name: partial(lateness_ns, name) for name in names}
+        late_ns = take_turns(arms, max(round(seconds / TURN_S), 2), ending=ending, progress=progress)
     return tuple(_compared(name, late_ns) for name in names)
 
 
@@ -121,15 +120,11 @@ def _ratio(own: list[NDArray[np.int64]], reference: list[NDArray[np.int64]], rou
     return late / early
 
 
-def text(found: Sequence[DeviceLateness]) -> str:
+def evidence(found: Sequence[DeviceLateness]) -> Evidence:
     """Return the table as text."""
-    return "\n".join(_lines(found)) + "\n"
-
-
-def _lines(found: Sequence[DeviceLateness]) -> Iterator[str]:
-    yield f"{'device':<28}{'ticks':>8}{'p50 us':>9}{'p99 us':>9}   p99 : {REFERENCE} (95 % interval)"
+    lines = [f"{'device':<28}{'ticks':>8}{'p50 us':>9}{'p99 us':>9}   p99 : {REFERENCE} (95 % interval)"]
     for one in found:
-        yield f"{one.name:<28}{one.ticks:>8}{one.p50_us:>9.0f}{one.p99_us:>9.0f}" + (
-            "" if one.name == REFERENCE else f"   {one.ratio:.2f} ({one.low:.2f} to {one.high:.2f}): {one.verdict}"
-        )
-    yield f"limit: {MOST_RATIO:g}; missed where the whole interval is above it"
+        ratio = f"   {one.ratio:.2f} ({one.low:.2f} to {one.high:.2f}): {one.verdict}" if one.name != REFERENCE else ""
+        lines.append(f"{one.name:<28}{one.ticks:>8}{one.p50_us:>9.0f}{one.p99_us:>9.0f}{ratio}")
+    text = "\n".join((*lines, f"limit: {MOST_RATIO:g}; missed where the whole interval is above it")) + "\n"
+    return Evidence(text, {"devices.txt": text}, missed=any(one.missed for one in found))

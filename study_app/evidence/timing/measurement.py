@@ -1,27 +1,22 @@
-"""What a tick has to do while it is timed: a scene with every effect on, and a hand that costs nothing itself.
+"""Lateness of ticks: loops that take a tick every millisecond, in turn, and what comes of them.
 
-The loops that are timed: each takes a tick every millisecond for a while, and says how late each began.
-
-All count alike: a deadline every millisecond; one that a tick ran past is passed over and counted, never made up for.
-
-What the loops' lateness comes to: percentiles, ratios to the bare loop, and whether they are within limits.
-
-One run: all loops in short ticks, round about, so that what else the machine does strikes all alike.
+All loops count alike: a deadline every millisecond; one that a tick ran past is passed over and counted, never made up
+for. What a tick has to do is a scene with every effect, on a hand that costs nothing itself.
 """
 
 import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Any, Final, Literal, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.errors import StudyError
 from study_app.evidence.computer import LoadName, Windows, machine, under_load
 from study_app.evidence.cost import hand
+from study_app.evidence.table import TURN_S, check_seconds, take_turns
 from study_app.haptics.kernels.c_functions import READ, READ_NEW, SLEEP, WRITE, Driver, c_function, call_at, record_at
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.model.device_dynamics import UNKNOWN
@@ -117,7 +112,7 @@ NAMES: Final[dict[Kind, str]] = {
 _sleep = call_at(SLEEP)
 
 
-class Taken(NamedTuple):
+class Ticks(NamedTuple):
     """What a loop did: how late each tick began, how long it took [ns] (n,), and how many deadlines it passed over."""
 
     lateness_ns: Whole
@@ -140,7 +135,7 @@ class Loop(Protocol):
     kind: Kind
     grant: Grant
 
-    def run(self, ticks: int) -> Taken: ...  # noqa: D102
+    def run(self, ticks: int) -> Ticks: ...  # noqa: D102
 
 
 class ServoLoop:
@@ -155,7 +150,7 @@ class ServoLoop:
         self.servo = Servo(driver, clock=self.clock, elements=elements_needed(FULL), real_time=real_time)
         self.servo.prepare()
 
-    def run(self, ticks: int) -> Taken:
+    def run(self, ticks: int) -> Ticks:
         """Take at least so many ticks."""
         servo = self.servo
         reader = servo.telemetry.reader()
@@ -172,7 +167,7 @@ class ServoLoop:
         samples = reader.read()[LEAD_IN : LEAD_IN + ticks]
         deadlines_ns = samples.time_ns - samples.lateness_ns
         overruns = int((np.diff(deadlines_ns) // PERIOD_NS - 1).sum())
-        return Taken(samples.lateness_ns.copy(), samples.busy_ns.copy(), overruns)
+        return Ticks(samples.lateness_ns.copy(), samples.busy_ns.copy(), overruns)
 
 
 class BareLoop:
@@ -186,7 +181,7 @@ class BareLoop:
         self._clock = clock
         _sleep_on(self._clock.sleep.address, self._clock.context, 0, np.zeros(0, np.int64), np.zeros(1, np.int64))
 
-    def run(self, ticks: int) -> Taken:
+    def run(self, ticks: int) -> Ticks:
         """Take so many ticks."""
         lateness_ns, overruns = np.zeros(ticks + LEAD_IN, np.int64), np.zeros(1, np.int64)
 
@@ -196,7 +191,7 @@ class BareLoop:
             _sleep_on(clock.sleep.address, clock.context, clock.now_ns(), lateness_ns, overruns)
 
         _in_a_thread(take)
-        return Taken(lateness_ns[LEAD_IN:], np.zeros(0, np.int64), int(overruns[0]))
+        return Ticks(lateness_ns[LEAD_IN:], np.zeros(0, np.int64), int(overruns[0]))
 
 
 @kernel
@@ -234,7 +229,7 @@ class ThreadLoop:
         self._real_time = real_time
         self.tick = _SameTick()
 
-    def run(self, ticks: int) -> Taken:
+    def run(self, ticks: int) -> Ticks:
         """Take so many ticks."""
         times: list[tuple[int, int]] = []
         start_ns = 0
@@ -268,7 +263,7 @@ class QtLoop:
         self._timer = timer
         self.tick = _SameTick()
 
-    def run(self, ticks: int) -> Taken:
+    def run(self, ticks: int) -> Ticks:
         """Take so many ticks."""
         times: list[tuple[int, int]] = []
 
@@ -280,7 +275,7 @@ class QtLoop:
         return taken(self._timer(PERIOD_NS // 1_000_000, ticks + LEAD_IN, fire), times)
 
 
-def taken(start_ns: int, times: Sequence[tuple[int, int]]) -> Taken:
+def taken(start_ns: int, times: Sequence[tuple[int, int]]) -> Ticks:
     """Return the lateness of ticks that began and ended at ``times`` [ns], a deadline every millisecond from a start.
 
     After each tick the deadlines that it ran past are passed over, but for the last; one that comes early is not late.
@@ -293,7 +288,7 @@ def taken(start_ns: int, times: Sequence[tuple[int, int]]) -> Taken:
         passed = max(1, (int(ended[i]) - due_ns) // PERIOD_NS)
         overruns += passed - 1 if i >= LEAD_IN else 0
         due_ns += passed * PERIOD_NS
-    return Taken(lateness_ns[LEAD_IN:], (ended - began)[LEAD_IN:], overruns)
+    return Ticks(lateness_ns[LEAD_IN:], (ended - began)[LEAD_IN:], overruns)
 
 
 def _in_a_thread(take: Callable[[], None]) -> None:
@@ -333,7 +328,7 @@ BUSY_US: Final = 5.0
 
 
 @dataclass(frozen=True, slots=True)
-class Lane:
+class LoopTiming:
     """One loop in one priority class: its latenesses, and how long its ticks took (empty: nothing was to do) [ns]."""
 
     kind: Kind
@@ -385,7 +380,7 @@ class Limit:
 
 @dataclass(frozen=True, slots=True)
 class Timed:
-    """What one run found; ``lanes`` come by priority class, the best last, the servo first in each."""
+    """What one run found; ``loops`` come by priority class, the best last, the servo first in each."""
 
     machine: str
     load: LoadName
@@ -393,29 +388,29 @@ class Timed:
     spin_us: float
     spun_share: float
     frames_hz: float | None
-    lanes: tuple[Lane, ...]
+    loops: tuple[LoopTiming, ...]
     notes: tuple[str, ...]
 
     @property
     def levels(self) -> tuple[Level, ...]:
         """The priority classes there are."""
-        return tuple(dict.fromkeys(lane.grant.level for lane in self.lanes))
+        return tuple(dict.fromkeys(loop.grant.level for loop in self.loops))
 
-    def lane(self, kind: Kind, level: Level) -> Lane | None:
-        """Return one of the lanes, if it was timed."""
-        return next((lane for lane in self.lanes if (lane.kind, lane.grant.level) == (kind, level)), None)
+    def loop(self, kind: Kind, level: Level) -> LoopTiming | None:
+        """Return one of the loops, if it was timed."""
+        return next((loop for loop in self.loops if (loop.kind, loop.grant.level) == (kind, level)), None)
 
-    def ratio(self, lane: Lane, percent: float) -> float:
-        """Return how many times as late as the bare loop of its class a lane is, at a percentile."""
-        bare = self.lane("bare", lane.grant.level)
-        return lane.late_us(percent) / max(bare.late_us(percent), 1e-3) if bare is not None else float("nan")
+    def ratio(self, loop: LoopTiming, percent: float) -> float:
+        """Return how many times as late as the bare loop of its class a loop is, at a percentile."""
+        bare = self.loop("bare", loop.grant.level)
+        return loop.late_us(percent) / max(bare.late_us(percent), 1e-3) if bare is not None else float("nan")
 
     def limits(self) -> tuple[Limit, ...]:
         """Return the limits and what was found, class by class."""
         return tuple(limit for level in self.levels for limit in self._of(level))
 
     def _of(self, level: Level) -> Sequence[Limit]:
-        servo, bare, thread = (self.lane(kind, level) for kind in ("servo", "bare", "thread"))
+        servo, bare, thread = (self.loop(kind, level) for kind in ("servo", "bare", "thread"))
         if servo is None or bare is None or thread is None:
             return ()
         above_us = servo.late_us(50) - bare.late_us(50)
@@ -436,16 +431,16 @@ class Timed:
         )
 
 
-def _fewer(thread: Lane, other: Lane) -> str:
-    """Return in words how many times fewer ticks over 1 ms late one lane has than a Python thread."""
+def _fewer(thread: LoopTiming, other: LoopTiming) -> str:
+    """Return in words how many times fewer ticks over 1 ms late one loop has than a Python thread."""
     if other.late == 0:
         return f"{thread.late:,} fewer"
     return f"{thread.late_share / other.late_share:.1f} times fewer"
 
 
-def lane(kind: Kind, grant: Grant, parts: Sequence[Taken]) -> Lane:
-    """Return a lane of what its loop did in all its ticks."""
-    return Lane(
+def loop_timing(kind: Kind, grant: Grant, parts: Sequence[Ticks]) -> LoopTiming:
+    """Return what a loop did in all its turns."""
+    return LoopTiming(
         kind,
         grant,
         np.concatenate([part.lateness_ns for part in parts]),
@@ -454,9 +449,8 @@ def lane(kind: Kind, grant: Grant, parts: Sequence[Taken]) -> Lane:
     )
 
 
-TICK_S: Final = 0.25
-LEAST_S: Final = 0.5
-MOST_S: Final = 3600.0
+def _run_loop(loop: Loop, ticks: int, _round: int) -> Ticks:
+    return loop.run(ticks)
 
 
 def timing(
@@ -468,7 +462,7 @@ def timing(
     ending: threading.Event | None = None,
     progress: Callable[[str], object] = lambda _line: None,
 ) -> Timed:
-    """Time all loops for ``seconds`` each and return what was found.
+    """Time all loops for ``seconds`` each, in turn, and return what was found.
 
     Parameters
     ----------
@@ -484,80 +478,38 @@ def timing(
     ServoFault
         The servo stopped itself.
     """
-    if not LEAST_S <= seconds <= MOST_S:
-        raise StudyError(f"each loop is timed for {LEAST_S:g} to {MOST_S:g} s, not {seconds:g}")
-    run = _Run(seconds, load, windows, spin_us, ending or threading.Event(), progress)
-    return under_load(load, windows, run.race)
+    check_seconds(seconds, "each loop is timed")
+    classes = granted()
+    servos: list[ServoLoop] = []
+    loops: list[Loop] = []
+    for grant in (classes.normal, *([classes.best] if classes.best else [])):
+        real_time = grant is classes.best
+        servos.append(ServoLoop(grant, real_time=real_time, spin_us=spin_us))
+        bare = BareLoop(grant, real_time=real_time, clock=SystemClock(spin_us))
+        loops += [servos[-1], bare, ThreadLoop(grant, real_time=real_time)]
+        if windows is not None and not real_time:
+            loops.append(QtLoop(grant, windows.timer))
+    notes = [f"priority: {classes.best or classes.normal}", *(() if classes.best else classes.normal.advice)]
+    if windows is None:
+        notes.append("Qt is not available: its timer was not measured")
+    rounds = max(1, round(seconds / TURN_S))
+    ticks = round(seconds / rounds * 1e9) // PERIOD_NS
 
-
-class _Run:
-    """The loops, and their ticks so far."""
-
-    def __init__(
-        self,
-        seconds: float,
-        load: LoadName,
-        windows: Windows | None,
-        spin_us: float | None,
-        ending: threading.Event,
-        progress: Callable[[str], object],
-    ) -> None:
-        self._seconds, self._load, self._windows, self._ending, self._progress = (
-            seconds,
-            load,
-            windows,
-            ending,
-            progress,
-        )
-        classes = granted()
-        ordinary, best = classes.normal, classes.best
-        self._servos = [ServoLoop(ordinary, real_time=False, spin_us=spin_us)]
-        self._loops: list[Loop] = [
-            *self._servos,
-            BareLoop(ordinary, real_time=False, clock=SystemClock(spin_us)),
-            ThreadLoop(ordinary, real_time=False),
-        ]
-        if windows is not None:
-            self._loops.append(QtLoop(ordinary, windows.timer))
-        self._notes = [f"priority: {best or ordinary}"]
-        if best is not None:
-            self._servos.append(ServoLoop(best, real_time=True, spin_us=spin_us))
-            self._loops += [
-                self._servos[-1],
-                BareLoop(best, real_time=True, clock=SystemClock(spin_us)),
-                ThreadLoop(best, real_time=True),
-            ]
-        else:
-            self._notes += ordinary.advice
-        if windows is None:
-            self._notes.append("Qt is not available: its timer was not measured")
-
-    def race(self) -> Timed:
-        """Let the loops take their ticks."""
-        rounds = max(1, round(self._seconds / TICK_S))
-        ticks = round(self._seconds / rounds * 1e9) // PERIOD_NS
-        parts: list[list[Taken]] = [[] for _ in self._loops]
-        frames, began_s = self._frames(), time.monotonic()
-        for number in range(rounds):
-            for loop, mine in zip(self._loops, parts, strict=True):
-                if self._ending.is_set():
-                    raise KeyboardInterrupt
-                mine.append(loop.run(ticks))
-            if number * 10 // rounds < (number + 1) * 10 // rounds:
-                self._progress(f"{100 * (number + 1) // rounds:3} %")
-        lasted_s = time.monotonic() - began_s
-        clocks = [servo.clock for servo in self._servos]
-        ticked_ns = len(self._servos) * rounds * ticks * PERIOD_NS
+    def measured() -> Timed:
+        frames, began_s = windows.frames if windows else 0, time.monotonic()
+        arms = {loop: partial(_run_loop, loop, ticks) for loop in loops}
+        found = take_turns(arms, rounds, ending=ending or threading.Event(), progress=progress)
+        frames_hz = ((windows.frames if windows else 0) - frames) / (time.monotonic() - began_s)
+        each_ns = rounds * ticks * PERIOD_NS
         return Timed(
             machine=machine(),
-            load=self._load,
-            seconds=rounds * ticks * PERIOD_NS * 1e-9,
-            spin_us=clocks[0].spin_us,
-            spun_share=sum(clock.spun_ns for clock in clocks) / ticked_ns,
-            frames_hz=(self._frames() - frames) / lasted_s if self._load != "none" else None,
-            lanes=tuple(lane(loop.kind, loop.grant, mine) for loop, mine in zip(self._loops, parts, strict=True)),
-            notes=tuple(self._notes),
+            load=load,
+            seconds=each_ns * 1e-9,
+            spin_us=servos[0].clock.spin_us,
+            spun_share=sum(servo.clock.spun_ns for servo in servos) / (len(servos) * each_ns),
+            frames_hz=frames_hz if load != "none" else None,
+            loops=tuple(loop_timing(loop.kind, loop.grant, parts) for loop, parts in found.items()),
+            notes=tuple(notes),
         )
 
-    def _frames(self) -> int:
-        return self._windows.frames if self._windows is not None else 0
+    return under_load(load, windows, measured)

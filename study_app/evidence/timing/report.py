@@ -1,18 +1,12 @@
-"""The key above the panels of a figure.
+"""Lateness of ticks as text, Markdown, CSV and a figure; and the layout of figures with panels abreast.
 
-What a measurement of timing leaves in a folder: the same texts, tables and pictures, whichever it was.
-
-The latenesses of all loops as one figure: a panel for each priority class, shares of ticks over lateness.
-
-Both axes are logarithmic, so that one tick in ten thousand is visible.
-
-The findings of ``timing`` as text, Markdown, CSV and a figure.
+The figure has a panel for each priority class, with shares of ticks over lateness. Both axes are logarithmic, so that
+one tick in ten thousand is visible.
 """
 
 import textwrap
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -21,49 +15,50 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
 from study_app import figure_style as style
-from study_app.evidence.timing.measurement import LATE_NS, NAMES, PERCENTILES, Kind, Lane, Timed
-from study_app.figure_style import PLOT_SETTINGS, file_bytes
+from study_app.evidence.table import Evidence, Table, plot_files
+from study_app.evidence.timing.measurement import LATE_NS, NAMES, PERCENTILES, Kind, LoopTiming, Timed
 from study_app.haptics.runtime.clocks.grants import Level
-from study_app.store.atomic import write_file
-from study_app.store.tables.csv_files import csv_text_of
+
+FOOT_PT: Final = 62.0
+LETTERS: Final = 132
 
 
-def figure_key(figure: Figure, handles: Sequence[Line2D], left_pt: float, *, handlelength: float) -> None:
-    """Name the lines above the panels, in one row from ``left_pt`` on."""
+class Layout(NamedTuple):
+    """Sizes [pt] of a figure with panels abreast."""
+
+    height_pt: float
+    top_pt: float
+    left_pt: float
+    gap_pt: float
+    right_pt: float
+
+
+def panels_abreast(
+    layout: Layout, count: int, handles: Sequence[Line2D], handlelength: float, caption: str
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure of a page's width with its panels, a key in one row above them and a caption below."""
+    width_pt, height_pt = style.PAGE_WIDTH_PT, layout.height_pt
+    figure = Figure(figsize=(width_pt / 72, height_pt / 72), facecolor="white")
+    panel_pt = (width_pt - layout.left_pt - layout.right_pt - layout.gap_pt * (count - 1)) / count
+    tall = (height_pt - layout.top_pt - FOOT_PT) / height_pt
+    lefts = [(layout.left_pt + k * (panel_pt + layout.gap_pt)) / width_pt for k in range(count)]
+    panels = [figure.add_axes((left, FOOT_PT / height_pt, panel_pt / width_pt, tall)) for left in lefts]
     figure.legend(
         handles=handles,
         loc="upper left",
-        bbox_to_anchor=(left_pt / style.PAGE_WIDTH_PT, 1.0),
+        bbox_to_anchor=((layout.left_pt - 6) / width_pt, 1.0),
         ncols=len(handles),
         frameon=False,
         fontsize=7.2,
         handlelength=handlelength,
         columnspacing=2.2,
     )
+    text = "\n".join(textwrap.wrap(caption, LETTERS))
+    figure.text(4 / width_pt, 29 / height_pt, text, va="top", fontsize=6.6, color=style.TEXT_SOFT)
+    return figure, panels
 
 
-def write_report(to: Path, name: str, texts: dict[str, str], figure: Figure, title: str) -> tuple[Path, ...]:
-    """Write texts by their endings, and a figure as PNG and SVG, into the folder ``to``; return the files.
-
-    Raises
-    ------
-    StoreError
-        A file cannot be written.
-    """
-    contents = {ending: text.encode() for ending, text in texts.items()}
-    contents |= {ending: file_bytes(figure, ending, title, PLOT_SETTINGS) for ending in ("png", "svg")}
-    for ending, content in contents.items():
-        write_file(to / f"{name}.{ending}", content)
-    return tuple(to / f"{name}.{ending}" for ending in contents)
-
-
-HEIGHT_PT: Final = 224.0
-TOP_PT: Final = 36.0
-FOOT_PT: Final = 62.0
-LEFT_PT: Final = 36.0
-GAP_PT: Final = 30.0
-RIGHT_PT: Final = 16.0
-LETTERS: Final = 132
+LAYOUT: Final = Layout(height_pt=224, top_pt=36, left_pt=36, gap_pt=30, right_pt=16)
 LOWEST_US: Final = 1.0
 BINS_A_DECADE: Final = 10
 
@@ -85,40 +80,39 @@ LOADS: Final = {
 @style.own_settings(style.PLOT_SETTINGS)
 def draw(found: Timed) -> Figure:
     """Draw what was found."""
-    figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, HEIGHT_PT / 72), facecolor="white")
-    levels = found.levels
-    width_pt = (style.PAGE_WIDTH_PT - LEFT_PT - RIGHT_PT - GAP_PT * (len(levels) - 1)) / len(levels)
-    highest_us = _highest_us(found)
-    for number, level in enumerate(levels):
-        left = (LEFT_PT + number * (width_pt + GAP_PT)) / style.PAGE_WIDTH_PT
-        tall = (HEIGHT_PT - TOP_PT - FOOT_PT) / HEIGHT_PT
-        axes = figure.add_axes((left, FOOT_PT / HEIGHT_PT, width_pt / style.PAGE_WIDTH_PT, tall))
-        _panel(axes, found, level, highest_us, first=number == 0)
-    _key(figure, found)
-    text = "\n".join(textwrap.wrap(_caption(found), LETTERS))
-    figure.text(4 / style.PAGE_WIDTH_PT, 29 / HEIGHT_PT, text, va="top", fontsize=6.6, color=style.TEXT_SOFT)
+    caption = (
+        f"Share of ticks in each of {BINS_A_DECADE} bins per decade; marks at the bottom: the 99th percentile of each. "
+        f"{found.seconds:g} s of each loop at 1 kHz alternating every quarter second, {LOADS[found.load]}. "
+        f"{found.machine}."
+    )
+    handles = []
+    for kind in (kind for kind in NAMES if any(loop.kind == kind for loop in found.loops)):
+        face = LOOKS[kind]["color"] if kind in {"servo", "thread"} else "white"
+        look = {name: value for name, value in LOOKS[kind].items() if name != "zorder"}
+        handles.append(
+            Line2D([], [], marker=MARKS[kind], markersize=4, markerfacecolor=face, label=NAMES[kind], **look)
+        )
+    figure, panels = panels_abreast(LAYOUT, len(found.levels), handles, 3.4, caption)
+    highest_us = float(10 ** np.ceil(np.log10(max(2e3, *(loop.late_us(100) for loop in found.loops)))))
+    for axes, level in zip(panels, found.levels, strict=True):
+        _panel(axes, found, level, highest_us, first=axes is panels[0])
     return figure
 
 
-def _highest_us(found: Timed) -> float:
-    most = max(lane.late_us(100) for lane in found.lanes)
-    return float(10 ** np.ceil(np.log10(max(most, 2e3))))
-
-
 def _panel(axes: Axes, found: Timed, level: Level, highest_us: float, *, first: bool) -> None:
-    """Draw the lanes of a class as steps, each with a mark at its 99th percentile."""
+    """Draw the loops of a class as steps, each with a mark at its 99th percentile."""
     decades = np.log10(highest_us / LOWEST_US)
     edges = np.logspace(np.log10(LOWEST_US), np.log10(highest_us), round(BINS_A_DECADE * decades) + 1)
-    lanes = [lane for lane in found.lanes if lane.grant.level == level]
-    least = 1 / max(lane.ticks for lane in found.lanes)
+    loops = [loop for loop in found.loops if loop.grant.level == level]
+    least = 1 / max(loop.ticks for loop in found.loops)
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlim(LOWEST_US, highest_us)
     axes.set_ylim(0.6 * least, 1.4)
-    for lane in lanes:
-        shares = np.histogram(np.clip(lane.lateness_ns * 1e-3, LOWEST_US, None), edges)[0] / lane.ticks
-        axes.stairs(np.where(shares > 0, shares, 0.1 * least), edges, baseline=None, **LOOKS[lane.kind])
-    _tails(axes, lanes, least)
+    for loop in loops:
+        shares = np.histogram(np.clip(loop.lateness_ns * 1e-3, LOWEST_US, None), edges)[0] / loop.ticks
+        axes.stairs(np.where(shares > 0, shares, 0.1 * least), edges, baseline=None, **LOOKS[loop.kind])
+    _tails(axes, loops, least)
     axes.axvline(LATE_NS * 1e-3, color=style.ZERO, linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1)
     axes.annotate("1 ms", (LATE_NS * 1e-3, 1.3), (2, -1), textcoords="offset points", va="top", fontsize=6.6)
     axes.xaxis.set_major_locator(FixedLocator([10.0**power for power in range(0, 8)]))
@@ -128,46 +122,25 @@ def _panel(axes: Axes, found: Timed, level: Level, highest_us: float, *, first: 
     axes.minorticks_off()
     axes.tick_params(labelsize=6.6, labelleft=first)
     axes.set_xlabel("lateness of a tick", fontsize=7, labelpad=2)
-    how = lanes[0].grant.how if level != "normal" else ""
+    how = loops[0].grant.how if level != "normal" else ""
     axes.set_title(f"{level.capitalize()} priority{f' ({how})' if how else ''}", pad=5, color=style.TEXT)
 
 
-def _tails(axes: Axes, lanes: list[Lane], least: float) -> None:
+def _tails(axes: Axes, loops: list[LoopTiming], least: float) -> None:
     """Mark the 99th percentiles along the foot of a panel."""
-    for lane in lanes:
-        look = LOOKS[lane.kind]
-        face = look["color"] if lane.kind in {"servo", "thread"} else "white"
+    for loop in loops:
+        look = LOOKS[loop.kind]
+        face = look["color"] if loop.kind in {"servo", "thread"} else "white"
         axes.plot(
-            [lane.late_us(99)],
+            [loop.late_us(99)],
             [0.6 * least],
-            marker=MARKS[lane.kind],
+            marker=MARKS[loop.kind],
             markersize=5,
             markerfacecolor=face,
             markeredgecolor=look["color"],
             clip_on=False,
             zorder=8 + look["zorder"],
         )
-
-
-def _key(figure: Figure, found: Timed) -> None:
-    """Name the loops above the panels."""
-    kinds = [kind for kind in NAMES if any(lane.kind == kind for lane in found.lanes)]
-    handles = []
-    for kind in kinds:
-        face = LOOKS[kind]["color"] if kind in {"servo", "thread"} else "white"
-        look = {name: value for name, value in LOOKS[kind].items() if name != "zorder"}
-        handles.append(
-            Line2D([], [], marker=MARKS[kind], markersize=4, markerfacecolor=face, label=NAMES[kind], **look)
-        )
-    figure_key(figure, handles, LEFT_PT - 6, handlelength=3.4)
-
-
-def _caption(found: Timed) -> str:
-    return (
-        f"Share of ticks in each of {BINS_A_DECADE} bins per decade; marks at the bottom: the 99th percentile of each. "
-        f"{found.seconds:g} s of each loop at 1 kHz alternating every quarter second, {LOADS[found.load]}. "
-        f"{found.machine}."
-    )
 
 
 def _duration(us: float) -> str:
@@ -191,88 +164,49 @@ _HEADINGS: Final = (
 )  # fmt: skip
 
 
-def write(found: Timed, to: Path) -> tuple[Path, ...]:
-    """Write text, tables (Markdown, CSV) and figure (PNG, SVG) into the folder ``to``; return the files.
-
-    Raises
-    ------
-    StoreError
-        A file cannot be written.
-    """
-    texts = {"txt": text(found), "md": markdown(found), "csv": csv_text(found)}
-    return write_report(to, "timing", texts, draw(found), "Lateness of ticks")
-
-
-def text(found: Timed) -> str:
-    """Return the report for a terminal."""
-    rows = [_HEADINGS, *(_row(found, lane) for lane in found.lanes)]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(_HEADINGS))]
-    lines = [_head(found), "lateness in µs; skipped: deadlines that passed during a longer tick", ""]
-    for row in rows:
-        cells = (f"{cell:{'<' if column < 2 else '>'}{widths[column]}}" for column, cell in enumerate(row))
-        lines.append("  ".join(cells).rstrip())
-    return "\n".join((*lines, "", *map(str, found.limits()), "", *_notes(found))) + "\n"
-
-
-def markdown(found: Timed) -> str:
-    """Return the report as Markdown, between comments, ready for docs/timing.md."""
-    marks = ("---", "---", *["--:"] * (len(_HEADINGS) - 2))
-    rows = [_HEADINGS, marks, *(_row(found, lane) for lane in found.lanes)]
-    table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
-    limits = "\n".join(f"- {limit}" for limit in found.limits())
-    notes = " ".join(f"{note[0].upper()}{note[1:]}." for note in _notes(found))
-    return f"{BEGIN}\n\n{_head(found)} Lateness in µs.\n\n{table}\n\n{limits}\n\n{notes}\n\n{END}\n"
-
-
-def csv_text(found: Timed) -> str:
-    """Return the table for machines: CSV, named `COLUMNS`."""
-    rows: list[Sequence[object]] = [COLUMNS]
-    for lane in found.lanes:
-        busy = (f"{lane.busy_us(50):.3f}", f"{lane.busy_us(99):.3f}") if len(lane.busy_ns) else ("n/a", "n/a")
-        rows.append(
-            (
-                lane.grant.level,
-                lane.grant.how,
-                lane.name,
-                lane.ticks,
-                lane.overruns,
-                lane.late,
-                *(f"{lane.late_us(percent):.3f}" for percent in (*PERCENTILES, 100.0)),
-                *(f"{found.ratio(lane, percent):.4g}" for percent in (50.0, 99.0)),
-                *busy,
-            )
-        )
-    return csv_text_of(rows)
-
-
-def _head(found: Timed) -> str:
-    painted = "" if found.frames_hz is None else f", {found.frames_hz:.0f} frames per second"
-    return (
+def evidence(found: Timed) -> Evidence:
+    """Return the report for a terminal, as Markdown between comments for docs/timing.md, as CSV, and the figure."""
+    head = (
         f"{found.seconds:g} s of each loop at 1 kHz, alternating every quarter second; {LOADS[found.load]}"
-        f"{painted}. {found.machine}."
+        f"{'' if found.frames_hz is None else f', {found.frames_hz:.0f} frames per second'}. {found.machine}."
+    )
+    notes = found.notes
+    if found.spin_us > 0:
+        notes += (f"a spin of {found.spin_us:g} µs before each deadline took {found.spun_share:.1%} of a core",)
+    table = Table(_HEADINGS, [_row(found, loop) for loop in found.loops], left=2)
+    what = "lateness in µs; skipped: deadlines that passed during a longer tick"
+    text = "\n".join((head, what, "", table.text(), "", *map(str, found.limits()), "", *notes)) + "\n"
+    limits = "\n".join(f"- {limit}" for limit in found.limits())
+    said = " ".join(f"{note[0].upper()}{note[1:]}." for note in notes)
+    markdown = f"{BEGIN}\n\n{head} Lateness in µs.\n\n{table.markdown()}\n\n{limits}\n\n{said}\n\n{END}\n"
+    csv = Table(COLUMNS, [_values(found, loop) for loop in found.loops]).csv()
+    files = {"timing.txt": text, "timing.md": markdown, "timing.csv": csv}
+    return Evidence(text, files, plot_files("timing", "Lateness of ticks", draw, found))
+
+
+def _values(found: Timed, loop: LoopTiming) -> tuple[object, ...]:
+    """Return the row of a loop in the CSV."""
+    return (
+        *(loop.grant.level, loop.grant.how, loop.name, loop.ticks, loop.overruns, loop.late),
+        *(f"{loop.late_us(percent):.3f}" for percent in (*PERCENTILES, 100.0)),
+        *(f"{found.ratio(loop, percent):.4g}" for percent in (50.0, 99.0)),
+        *(f"{loop.busy_us(percent):.3f}" if len(loop.busy_ns) else "n/a" for percent in (50, 99)),
     )
 
 
-def _row(found: Timed, lane: Lane) -> tuple[str, ...]:
+def _row(found: Timed, loop: LoopTiming) -> tuple[str, ...]:
     ratios = (
-        ("1", "1") if lane.kind == "bare" else tuple(_ratio(found.ratio(lane, percent)) for percent in (50.0, 99.0))
+        ("1", "1") if loop.kind == "bare" else tuple(_ratio(found.ratio(loop, percent)) for percent in (50.0, 99.0))
     )
     return (
-        lane.grant.level,
-        lane.name,
-        *(_number(lane.late_us(percent)) for percent in (*PERCENTILES, 100.0)),
-        f"{lane.late:,}",
-        f"{lane.overruns:,}",
+        loop.grant.level,
+        loop.name,
+        *(_number(loop.late_us(percent)) for percent in (*PERCENTILES, 100.0)),
+        f"{loop.late:,}",
+        f"{loop.overruns:,}",
         *ratios,
-        f"{lane.busy_us(99):.1f}" if len(lane.busy_ns) else "–",
+        f"{loop.busy_us(99):.1f}" if len(loop.busy_ns) else "–",
     )
-
-
-def _notes(found: Timed) -> tuple[str, ...]:
-    spin: tuple[str, ...] = ()
-    if found.spin_us > 0:
-        spin = (f"a spin of {found.spin_us:g} µs before each deadline took {found.spun_share:.1%} of a core",)
-    return (*found.notes, *spin)
 
 
 def _number(us: float) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from study_app.evidence.accuracy import candidates
-from study_app.evidence.accuracy.candidates import LinearRung, TickRung
+from study_app.evidence.accuracy.candidates import Candidate, LinearViscosity
 from study_app.evidence.accuracy.comparison import Row, Time, front
 from study_app.evidence.reference_solutions import Case, Error, Truth, error_of
 from study_app.haptics.model.motion import Motion
@@ -45,22 +45,22 @@ def test_direction_counts_where_the_force_is_felt():
 
 def test_the_front_takes_rounding_errors_and_times_within_a_twentieth_as_equal():
     def row(name, ns, rms):
-        rung = TickRung(name, name, "tick", TANK)
-        return rung, Row(
-            "numerical", "water", "t", rung, Error(0, 0, rms, 0, 0, 0.05), Time(ns, ns, 1), 1, chosen=False
+        candidate = Candidate(name, name, "tick", TANK)
+        return candidate, Row(
+            "numerical", "water", "t", candidate, Error(0, 0, rms, 0, 0, 0.05), Time(ns, ns, 1), 1, chosen=False
         )
 
     points = dict([row("quick", 10, 0.5), row("dear", 20, 0.6), row("sums", 30, 1e-13), row("list", 900, 1e-16)])
-    assert [rung.name for rung in front(points)] == ["quick", "sums"]
+    assert [candidate.name for candidate in front(points)] == ["quick", "sums"]
     alike = dict([row("quick", 100, 0.5), row("truer", 104, 0.1), row("truest", 150, 0.01)])
-    assert [rung.name for rung in front(alike)] == ["truer", "truest"]
+    assert [candidate.name for candidate in front(alike)] == ["truer", "truest"]
 
 
 @pytest.mark.parametrize(("speed_mps", "expects"), [(1e-3, "no resistance"), (0.6, "+ history")])
 def test_the_ladder_has_the_gates_own_choice(speed_mps, expects):
     box = MotionBox(speed_mps=speed_mps, acceleration_mps2=10 * speed_mps)
-    rungs, choice = candidates.physical(REAL.model_copy(update={"motion": box}))
-    assert choice in rungs
+    found, choice = candidates.physical(REAL.model_copy(update={"motion": box}))
+    assert choice in found
     assert expects in choice.name
-    assert isinstance(rungs[0], LinearRung)
+    assert isinstance(found[0], LinearViscosity)
     assert candidates.numerical(TANK)[1].name == "O(1) wake"

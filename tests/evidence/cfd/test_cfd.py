@@ -200,7 +200,7 @@ def test_a_table_that_was_damaged_is_named(tmp_path):
 @pytest.mark.slow
 @COMPILED
 def test_the_stored_fits_have_the_errors_they_say(fits):
-    rows = fitted.fits_csv(fits).decode().splitlines()
+    rows = fitted.fits_csv(fits).splitlines()
     said = (PACKAGE / fitted.FITS_FILE).read_text("utf-8").splitlines()
     assert len(rows) == 1 + len(NAMES) * len(fitted.MODELS)
     for row, other in zip(rows, said, strict=True):

@@ -51,7 +51,7 @@ def test_planted_constants_are_found_and_a_motion_left_out_is_met():
     assert max(max(it.fitted) for it in found.errors) < 1e-4
     assert max(it.left_out[0] for it in found.errors) < 0.02
     assert min(it.program[0] for it in found.errors) > 0.01
-    text = law_fit.refit_markdown(found)
+    text = law_fit.evidence(found).text
     assert "| c_z | 5 | 3.15 |" in text
     assert text.count("gear_oil | ") == len(tables)
 

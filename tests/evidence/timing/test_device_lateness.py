@@ -14,7 +14,7 @@ if numba.config.DISABLE_JIT:
 from study_app.errors import StudyError
 from study_app.evidence.timing import device_lateness
 from study_app.evidence.timing.device_lateness import emulated_devices, time_devices
-from study_app.evidence.timing.measurement import Taken
+from study_app.evidence.timing.measurement import Ticks
 
 pytestmark = pytest.mark.slow
 
@@ -28,11 +28,11 @@ def times(monkeypatch: pytest.MonkeyPatch, factors: dict[str, Any]) -> list[str]
         def __init__(self, _grant: object, *, device: str, **_options: object) -> None:
             self.device, self.round = device, 0
 
-        def run(self, ticks: int) -> Taken:
+        def run(self, ticks: int) -> Ticks:
             order.append(self.device)
             self.round += 1
             lateness = rng.gamma(2.0, 10_000.0, ticks) * factors[self.device](self.round)
-            return Taken(lateness.astype(np.int64), np.zeros(0, np.int64), 0)
+            return Ticks(lateness.astype(np.int64), np.zeros(0, np.int64), 0)
 
     monkeypatch.setattr(device_lateness, "ServoLoop", FakeLoop)
     monkeypatch.setattr(device_lateness, "open_device", nullcontext)

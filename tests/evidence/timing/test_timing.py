@@ -17,14 +17,14 @@ from study_app.evidence.timing.measurement import (
     FULL,
     LEAD_IN,
     PERIOD_NS,
-    Lane,
+    LoopTiming,
     PlayedHand,
     Timed,
     granted,
     taken,
     timing,
 )
-from study_app.evidence.timing.report import BEGIN, END, markdown
+from study_app.evidence.timing.report import BEGIN, END, evidence
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.pack import elements_needed
@@ -35,7 +35,7 @@ NORMAL = Grant("normal", "no more was requested")
 
 def lane(kind, grant, lateness_us, overruns=0, busy_us=()):
     whole = [np.asarray(np.asarray(us) * 1000, np.int64) for us in (lateness_us, busy_us)]
-    return Lane(kind, grant, *whole, overruns)
+    return LoopTiming(kind, grant, *whole, overruns)
 
 
 def found(*lanes, load="none", **changed):
@@ -46,7 +46,7 @@ def found(*lanes, load="none", **changed):
         "spin_us": 0.0,
         "spun_share": 0.0,
         "frames_hz": None,
-        "lanes": lanes,
+        "loops": lanes,
         "notes": ("priority: normal",),
     }
     return Timed(**(fields | changed))
@@ -114,9 +114,9 @@ def test_a_race_times_every_loop_in_every_class_it_is_granted():
     raced = timing(0.5, "none", FakeWindows(), progress=lines.append)
     levels = ["normal"] if granted().best is None else ["normal", granted().best.level]
     assert list(raced.levels) == levels
-    assert [one.kind for one in raced.lanes][:4] == ["servo", "bare", "thread", "qt"]
-    assert {one.ticks for one in raced.lanes} == {500}
-    assert all((one.lateness_ns >= 0).all() for one in raced.lanes)
+    assert [one.kind for one in raced.loops][:4] == ["servo", "bare", "thread", "qt"]
+    assert {one.ticks for one in raced.loops} == {500}
+    assert all((one.lateness_ns >= 0).all() for one in raced.loops)
     assert len(raced.limits()) == 4 * len(levels)
     assert lines[-1] == "100 %"
     assert raced.frames_hz is None
@@ -127,7 +127,7 @@ def test_the_page_of_timing_has_such_a_table_to_be_replaced_whole():
     page = (Path(__file__).resolve().parents[3] / "docs" / "timing.md").read_text(encoding="utf-8")
     assert page.count(BEGIN) == page.count(END) == 1
     held = page.split(BEGIN)[1].split(END, maxsplit=1)[0]
-    ours = markdown(WELL)
+    ours = evidence(WELL).files["timing.md"]
     headings = [line for line in ours.splitlines() if line.startswith("| priority")]
     assert [line for line in held.splitlines() if line.startswith("| priority")] == headings
     for words in ("this servo", "bare compiled loop", "Python thread", "Qt timer", "cores", "of each loop at 1 kHz"):
@@ -136,7 +136,8 @@ def test_the_page_of_timing_has_such_a_table_to_be_replaced_whole():
 
 @pytest.mark.parametrize(("late_us", "shown"), [(100, "5.00"), (500, "25"), (19_980, "999"), (20_000, "> 1,000")])
 def test_a_ratio_to_the_bare_loop_has_as_many_digits_as_it_is_worth(late_us, shown):
-    table = markdown(found(lane("bare", NORMAL, STEADY), lane("qt", NORMAL, np.full(1000, float(late_us)))))
+    loops = (lane("bare", NORMAL, STEADY), lane("qt", NORMAL, np.full(1000, float(late_us))))
+    table = evidence(found(*loops)).files["timing.md"]
     (row,) = [line for line in table.splitlines() if "Qt timer" in line]
     assert row.count(f"| {shown} ") == 2, row
 

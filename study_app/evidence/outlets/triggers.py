@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import os
-import subprocess
-import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
@@ -15,15 +12,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.errors import OutletError, StudyError, WorkerError
-from study_app.evidence.outlets.streams import paced
+from study_app.errors import OutletError, StudyError
+from study_app.evidence.outlets.streams import Listener
+from study_app.evidence.table import Evidence, paced
 from study_app.haptics.runtime.clocks.clock import SystemClock
-from study_app.outlets.markers import CODES, SinkThread, TriggerSink, marker_of
+from study_app.outlets.markers import CODES, HIGH_S, SinkThread, TriggerSink, marker_of
 from study_app.outlets.session_outlets import open_sink
 
 VIRTUAL: Final = "virtual"
 EVERY_S: Final = 0.05
-PATIENCE_S: Final = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,22 +56,14 @@ class VirtualPort:
         ours, self._theirs = os.openpty()
         tty.setraw(self._theirs)
         self.address = f"serial:{os.ttyname(self._theirs)}"
-        self._process = subprocess.Popen(  # noqa: S603 - our own words
-            [sys.executable, "-m", "study_app.evidence.outlets.byte_reader", str(ours)],
-            pass_fds=(ours,),
-            stdout=subprocess.PIPE,
-            text=True,
-        )
+        self._listener = Listener(str(ours), pass_fds=(ours,))
         os.close(ours)
-        assert self._process.stdout is not None  # noqa: S101 - asked for above
-        if self._process.stdout.readline() != "ready\n":
-            raise WorkerError("the reader of the virtual port ended")
+        self._listener.ready()
 
     def unplug(self) -> list[tuple[int, int]]:
         """End the reader, as if an adapter were unplugged; return the bytes, each with when it was read [ns]."""
         self.close()
-        said = self._process.communicate(timeout=PATIENCE_S)[0]
-        return [(byte, at_ns) for byte, at_ns in json.loads(said)]
+        return [(byte, at_ns) for byte, at_ns in self._listener.end()]
 
     def close(self) -> None:
         """Close this end; the reader ends once the port is closed, too."""
@@ -86,8 +75,7 @@ class VirtualPort:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-        self._process.kill()
-        self._process.communicate()
+        self._listener.__exit__()
 
 
 def measure(
@@ -149,3 +137,24 @@ def _send(
     if thread.lost:
         raise OutletError(thread.lost)
     return sent, sink
+
+
+def evidence(found: TriggerDelays) -> Evidence:
+    """Return the results as text."""
+    lines = [
+        f"{len(found.written_us)} events, twenty a second, on {found.port}",
+        f"  from event to the byte being written: {_spread(found.written_us)} us",
+    ]
+    if found.read_us is not None and found.high_ms is not None:
+        lines += [
+            f"  from event to the byte being read by another process: {_spread(found.read_us)} us",
+            f"  from the code to 0: {_spread(found.high_ms)} ms, nominal {1e3 * HIGH_S:g} ms",
+            f"  wrong or missing bytes: {found.wrong}",
+        ]
+    text = "\n".join(lines) + "\n"
+    return Evidence(text, {"triggers.txt": text}, missed=bool(found.wrong))
+
+
+def _spread(values: NDArray[np.float64]) -> str:
+    p50, p99, most = np.percentile(values, [50, 99, 100]) if len(values) else (np.nan,) * 3
+    return f"p50 {p50:.3g}, p99 {p99:.3g}, most {most:.3g}"

@@ -1,0 +1,163 @@
+"""The form of all evidence: a table in three forms, what a command prints and writes, and loops that take turns."""
+
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from matplotlib.figure import Figure
+
+from study_app.errors import StudyError
+from study_app.figure_style import PLOT_SETTINGS, file_bytes
+from study_app.store.output_files import write_files
+from study_app.store.tables.csv_files import csv_text_of
+
+TURN_S: Final = 0.25
+"""How long a loop runs until it is another's turn."""
+LEAST_S: Final = 0.5
+MOST_S: Final = 3600.0
+
+Arm = TypeVar("Arm")
+Found = TypeVar("Found")
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of cells below headings; the first ``left`` columns are words, the others numbers."""
+
+    headings: Sequence[str]
+    rows: Sequence[Sequence[object]]
+    left: int = 0
+
+    def text(self) -> str:
+        """Return the table for a terminal."""
+        cells = [[str(cell) for cell in row] for row in (self.headings, *self.rows)]
+        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+        aligned = [f"{'<' if k < self.left else '>'}{width}" for k, width in enumerate(widths)]
+        lines = ("  ".join(map(format, row, aligned)).rstrip() for row in cells)
+        return "\n".join(lines)
+
+    def markdown(self) -> str:
+        """Return the table as Markdown."""
+        marks = ["---" if k < self.left else "--:" for k in range(len(self.headings))]
+        return "\n".join(f"| {' | '.join(map(str, row))} |" for row in (self.headings, marks, *self.rows))
+
+    def csv(self) -> str:
+        """Return the table for machines."""
+        return csv_text_of([self.headings, *self.rows])
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a command of evidence prints, what it writes, and whether a limit is missed.
+
+    ``files`` are texts by file name; ``figures`` draws the others.
+    """
+
+    text: str
+    files: Mapping[str, str]
+    figures: Callable[[], Mapping[str, bytes]] = dict
+    missed: bool = False
+
+    def write(self, to: Path) -> tuple[Path, ...]:
+        """Write all files into the folder ``to``, or none; return their paths.
+
+        Raises
+        ------
+        AnalysisError
+            The folder cannot be written.
+        """
+        contents = {name: text.encode() for name, text in self.files.items()}
+        return write_files(to, {**contents, **self.figures()})
+
+
+def plot_files(name: str, title: str, draw: Callable[..., Figure], *of: Any) -> Callable[[], Mapping[str, bytes]]:
+    """Return what draws a figure ``of`` these results as ``name.png`` and ``name.svg``."""
+
+    def files() -> Mapping[str, bytes]:
+        figure = draw(*of)
+        return {f"{name}.{kind}": file_bytes(figure, kind, title, PLOT_SETTINGS) for kind in ("png", "svg")}
+
+    return files
+
+
+def run(
+    measure: Callable[..., Found],
+    cases: Iterable[Sequence[Any]],
+    executor: Executor | None = None,
+    progress: Callable[[int], object] = lambda _done: None,
+) -> tuple[Found, ...]:
+    """Return what ``measure`` returns for the arguments of each case, by an executor or here.
+
+    ``progress`` is called with the number of finished cases.
+    """
+    found: list[Found] = []
+    for one in (map if executor is None else executor.map)(measure, *zip(*cases, strict=True)):
+        found.append(one)
+        progress(len(found))
+    return tuple(found)
+
+
+def check_seconds(seconds: float, what: str) -> None:
+    """Refuse a duration out of range.
+
+    Raises
+    ------
+    StudyError
+        It is.
+    """
+    if not LEAST_S <= seconds <= MOST_S:
+        raise StudyError(f"{what} for {LEAST_S:g} to {MOST_S:g} s, not {seconds:g}")
+
+
+def take_turns(
+    arms: Mapping[Arm, Callable[[int], Found]],
+    rounds: int,
+    *,
+    ending: threading.Event,
+    progress: Callable[[str], object] = lambda _line: None,
+    alternating: bool = False,
+) -> dict[Arm, list[Found]]:
+    """Run each arm once a round, so that other load on the machine affects all alike; return what each gave.
+
+    An arm is called with the number of the round; ``alternating``: every second round is in reverse order.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        ``ending`` was set.
+    """
+    found: dict[Arm, list[Found]] = {arm: [] for arm in arms}
+    for number in range(rounds):
+        for arm in reversed(tuple(arms)) if alternating and number % 2 else arms:
+            if ending.is_set():
+                raise KeyboardInterrupt
+            found[arm].append(arms[arm](number))
+        if number * 10 // rounds < (number + 1) * 10 // rounds:
+            progress(f"{100 * (number + 1) // rounds:3} %")
+    return found
+
+
+def paced(
+    seconds: float, every_s: float, *, ending: threading.Event, progress: Callable[[str], object]
+) -> Iterator[int]:
+    """Yield 0, 1, 2 … for so many seconds, with a pause after each, and report each per cent once.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        ``ending`` was set.
+    """
+    began_s, shown, number = time.monotonic(), -1, 0
+    while (share := (time.monotonic() - began_s) / seconds) < 1:
+        if ending.is_set():
+            raise KeyboardInterrupt
+        if int(100 * share) > shown:
+            shown = int(100 * share)
+            progress(f"{shown:3} %")
+        yield number
+        number += 1
+        time.sleep(every_s)
