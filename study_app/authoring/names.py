@@ -101,6 +101,22 @@ def renamed(document: Document, thing: Path, name: str, recorded: frozenset[str]
     return (Set((*thing, "id"), name), *(Set(place, name) for place in references_to(document, thing)))
 
 
+def id_at(document: Document, thing: Path) -> str:
+    """Return the id of a table or item; "" where there is none."""
+    return str(_item_id(document, thing) or thing[-1]) if value_at(document, thing) is not None else ""
+
+
+def suggested_id(document: Document, thing: Path, recorded: frozenset[str] = frozenset()) -> str:
+    """Return the free id that the text of a table or item gives in the first language; "" for its own, or no text."""
+    text = value_at(document, (*thing, "text" if _item_id(document, thing) is not None else "title"))
+    if isinstance(text, Mapping):
+        text = text.get(next((code for _, code in entries(document, "study.languages.*")), "en"))
+    wanted = id_of(text, MAX_FROM_TEXT) if isinstance(text, str) else ""
+    own = id_at(document, thing)
+    free = free_id(taken_beside(document, thing) | (recorded - {own}), wanted) if wanted else ""
+    return "" if free == own else free
+
+
 def taken_beside(document: Document, thing: Path) -> set[str]:
     """Return the names that a table or item cannot have, since others have them."""
     if _item_id(document, thing) is None:

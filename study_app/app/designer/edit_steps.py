@@ -18,9 +18,7 @@ from study_app.app.designer.element_steps import (
 )
 from study_app.app.designer.series_steps import series
 from study_app.authoring.additions import added
-from study_app.authoring.changes.followed_ids import FollowedIds
 from study_app.authoring.changes.initial_values import initial, singular
-from study_app.authoring.changes.languages import TypedCopies
 from study_app.authoring.changes.short_texts import followed
 from study_app.authoring.conversions import left_by, switched
 from study_app.authoring.edited_study import Study
@@ -52,7 +50,6 @@ from study_app.viewmodels.designer.requests import (
     Several,
     SwitchKey,
     SwitchKind,
-    with_path,
 )
 
 Recorded: TypeAlias = Callable[[Path], frozenset[str]]
@@ -64,7 +61,7 @@ def no_answers(_element: Path) -> frozenset[str]:
 
 
 class Steps:
-    """Makes steps; keeps the values that a switch of kind removed, and which ids follow their texts.
+    """Makes steps; keeps the values that a switch of kind removed.
 
     Parameters
     ----------
@@ -74,14 +71,11 @@ class Steps:
 
     def __init__(self, recorded: Recorded = no_answers) -> None:
         self._left: dict[Path, dict[str, Any]] = {}
-        self._ids = FollowedIds()
-        self._copies = TypedCopies()
         self._recorded = recorded
 
     def leave(self) -> None:
-        """Forget what switches removed, and what was typed in: another element is selected."""
+        """Forget what switches removed: another element is selected."""
         self._left.clear()
-        self._copies.end()
 
     def step(self, study: Study, asked: Request, selected: Path = ()) -> Step:
         """Return the step that is asked for while an element is selected.
@@ -92,8 +86,8 @@ class Steps:
             It makes no sense in this study.
         """
         if isinstance(asked, SetText):
-            return self._type(study, asked, selected)
-        self._copies.end()
+            edits = (*_text(study, asked), *followed(study, asked.path, asked.language, asked.text))
+            return Step(f"Type {label_of(asked.path[-1])}", edits, None, (asked.path, asked.language))
         if isinstance(asked, SwitchKind):
             return self._switch(study, asked)
         if isinstance(asked, SwitchKey):
@@ -114,36 +108,11 @@ class Steps:
             return replace(step, select=None, several=(), fresh=False)
         if isinstance(asked, RenameElement):
             edits = renamed(study.document, asked.path, asked.name, self._recorded(asked.path))
-            self._ids.rename(study, asked.path, asked.name)
             after = asked.path if isinstance(asked.path[-1], int) else (*asked.path[:-1], asked.name)
             return Step(f"Rename to {asked.name}", edits, after)
         if isinstance(asked, Several):
             return self._several(study, asked, selected)
-        step = _of_elements(study, asked, selected)
-        if isinstance(asked, AddElement | AddNamed) and step.select is not None:
-            self._ids.add(study.trial.edited(*step.edits)[0], step.select)
-        if step.text:
-            self.retyped(study, study.typed(step.text)[0])
-        return step
-
-    def retyped(self, before: Study, after: Study) -> None:
-        """Let ids stay that another text of the file brings in."""
-        self._ids.forget_brought(before, after)
-
-    def travelled(self, before: Study, after: Study) -> None:
-        """Let ids follow their texts again after undo or redo restored them."""
-        self._ids.go_on(before, after)
-
-    def _type(self, study: Study, asked: SetText, selected: Path) -> Step:
-        """Return the step of a text, with the copies in other languages, the short text and the id that follow it."""
-        element = asked.path[:-1]
-        field = (self._ids.element(study, element) or element, asked.path[-1], asked.language)
-        ids, after = self._ids.followed(study, asked.path, asked.language, asked.text, self._recorded(element))
-        edits: tuple[Edit, ...] = ()
-        for code in (asked.language, *self._copies.following(study, asked.path, asked.language, field)):
-            edits += (*_text(study, replace(asked, language=code)), *followed(study, asked.path, code, asked.text))
-        select = with_path(selected, element, after) if selected[: len(element)] == element else None
-        return Step(f"Type {label_of(asked.path[-1])}", (*edits, *ids), select, field)
+        return _of_elements(study, asked, selected)
 
     def _several(self, study: Study, asked: Several, selected: Path) -> Step:
         edits: tuple[Edit, ...] = ()

@@ -13,12 +13,13 @@ from study_app.app.designer.element_steps import Step
 from study_app.app.designer.known_studies import there
 from study_app.app.designer.open_study import OpenStudy
 from study_app.authoring.edited_study import Study
+from study_app.authoring.names import id_at, renamed, suggested_id
 from study_app.authoring.undo_stack import History
 from study_app.authoring.writer.edits import Edit
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.source.document import Path as Place
 from study_app.viewmodels.designer.file_text import retyped
-from study_app.viewmodels.designer.requests import Request, RetypeFile
+from study_app.viewmodels.designer.requests import AddElement, AddNamed, LeaveText, Request, RetypeFile, with_path
 
 JOIN_S: Final = 1.0  # typing in one field is one step until the keyboard rests for so long
 
@@ -51,6 +52,7 @@ class Editing(QObject):
         self._last: tuple[object, float, Study | None] = (None, 0.0, None)
         self._back: list[Place] = []
         self._made: Step | None = None
+        self._added: tuple[Place, str, str] = ((), "", "")
 
     @property
     def writable(self) -> OpenStudy | None:
@@ -66,6 +68,7 @@ class Editing(QObject):
         """Take another study from now on, None for none."""
         self.opened = opened
         self._steps, self._last, self._back = Steps(self.recorded), (None, 0.0, None), []
+        self._added = ((), "", "")
         self.opened_other.emit()
 
     # selection
@@ -75,6 +78,9 @@ class Editing(QObject):
         opened = self.opened
         if opened is None or opened.history.selected == path:
             return
+        before = opened.history.selected
+        self.suggest_id()
+        path = with_path(path, before, opened.history.selected)
         if not back:
             self._back.append(opened.history.selected)
         self._steps.leave()
@@ -101,6 +107,9 @@ class Editing(QObject):
         opened = self.writable
         if opened is None:
             return
+        if isinstance(asked, LeaveText):
+            self.suggest_id()
+            return
         try:
             if isinstance(asked, RetypeFile):
                 text = retyped(opened.study.text, asked.text)
@@ -109,6 +118,9 @@ class Editing(QObject):
                 self._type(opened, "Edit the file", text, "file")
             else:
                 self._make(opened, self._steps.step(opened.study, asked, opened.history.selected))
+                if isinstance(asked, AddElement | AddNamed):
+                    document, added = opened.study.document, opened.history.selected
+                    self._added = added, id_at(document, added), suggested_id(document, added)
         except Refused as refusal:
             path = asked.path if hasattr(asked, "path") else opened.history.selected
             self.refused.emit(path, f"{str(refusal)[:1].upper()}{str(refusal)[1:]}.", asked)
@@ -126,8 +138,24 @@ class Editing(QObject):
 
     def _type(self, opened: OpenStudy, words: str, text: str, key: object = None) -> None:
         history = opened.history.typed(words, text, joins=self._joins(key))
-        self._steps.retyped(opened.study, history.study)
         self._take(opened, history, key)
+
+    def suggest_id(self) -> None:
+        """Give the element that was added last the id of its text, once: when its text is left."""
+        path, name, initial = self._added
+        if (opened := self.writable) is None or not path or id_at(opened.study.document, path) != name:
+            return
+        recorded = self.recorded(path)
+        wanted = "" if name in recorded else suggested_id(opened.study.document, path, recorded)
+        if wanted in {"", initial}:
+            return
+        self._added = ((), "", "")
+        after = path if isinstance(path[-1], int) else (*path[:-1], wanted)
+        edits = renamed(opened.study.document, path, wanted, recorded)
+        select = with_path(opened.history.selected, path, after)
+        joins = self._joins(self._last[0])
+        self._take(opened, opened.history.edited(f"Rename to {wanted}", *edits, select=select, joins=joins))
+        self._note()
 
     def _joins(self, key: object) -> bool:
         """Return whether an edit continues the last step: of the same key, made here, not long ago."""
@@ -169,9 +197,7 @@ class Editing(QObject):
 
     def _travel(self, to: Callable[[History], History]) -> None:
         if (opened := self.writable) is not None:
-            history = to(opened.history)
-            self._steps.travelled(opened.study, history.study)
-            self._take(opened, history)
+            self._take(opened, to(opened.history))
             self._note()
 
     def _note(self) -> None:

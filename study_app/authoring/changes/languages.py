@@ -9,7 +9,7 @@ from study_app.authoring.names import ITEMS
 from study_app.authoring.writer.edits import Edit, Set, Unset
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.checks.cross_references import TEXTS
-from study_app.protocol.source.document import Path, entries, value_at
+from study_app.protocol.source.document import Path, entries
 from study_app.protocol.wording.languages import LANGUAGES, language_name
 
 
@@ -70,56 +70,6 @@ def is_copied(texts: Mapping[str, Any], code: str, first: str) -> bool:
     """
     text = texts.get(code)
     return text in (texts.get(first), new_text(ITEMS)) and any(map(str.isalpha, str(text or "")))
-
-
-def following(study: Study, path: Path, language: str) -> tuple[str, ...]:
-    """Return the languages whose copies follow a text that is typed in a language, if that is the first one."""
-    texts, first = value_at(study.document, path), languages_of(study)[0]
-    if language != first or not isinstance(texts, Mapping):
-        return ()
-    old = texts.get(first)
-    if old == new_text(ITEMS):  # there is no text to translate yet
-        return ()
-    return tuple(code for code in texts if code != first and texts[code] == old and is_copied(texts, code, first))
-
-
-class TypedCopies:
-    """Languages that follow a text while it is typed: determined when typing begins, not at each key.
-
-    So a translation that equals the typed text for a moment stays, and a copy also follows an empty text.
-    """
-
-    def __init__(self) -> None:
-        self._typing: tuple[object, tuple[str, ...], Mapping[str, Any]] | None = None
-
-    def end(self) -> None:
-        """Reset: the next typed text starts a new decision."""
-        self._typing = None
-
-    def following(self, study: Study, path: Path, language: str, field: object) -> tuple[str, ...]:
-        """Return the languages that follow; typing continues in one field while the other languages' texts stay.
-
-        Parameters
-        ----------
-        study : Study
-            The study before the text is typed.
-        path : tuple of str or int
-            The text.
-        language : str
-            The language of the typed text.
-        field : tuple
-            The field in which the user types.
-        """
-        texts = value_at(study.document, path)
-        texts = dict(texts) if isinstance(texts, Mapping) else {}
-        old = texts.pop(language, None)
-        if self._typing is not None:
-            before, codes, others = self._typing
-            if before == field and texts == {**others, **dict.fromkeys(codes, old)}:
-                return codes
-        codes = following(study, path, language)
-        self._typing = field, codes, {code: text for code, text in texts.items() if code not in codes}
-        return codes
 
 
 def texts_of(study: Study) -> Iterator[tuple[Path, Any]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 from study_app.protocol.source.document import Path
@@ -24,6 +24,13 @@ class SetText:
     path: Path
     language: str
     text: str
+
+
+@dataclass(frozen=True, slots=True)
+class LeaveText:
+    """Say that a text is left: a new element takes the id of its text."""
+
+    path: Path
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,20 +224,13 @@ class GoTo:
 
 
 Request: TypeAlias = (
-    SetValue | SetText | RemoveKey | AddKey | AddEntry | SwitchKind | SwitchKey | AddElement | AddNamed | AddInstrument
-    | ChangeLanguage | DuplicateElement | MakeSeries | MoveElement | MoveTo | MoveEntries | DuplicateEntries
-    | Paste | DeleteElement | RenameElement
+    SetValue | SetText | LeaveText | RemoveKey | AddKey | AddEntry | SwitchKind | SwitchKey | AddElement | AddNamed
+    | AddInstrument | ChangeLanguage | DuplicateElement | MakeSeries | MoveElement | MoveTo | MoveEntries
+    | DuplicateEntries | Paste | DeleteElement | RenameElement
     | RetypeFile | Several
 )  # fmt: skip
 
 
-def with_path(asked: Any, before: Path, after: Path) -> Any:
-    """Return a request, or a path, in which the path of an element is another one, as after a new id."""
-    if isinstance(asked, tuple):
-        if asked[: len(before)] == before:
-            return (*after, *asked[len(before) :])
-        return tuple(with_path(one, before, after) for one in asked)
-    if is_dataclass(asked) and not isinstance(asked, type):
-        parts = {part.name: getattr(asked, part.name) for part in fields(asked)}
-        return replace(asked, **{name: with_path(value, before, after) for name, value in parts.items()})
-    return asked
+def with_path(path: Path, before: Path, after: Path) -> Path:
+    """Return a path in which that of an element is another one, as after a new id."""
+    return (*after, *path[len(before) :]) if path[: len(before)] == before else path

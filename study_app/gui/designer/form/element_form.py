@@ -25,7 +25,7 @@ from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.form.form_changes import added_row, shape_of
 from study_app.viewmodels.designer.form.form_rows import Form, FormRow, Section
 from study_app.viewmodels.designer.problem_rows import ProblemRow
-from study_app.viewmodels.designer.requests import AddKey, RemoveKey, RenameElement, SetText
+from study_app.viewmodels.designer.requests import AddKey, LeaveText, RemoveKey, RenameElement
 from study_app.viewmodels.designer.special.questions import QuestionLine
 
 ACROSS = 2
@@ -83,7 +83,7 @@ class FormCard(Card):
 
     def _ask(self, asked: object) -> None:
         """Ask for a step; the form of an element that it renames keeps its editors."""
-        before, self._may_rename = self._may_rename, isinstance(asked, RenameElement | SetText)
+        before, self._may_rename = self._may_rename, isinstance(asked, RenameElement | LeaveText)
         self.asked.emit(asked)
         self._may_rename = before
 

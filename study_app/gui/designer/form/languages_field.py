@@ -11,7 +11,7 @@ from study_app.gui.widgets.boxes import add_layout
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.form.form_rows import FormRow
 from study_app.viewmodels.designer.form.form_words import is_right_to_left
-from study_app.viewmodels.designer.requests import SetText
+from study_app.viewmodels.designer.requests import LeaveText, SetText
 
 
 class LanguagesField(Field):
@@ -39,6 +39,7 @@ class LanguagesField(Field):
             if is_right_to_left(code):
                 made.setLayoutDirection(Qt.LayoutDirection.RightToLeft)
             made.typed.connect(lambda text, code=code: self.asked.emit(SetText(self.row.row.path, code, text)))
+            made.left.connect(lambda: self.asked.emit(LeaveText(self.row.row.path)))
             made.came.connect(self.came)
             self.lines[code] = made
             if down and len(row.languages) > 1:

@@ -37,10 +37,11 @@ else:
 
 
 class _Typed(_Base):
-    """What a line and a field of several lines share; ``typed`` carries the text."""
+    """What a line and a field of several lines share; ``typed`` carries the text, ``left`` follows when it is left."""
 
     typed: Any
     came: Any
+    left: Any
     rests = True
     """Whether what is typed is handed on while typing, not only at Enter and on leaving."""
     beside: Sequence[_Typed] = ()
@@ -70,6 +71,8 @@ class _Typed(_Base):
         """Hand on what was typed, once no button is pressed and no list is open: another form would take it away."""
         if QApplication.mouseButtons() == Qt.MouseButton.NoButton and QApplication.activePopupWidget() is None:
             self.flush()
+            if not self.hasFocus():
+                self.left.emit()
         else:
             self._rest.start(CLICK_MS)
 
@@ -154,7 +157,8 @@ class _Typed(_Base):
         super().focusOutEvent(event)
         if event.reason() != Qt.FocusReason.MouseFocusReason:
             self.flush()
-        elif self.pending:
+            QTimer.singleShot(0, self, self.left.emit)  # once the keyboard is elsewhere: the form may be made anew
+        else:
             self._rest.start(CLICK_MS)
 
 
@@ -164,6 +168,7 @@ class TypedLine(_Typed, QLineEdit):
     stepped = Signal(int)
     typed = Signal(str)
     came = Signal()
+    left = Signal()
 
     def __init__(self, name: str) -> None:
         super().__init__()
@@ -206,6 +211,7 @@ class TypedText(_Typed, QPlainTextEdit):
 
     typed = Signal(str)
     came = Signal()
+    left = Signal()
 
     def __init__(self, name: str) -> None:
         super().__init__()
