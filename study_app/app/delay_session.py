@@ -188,7 +188,6 @@ class _Showing:
         return self._read(store, schedule, paced)
 
     def _size(self, bridge: SessionBridge) -> None:
-        """Give the windows the sizes that they are painted in."""
         if self._refresh_hz is not None:
             bridge.participant.setGeometry(0, 0, *SIZE_PX)
         bridge.operator.resize(*OPERATOR_PX)

@@ -13,7 +13,7 @@ log = logging.getLogger(__name__)
 class Failing(Protocol):
     """An object that handles a failure and ends in zero force."""
 
-    def fail(self, error: BaseException) -> None: ...  # noqa: D102
+    def fail(self, error: BaseException) -> None: ...
 
 
 F = TypeVar("F", bound=Failing)

@@ -224,7 +224,6 @@ class MainController(QObject):
         self.window.go("help")
 
     def _show_saved(self) -> None:
-        """Show the study, or the pilot, that was saved on home's cards."""
         if self._home_place is not None:
             self._home_place.show_studies()
 

@@ -248,7 +248,6 @@ class ResultsController(QObject):
         self._show(figures=tuple(figures if drawn.name in there else [*figures, new]))
 
     def _end(self, order: Order, *, newest: bool) -> None:
-        """Show what is there now that an order was carried out."""
         if isinstance(order, Decided):
             self._read(order.folder)
         elif isinstance(order, ReadStudy) and newest:

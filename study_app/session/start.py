@@ -38,7 +38,8 @@ from study_app.video.sources import Videos
 if TYPE_CHECKING:
     from study_app.haptics.runtime.servo import Servo
 
-MAX_SEED = 999_999
+MAX_SEED = 2_147_483_647
+MAX_DRAWN_SEED = 999_999  # short enough to be read aloud
 MEASURED_S = 2.0  # so long the servo is looked at before a session
 PLAYED_MEASURED_S = 0.5  # and before one that is played from the designer
 
@@ -159,8 +160,8 @@ def check_row(row_of: str | None, study: Protocol) -> None:
 
 
 def draw_seed() -> int:
-    """Return a random seed, short enough to be read aloud."""
-    return secrets.randbelow(MAX_SEED) + 1
+    """Return a random seed, at most `MAX_DRAWN_SEED`."""
+    return secrets.randbelow(MAX_DRAWN_SEED) + 1
 
 
 def study_results(results: Path, study: str, device: str, *, pilot: bool = False) -> Path:

@@ -125,6 +125,11 @@ def of_settings(undo: str = "", **settings: Any) -> Callable[[Any], None]:
     return lambda place: show_settings(place, MachineSettings(**settings), undo=undo)
 
 
+def chosen_at(choice: Any, at: int) -> None:
+    choice.setCurrentIndex(at)
+    choice.activated.emit(at)
+
+
 SETTINGS: Actions = {
     "plain": lambda place: show_settings(place, DEFAULTS),
     "screen gone": of_settings("screen", screen="HDMI-7", screen_number=2, viewing_distance_mm=900.0),
@@ -132,19 +137,20 @@ SETTINGS: Actions = {
     "outlets": of_settings(lsl_markers=True, lsl_samples="always", triggers="serial:COM3", camera="tcp://127.0.0.1:5"),
     "offset": of_settings(display_offset=DisplayOffset(mean_ms=23.5, spread_ms=1.25, screen="DP-1"), photodiode=False),
     "offset of another": of_settings(display_offset=DisplayOffset(mean_ms=23.5, screen="HDMI-1")),
-    "offset refused": in_turn(typed("offset.form.mean", "900"), clicked("offset.form.keep")),
-    "offset kept": in_turn(typed("offset.form.mean", "20"), clicked("offset.form.keep", "offset.form.forget")),
-    "distance refused": typed("seen.distance.field", "6"),
-    "distance taken": typed("seen.distance.field", "600"),
-    "port refused": typed("outlets.triggers", "COM3"),
-    "port taken": typed("outlets.triggers", "serial:COM3"),
+    "offset refused": in_turn(typed("offset.mean", "900"), clicked("offset.keep")),
+    "offset kept": in_turn(typed("offset.mean", "20"), clicked("offset.keep", "offset.forget")),
+    "distance refused": typed("editors.viewing_distance_mm.control", "6"),
+    "distance taken": typed("editors.viewing_distance_mm.control", "600"),
+    "port refused": typed("editors.triggers.control", "COM3"),
+    "port taken": typed("editors.triggers.control", "serial:COM3"),
     "switched": in_turn(
-        clicked("windows.sound", "offset.patch", "outlets.markers", "sessions.devices", "check", "screens.radios.0"),
-        lambda place: (place.outlets.samples.setCurrentIndex(1), place.outlets.samples.activated.emit(1)),
-        lambda place: (place.windows.theme_choice.setCurrentIndex(1), place.windows.theme_choice.activated.emit(1)),
-        lambda place: (place.sessions.device.setCurrentIndex(1), place.sessions.device.activated.emit(1)),
-        typed("sessions.camera", " tcp://127.0.0.1:5000 "),
-        typed("outlets.triggers", " "),
+        clicked("editors.sound.control", "editors.photodiode.control", "editors.lsl_markers.control", "devices", "check", "screens.radios.0"),
+        *(
+            lambda place, name=name: chosen_at(place.editors[name].control, 1)
+            for name in ("lsl_samples", "theme", "device")
+        ),
+        typed("editors.camera.control", " tcp://127.0.0.1:5000 "),
+        typed("editors.triggers.control", " "),
     ),
     "numbers": lambda place: place.screens.identify.click(),
     "stacked, light": lambda place: (place.resize(928, 640), apply_theme(place, LIGHT)),

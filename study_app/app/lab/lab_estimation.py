@@ -32,9 +32,9 @@ class Lab(Protocol):
     bench: Workbench
     live: Live | None
 
-    def feel(self, bench: Workbench) -> None: ...  # noqa: D102
+    def feel(self, bench: Workbench) -> None: ...
 
-    def fail(self, error: BaseException) -> None: ...  # noqa: D102
+    def fail(self, error: BaseException) -> None: ...
 
 
 class LabEstimation(QObject):

@@ -265,7 +265,6 @@ class SessionBridge(QObject):
 
     @guarded_session_slot
     def show_tiles(self) -> None:
-        """Show the servo's lateness and the state of the session."""
         self.monitor.show_lateness(self.operator)
         self._show()
 

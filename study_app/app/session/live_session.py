@@ -283,7 +283,6 @@ class LiveSession(QObject):
         diagnosis(self.bridge.operator, self.bridge.operator.theme, name, self.settings, held=held).show()
 
     def _show_compiled(self, share: float) -> None:
-        """Show how far the compiler is."""
         if self.note is not None:
             self.note.show_compiled(share)
 

@@ -52,7 +52,6 @@ class DeviceRow(QWidget):
         self.show_bench(None)
 
     def show_device(self, shown: DeviceShown) -> None:
-        """Show a device as it was found."""
         self.chip.show_state(shown.tone, shown.sign, shown.word)
         ways = shown.ways if len(shown.ways) > 1 else ()
         for line, words in (
@@ -94,7 +93,6 @@ class DeviceList(Card):
                 self._add(device)
 
     def show_benches(self, benches: Mapping[str, BenchShown]) -> None:
-        """Show the last bench of each device, by its name."""
         for name, row in self.rows.items():
             row.show_bench(benches.get(name.partition(":")[0]))
 

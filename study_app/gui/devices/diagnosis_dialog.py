@@ -153,7 +153,6 @@ class DiagnosisDialog(QDialog):
                 self._finish(answer)
 
     def _finish(self, said: Report | Refused | Crashed) -> None:
-        """Show what was found, or why nothing could be looked at."""
         self._timer.stop()
         self.bar.hide()
         self.again.setEnabled(True)
@@ -175,7 +174,6 @@ class DiagnosisDialog(QDialog):
         self.over.emit(well)
 
     def _show_waiting(self) -> None:
-        """Show every mode before anybody has looked, in its order."""
         for row in self.rows:
             row.show_waiting()
         self._order(self.rows)

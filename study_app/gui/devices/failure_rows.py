@@ -71,7 +71,6 @@ class FindingRow(Themed, QWidget):
         self.show_waiting()
 
     def show_waiting(self) -> None:
-        """Say that no diagnosis has run yet."""
         self._show(WAITING, self.finding, found=False)
 
     def show_finding(self, finding: Finding) -> None:
@@ -121,8 +120,7 @@ class FindingRow(Themed, QWidget):
             grid.addWidget(Paste(finding.paste), len(rows), 1)
         return whole
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Tint what is found."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         if not self.found:
             return
         painter = QPainter(self)

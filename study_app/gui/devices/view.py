@@ -50,7 +50,6 @@ class OptionCard(Card):
         self.show_file(None)
 
     def show_file(self, path: str | None) -> None:
-        """Show which file was chosen."""
         self._path = path or ""
         self.file.show_text(path or NO_FILE)
         self.forget.setEnabled(path is not None)
@@ -133,7 +132,6 @@ class DevicesPlace(Place):
         self.left.emit()
 
     def show_devices(self, shown: tuple[DeviceShown, ...], preferred: str) -> None:
-        """Show what was found, and which device sessions begin with."""
         self.people.show_devices(tuple(one for one in shown if not one.simulated))
         self.simulated.show_devices(tuple(one for one in shown if one.simulated))
         self._group.setExclusive(False)  # or what is marked could not lose its mark
@@ -143,21 +141,18 @@ class DevicesPlace(Place):
         self._group.setExclusive(True)
 
     def show_benches(self, benches: Mapping[str, BenchShown]) -> None:
-        """Show the last bench of each device, by its name."""
         for part in (self.people, self.simulated):
             part.show_benches(benches)
 
     def show_options(self, values: Mapping[str, Path]) -> None:
-        """Show which files are chosen, by the option's name."""
         for name, card in self.options.items():
             card.show_file(str(values[name]) if name in values else None)
 
     def show_looking(self, looking: bool) -> None:
-        """Say that the machine is being looked at."""
         self.refresh.setEnabled(not looking)
         self.refresh.show_action("repeat", "Looking …" if looking else "Refresh")
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+    def resizeEvent(self, event: QResizeEvent) -> None:
         """Make room: move the side column below."""
         super().resizeEvent(event)
         stacked = self.width() < STACKED_BELOW

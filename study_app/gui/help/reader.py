@@ -89,8 +89,7 @@ class PageReader(Themed, QTextBrowser):
         if self.page:
             self._draw()
 
-    def loadResource(self, kind: int, name: QUrl | str) -> Any:  # noqa: N802 - Qt's name
-        """Return a picture, no wider than the text."""
+    def loadResource(self, kind: int, name: QUrl | str) -> Any:
         if kind != QTextDocument.ResourceType.ImageResource.value:
             return super().loadResource(kind, name)
         path = name.toString() if isinstance(name, QUrl) else name
@@ -102,7 +101,7 @@ class PageReader(Themed, QTextBrowser):
         picture.setDevicePixelRatio(ratio)
         return picture
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+    def resizeEvent(self, event: QResizeEvent) -> None:
         """Draw the page again, since pictures are as wide as the text; what is read stays in sight."""
         at = self.verticalScrollBar().value() / max(1, self.verticalScrollBar().maximum())
         super().resizeEvent(event)

@@ -136,7 +136,7 @@ class HelpPlace(Place):
         if item is not None:
             self.open_page(item.data(PAGE))
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Let arrows in the search field act on the list; the first one, and Enter, open its first page."""
         if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent) and event.key() in (*MOVES, *ENTERS):
             if not self.list.selectedItems():

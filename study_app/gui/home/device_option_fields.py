@@ -55,7 +55,6 @@ class DeviceOptionFields(QWidget):
         return row
 
     def show_device(self, device: str) -> None:
-        """Show the fields of a device."""
         self._asked = descriptor_of(device).window_options
         names = {option.name for option in self._asked}
         for name, row in self._rows.items():

@@ -200,7 +200,6 @@ class MainWindow(QMainWindow):
             self._say_not_opened(name, error)
 
     def _say_not_opened(self, name: str, error: BaseException) -> None:
-        """Say why a place could not be opened, and offer to try again."""
         if not self.isVisible():
             return
         self.not_opened = error
@@ -265,13 +264,12 @@ class MainWindow(QMainWindow):
     def _arrange(self) -> None:
         self.rail.narrow(self.width() < NARROW_BELOW or self._now().wants_narrow_rail())
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+    def resizeEvent(self, event: QResizeEvent) -> None:
         """Make room: the rail becomes narrow in a small window."""
         super().resizeEvent(event)
         self._arrange()
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
-        """Leave every place, close what was asked or said, and tell that the operator is done."""
+    def closeEvent(self, event: QCloseEvent) -> None:
         for place in self._places.values():
             place.leave()
         for dialog in self.findChildren(QDialog):

@@ -61,12 +61,11 @@ class RailButton(Themed, PressedByEnter):
         self.updateGeometry()
         self.update()
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+    def sizeHint(self) -> QSize:
         """Return the room for icon and word; a fixed height would not outlast a change of theme."""
         return QSize(NARROW_RAIL - 2 * NARROW_MARGIN, 58) if self._narrow else QSize(WIDE_RAIL - 2 * WIDE_MARGIN, 42)
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the same room."""
+    def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
 
     @property
@@ -86,8 +85,7 @@ class RailButton(Themed, PressedByEnter):
         self.setAccessibleName(word)
         self.narrow(self._narrow)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the place one is at with its tint and mark, then icon and word."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -164,8 +162,7 @@ class Rail(Themed, QWidget):
         word = "Light" if theme.dark else "Dark"
         self.switch.say("sun" if theme.dark else "moon", f"{word} theme", word)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the strip and the hairline at its side."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.fillRect(self.rect(), QColor(self.theme.surface))
         painter.fillRect(self.width() - 1, 0, 1, self.height(), QColor(self.theme.border))

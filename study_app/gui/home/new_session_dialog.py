@@ -233,7 +233,6 @@ class NewSessionDialog(QDialog):
         self._look()
 
     def _show_verdict(self) -> None:
-        """Say at once whether this can begin, and if not, why and what to do."""
         fault = self._fault()
         inside = Path(self.results.text()).resolve().is_relative_to(workspace().folder.resolve())
         self.where.setText("in the workspace" if inside else "outside the workspace: Home will not list its sessions")

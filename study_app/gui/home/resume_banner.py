@@ -41,8 +41,7 @@ class ResumeBanner(Themed, QWidget):
         self.resume.show_action("play", f"Resume {session.participant}")
         self.resume.setAccessibleName(f"Resume {session.participant}")
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the tint."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(Qt.PenStyle.NoPen)

@@ -41,7 +41,6 @@ class DeviceCard(Card):
         add_parts(self.column, 4, hbox((self.devices, 1), (self.display, 1), spacing=12))
 
     def show_device(self, shown: DeviceShown) -> None:
-        """Show the device that sessions begin with, as it was found."""
         self.icon.show_icon(shown.icon, "text2")
         self.name.setText(shown.title)
         self.state.show_state(shown.tone, shown.sign, shown.word)
@@ -51,7 +50,6 @@ class DeviceCard(Card):
         set_ink(self.why, "warn" if shown.tone == "warn" else "bad" if shown.tone == "bad" else "text2")
 
     def show_screens(self, lines: tuple[str, ...]) -> None:
-        """Show a line for each screen."""
         self.screens.setText("\n".join(lines))
 
 
@@ -73,8 +71,7 @@ class LabCard(Card):
         self.open.clicked.connect(self.lab_asked)
         add_layout(self.column, hbox((vbox(label("Liquid lab", "card"), about, spacing=4), 1), self.open))
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the card, and into its upper part the water, the wake and the ball."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)

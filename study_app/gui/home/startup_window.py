@@ -62,7 +62,6 @@ class OpeningWindow(QWidget):
             self.step.setText(FIRST_TIME)
 
     def show_compiled(self, share: float) -> None:
-        """Show that the force model is compiled, and the share done (0 to 1)."""
         if not self._said:
             self.step.setText(FIRST_TIME)
         self._bar.setRange(0, 100)
@@ -79,15 +78,14 @@ class OpeningWindow(QWidget):
         self._timer.stop()
         self.close()
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         """Go back on Esc, tapped or held: whatever was opened so far is let go of, with zero force."""
         if event.key() == Qt.Key.Key_Escape:
             self.close()
         else:
             super().keyPressEvent(event)
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
-        """Go back, if it was not we who closed it."""
+    def closeEvent(self, event: QCloseEvent) -> None:
         self._timer.stop()
         super().closeEvent(event)
         if not self._done:

@@ -145,7 +145,6 @@ class CardGrid(QWidget):
         return self._grid.totalHeightForWidth(self.width()) if grows else self._grid.totalSizeHint().height()
 
     def show_cards(self, cards: list[QWidget]) -> None:
-        """Show these cards in place of those before."""
         for card in self.cards:
             remove_widget(card)
         self.cards = cards

@@ -349,15 +349,14 @@ class HomePlace(Place):
             self.cards_area.setMinimumHeight(min(whole, self.grid.row_height + NEXT_ROW_PX))
             self.cards_area.setMaximumHeight(whole)
 
-    def focusNextPrevChild(self, forward: bool) -> bool:  # noqa: N802 - Qt's name
-        """Scroll to a card that gets the keyboard from outside the cards, too."""
+    def focusNextPrevChild(self, forward: bool) -> bool:
         moved = super().focusNextPrevChild(forward)
         now = self.focusWidget()
         if moved and now is not None and self.grid.isAncestorOf(now):
             self.cards_area.ensureWidgetVisible(now)
         return moved
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+    def resizeEvent(self, event: QResizeEvent) -> None:
         """Make room: cards go below each other."""
         super().resizeEvent(event)
         self._arrange()

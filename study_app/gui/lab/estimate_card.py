@@ -61,7 +61,6 @@ class EstimateCard(ReadingCard):
         self.follow.clicked.connect(self._ask_follow)
 
     def show_view(self, view: LabView) -> None:
-        """Show the estimation of the selected setting."""
         shown = view.estimate
         if self.show_blind(view.workbench.blind):
             return

@@ -42,7 +42,7 @@ class FlowCurvePlot(Plot):
         self.show_ticks("bottom", _decades(first, last))
         self.apply_theme(LIGHT)
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+    def sizeHint(self) -> QSize:
         """Return a small size: a plot takes what is left."""
         return QSize(240, 120)
 

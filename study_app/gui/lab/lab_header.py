@@ -46,8 +46,7 @@ class Picker(Choice):
         policy = self.SizeAdjustPolicy
         self.setSizeAdjustPolicy(policy.AdjustToContents if yes else policy.AdjustToMinimumContentsLengthWithIcon)
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the list and its icon."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         draw_icon(QPainter(self), self._icon, QRectF(13, self.height() / 2 - 10, 20, 20), self.theme.text2, 1.9)
 
@@ -128,7 +127,6 @@ class LabHeader(Themed, QWidget):
         self.save.clicked.connect(self.save_asked)
 
     def show_view(self, view: LabView) -> None:
-        """Show what is chosen, and what can be done."""
         self.sides.show_view(view)
         self.blind.setChecked(view.workbench.blind)
         self.device.show_choices(view.device.choices, view.device.chosen)
@@ -142,8 +140,7 @@ class LabHeader(Themed, QWidget):
         self.blind.setChecked(not on)  # the view says when it is
         self.blind_asked.emit(on)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the hairline below."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         QPainter(self).fillRect(0, self.height() - 1, self.width(), 1, QColor(self.theme.border))
 
 

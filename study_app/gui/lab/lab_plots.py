@@ -62,8 +62,7 @@ class Legend(Themed, QWidget):
             self._fit()
             self.update()
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Take a second line where one is too short."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._fit()
 
@@ -83,8 +82,7 @@ class Legend(Themed, QWidget):
             x += width + LEGEND_GAP
         return places
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint strokes and names."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setFont(self._font)
@@ -118,7 +116,7 @@ class CurvePlot(Plot):
         self.box.sigResized.connect(self._lay_ticks)
         self.apply_theme(LIGHT)
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+    def sizeHint(self) -> QSize:
         """Return a small size: a plot takes what is left."""
         return QSize(240, 120)
 
@@ -180,7 +178,6 @@ class PlotCard(Card):
         self.setMinimumHeight(226)
 
     def show_blind(self, blind: bool) -> None:
-        """Show the plot, or that it is hidden."""
         self.stack.setCurrentIndex(int(blind))
 
 

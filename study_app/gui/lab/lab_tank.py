@@ -76,8 +76,7 @@ class LabTank(Themed, QWidget):
         self.pointer.moved.connect(self.moved)
         self.pointer.pressed.connect(self._press)
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the size that it was drawn for."""
+    def sizeHint(self) -> QSize:
         return QSize(784, 470)
 
     def show_view(self, view: LabView) -> None:
@@ -105,13 +104,11 @@ class LabTank(Themed, QWidget):
         view = self._view
         return view is not None and view.device.pointer and view.path is None and not view.busy
 
-    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Take the pointer for the ball."""
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
             self._take()
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Take the pointer with Return or the space bar, let it go with Esc."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space} and not self.pointer.held:
             self._take()
         elif event.key() == Qt.Key.Key_Escape and self.pointer.held:
@@ -119,13 +116,11 @@ class LabTank(Themed, QWidget):
         else:
             event.ignore()
 
-    def hideEvent(self, event: QHideEvent) -> None:  # noqa: N802 - Qt's name
-        """Give the pointer back with the place."""
+    def hideEvent(self, event: QHideEvent) -> None:
         self.let_go()
         super().hideEvent(event)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Find the tank's place anew."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self.camera = None
 
@@ -150,8 +145,7 @@ class LabTank(Themed, QWidget):
             self._placer = BallPlacer(self.camera, self.box, self._radius_m)
         return self.camera
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint tank, tail, ball, arrows and words."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         camera = self._ready()
         still = self._still_of(camera)
         painter = QPainter(self)
@@ -198,7 +192,6 @@ class LabTank(Themed, QWidget):
         return self._placer.place(self._view.now.position_m)
 
     def _paint_ball_below(self, painter: QPainter, ball: BallPlace | None) -> None:
-        """Paint the ball's shadow and the dots between both."""
         if ball is None:
             return
         dark = sprites.shadow(ball.floor_radius, self.devicePixelRatioF(), ball.floor_flat)
@@ -209,7 +202,6 @@ class LabTank(Themed, QWidget):
         painter.drawPoints(ball.feet)
 
     def _paint_arrows(self, painter: QPainter, camera: Camera, view: LabView) -> None:
-        """Paint the force on the hand and the wake that the body meets."""
         if view.now is None:
             return
         high = ARROW_HEIGHTS * (self.box.water - self.box.floor)
@@ -266,7 +258,6 @@ class LabTank(Themed, QWidget):
         return "Click to move the ball with the mouse" if self._takes_pointer else ""
 
     def _paint_words(self, painter: QPainter, places: TailPlaces | None) -> None:
-        """Paint the words in the corners."""
         view = self._view
         if view is None:
             return
@@ -298,7 +289,6 @@ class LabTank(Themed, QWidget):
         return plate(words, self.devicePixelRatioF()).width() / self.devicePixelRatioF() if words[0] else 0.0
 
     def _chip(self, painter: QPainter, words: Words, left: float, top: float) -> None:
-        """Paint words on a dark plate."""
         if words[0]:
             painter.drawImage(QPointF(left, top), plate(words, self.devicePixelRatioF()))
 

@@ -63,7 +63,6 @@ class CostLine(QWidget):
         self.setFixedHeight(LINE)
 
     def show_cost(self, cost: CostRow, most_ns: float) -> None:
-        """Show what an effect takes."""
         ns = cost.ns or 0.0
         self.name.show_text(cost.effect)
         self.bar.show_share(ns / most_ns if most_ns > 0 else 0.0)
@@ -72,7 +71,6 @@ class CostLine(QWidget):
         self.setAccessibleName(f"{cost.effect}: {words}")
 
     def show_waiting(self) -> None:
-        """Show that the number is not known now."""
         self.bar.show_share(0.0)
         self.ns.setText(UNKNOWN)
         self.setAccessibleName(f"{self.name.accessibleName()}: measuring")
@@ -90,7 +88,6 @@ class AbsentLine(QWidget):
         self.setFixedHeight(LINE - 3)
 
     def show_cost(self, cost: CostRow) -> None:
-        """Show which effect, and why it is not there."""
         self.name.setText(cost.effect)
         self.why.show_text(cost.why)
 
@@ -114,7 +111,6 @@ class CostCard(ReadingCard):
         self.stack.widget(1).setMinimumHeight(COST_HEIGHT)  # of the hidden page: the lines may need more
 
     def show_view(self, view: LabView) -> None:
-        """Show the felt setting's costs."""
         if self.show_blind(view.workbench.blind):
             return
         self.aside.setText(_aside(view))
@@ -155,7 +151,6 @@ class ErrorCard(ReadingCard):
         self.stack.widget(0).setMinimumHeight(ERROR_HEIGHT)
 
     def show_view(self, view: LabView) -> None:
-        """Show the felt setting's errors."""
         if self.show_blind(view.workbench.blind):
             return
         rows = view.errors or (ErrorRow("Not measured yet", ""),)
@@ -195,7 +190,6 @@ class LimiterLine(Themed, QWidget):
         self.setFixedHeight(LINE + 2)
 
     def show_limiter(self, limiter: Limiter) -> None:
-        """Show whether it acts, acted or did not."""
         state: LimiterState = "acting" if limiter.acting else "acted" if limiter.ticks else "quiet"
         self.name.show_text(limiter.name)
         self.count.setText(grouped(limiter.ticks))
@@ -209,8 +203,7 @@ class LimiterLine(Themed, QWidget):
             self.update()
         self.setAccessibleName(f"{limiter.name}: {self.word.text() or 'did not act'}, {limiter.ticks} ticks")
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint tint and mark."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -239,7 +232,6 @@ class LimiterCard(ReadingCard):
         add_parts(self.content, self._lines, STRETCH)
 
     def show_view(self, view: LabView) -> None:
-        """Show the limiters, each always in the same place."""
         if self.show_blind(view.workbench.blind):
             return
         _fit(self.lines, len(view.limiters), LimiterLine, self._lines, self)

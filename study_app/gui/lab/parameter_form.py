@@ -126,7 +126,6 @@ class FormPanel(Card):
         add_layout(self.column, self._stack, 1)
 
     def show_view(self, view: LabView) -> None:
-        """Show the felt side's liquid and parameters."""
         bench = view.workbench
         self._stack.setCurrentIndex(int(bench.blind))
         if bench.blind:

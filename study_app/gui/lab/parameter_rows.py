@@ -49,7 +49,6 @@ class ParameterRow(QWidget):
         return self._refused
 
     def show_row(self, row: FormRow) -> None:
-        """Show a parameter as it is."""
         raise NotImplementedError
 
     def show_refused(self, why: str) -> None:
@@ -112,7 +111,6 @@ class NumberRow(ParameterRow):
         self.field.setAccessibleDescription(f"initially {was}" if row.changed else "")
 
     def show_refused(self, why: str) -> None:
-        """Say why, with a bad edge round what was typed."""
         super().show_refused(why)
         changed = "changed" if self._row is not None and self._row.changed else ""
         self.field.show_state("refused" if why else changed)
@@ -156,7 +154,6 @@ class NumberRow(ParameterRow):
         self.show_refused(f"{said}: write one such as {example}, or press Esc.")
 
     def _forget(self) -> None:
-        """Show what counts in place of what was refused."""
         self.show_refused("")
         if self._row is not None:
             self.show_row(self._row)

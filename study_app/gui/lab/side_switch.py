@@ -41,13 +41,11 @@ class Badge(Themed, QWidget):
         self.setFixedSize(BADGE + 2, BADGE + 2)
 
     def show_side(self, side: Side) -> None:
-        """Show another side's letter."""
         if side != self._side:
             self._side = side
             self.update()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the disc."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         draw_badge(painter, QRectF(self.rect()).center(), self.theme, self._side, self._side)
@@ -66,7 +64,6 @@ class Segment(Themed, QAbstractButton):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
 
     def show_name(self, name: str, letter: str) -> None:
-        """Say which setting this is."""
         if (name, letter) != (self.text(), self._letter):
             self._letter = letter
             self.setText(name)
@@ -74,20 +71,17 @@ class Segment(Themed, QAbstractButton):
             self.updateGeometry()
             self.update()
 
-    def nextCheckState(self) -> None:  # noqa: N802 - Qt's name
+    def nextCheckState(self) -> None:
         """Leave it to the view which side is felt."""
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for letter and name, as much as there may be."""
+    def sizeHint(self) -> QSize:
         width = QFontMetricsF(font("strong", scale=0.94)).horizontalAdvance(self.text())
         return QSize(min(round(width) + 60, WIDEST), HEIGHT - 8)
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the least that still names a setting."""
+    def minimumSizeHint(self) -> QSize:
         return QSize(110, HEIGHT - 8)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the segment."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -125,7 +119,6 @@ class SideSwitch(Themed, QWidget):
         self.setToolTip("Feel the other setting (X)")
 
     def show_view(self, view: LabView) -> None:
-        """Show both names, and which is felt."""
         bench = view.workbench
         order: tuple[Side, ...] = SIDES if not bench.blind or bench.first == "A" else SIDES[::-1]
         for number, (place, side) in enumerate(zip(SIDES, order, strict=True), 1):
@@ -135,8 +128,7 @@ class SideSwitch(Themed, QWidget):
             felt = ", felt now" if side == bench.felt else ""
             segment.setAccessibleName(f"{'' if bench.blind else side + ': '}{bench.shown_name(side)}{felt}")
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the track and the key's cap."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)

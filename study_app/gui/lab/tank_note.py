@@ -46,14 +46,12 @@ class TankNote(Card):
         parent.installEventFilter(self)
         self.hide()
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
-        """Stay in the middle of a tank that changes its size."""
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.Resize:
             self.place()
         return super().eventFilter(watched, event)
 
     def show_view(self, view: LabView) -> None:
-        """Say what must be said."""
         before, self._view = self._view, view
         if view.busy and not view.trouble:
             if self.isHidden() and not self._wait.isActive():

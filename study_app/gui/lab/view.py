@@ -194,7 +194,6 @@ class LabPlace(Place):
         return self._view
 
     def show_view(self, view: LabView) -> None:
-        """Show the lab as of now."""
         self._view = view
         for part in (
             self.header, self.form, self.tank, self.note, self.force, self.speed, self.curves, self.estimate, self.cost,
@@ -269,8 +268,7 @@ class LabPlace(Place):
         if self.isVisible():
             self.stop_asked.emit()
 
-    def changeEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
-        """Give the pointer back when the window is left."""
+    def changeEvent(self, event: QEvent) -> None:
         super().changeEvent(event)
         if event.type() == QEvent.Type.ActivationChange and not self.isActiveWindow():
             self.tank.let_go()
@@ -279,20 +277,18 @@ class LabPlace(Place):
         """Return that it does: parameters, tank and readings stand side by side."""
         return True
 
-    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 - Qt's name
-        """Say that the lab is entered."""
+    def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         self.setFocus()
         self.entered.emit()
 
-    def hideEvent(self, event: QHideEvent) -> None:  # noqa: N802 - Qt's name
-        """Say that the lab is left."""
+    def hideEvent(self, event: QHideEvent) -> None:
         super().hideEvent(event)
         self.left.emit()
         if self.dialog is not None:
             self.dialog.reject()
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+    def resizeEvent(self, event: QResizeEvent) -> None:
         """Give way in a small window: first the header, then the right column; the middle and the form scroll."""
         super().resizeEvent(event)
         self.header.arrange(narrow=self.width() < ONE_ROW)

@@ -87,8 +87,7 @@ class Arrangement(QWidget):
         vbox(p.header, (self._body, 1), spacing=0, margins=0, parent=self)
         self._arrange(QSize(1600, 900))
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Rearrange the parts to fit the new size."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._arrange(event.size())
 

@@ -44,7 +44,6 @@ class Banner(Themed, QWidget):
         self.hide()
 
     def show_view(self, view: OperatorView) -> None:
-        """Say what happened, or nothing where nothing did."""
         if view.trouble != self.what.text():
             self.what.setText(view.trouble[:1].upper() + view.trouble[1:])
         offered = view.may_reconnect and not view.over
@@ -54,8 +53,7 @@ class Banner(Themed, QWidget):
         self.reconnect.setEnabled(not view.reconnects)
         self.setVisible(bool(view.trouble))
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the tint."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(Qt.PenStyle.NoPen)

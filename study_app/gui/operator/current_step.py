@@ -51,7 +51,6 @@ class Now(QWidget):
         self._grid.setColumnStretch(1, 2 if yes else 0)
 
     def show_view(self, view: OperatorView) -> None:
-        """Show where the session is."""
         self.part.show_text(view.part_line)
         if view.heading != self.heading.text():
             self.heading.setText(view.heading)
@@ -70,8 +69,7 @@ class Now(QWidget):
         self.bar.show_share(time.elapsed_s / time.most_s, time.least_s / time.most_s if time.least_s else None)
         self.least.setText(f"at least {minutes(time.least_s)}" if time.least_s else "")
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Let the heading be as large as it fits."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._fit_heading()
 

@@ -44,7 +44,6 @@ class DeviceCard(Card):
             self.show_device(self._view)
 
     def show_device(self, device: DeviceView) -> None:
-        """Show the device's name, state and rows."""
         self._view = device
         self.icon.show_icon(device.icon, "text2")
         self.name.setText(device.name)

@@ -167,10 +167,8 @@ class ForceCard(Card):
         self.wake.keep_right(float(self.plot.box.viewRange()[0][1]))
         self.wake.show_wake(times_s, wakes_mps)
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return what the hidden field asks for too."""
+    def sizeHint(self) -> QSize:
         return FIELD
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return what the hidden field asks for too."""
+    def minimumSizeHint(self) -> QSize:
         return FIELD

@@ -32,7 +32,6 @@ class TileCard(Card):
         add_layout(self.column, below)
 
     def show_tile(self, tile: Tile) -> None:
-        """Show a number, its unit, verdict and comparison."""
         self.title.setText(tile.title)
         self.value.setText(tile.value)
         self.unit.setText(tile.unit)
@@ -63,6 +62,5 @@ class Tiles(QWidget):
             self._grid.setColumnStretch(column, int(column < across))
 
     def show_view(self, view: OperatorView) -> None:
-        """Show the session's figures."""
         for card, tile in zip(self.cards, view.tiles, strict=True):
             card.show_tile(tile)

@@ -26,7 +26,7 @@ class NoteField(QPlainTextEdit):
         self.setTabChangesFocus(True)
         self.setMinimumHeight(52)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         """Keep the note on Enter; leave Esc to the window."""
         plain = not event.modifiers() & Qt.KeyboardModifier.ShiftModifier
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and plain:
@@ -76,7 +76,6 @@ class NotesCard(Card):
             self.show_view(self._view)
 
     def show_view(self, view: OperatorView) -> None:
-        """Show the newest notes, newest first."""
         self._view = view
         self.none.setVisible(not view.notes)
         for index, row in enumerate(self.lines):
@@ -114,7 +113,6 @@ class _NoteRow(QWidget):
         hbox((self.sign, 0, top), (self.time, 0, top), (self.text, 1), spacing=8, margins=0, parent=self)
 
     def show_note(self, kind: str, at: str, text: str) -> None:
-        """Show a note or mark."""
         self.sign.show_icon(*(("flag", "warn") if kind == "mark" else ("pen", "text2")))
         self.time.setText(at)
         self.text.show_text(" ".join(text.split()) or "Mark")

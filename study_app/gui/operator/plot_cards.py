@@ -57,10 +57,8 @@ class HiddenForceCard(Card):
         super().__init__("Force", Chip("neutral", "eye_off", "Hidden", small=True), padding=16, gap=8)
         self.column.addWidget(MaskedPanel(self.TITLE, self.WHY), 1)
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return what the plots of the force ask for where they are shown."""
+    def sizeHint(self) -> QSize:
         return FIELD
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return what the plots of the force ask for where they are shown."""
+    def minimumSizeHint(self) -> QSize:
         return FIELD

@@ -48,8 +48,7 @@ class ThemeButton(Themed, QPushButton):
         self.setToolTip("Light or dark")
         self.setAccessibleName("Switch between light and dark theme")
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the button and the sign of the other theme."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         name = "sun" if self.theme.dark else "moon"
         draw_icon(QPainter(self), name, QRectF(10, 10, 20, 20), self.theme.text2)
@@ -64,13 +63,11 @@ class PartsBar(Themed, QWidget):
         self.setFixedSize(PARTS_WIDTH, 14)
 
     def show_trials(self, main_trials: tuple[tuple[int, int], ...]) -> None:
-        """Show (done, of) of every part."""
         if main_trials != self.main_trials:
             self.main_trials = main_trials
             self.update()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint track and fill of each part."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(Qt.PenStyle.NoPen)
@@ -123,7 +120,6 @@ class Header(Themed, QWidget):
         hbox(*left, (STRETCH, 1), *right, spacing=12, margins=(24, 8, 24, 8), parent=self)
 
     def show_view(self, view: OperatorView) -> None:
-        """Show the session's head."""
         self.study.show_text(view.study)
         self.who.show_text(view.who)
         self.blind.show_state("neutral", *BLINDINGS[view.blinding])
@@ -139,8 +135,7 @@ class Header(Themed, QWidget):
         self.bar.show_trials(view.main_trials)
         self.trials.setText(view.trials_line)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the strip and the hairline under it."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.fillRect(self.rect(), QColor(self.theme.surface))
         painter.fillRect(0, self.height() - 1, self.width(), 1, QColor(self.theme.border))

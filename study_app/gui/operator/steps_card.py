@@ -33,7 +33,7 @@ class StepLine(Themed, QWidget):
         self.setMinimumHeight(LEAST_ROW_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+    def sizeHint(self) -> QSize:
         """Return the room that a row likes; where there are many, each takes less."""
         return QSize(super().sizeHint().width(), ROW_HEIGHT)
 
@@ -44,7 +44,6 @@ class StepLine(Themed, QWidget):
             part.setVisible(not yes)
 
     def show_row(self, row: StepRow, *, first: bool, last: bool) -> None:
-        """Show a step's state."""
         if (row, first, last) == (self.row, self.first, self.last):
             return
         self.row, self.first, self.last = row, first, last
@@ -58,8 +57,7 @@ class StepLine(Themed, QWidget):
         self.setToolTip(f"{row.label}  ·  {row.note}" if row.note else row.label)
         self.update()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the line and the dot."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -148,8 +146,7 @@ class Rail(Card):
             if arrived:
                 self.steps_area.ensureWidgetVisible(line, 0, 2 * LEAST_ROW_HEIGHT)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Keep the present step in sight."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         for line in self.lines:
             if line.row.state == "now":

@@ -27,12 +27,10 @@ class StopButton(Themed, QPushButton):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the least size."""
+    def sizeHint(self) -> QSize:
         return QSize(LEAST_WIDTH, LEAST_HEIGHT)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the octagon, the words and the other ways to stop."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QStylePainter(self)
         option = QStyleOptionButton()
         self.initStyleOption(option)
@@ -76,7 +74,6 @@ class StopPanel(Card):
         add_parts(self.column, row, (self.stop, 1))
 
     def show_view(self, view: OperatorView) -> None:
-        """Say whether the force is on."""
         if view.over:
             self._say("minus", "text2", "Force is off")
         elif view.force_on and self._felt:

@@ -43,12 +43,10 @@ class Strip(Themed, QWidget):
         apply_theme_within(self, PARTICIPANT)
 
     def show_view(self, view: OperatorView) -> None:
-        """Show the state and where the session is."""
         self.state.show_state(*shown_state(view))
         self.where.show_text(view.heading)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the strip and the hairline under it."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.fillRect(self.rect(), QColor(self.theme.surface))
         painter.fillRect(0, self.height() - 1, self.width(), 1, QColor(self.theme.border))

@@ -192,7 +192,6 @@ class OperatorWindow(QMainWindow):
         self._open(question)
 
     def show_message(self, title: str, sentence: str) -> None:
-        """Say something in one sentence, with one button."""
         notice = Notice(self, self.theme, title, sentence)
         notice.finished.connect(notice.deleteLater)
         notice.finished.connect(self._take_keyboard)
@@ -244,7 +243,7 @@ class OperatorWindow(QMainWindow):
         apply_theme(self, self.theme)
         self.theme_changed.emit(self.theme)
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
+    def closeEvent(self, event: QCloseEvent) -> None:
         """Close at once when the session is over; else leave it to who listens, with the window open."""
         if self.may_close:
             event.accept()

@@ -71,8 +71,7 @@ class PointerCapture(QObject):
             self._bits = 0
             self.pressed.emit(0)
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802
-        """Take the pointer's events for the hand."""
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if watched is not self._widget:
             return False
         if isinstance(event, QWheelEvent):

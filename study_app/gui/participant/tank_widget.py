@@ -147,8 +147,7 @@ class TankWidget(QWidget):
         """Whether the task shown ended because its time is over."""
         return self.view is not None and self.view.task.elapsed_s >= self._page.task.limit_s
 
-    def sizeHint(self) -> QSize:  # noqa: N802
-        """Return the size that the tank was drawn for."""
+    def sizeHint(self) -> QSize:
         return QSize(1920, 1080)
 
     def turn_to(self, page: TaskPage) -> None:
@@ -169,7 +168,6 @@ class TankWidget(QWidget):
             self._pane.update()
 
     def _announce(self) -> None:
-        """Say which interval begins, or comes."""
         interval = self._page.interval
         if interval is not None:
             self.setAccessibleName(f"{interval.announced}. {self._page.said}")
@@ -195,20 +193,17 @@ class TankWidget(QWidget):
         else:
             self._pane.update()
 
-    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
-        """Announce the first interval."""
+    def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         self._announce()
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
-        """Find the tank's place anew."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self.camera = None
         if self._pane is not None:
             self._pane.setGeometry(self.rect())
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
-        """Paint what lies in the region asked for, and tell when."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         if self._pane is not None:
             return
         painter = page_painter(self)

@@ -230,8 +230,7 @@ class ParticipantWindow(QWidget):
         if self.tank is not None:
             self.tank.show_view(view)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Hear Space and Enter in the tank, and the arrows where a level is set."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         controls = None if self.tank is None else self.tank.controls
         if (controls is not None and controls.press(event)) or event.isAutoRepeat():
             return
@@ -241,19 +240,16 @@ class ParticipantWindow(QWidget):
         else:
             super().keyPressEvent(event)
 
-    def keyReleaseEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Hear that an arrow was let go."""
+    def keyReleaseEvent(self, event: QKeyEvent) -> None:
         super().keyReleaseEvent(event)
         if self.tank is not None and self.tank.controls is not None:
             self.tank.controls.release(event)
 
-    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802
-        """Hear the wheel where a level is set."""
+    def wheelEvent(self, event: QWheelEvent) -> None:
         if self.tank is not None and self.tank.controls is not None:
             self.tank.controls.turn_wheel(event)
 
-    def changeEvent(self, event: QEvent) -> None:  # noqa: N802
-        """Hold the pointer in the tank only while this window is active."""
+    def changeEvent(self, event: QEvent) -> None:
         super().changeEvent(event)
         if event.type() != QEvent.Type.ActivationChange or not self._captures or self.tank is None:
             return
@@ -264,8 +260,7 @@ class ParticipantWindow(QWidget):
             self.tank.setCursor(Qt.CursorShape.BlankCursor)
             self.settling.start()
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
-        """Let the page fill the window."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         if self.strip is not None:
             room = self._room()
@@ -273,7 +268,7 @@ class ParticipantWindow(QWidget):
         self._widget.setGeometry(self._room())
         self._ahead.start()
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
+    def closeEvent(self, event: QCloseEvent) -> None:
         """Do not let the participant close a session by accident: that is a pause."""
         if not self.may_close and not isinstance(self._page, EndPage | None):
             event.ignore()
@@ -284,7 +279,7 @@ class ParticipantWindow(QWidget):
         if not self.may_close:
             self.left.emit()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
+    def paintEvent(self, _event: QPaintEvent) -> None:
         """Fill what no page covers: nothing, or the frame of a pilot."""
         painter = QPainter(self)
         painter.setClipRegion(QRegion(self.rect()) - QRegion(self._widget.geometry()))

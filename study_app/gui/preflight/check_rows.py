@@ -57,8 +57,7 @@ class CheckRow(Themed, QWidget):
             column.addWidget(advice)
         self.setAccessibleName(f"{check.name}, {word}, {check.said}")
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint tint, verdict and the hairline below."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
         icon, ink, _ = LOOKS[self.check.verdict]
         painter = QPainter(self)

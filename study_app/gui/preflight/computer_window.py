@@ -46,19 +46,16 @@ class ComputerWindow(Question):
         self.resize(*SIZE)
 
     def show_measuring(self) -> None:
-        """Show that it is measured."""
         self.state.setText(MEASURING)
         self.back.setEnabled(False)
         self.bar.setRange(0, 0)
         self.bar.show()
 
     def show_compiled(self, share: float) -> None:
-        """Show the share of the force model that is compiled (0 to 1)."""
         self.bar.setRange(0, 100)
         self.bar.setValue(round(100 * share))
 
     def show_checks(self, checks: tuple[Check, ...]) -> None:
-        """Show what was found."""
         for row in self.rows:
             row.hide()
             row.deleteLater()
@@ -70,7 +67,6 @@ class ComputerWindow(Question):
         self.show_sentence(f"{passed} of {len(checks)} passed.")
 
     def show_sentence(self, sentence: str) -> None:
-        """Show how it ended."""
         self.state.setText(sentence)
         self.back.setEnabled(True)
         self.bar.hide()

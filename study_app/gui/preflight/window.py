@@ -96,7 +96,6 @@ class PreflightWindow(QWidget):
         return side
 
     def show_view(self, view: PreflightView) -> None:
-        """Show what was found."""
         self.who.setText(f"{view.study}  ·  {view.who}")
         self._show_chip(view)
         self.start.show_action("play", view.start_words)
@@ -157,8 +156,7 @@ class PreflightWindow(QWidget):
         self._done = True
         self.close()
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Begin on Enter, go back on Esc, look at the checks below by the page keys."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:
             self.close()
         elif event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
@@ -169,8 +167,7 @@ class PreflightWindow(QWidget):
         else:
             super().keyPressEvent(event)
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
-        """Cancel, unless the program closed the window."""
+    def closeEvent(self, event: QCloseEvent) -> None:
         super().closeEvent(event)
         if not self._done:
             self._done = True

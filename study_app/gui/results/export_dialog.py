@@ -103,12 +103,10 @@ class WriteDialog(QDialog):
         vbox(*parts, spacing=12, margins=(28, 24, 28, 24), parent=self)
 
     def show_progress(self, what: str, share: float) -> None:
-        """Say what is being done and how far it is."""
         self.said.setText(f"{what[:1].upper()}{what[1:]} …")
         self.bar.show_share(share)
 
     def show_written(self, files: Sequence[Path], opens: Path, warnings: Sequence[str]) -> None:
-        """Say what was written, and offer to open it."""
         self._working = False
         self._result = opens
         self.bar.hide()

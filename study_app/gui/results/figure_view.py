@@ -107,20 +107,16 @@ class FigureView(Themed, QWidget):
         super().apply_theme(theme)
         self._ask()
 
-    def heightForWidth(self, width: int) -> int:  # noqa: N802 - Qt's name
-        """Return the height that goes with a width."""
+    def heightForWidth(self, width: int) -> int:
         return round(width * self._proportion)
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the size at which print's smallest letters are well read."""
+    def sizeHint(self) -> QSize:
         return QSize(900, self.heightForWidth(900))
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the smallest size that is any use."""
+    def minimumSizeHint(self) -> QSize:
         return QSize(320, self.heightForWidth(320))
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Draw at the new size."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._ask()
 
@@ -160,8 +156,7 @@ class FigureView(Themed, QWidget):
         if what != self._wanted:
             self._begin()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint what was drawn last, stretched where the size has just changed."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         if self._image.isNull():
             self._ask()
             return

@@ -48,7 +48,6 @@ class FigureCard(Card):
         self.show_figure(figure, colours)
 
     def show_figure(self, figure: FigureShown, colours: Mapping[str, str]) -> None:
-        """Show another figure in the place of this one."""
         self.figure = figure
         self.caption.setText(figure.caption)
         there = bool(figure.svg)
@@ -74,8 +73,7 @@ class FigureCard(Card):
         if self.drawing is not None and self.drawing.maximumSize() != size:
             self.drawing.setFixedSize(size)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Keep the way to the caption in the corner."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         size = self.more.sizeHint()
         self.more.setGeometry(
@@ -137,7 +135,6 @@ class TroubleCard(Card):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
 
     def show_trouble(self, trouble: Trouble) -> None:
-        """Say what is wrong."""
         self.title.setText(trouble.title)
         self.sentence.setText(trouble.sentence)
         self.sentence.setVisible(bool(trouble.sentence))
@@ -146,7 +143,6 @@ class TroubleCard(Card):
         self._remedy = trouble.remedy
 
     def show_going(self, going: Going) -> None:
-        """Say what is being done, with a way to stop it."""
         self.show_trouble(Trouble(f"{going.what[:1].upper()}{going.what[1:]} …", "", "Stop", "stop"))
         self.bar.setVisible(True)
         self.bar.show_share(going.share)
@@ -226,7 +222,6 @@ class FiguresPanel(QScrollArea):
             card.fit(max(width, 320))
         self.setMinimumHeight(self._inside.sizeHint().height() if self._whole else 0)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Fit the figures to the new size."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self.fit()

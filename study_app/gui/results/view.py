@@ -284,8 +284,7 @@ class ResultsPlace(Place):
             self._below.addWidget(self._chips_there, 0, Qt.AlignmentFlag.AlignLeft)
         self._chips_there.setVisible(bool(self.chips))
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Make room."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._arrange()
 

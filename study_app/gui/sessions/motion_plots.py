@@ -43,13 +43,11 @@ class MotionPlot(Themed, QWidget):
         self.update()
 
     def show_sentence(self, sentence: str) -> None:
-        """Say why there is no motion."""
         self._times_s, self._mm, self._sentence = np.empty(0), np.empty((0, 3)), sentence
         self.setAccessibleDescription(sentence)
         self.update()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint grid, numbers and curves."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         theme = self.theme
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)

@@ -43,16 +43,13 @@ class TrialsModel(QAbstractTableModel):
         self.trials = trials
         self.endResetModel()
 
-    def rowCount(self, parent: Index = NOWHERE) -> int:  # noqa: N802 - Qt's name
-        """Return how many presentations there were."""
+    def rowCount(self, parent: Index = NOWHERE) -> int:
         return 0 if parent.isValid() else len(self.trials)
 
-    def columnCount(self, parent: Index = NOWHERE) -> int:  # noqa: N802 - Qt's name
-        """Return how many columns there are."""
+    def columnCount(self, parent: Index = NOWHERE) -> int:
         return 0 if parent.isValid() else len(HEADINGS)
 
-    def headerData(self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole) -> Any:  # noqa: N802 - Qt's name
-        """Return a column's heading."""
+    def headerData(self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
         across = orientation == Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole
         return HEADINGS[section] if across else None
 
@@ -171,7 +168,6 @@ class SessionPage(QDialog):
         vbox(head, self.about, self.limits, (body, 1), foot, spacing=8, margins=(24, 20, 24, 18), parent=self)
 
     def _show(self, record: SessionRecord | StoreError) -> None:
-        """Show what was read, or why it cannot be read."""
         if isinstance(record, StoreError):
             sentence = str(record)
             self.limits.setText(f"{sentence[:1].upper()}{sentence[1:]}.")

@@ -40,15 +40,13 @@ class SessionsModel(QAbstractTableModel):
         self.shown = tuple(filter(matches, self._every))
         self.endResetModel()
 
-    def rowCount(self, parent: Index = NOWHERE) -> int:  # noqa: N802 - Qt's name
-        """Return how many sessions match."""
+    def rowCount(self, parent: Index = NOWHERE) -> int:
         return 0 if parent.isValid() else len(self.shown)
 
-    def columnCount(self, parent: Index = NOWHERE) -> int:  # noqa: N802 - Qt's name
-        """Return how many columns there are."""
+    def columnCount(self, parent: Index = NOWHERE) -> int:
         return 0 if parent.isValid() else len(self.columns)
 
-    def headerData(self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole) -> Any:  # noqa: N802 - Qt's name
+    def headerData(self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
         """Return a column's heading; of a row, whose session it is."""
         if role == Qt.ItemDataRole.DisplayRole:
             return self.columns[section].heading if orientation == Qt.Orientation.Horizontal else None
@@ -153,7 +151,6 @@ class SessionsTable(QWidget):
         self._choose(before)
 
     def show_matching(self, matches: Callable[[SessionFacts], bool]) -> None:
-        """Show the rows alone that match, now and later."""
         before = self.chosen
         self.model.keep(matches)
         self._choose(before)

@@ -5,23 +5,23 @@ Frames are asked for as a session asks for them, and the time of each painting i
 
 import time
 from collections.abc import Callable
+from itertools import pairwise
 
-from PySide6.QtCore import QRect, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QCloseEvent, QColor, QKeyEvent, QPainter, QPaintEvent, QScreen
-from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLabel, QWidget
+from PySide6.QtCore import QRect, QRectF, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QCloseEvent, QColor, QImage, QKeyEvent, QPainter, QPaintEvent, QScreen
+from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLabel, QSizePolicy, QWidget
 
 from study_app.gui.display.frame_clock import Frames
+from study_app.gui.kit.fields import LEAST_WORDS
 from study_app.gui.participant.tank.photodiode_patch import paint_patch, patch_place
-from study_app.gui.settings.display_offset import OffsetForm
-from study_app.gui.settings.measured_number import LEAST_WORDS
-from study_app.gui.settings.pixel_patterns import GreyRamp, LineField
-from study_app.gui.theme.theme import PARTICIPANT
+from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
-from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.cards import Icon
+from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import figures, label
-from study_app.gui.widgets.number_field import NumberField, write_number
-from study_app.store.workstation import DisplayOffset
+from study_app.gui.widgets.number_field import NumberField, read_number, write_number
+from study_app.store.workstation import OFFSET_MS, SPREAD_MS, DisplayOffset
 from study_app.viewmodels.frame_times import LEAST_S, FrameFigures, FrameTimes
 
 REPORT_MS = 500
@@ -29,6 +29,162 @@ INTERVAL_MS = (50.0, 5000.0)
 FIRST_MS = 500.0
 NAMES = ("Frames painted", "Median gap", "99 % of gaps within", "Missed in 10 s")
 LEAST = QSize(960, 600)
+HOWS = ("photodiode", "high-speed camera", "data sheet")
+DECIMALS = 2
+GREYS = 17
+LABEL = 20
+FIELD = 120
+
+
+class OffsetForm(QWidget):
+    """Two numbers and a way; ``kept(mean [ms], spread [ms], how)``, and ``forgotten``."""
+
+    kept = Signal(float, float, str)
+    forgotten = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.mean, self.spread = NumberField(), NumberField()
+        self.how = Choice()
+        self.how.setProperty("dense", "true")
+        self.how.setFont(font("label"))
+        self.how.setMaximumWidth(220)
+        for way in HOWS:
+            self.how.addItem(way.capitalize(), way)
+        self.said = label("", "label", "text2", wraps=True)
+        self.said.setFont(font("label", weight=400, tabular=True))
+        self.said.setMinimumWidth(LEAST_WORDS)
+        self.sign = Icon("warning", "bad", 16)
+        self.why = label("", "label", "bad", wraps=True)
+        self.keep = ActionButton("save", "Save offset", height=38)
+        self.forget = ActionButton("", "Forget", height=38)
+        for button in (self.keep, self.forget):
+            button.setAutoDefault(False)
+        self._lay_out()
+        self.keep.clicked.connect(self._keep)
+        self.forget.clicked.connect(self.forgotten)
+        for field in (self.mean, self.spread):
+            field.setFixedWidth(88)
+            field.textEdited.connect(lambda: self._refuse(""))
+            field.returnPressed.connect(self._keep)
+        self._refuse("")
+
+    def _lay_out(self) -> None:
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(12)
+        grid.setVerticalSpacing(6)
+        named = (("Mean, ms", self.mean), ("Spread, ms", self.spread), ("Measured by", self.how))
+        for column, (name, field) in enumerate(named):
+            over = label(name, "label", "text2")
+            over.setBuddy(field)
+            field.setAccessibleName(f"Display offset: {name}")
+            grid.addWidget(over, 0, column)
+            grid.addWidget(field, 1, column)
+        grid.setColumnStretch(2, 1)
+        grid.setColumnStretch(3, 2)
+        trouble = hbox((self.sign, 0, Qt.AlignmentFlag.AlignTop), (self.why, 1), spacing=6)
+        foot = hbox(self.keep, self.forget, STRETCH, spacing=12)
+        vbox(self.said, grid, trouble, foot, spacing=8, margins=0, parent=self)
+
+    def show_offset(self, offset: DisplayOffset | None, screen: str) -> None:
+        """Show what was measured; of another screen than ``screen`` it is said so."""
+        self.forget.setEnabled(offset is not None)
+        self.said.setText(offset_words(offset, screen))
+        if offset is None:
+            return
+        for field, value in ((self.mean, offset.mean_ms), (self.spread, offset.spread_ms)):
+            field.show_text(write_number(value, DECIMALS))
+        self.how.setCurrentIndex(max(0, self.how.findData(offset.how)))
+
+    def _keep(self) -> None:
+        found = []
+        for name, field, (least, most) in (("Mean", self.mean, OFFSET_MS), ("Spread", self.spread, SPREAD_MS)):
+            value = read_number(field.text() or "0") if field is self.spread else read_number(field.text())
+            good = value is not None and least <= value <= most
+            field.show_state("" if good else "refused")
+            if value is None or not good:
+                self._refuse(f"{name} must be a number from {least:g} to {most:g} ms.")
+                field.setFocus()
+                return
+            found.append(value)
+        self._refuse("")
+        for field in (self.mean, self.spread):
+            field.setModified(False)
+        self.kept.emit(*found, self.how.currentData())
+
+    def _refuse(self, why: str) -> None:
+        self.why.setText(why)
+        self.why.setVisible(bool(why))
+        self.sign.setVisible(bool(why))
+
+
+def offset_words(offset: DisplayOffset | None, screen: str) -> str:
+    """Return what is known of a screen's offset, in a sentence."""
+    if offset is None:
+        return (
+            "Not measured. The screen shows each frame slightly later; the delay is recorded as “not measured” in "
+            "every receipt."
+        )
+    text = f"{write_number(offset.mean_ms, DECIMALS)} ± {write_number(offset.spread_ms, DECIMALS)} ms"
+    when = f", {offset.measured}" if offset.measured else ""
+    where = "" if offset.screen == screen else f" for another screen ({offset.screen}): not used here"
+    return f"{text} by {offset.how}{when}{where}."
+
+
+class GreyRamp(QWidget):
+    """Seventeen greys from black to white, each distinguishable from the next."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setMinimumSize(17 * 24, 80)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setAccessibleName("Seventeen greys from black to white")
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setFont(font("key", tabular=True))
+        for step, (left, right) in enumerate(steps(self.width())):
+            value = round(255 * step / (GREYS - 1))
+            painter.fillRect(QRect(left, 0, right - left, self.height() - LABEL), QColor(value, value, value))
+            painter.setPen(QColor(PARTICIPANT.text2))
+            below = QRectF(left, self.height() - LABEL, right - left, LABEL)
+            painter.drawText(below, Qt.AlignmentFlag.AlignCenter, str(value))
+
+
+class LineField(QWidget):
+    """Black and white lines, ``thick`` device pixels each, standing or lying: grey or shimmering where scaled."""
+
+    def __init__(self, thick: int, *, standing: bool) -> None:
+        super().__init__()
+        self.thick, self.standing = thick, standing
+        self.setMinimumSize(FIELD, FIELD - 40)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        way = "standing" if standing else "lying"
+        self.setAccessibleName(f"Lines of {thick} pixels, {way}")
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        ratio = self.devicePixelRatioF()
+        painter = QPainter(self)
+        painter.drawImage(0, 0, lines(round(self.width() * ratio), round(self.height() * ratio), ratio, self))
+
+
+def lines(width: int, height: int, ratio: float, field: LineField) -> QImage:
+    """Return the picture of lines, ``width`` by ``height`` device pixels."""
+    image = QImage(width, height, QImage.Format.Format_RGB32)
+    image.fill(Qt.GlobalColor.black)
+    painter = QPainter(image)
+    for start in range(0, width if field.standing else height, 2 * field.thick):
+        size = (field.thick, height) if field.standing else (width, field.thick)
+        painter.fillRect(QRect(*((start, 0) if field.standing else (0, start)), *size), QColor(Qt.GlobalColor.white))
+    painter.end()
+    image.setDevicePixelRatio(ratio)
+    return image
+
+
+def steps(width: int) -> list[tuple[int, int]]:
+    """Return from where to where each grey goes, without a gap between two."""
+    edges = [round(width * step / GREYS) for step in range(GREYS + 1)]
+    return list(pairwise(edges))
 
 
 class DisplayTest(QWidget):
@@ -157,12 +313,10 @@ class DisplayTest(QWidget):
         self.update(self.patch_area())
 
     def show_figures(self) -> None:
-        """Show what the frames come to."""
         for value, words in zip(self.values, figures_words(self.times.figures(), self.times.refresh_hz), strict=True):
             value.setText(words)
 
     def show_offset(self, offset: DisplayOffset | None, screen: str) -> None:
-        """Show the offset that is kept."""
         self.offset.show_offset(offset, screen)
 
     def patch_area(self) -> QRect:
@@ -182,8 +336,7 @@ class DisplayTest(QWidget):
         self.interval.show_state("refused")
         self.why.setText(f"From {INTERVAL_MS[0]:g} to {INTERVAL_MS[1]:g} ms.")
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint ground and patch, and keep the time of a frame that was asked for."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.fillRect(event.rect(), QColor(PARTICIPANT.window))
         paint_patch(painter, patch_place(self.width(), self.height()), lit=self.lit)
@@ -192,15 +345,13 @@ class DisplayTest(QWidget):
             self._unpainted = False
             self.times.add(self._now_ns())
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Leave on Esc."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:
             self.close()
         else:
             super().keyPressEvent(event)
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
-        """Stop painting."""
+    def closeEvent(self, event: QCloseEvent) -> None:
         self.frames.stop()
         self.report_timer.stop()
         super().closeEvent(event)

@@ -1,27 +1,154 @@
 """The machine's place: what this computer and its screens are like, apart from every study; kept at once, with undo.
 
-It draws `MachineSettings` and the screens there are, and says what is to be changed; it reads and writes no file.
+`FIELDS` says what is set, `MachinePlace` where it stands. It reads and writes no file.
 """
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QGuiApplication, QKeySequence, QResizeEvent, QShortcut
-from PySide6.QtWidgets import QBoxLayout, QWidget
+from functools import partial
 
+from PySide6.QtCore import QRectF, Qt, QTimer, Signal
+from PySide6.QtGui import (
+    QColor,
+    QGuiApplication,
+    QKeyEvent,
+    QKeySequence,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QResizeEvent,
+    QScreen,
+    QShortcut,
+)  # fmt: skip
+from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QFileDialog, QWidget
+
+from study_app.devices.registry import list_devices, title_of
 from study_app.gui.display.screens import ScreenShown, screens_shown
-from study_app.gui.settings.display_test import DisplayTest
-from study_app.gui.settings.outlets_card import OutletsCard
-from study_app.gui.settings.screen_numbers import ScreenNumber, identify
-from study_app.gui.settings.setting_cards import OffsetCard, ScreensCard, SeenCard, SessionsCard, WindowsCard
-from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import apply_theme_within
-from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox, vbox
-from study_app.gui.widgets.cards import SHADOW, scrolled
-from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.kit.fields import LEAST_WORDS, Editor, Field, number
+from study_app.gui.settings.display_test import DisplayTest, OffsetForm
+from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
+from study_app.gui.theme.themed import apply_theme_within, remove_widget
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
+from study_app.gui.widgets.cards import SHADOW, Card, Rule, scrolled
+from study_app.gui.widgets.controls import ActionButton, Radio
 from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.main_view import Place
-from study_app.store.workstation import DEFAULTS, MachineSettings
+from study_app.outlets.session_outlets import is_port
+from study_app.store.workstation import (
+    CAMERA_LENGTH,
+    DEFAULTS,
+    DISTANCE_MM,
+    LEAST_X_HEIGHT_DEG,
+    WIDTH_MM,
+    MachineSettings,
+)  # fmt: skip
+from study_app.video.sources import USUAL
 
 STACKED_BELOW = 1000
+SAMPLE = "I think this feels like interacting with a liquid."
+MOST_SAMPLE = 2.4
+SHOWN_MS = 4000
+NUMBER_SHARE = 0.42  # of the screen's height
+PORTS = "One byte per event: serial:/dev/ttyUSB0, serial:COM3 or parallel:/dev/parport0. Leave empty for none."
+
+
+def _port(text: str) -> str:
+    if text and not is_port(text):
+        raise ValueError(f"This is not the address of a port. {PORTS}")
+    return text
+
+
+SAMPLES = (
+    ("off", "Off"),
+    ("single-blind", "On, but off in double-blind studies"),
+    ("always", "On, also in double-blind studies"),
+)
+FIELDS = (
+    number("viewing_distance_mm", "Viewing distance, eye to screen", "mm", DISTANCE_MM),
+    number("screen_width_mm", "Width of the picture on the screen", "mm", WIDTH_MM),
+    Field("lsl_markers", "Markers over the Lab Streaming Layer (LSL)", "switch"),
+    Field("lsl_samples", "Samples of position and force over LSL", "choice", SAMPLES),
+    Field("triggers", "Trigger port", hint=PORTS, parse=_port),
+    Field("photodiode", "Square for a photodiode in the tank's corner", "switch"),
+    Field("device", "Device", "choice", tuple((name, title_of(name)) for name in list_devices())),
+    Field("camera", "Camera of conditions that show one", longest=CAMERA_LENGTH, placeholder=USUAL),
+    Field("theme", "Theme of the operator's windows", "choice", (("light", "Light"), ("dark", "Dark"))),
+    Field("sound", "Sound when a device needs attention", "switch"),
+)
+
+
+class ScreensCard(Card):
+    """Every screen, and which is the participant's; ``chosen`` carries it."""
+
+    chosen = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__("Participant's screen", gap=10)
+        self.radios: list[Radio] = []
+        self.note = label("", "label", "warn", wraps=True)
+        self.note.setMinimumWidth(LEAST_WORDS)
+        self.identify = ActionButton("eye", "Identify", height=38)
+        self.test = ActionButton("screen", "Display test …", height=38)
+        self._rows = QWidget()
+        self._shown: tuple[ScreenShown, ...] = ()
+        self._host = vbox(self._rows)
+        add_parts(self.column, self._host, self.note, hbox(self.identify, self.test, STRETCH, spacing=12))
+
+    def show_screens(self, screens: tuple[ScreenShown, ...], chosen: int, missing: str) -> None:
+        """Show screens; ``chosen`` is the participant's number, ``missing`` the name of one that is not there."""
+        if screens != self._shown:
+            self._shown, old, self._rows = screens, self._rows, QWidget()
+            group, rows = QButtonGroup(self._rows), vbox(spacing=8, margins=0, parent=self._rows)
+            self.radios = []
+            for screen in screens:
+                radio = Radio(f"Screen {screen.number}")
+                radio.setFont(font("strong"))
+                radio.setAccessibleName(f"Screen {screen.number}, {screen.name}, {screen.words}")
+                radio.clicked.connect(partial(self.chosen.emit, screen))
+                group.addButton(radio)
+                size = f"{screen.width_mm:.0f} × {screen.height_mm:.0f} mm" if screen.width_mm > 0 else "size unknown"
+                about = label(f"{screen.words}  ·  {size}", "label", "text2", wraps=True)
+                about.setFont(font("label", weight=400, tabular=True))
+                about.setMinimumWidth(LEAST_WORDS)
+                name = Elided("label", "text2")
+                name.show_text(screen.name)
+                name.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+                below = hbox(about, margins=(30, 0, 0, 0))
+                add_parts(rows, *([Rule()] if self.radios else []), vbox(hbox(radio, (name, 1)), below, spacing=0))
+                self.radios.append(radio)
+            self._host.addWidget(self._rows)
+            remove_widget(old)
+        for at, radio in enumerate(self.radios, start=1):
+            radio.setChecked(at == chosen)
+        self.note.setText(f"{missing} is not connected; the last screen is used instead." if missing else "")
+        self.note.setVisible(bool(missing))
+
+
+class ScreenNumber(QWidget):
+    """The number of one screen, all over it; any key or click takes it away."""
+
+    def __init__(self, number: int, screen: QScreen) -> None:
+        super().__init__(None, Qt.WindowType.FramelessWindowHint | Qt.WindowType.WindowStaysOnTopHint)
+        self.number = number
+        self.setWindowTitle(f"Screen {number}")
+        self.setScreen(screen)
+        self.setGeometry(screen.geometry())
+        QTimer.singleShot(SHOWN_MS, self, self.close)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.fillRect(self.rect(), QColor(PARTICIPANT.window))
+        painter.setPen(QColor(PARTICIPANT.accent))
+        painter.setFont(font("display", scale=self.height() * NUMBER_SHARE / 34))
+        painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, str(self.number))
+        painter.setPen(QColor(PARTICIPANT.text2))
+        painter.setFont(font("title"))
+        below = QRectF(0, self.height() * 0.8, self.width(), 48)
+        painter.drawText(below, Qt.AlignmentFlag.AlignCenter, self.screen().name())
+
+    def keyPressEvent(self, _event: QKeyEvent) -> None:
+        self.close()
+
+    def mousePressEvent(self, _event: QMouseEvent) -> None:
+        self.close()
 
 
 class MachinePlace(Place):
@@ -43,43 +170,70 @@ class MachinePlace(Place):
         self._screens: tuple[ScreenShown, ...] = ()
         self.numbers: list[ScreenNumber] = []
         self.test: DisplayTest | None = None
-        self.screens, self.seen, self.offset = ScreensCard(), SeenCard(), OffsetCard()
-        self.sessions, self.windows, self.outlets = SessionsCard(), WindowsCard(), OutletsCard()
+        self.devices = ActionButton("", "Devices", height=40)
+        self.change = ActionButton("", "Change …", height=40)
+        self.editors = {one.name: Editor(one, self.devices if one.name == "device" else None) for one in FIELDS}
+        for editor in self.editors.values():
+            editor.changed.connect(lambda name, value: self.changed.emit({name: value}))
+        self.screens, self.offset = ScreensCard(), OffsetForm()
+        self.sample = label(SAMPLE, "statement", wraps=True)
+        self.sample.setAccessibleName(f"A statement at the size that participants see: {SAMPLE}")
+        self.sample.setFixedHeight(112)
+        self.sample.setIndent(0)
+        self.sample.setStyleSheet(
+            f"background: {PARTICIPANT.window}; color: {PARTICIPANT.text}; padding: 7px 15px;"
+            f"border: 1px solid {PARTICIPANT.border}; border-radius: {RADIUS_CONTROL}px"
+        )
+        self.said = label("", "label", "text2", wraps=True)
+        self.said.setFont(font("label", weight=400, tabular=True))
+        self.said.setMinimumWidth(LEAST_WORDS)
+        self.folder, self.kept_in = Elided("label", "text"), Elided("label", "text2")
+        self.kept_in.setFont(font("label", weight=400))
         self.undo = ActionButton("undo", "Undo")
         self.check = ActionButton("check", "Check this computer …")
-        self.kept_in = Elided("label", "text2")
-        self.kept_in.setFont(font("label", weight=400))
         self._lay_out()
-        self._connect()
-
-    def _lay_out(self) -> None:
-        about = "Settings of this computer and its screens, independent of every study. Changes are saved immediately."
-        titles = vbox(label("This machine", "title"), label(about, "body", "text2", wraps=True), spacing=4)
-        head = hbox((titles, 1), self.check, self.undo, spacing=16, margins=(SHADOW, 0, SHADOW, 0))
-        self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
-        self._body.setSpacing(18)
-        for cards in ((self.screens, self.seen, self.outlets), (self.offset, self.sessions, self.windows)):
-            add_layout(self._body, vbox(*cards, STRETCH, spacing=18), 1)
-        foot = hbox(self.kept_in, margins=(SHADOW, 0, SHADOW, 0))
-        inside = QWidget()
-        vbox(head, (self._body, 1), foot, spacing=20, margins=(30, 30, 30, 22), parent=inside)
-        self._area = scrolled(inside)
-        vbox(self._area, margins=0, parent=self)
-
-    def _connect(self) -> None:
-        for card in (self.seen, self.sessions, self.windows, self.offset, self.outlets):
-            card.changed.connect(lambda name, value: self.changed.emit({name: value}))
-        self.screens.chosen.connect(
-            lambda screen: self.changed.emit({"screen": screen.name, "screen_number": screen.number})
-        )
-        self.screens.identify_asked.connect(self._identify)
-        self.screens.test_asked.connect(self.open_test)
-        self.sessions.devices_asked.connect(lambda: self.go_asked.emit("devices"))
-        self.offset.form.kept.connect(self._measured)
-        self.offset.form.forgotten.connect(lambda: self.changed.emit({"display_offset": None}))
+        self.screens.chosen.connect(lambda it: self.changed.emit({"screen": it.name, "screen_number": it.number}))
+        self.screens.identify.clicked.connect(self._identify)
+        self.screens.test.clicked.connect(self.open_test)
+        self.devices.clicked.connect(lambda: self.go_asked.emit("devices"))
+        self.change.clicked.connect(self._choose_folder)
+        self._save_offset_of(self.offset)
         self.undo.clicked.connect(self.undo_asked)
         self.check.clicked.connect(self.check_asked)
         QShortcut(QKeySequence.StandardKey.Undo, self, self.undo.click, context=Qt.ShortcutContext.WindowShortcut)
+
+    def _lay_out(self) -> None:
+        def card(title: str, *parts: str | QWidget | QBoxLayout) -> Card:
+            made = Card(title, gap=10)
+            add_parts(made.column, *(self.editors[part] if isinstance(part, str) else part for part in parts))
+            return made
+
+        workspace = label("Workspace, the folder of protocols and results", "label", "text2")
+        folder = vbox(workspace, hbox((self.folder, 1), self.change, spacing=8), spacing=6)
+        seen = "viewing_distance_mm", "screen_width_mm", self.sample, self.said
+        columns = (
+            (
+                self.screens,
+                card("Text size for the participant", *seen),
+                card("Other programs", "lsl_markers", "lsl_samples", Rule(), "triggers"),
+            ),
+            (
+                card("Display offset", self.offset, Rule(), "photodiode"),
+                card("New sessions", "device", folder, "camera"),
+                card("This program", "theme", "sound"),
+            ),
+        )
+        self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._body.setSpacing(18)
+        for column in columns:
+            add_layout(self._body, vbox(*column, STRETCH, spacing=18), 1)
+        about = "Settings of this computer and its screens, independent of every study. Changes are saved immediately."
+        titles = vbox(label("This machine", "title"), label(about, "body", "text2", wraps=True), spacing=4)
+        head = hbox((titles, 1), self.check, self.undo, spacing=16, margins=(SHADOW, 0, SHADOW, 0))
+        foot = hbox(self.kept_in, margins=(SHADOW, 0, SHADOW, 0))
+        inside = QWidget()
+        vbox(head, (self._body, 1), foot, spacing=20, margins=(30, 30, 30, 22), parent=inside)
+        vbox(scrolled(inside), margins=0, parent=self)
 
     def enter(self) -> None:
         """Look at the screens again: one may have been plugged in."""
@@ -104,32 +258,40 @@ class MachinePlace(Place):
         self.settings = settings
         self.undo.setEnabled(bool(undo))
         self.undo.show_action("undo", f"Undo {undo}" if undo else "Undo")
-        self.sessions.show_settings(settings, folder)
-        self.windows.show_settings(settings)
-        self.outlets.show_settings(settings)
-        self.offset.patch.setChecked(settings.photodiode)
+        self.folder.show_text(folder)
         self.kept_in.show_text(f"Saved in {kept_in}")
         self._show()
 
     def _show(self) -> None:
-        """Show what depends on the screens."""
         self._screens = screens_shown()
-        names = [screen.name for screen in self._screens]
-        missing = self.settings.screen if self.settings.screen not in {"", *names} else ""
-        there = self.participants
+        settings, there = self.settings, self.participants
+        for name, editor in self.editors.items():
+            editor.show_value(settings.device.partition(":")[0] if name == "device" else getattr(settings, name))
+        self.editors["screen_width_mm"].show_value(settings.screen_width_mm, width_words(settings, there))
+        missing = settings.screen if settings.screen not in {"", *(one.name for one in self._screens)} else ""
         self.screens.show_screens(self._screens, there.number, missing)
-        self.seen.show_settings(self.settings, there)
-        self.offset.form.show_offset(self.settings.display_offset, there.name)
+        scale = settings.text_scale(there.width_px, there.width_mm)
+        self.sample.setFont(font("statement", scale=min(scale, MOST_SAMPLE)))
+        self.said.setText(size_words(settings, there, scale))
+        self.offset.show_offset(settings.display_offset, there.name)
         if self.test is not None:
-            self.test.show_offset(self.settings.display_offset, there.name)
+            self.test.show_offset(settings.display_offset, there.name)
         apply_theme_within(self.screens, self.theme)
 
-    def _measured(self, mean_ms: float, spread_ms: float, how: str) -> None:
-        self.offset_measured.emit(mean_ms, spread_ms, how, self.participants.name)
+    def _choose_folder(self) -> None:
+        if chosen := QFileDialog.getExistingDirectory(self, "Workspace", self.folder.whole):
+            self.changed.emit({"workspace": chosen})
+
+    def _save_offset_of(self, form: OffsetForm | DisplayTest) -> None:
+        form.kept.connect(lambda *measured: self.offset_measured.emit(*measured, self.participants.name))
+        form.forgotten.connect(lambda: self.changed.emit({"display_offset": None}))
 
     def _identify(self) -> None:
         self.leave()
-        self.numbers = identify()
+        screens = QGuiApplication.screens()
+        self.numbers = [ScreenNumber(at, screen) for at, screen in enumerate(screens, start=1)]
+        for one in self.numbers:
+            one.showFullScreen()
 
     def open_test(self) -> None:
         """Fill the participant's screen with the display test."""
@@ -139,11 +301,9 @@ class MachinePlace(Place):
         if there.number > len(screens):  # it was unplugged
             self._show()
             return
-        self.test = DisplayTest(
-            "  ·  ".join(filter(None, (f"Screen {there.number}", there.name, there.words))), there.refresh_hz
-        )
-        self.test.kept.connect(self._measured)
-        self.test.forgotten.connect(lambda: self.changed.emit({"display_offset": None}))
+        words = "  ·  ".join(filter(None, (f"Screen {there.number}", there.name, there.words)))
+        self.test = DisplayTest(words, there.refresh_hz)
+        self._save_offset_of(self.test)
         self.test.left.connect(self._test_left)
         self.test.show_offset(self.settings.display_offset, there.name)
         self.test.open_on(screens[there.number - 1])
@@ -153,8 +313,24 @@ class MachinePlace(Place):
         if test is not None:
             test.deleteLater()
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Make room: the second column goes below the first."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         stacked = self.width() < STACKED_BELOW
         self._body.setDirection(QBoxLayout.Direction.TopToBottom if stacked else QBoxLayout.Direction.LeftToRight)
+
+
+def width_words(settings: MachineSettings, screen: ScreenShown) -> str:
+    """Return what the system reports of a screen's width."""
+    known = f"The system reports {screen.width_mm:.0f} mm." if screen.width_mm > 0 else "The system does not report it."
+    return known if settings.screen_width_mm is None else f"{known} The measured value is used."
+
+
+def size_words(settings: MachineSettings, screen: ScreenShown, scale: float) -> str:
+    """Return what the viewing distance means for the size of text, in a sentence."""
+    seen, least = settings.x_height_deg(screen.width_px, screen.width_mm), f"{LEAST_X_HEIGHT_DEG:g}°"
+    if seen is None:
+        enlarged = f"Measure the distance: text is then enlarged until an x subtends {least}."
+        return f"{enlarged} Until then it has its default size."
+    if scale == 1.0:
+        return f"Default size: an x subtends {seen:.2f}°; at least {least} is needed."
+    return f"{scale:.2f} times the default size: an x subtends {least} instead of {seen:.2f}°."

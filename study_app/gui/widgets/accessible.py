@@ -36,7 +36,6 @@ class HeadingLabel(QLabel):
         self.setAccessibleName(text)
         give_role(self, QAccessible.Role.Heading)
 
-    def setText(self, text: str) -> None:  # noqa: N802 - Qt's name
-        """Show another text."""
+    def setText(self, text: str) -> None:
         super().setText(text)
         self.setAccessibleName(text)

@@ -30,8 +30,7 @@ class Card(Themed, QWidget):
             self.title_row = hbox(self.heading, STRETCH, *([] if aside is None else [aside]))
             add_layout(self.column, self.title_row)
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the surface, its edge and, in light, a shadow of at most 6 % black."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         body = QRectF(self.rect()).adjusted(SHADOW, SHADOW - 1, -SHADOW, -SHADOW - 1).adjusted(0.5, 0.5, -0.5, -0.5)
         if body.adjusted(RADIUS_CARD, RADIUS_CARD, -RADIUS_CARD, -RADIUS_CARD).contains(QRectF(event.rect())):
@@ -80,8 +79,7 @@ class Rule(Themed, QWidget):
         super().__init__()
         self.setFixedHeight(1)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the line."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         QPainter(self).fillRect(self.rect(), QColor(self.theme.border))
 
 
@@ -99,8 +97,7 @@ class Icon(Themed, QWidget):
             self.name, self.ink = name, ink
             self.update()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the icon."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         draw_icon(QPainter(self), self.name, QRectF(self.rect()), getattr(self.theme, self.ink), 2.0)
 
 
@@ -115,7 +112,6 @@ class Chip(Themed, QWidget):
         self.setAccessibleName(word)
 
     def show_state(self, tone: Tone, icon: str, word: str) -> None:
-        """Say another state from now on."""
         if (tone, icon, word) == (self.tone, self.icon, self.word):
             return
         widened = len(word) != len(self.word) or word.rstrip("0123456789. ") != self.word.rstrip("0123456789. ")
@@ -125,16 +121,14 @@ class Chip(Themed, QWidget):
             self.updateGeometry()
         self.update()
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for icon and word."""
+    def sizeHint(self) -> QSize:
         return chip_size(self.word, small=self._small)
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+    def minimumSizeHint(self) -> QSize:
         """Return the same as the hint: a chip is never cut."""
         return self.sizeHint()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the pill, the icon and the word."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         body = QRectF(QPointF(), self.sizeHint().toSizeF())
@@ -178,8 +172,7 @@ class Bar(Themed, QWidget):
         self.share, self.tick = min(1.0, max(0.0, share)), tick
         self.update()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint track, fill and tick."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(Qt.PenStyle.NoPen)
@@ -205,6 +198,5 @@ class Logo(Themed, QWidget):
         super().__init__()
         self.setFixedSize(size, size)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the mark."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         draw_logo(QPainter(self), QRectF(self.rect()), self.theme.accent, self.theme.on_accent)

@@ -29,7 +29,7 @@ STOP_HEIGHT = 44
 class PressedByEnter(QPushButton):
     """A button that Enter presses as Space does, in a dialog too, where it would else press the default one."""
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         """Press on Enter; the keyboard's own repetition presses nothing."""
         if event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             super().keyPressEvent(event)
@@ -45,12 +45,10 @@ class Cap(Themed, QWidget):
         self.words = words
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for the words."""
+    def sizeHint(self) -> QSize:
         return cap_size(self.words)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the edge and the words."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         paint_cap(painter, QPointF(), self.words, self.theme.text, self.theme.ctl)
@@ -99,11 +97,10 @@ class ActionButton(Themed, PressedByEnter):
         self.updateGeometry()  # words that stay ask for no other room, but a sign that comes or goes does
         self.update()
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for icon, words and key cap."""
+    def sizeHint(self) -> QSize:
         return QSize(round(self._content_width()) + 36, self.minimumHeight())
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+    def minimumSizeHint(self) -> QSize:
         """Return the same room less some padding: words are never cut."""
         return QSize(round(self._content_width()) + 20, self.minimumHeight())
 
@@ -112,8 +109,7 @@ class ActionButton(Themed, PressedByEnter):
         icon = (28 if self.text() or self.cap else 20) if self._icon else 0
         return width + icon + (12 + cap_size(self.cap).width() if self.cap else 0)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the style sheet's button, then its content in the middle."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QStylePainter(self)
         option = QStyleOptionButton()
         self.initStyleOption(option)
@@ -159,17 +155,15 @@ class CompactStop(Themed, QPushButton):
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self._font = font("strong", scale=0.96)
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for octagon, words and keys."""
+    def sizeHint(self) -> QSize:
         keys = cap_size(self.cap).width() + 10 if self.cap else 0
         return QSize(round(QFontMetricsF(self._font).horizontalAdvance(self.words)) + 62 + keys, STOP_HEIGHT)
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+    def minimumSizeHint(self) -> QSize:
         """Return the same: it is never cut."""
         return self.sizeHint()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the button, its octagon, its words and its keys."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QStylePainter(self)
         option = QStyleOptionButton()
         self.initStyleOption(option)
@@ -199,12 +193,11 @@ class IconButton(Themed, PressedByEnter):
         self.setToolTip(tip or name)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+    def minimumSizeHint(self) -> QSize:
         """Return the square; there are no words to make room for."""
         return self.minimumSize()
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the button and its icon."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         ink = {"danger": self.theme.bad, "plain": self.theme.text3}.get(self._role, self.theme.text)
         middle, half = QRectF(self.rect()).center(), 10 if self.width() >= 40 else 8
@@ -224,8 +217,7 @@ class Choice(Themed, QComboBox):
         self._named = QLabel()
         self.setItemDelegate(QStyledItemDelegate(self))  # the theme gives the list's lines their height
 
-    def setAccessibleName(self, name: str) -> None:  # noqa: N802 - Qt's name
-        """Name the choice, in its label too."""
+    def setAccessibleName(self, name: str) -> None:
         super().setAccessibleName(name)
         self._named.setText(name)
         self._named.setBuddy(self)
@@ -237,22 +229,19 @@ class Choice(Themed, QComboBox):
             self._named.hide()
         return super().event(event)
 
-    def showPopup(self) -> None:  # noqa: N802 - Qt's name
-        """Open the list, as wide as its longest words."""
+    def showPopup(self) -> None:
         view = self.view()
         view.setMinimumWidth(max(self.width(), view.sizeHintForColumn(0) + 24))
         super().showPopup()
 
-    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802 - Qt's name
-        """Leave the wheel to what scrolls."""
+    def wheelEvent(self, event: QWheelEvent) -> None:
         event.ignore()
 
     def fitted(self, words: str, room_px: int) -> str:
         """Return as much of the chosen words as there is room for."""
         return self.fontMetrics().elidedText(words, Qt.TextElideMode.ElideRight, room_px)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the field, then the chevron."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QStylePainter(self)
         option = QStyleOptionComboBox()
         self.initStyleOption(option)
@@ -283,16 +272,13 @@ class Number(QSpinBox):
 class Check(Themed, QCheckBox):
     """A yes or no; hit anywhere on mark or words."""
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for mark and words."""
+    def sizeHint(self) -> QSize:
         return _marked_size(self)
 
-    def hitButton(self, _place: QPoint) -> bool:  # noqa: N802 - Qt's name
-        """Take a click anywhere."""
+    def hitButton(self, _place: QPoint) -> bool:
         return True
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint a box, filled and checked when on, and the words."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter, mark = _begin_mark(self, self.theme)
         painter.setBrush(QColor(self.theme.accent if self.isChecked() else self.theme.surface))
         painter.drawRoundedRect(mark, 5, 5)
@@ -303,12 +289,10 @@ class Check(Themed, QCheckBox):
 class Toggle(Check):
     """A yes or no that takes effect at once, as a switch; hit anywhere on switch or words."""
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for switch and words."""
+    def sizeHint(self) -> QSize:
         return QSize(round(QFontMetricsF(self.font()).horizontalAdvance(self.text())) + 50, 32)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint a track with its knob at the right when on, and the words."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -333,16 +317,13 @@ class Toggle(Check):
 class Radio(Themed, QRadioButton):
     """One of several; hit anywhere on mark or words."""
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for mark and words."""
+    def sizeHint(self) -> QSize:
         return _marked_size(self)
 
-    def hitButton(self, _place: QPoint) -> bool:  # noqa: N802 - Qt's name
-        """Take a click anywhere."""
+    def hitButton(self, _place: QPoint) -> bool:
         return True
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint a ring, with a dot when on, and the words."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter, mark = _begin_mark(self, self.theme)
         painter.setBrush(QColor(self.theme.surface))
         painter.drawEllipse(mark)

@@ -22,7 +22,7 @@ class EscapeHold(QObject):
         self._timer = _timer(self)
         self._timer.timeout.connect(self.held)
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Start at the first press, stop at the release; the keyboard's own repetition counts for neither."""
         if isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_Escape and not event.isAutoRepeat():
             if event.type() == QEvent.Type.KeyPress:
@@ -61,8 +61,7 @@ class EscapeAnywhere(QObject):
         """Let ``window`` hear its own."""
         self._aside = window
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
-        """Start at the first press, stop at the release."""
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         kind = event.type()
         if kind not in {QEvent.Type.KeyPress, QEvent.Type.KeyRelease} or not isinstance(event, QKeyEvent):
             return False

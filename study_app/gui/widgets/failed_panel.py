@@ -34,8 +34,7 @@ class FailedPanel(Themed, QWidget):
         panel.installEventFilter(self)
         self._fit(panel)
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
-        """Stay as large as the panel, above all that is in it."""
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() in {QEvent.Type.Resize, QEvent.Type.ChildAdded} and isinstance(watched, QWidget):
             self._fit(watched)
         return False
@@ -45,7 +44,7 @@ class FailedPanel(Themed, QWidget):
         self.line.setVisible(panel.width() >= LEAST_WIDTH)
         self.raise_()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+    def paintEvent(self, _event: QPaintEvent) -> None:
         """Paint all of it, since nothing is painted below: in place of a card the window's ground shows at corners."""
         painter = QPainter(self)
         if not isinstance(self.parentWidget(), Card):

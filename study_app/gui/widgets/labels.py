@@ -58,17 +58,14 @@ class Elided(QLabel):
             self.updateGeometry()
             self._elide()
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for the whole text."""
+    def sizeHint(self) -> QSize:
         metrics = QFontMetricsF(self.font())
         return QSize(round(metrics.horizontalAdvance(self.whole)) + 2, round(metrics.height()) + 2)
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the least that still says something."""
+    def minimumSizeHint(self) -> QSize:
         return QSize(24, self.sizeHint().height())
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Cut the text anew."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._elide()
 
@@ -101,8 +98,7 @@ class Clamped(QLabel):
         if role in HEADINGS:
             give_role(self, QAccessible.Role.Heading)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Cut the text anew."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._cut()
 

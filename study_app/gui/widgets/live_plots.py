@@ -54,7 +54,7 @@ def pen(colour: str, width: float = STROKE, dash: tuple[float, float] | None = N
 class Axis(pg.AxisItem):
     """An axis without a label; laying out the empty label took a quarter of the time to make a plot."""
 
-    def _updateLabel(self) -> None:  # noqa: N802 - pyqtgraph's name
+    def _updateLabel(self) -> None:
         self.picture = None
         self.update()
 
@@ -110,7 +110,7 @@ class Plot(Themed, pg.GraphicsView):
         """Paint what was changed at once, and not when Qt finds the time."""
         QCoreApplication.sendPostedEvents(self.scene(), QEvent.Type.MetaCall.value)
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+    def sizeHint(self) -> QSize:
         """Return a small size: a plot takes what is left, and never makes a window scroll."""
         return QSize(320, 150)
 

@@ -52,7 +52,6 @@ class NumberField(QLineEdit):
         return self._state
 
     def show_text(self, text: str) -> None:
-        """Show a number as text, unless something else is being typed."""
         self._shown = text
         if not self.isModified() and text != self.text():
             self.setText(text)
@@ -85,8 +84,7 @@ class NumberField(QLineEdit):
                 return True
         return super().event(event)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Step, go back, or type what a number is written with."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Up:
             self.stepped.emit(1)
         elif event.key() == Qt.Key.Key_Down:
@@ -99,14 +97,12 @@ class NumberField(QLineEdit):
         else:
             super().keyPressEvent(event)
 
-    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Choose the whole number when the keyboard comes."""
+    def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
         if event.reason() in {Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason}:
             self.selectAll()
 
-    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Take what was typed."""
+    def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
         self.flush()
 

@@ -121,19 +121,16 @@ class Table(Themed, QTableView):
         self.theme = theme
         self.viewport().update()
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for the heading and a row."""
+    def minimumSizeHint(self) -> QSize:
         return QSize(sum(least for _, least in self._widths), 26 + ROW_HEIGHT)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Open the row at Enter."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and self.currentIndex().isValid():
             self.opened.emit(self.currentIndex())
         else:
             super().keyPressEvent(event)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Share the width among the columns."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         least = sum(least for _, least in self._widths)
         shares = sum(share for share, _ in self._widths)
@@ -141,8 +138,7 @@ class Table(Themed, QTableView):
         for column, (share, needs) in enumerate(self._widths):
             self.setColumnWidth(column, needs + spare * share // shares)
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint tints and hairlines, then the cells, then the ring of the keyboard."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self.viewport())
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         first, last = self.rowAt(0), self.rowAt(self.viewport().height() - 1)

@@ -115,16 +115,13 @@ class Slider(Themed, QSlider):
         """Go some steps to the right, or to the left where ``steps`` is negative."""
         self._move(self._stepped(steps), held=False)
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return a width that can be aimed at."""
+    def sizeHint(self) -> QSize:
         return QSize(110, 32)
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the least that still slides."""
+    def minimumSizeHint(self) -> QSize:
         return QSize(64, 32)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Step with the arrows and the page keys, go to the ends, or back to the tick."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         keys = Qt.Key
         page = max(1, self._span.steps // (STEPS // PAGE))
         steps = {
@@ -142,35 +139,29 @@ class Slider(Themed, QSlider):
         else:
             event.ignore()
 
-    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Bring the knob under the pointer."""
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
             self._dragged = True
             self._move(self._at(event.position().x()), held=True)
 
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Follow the pointer."""
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self._dragged:
             self._move(self._at(event.position().x()), held=True)
 
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Let the knob go where it is."""
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton and self._dragged:
             self._dragged = False
             self.slid.emit(self._value, False)
             self.update()
 
-    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Go back to the tick."""
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton and self._tick is not None:
             self._move(self._tick, held=False)
 
-    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802 - Qt's name
-        """Leave the wheel to what scrolls."""
+    def wheelEvent(self, event: QWheelEvent) -> None:
         event.ignore()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint track, the part up to the knob, tick and knob."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -218,7 +209,6 @@ class Slider(Themed, QSlider):
         self._move(self._span.value(step / self._span.steps), held=False)
 
     def _tell(self) -> None:
-        """Give the slider's own place what screen readers read of it."""
         self.blockSignals(True)
         self.setRange(0, self._span.steps)
         self.setValue(round(self._span.share(self._value) * self._span.steps))

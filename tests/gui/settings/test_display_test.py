@@ -8,8 +8,7 @@ from PySide6.QtGui import QColor
 
 from study_app.gui.participant.tank.photodiode_patch import PATCH
 from study_app.gui.participant.tank_widget import TankWidget
-from study_app.gui.settings.display_test import FIRST_MS
-from study_app.gui.settings.pixel_patterns import GREYS, GreyRamp, LineField, lines
+from study_app.gui.settings.display_test import FIRST_MS, GREYS, GreyRamp, LineField, lines
 from study_app.protocol.wording.languages import words
 from tests.gui.small import task_page
 from tests.gui.windows import display_test

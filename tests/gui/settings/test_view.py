@@ -3,7 +3,8 @@
 import pytest
 from PySide6.QtCore import Qt
 
-from tests.gui.windows import machine
+from study_app.store.workstation import MachineSettings
+from tests.gui.windows import machine, show_settings
 
 
 @pytest.fixture
@@ -36,3 +37,12 @@ def test_the_display_test_is_opened_once_and_left_by_esc(real_place, qtbot):
     with qtbot.waitSignal(test.left):
         qtbot.keyClick(test, Qt.Key.Key_Escape)
     assert real_place.test is None
+
+
+def test_what_is_being_typed_stays_if_something_else_is_set(real_place, qtbot):
+    camera = real_place.editors["camera"].control
+    qtbot.keyClicks(camera, "v4l2:/dev/vid")
+    show_settings(real_place, MachineSettings(theme="dark", camera="tcp://127.0.0.1:5000"))
+    assert camera.text() == "v4l2:/dev/vid"
+    qtbot.keyClick(camera, Qt.Key.Key_Escape)
+    assert camera.text() == "tcp://127.0.0.1:5000"

@@ -51,7 +51,6 @@ class Foot(QWidget):
         self.update()
 
     def show_state(self, message: str, done: int, of: int, keys: str) -> None:
-        """Say what is missing, how many are answered, and which keys answer."""
         self._message, self._answer_keys = message, keys
         self._count = self._words.answered.format(done=done, of=of)
         kept = self._words.answers_kept if message else ""
@@ -60,7 +59,7 @@ class Foot(QWidget):
         self.setAccessibleDescription(", ".join(f"{key} {text}" for key, text in hints))
         self.update()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
+    def paintEvent(self, _event: QPaintEvent) -> None:
         """Draw a line, and under it from the end: how many are answered, the keys, and what is missing."""
         painter = page_painter(self)
         painter.setLayoutDirection(Qt.LayoutDirection.LayoutDirectionAuto)  # words are in their own language's

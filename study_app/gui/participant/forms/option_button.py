@@ -126,39 +126,32 @@ class OptionLook(Button):
             self.pointed = pointed
             self.update()
 
-    def hitButton(self, position: QPoint) -> bool:  # noqa: N802
-        """Take clicks anywhere in the rectangle."""
+    def hitButton(self, position: QPoint) -> bool:
         return self.rect().contains(position)
 
-    def sizeHint(self) -> QSize:  # noqa: N802
-        """Return a size that can be hit, as wide as the longest word."""
+    def sizeHint(self) -> QSize:
         return size_of(self._words, self._scale)
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802
-        """Return the same."""
+    def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
 
-    def hasHeightForWidth(self) -> bool:  # noqa: N802
+    def hasHeightForWidth(self) -> bool:
         """Return that words wrap; points are short."""
         return self._look != "point"
 
-    def heightForWidth(self, width: int) -> int:  # noqa: N802
-        """Return the height [px] that the words need where they wrap."""
+    def heightForWidth(self, width: int) -> int:
         needed = height_of(self._words, self._scale, max(1.0, width - TAKEN * self._scale))
         return round(max(target_px(self._scale), needed + 12 * self._scale))
 
-    def enterEvent(self, event: QEnterEvent) -> None:  # noqa: N802
-        """Tell the question that the pointer is here."""
+    def enterEvent(self, event: QEnterEvent) -> None:
         super().enterEvent(event)
         self._tell_pointed(self.place)
 
-    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802
-        """Tell it that the pointer left."""
+    def leaveEvent(self, event: QEvent) -> None:
         super().leaveEvent(event)
         self._tell_pointed(-1)
 
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802
-        """End the pointing when a finger is lifted."""
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         super().mouseReleaseEvent(event)
         if event.device().type() == QInputDevice.DeviceType.TouchScreen:
             self._tell_pointed(-1)
@@ -167,7 +160,7 @@ class OptionLook(Button):
         if (question := question_of(self)) is not None:
             question.point(place)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
+    def paintEvent(self, _event: QPaintEvent) -> None:
         """Draw the answer; a point looks like those of other questions and is drawn once for all of them."""
         painter = page_painter(self)
         in_focus = self._in_focus()

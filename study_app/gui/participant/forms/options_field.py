@@ -59,7 +59,6 @@ class OptionsField(QuestionField):
         raise NotImplementedError
 
     def show_answer(self, value: Value) -> None:
-        """Show options as chosen."""
         self.kept(value)
         self._check()
 
@@ -92,7 +91,7 @@ class OptionsField(QuestionField):
         if by_key:
             self.left.emit()
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         """Choose with digits and Space, point with left and right; the rest is the page's."""
         number = event.key() - Qt.Key.Key_0
         plain = not event.modifiers() & Qt.KeyboardModifier.ControlModifier
@@ -107,13 +106,11 @@ class OptionsField(QuestionField):
         else:
             super().keyPressEvent(event)
 
-    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802
-        """Hide the keyboard's pointer, too."""
+    def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
         self.point(-1)
 
-    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802
-        """Take the keyboard where the mouse clicks outside the options."""
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         self.setFocus(Qt.FocusReason.MouseFocusReason)
         event.accept()
 

@@ -88,7 +88,6 @@ class QuestionField(QWidget):
         self.grid.addWidget(answer, 0, self.ANSWER, Qt.AlignmentFlag.AlignVCenter)
 
     def show_answer(self, value: Value) -> None:
-        """Show an answer that was given before, without a signal."""
         raise NotImplementedError
 
     def spoken(self) -> str:
@@ -171,18 +170,15 @@ class QuestionField(QWidget):
         self.value, self.is_answered, self.missing = value, True, False
         self._tell()
 
-    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802
-        """Show the ring."""
+    def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
         self.update()
 
-    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802
-        """Hide the ring."""
+    def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
         self.update()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
-        """Draw the ground, the mark of a missing answer and the ring."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = page_painter(self)
         self._paint_ground(painter)
         painter.end()
@@ -215,7 +211,6 @@ class QuestionField(QWidget):
             painter.drawRoundedRect(bar, 2 * scale, 2 * scale)
 
     def _tell(self) -> None:
-        """Give the field its words and its state for a screen reader."""
         words = self._words
         self.statement.show_note(self.note, missing=self.missing)
         if self.is_answered:

@@ -54,24 +54,21 @@ class QuestionWords(QWidget):
             self._number_width = width
             self._changed()
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+    def sizeHint(self) -> QSize:
         """Return the least size: the width is a share of the row, the height follows from it."""
         return self.minimumSizeHint()
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the width of the longest word."""
+    def minimumSizeHint(self) -> QSize:
         if not self.sizePolicy().hasHeightForWidth():
             return QSize(0, 0)
         text, note, _ = self._faces
         longest = self._note_left + self._bounds(note, self.note, 0).width()
         return QSize(self._number_width + max(longest, self._bounds(text, self.text, 0).width()), 0)
 
-    def heightForWidth(self, width: int) -> int:  # noqa: N802 - Qt's name
-        """Return the height [px] that the words need where they wrap."""
+    def heightForWidth(self, width: int) -> int:
         return sum(self._heights(width))
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the words in the middle of the height."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         width, left = self.width(), self._number_width
         high, note_high = self._heights(width)
         top = (self.height() - high - note_high + 1) // 2

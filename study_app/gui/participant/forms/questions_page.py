@@ -186,8 +186,7 @@ class QuestionsPage(PageWidget):
             self._send_seen()
             self.event_made.emit(Submitted(self._clock()))
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Move with up and down, go back with Backspace, confirm with Enter."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             if not event.isAutoRepeat():
                 self.submit()
@@ -220,7 +219,6 @@ class QuestionsPage(PageWidget):
         self._show(index)
 
     def _show(self, index: int) -> None:
-        """Show a part."""
         self._part = index
         part = self.part
         for field in self.fields:

@@ -27,8 +27,7 @@ class EntryKeys(Widget):
         """Return whether a key is the page's: it means nothing while one types."""
         return event.key() in (*ENTER, *VERTICAL)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Type, or leave the key to the page."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         escape = event.key() == Qt.Key.Key_Escape
         if escape and (question := question_of(self)) is not None:
             question.finish()  # before the page gives way to a pause
@@ -37,14 +36,12 @@ class EntryKeys(Widget):
         else:
             super().keyPressEvent(event)
 
-    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802
-        """Show the question's ring."""
+    def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
         if (question := question_of(self)) is not None:
             question.update()
 
-    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802
-        """Hide it, and take what was typed."""
+    def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
         if (question := question_of(self)) is not None:
             question.finish()
@@ -66,8 +63,7 @@ class TypedField(QuestionField):
         """Return what was typed."""
         raise NotImplementedError
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Go on with Enter, once what was typed is an answer."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in ENTER and self.typed():
             if not event.isAutoRepeat() and self.finish():
                 self.left.emit()

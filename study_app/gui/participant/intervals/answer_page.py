@@ -53,8 +53,7 @@ class AnswerPage(PageWidget):
         self._progress.set_scale(self.words_scale)
         self.question.setFont(sized(QUESTION_PX * self.words_scale))
 
-    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
-        """Tell when the question was shown."""
+    def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         self.event_made.emit(ItemShown(self._clock(), self.page.item.id))
 

@@ -65,14 +65,12 @@ class ChoiceWidget(AnswerPage):
         self._cap.show_key(self.page.item.keys, self.words_scale)
         self._hint.setFont(font("body", scale=self.words_scale))
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802
-        """Hear the page's keys wherever the keyboard is."""
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress and self._take(event):
             return True
         return super().eventFilter(watched, event)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Choose by number or position."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if not self._take(event):
             super().keyPressEvent(event)
 

@@ -51,7 +51,6 @@ class FeedbackWidget(PageWidget):
         self._word.setFont(font("display", scale=self.words_scale))
         self._column.setSpacing(round(14 * self.words_scale))
 
-    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
-        """Announce it."""
+    def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         say(self, self._text)

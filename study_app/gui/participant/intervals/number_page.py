@@ -75,8 +75,7 @@ class NumberWidget(AnswerPage):
         """Put the keyboard into the field."""
         self.field.setFocus()
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Confirm with Enter."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             if not event.isAutoRepeat():
                 self._confirm()

@@ -60,8 +60,7 @@ class Heading(QWidget):
             self._pointed = column
             self.update()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
-        """Draw the labels, their last lines level."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         if self._sizes is None:
             return
         painter = page_painter(self)

@@ -66,15 +66,13 @@ class KeyCap(QWidget):
         self._scale = 1.0
 
     def show_key(self, text: str, scale: float) -> None:
-        """Show a key, or none."""
         self._text, self._scale = text, scale
         width, height = key_size(text, scale)
         self.setFixedSize(round(width) + 2, round(height) + 2)
         self.setVisible(bool(text))
         self.update()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
-        """Draw it."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = page_painter(self)
         draw_key(painter, 1, self.height() / 2, self._text, self._scale)
         painter.end()
@@ -85,18 +83,16 @@ class LitButton(Button):
 
     ringed = False
 
-    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802
+    def focusInEvent(self, event: QFocusEvent) -> None:
         """Show the ring where the keyboard led here; a page that begins here has its key cap to say so."""
         self.ringed = event.reason() in KEYBOARD
         super().focusInEvent(event)
 
-    def enterEvent(self, event: QEnterEvent) -> None:  # noqa: N802
-        """Light up under the pointer."""
+    def enterEvent(self, event: QEnterEvent) -> None:
         super().enterEvent(event)
         self.update()
 
-    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802
-        """Be as before."""
+    def leaveEvent(self, event: QEvent) -> None:
         super().leaveEvent(event)
         self.update()
 
@@ -120,16 +116,14 @@ class GoButton(LitButton, QPushButton):
         self.setFixedSize(self.sizeHint())
         self.update()
 
-    def sizeHint(self) -> QSize:  # noqa: N802
-        """Return the size that label, key cap and focus ring need."""
+    def sizeHint(self) -> QSize:
         scale = self._scale
         label = QFontMetricsF(self.font()).horizontalAdvance(self.text())
         cap, _ = key_size(self._key, scale)
         width = max(150 * scale, label + cap + (36 + 12 + 28) * scale)
         return QSize(round(width + 2 * RING), round(48 * scale + 2 * RING))
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
-        """Draw the button, its label and its key."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = page_painter(self)
         scale, theme = self._scale, PARTICIPANT
         body = QRectF(self.rect()).adjusted(RING, RING, -RING, -RING)
@@ -154,7 +148,7 @@ class GoButton(LitButton, QPushButton):
         draw_key(painter, cap_at, body.center().y(), self._key, scale, ink=ink, edge=ink, strength=0.5)
         painter.end()
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         """Leave arrows to the page: they scroll or move there, and must not lead the keyboard away."""
         if event.key() in ARROWS:
             event.ignore()

@@ -33,25 +33,21 @@ class LanguageButton(LitButton, QRadioButton):
         self.setFont(font("body", scale=scale, weight=600 if self.isChecked() else 500))
         self.setFixedSize(self.sizeHint())
 
-    def sizeHint(self) -> QSize:  # noqa: N802
-        """Return the size that name, check mark and focus ring need."""
+    def sizeHint(self) -> QSize:
         wide = QFontMetricsF(self.font()).horizontalAdvance(self.text()) + (30 + 24 * self.isChecked()) * self._scale
         return QSize(round(wide) + 2 * RING, round(LEAST_HEIGHT * self._scale) + 2 * RING)
 
-    def hitButton(self, _place: object) -> bool:  # noqa: N802
-        """Take clicks anywhere."""
+    def hitButton(self, _place: object) -> bool:
         return True
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Choose with Enter as well, which would otherwise go on from the page."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             if not event.isAutoRepeat():
                 self.click()
         else:
             super().keyPressEvent(event)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
-        """Draw outline, check mark and name."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = page_painter(self)
         theme, scale, radius = PARTICIPANT, self._scale, RADIUS_CONTROL * self._scale
         body = QRectF(self.rect()).adjusted(RING + 0.5, RING + 0.5, -RING - 0.5, -RING - 0.5)
@@ -105,7 +101,7 @@ class LanguageSwitch(QGroupBox):
             x += button.width() + round(4 * scale)
         self.resize(x - round(4 * scale), self.buttons[0].height())
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
+    def paintEvent(self, _event: QPaintEvent) -> None:
         """Draw nothing: the buttons are all."""
 
     def _choose(self, code: str, present: str) -> None:

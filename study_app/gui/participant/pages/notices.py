@@ -52,7 +52,7 @@ class PauseWidget(ReadingPage):
         button = (label, words.enter_key) if page.held is None else None
         super().__init__(column, words, clock, button=button, parent=parent, text_scale=text_scale)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         """Go on with Enter; Space alone could still be the key of the page before."""
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and not event.isAutoRepeat():
             self.go_on()
@@ -64,8 +64,7 @@ class PauseWidget(ReadingPage):
         if self.button is not None:
             self.event_made.emit(ResumeAsked(self._clock(), "participant"))
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
-        """Paint the page below as a shade, and a card on it."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         painter = page_painter(self)
         if self.under is not None and not self.under.isNull():
@@ -106,8 +105,7 @@ class NoticeWidget(ReadingPage):
         """Put the keyboard on the button, where there is one."""
         (self.button or self).setFocus()
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Close the last page with Enter as well, and with Space wherever the keyboard is."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         keys = (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space)
         if self.button is not None and event.key() in keys and not event.isAutoRepeat():
             self.go_on()

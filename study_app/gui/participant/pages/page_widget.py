@@ -93,13 +93,11 @@ class PageWidget(QWidget):
         """Put the keyboard where the page begins."""
         self.setFocus()
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
-        """Lay the page out anew."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self.lay_out(page_scale(self.width(), self.height()))
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
-        """Fill the page."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.fillRect(self.rect(), QColor(PARTICIPANT.window))
         painter.end()

@@ -100,8 +100,7 @@ class ProgressLine(QWidget):
         self.setFixedHeight(round(QFontMetricsF(font("statement", scale=scale)).height()))
         self.update()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
-        """Draw words and bars."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         if self._progress is None:
             return
         painter = page_painter(self)

@@ -52,8 +52,7 @@ class Badge(QWidget):
         side = round(56 * scale)
         self.setFixedSize(side, side)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
-        """Draw the disc and the icon."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = page_painter(self)
         disc = QRectF(self.rect()).adjusted(1, 1, -1, -1)
         painter.setPen(QPen(QColor(PARTICIPANT.border), 1))
@@ -139,8 +138,7 @@ class ReadingPage(PageWidget):
     def go_on(self) -> None:
         """Do what the page's button says."""
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Scroll a text that is too long for the window."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         bar = self._scroll.verticalScrollBar()
         if (lines := LINE_KEYS.get(Qt.Key(event.key()))) is not None:
             bar.setValue(bar.value() + lines * LINE_STEP)

@@ -110,13 +110,11 @@ class StatementField(ScaleField):
                 return fitted
         return None
 
-    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802
-        """Show the ring, and which keys answer."""
+    def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
         self._tell()
 
-    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802
-        """Hide them."""
+    def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
         self._tell()
 

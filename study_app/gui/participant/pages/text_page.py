@@ -39,7 +39,7 @@ class DeclineButton(QPushButton):
         metrics = QFontMetricsF(self.font())
         self.setFixedSize(round(metrics.horizontalAdvance(self.text()) + 44 * scale), round(48 * scale))
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         """Decline with Enter, too, where the keyboard is here: it must not agree."""
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             if not event.isAutoRepeat():
@@ -190,8 +190,7 @@ class TextWidget(ReadingPage):
     def _choose_language(self, language: str) -> None:
         self.event_made.emit(LanguageChosen(self._clock(), language))
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Go on with Enter, and with Space unless the page is a consent."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         enter = event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter)
         space = event.key() == Qt.Key.Key_Space and not self._consent
         if (enter or space) and not event.isAutoRepeat():

@@ -65,7 +65,6 @@ class NumberField(TypedField):
         return self._wrong.text()
 
     def show_answer(self, value: Value) -> None:
-        """Show a number that was entered."""
         self.kept(value)
         if isinstance(value, int | float):
             self._write(write_number(value, 9))

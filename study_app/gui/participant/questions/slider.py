@@ -45,8 +45,7 @@ class Line(QSlider):
         self._scale = scale
         self.setFixedHeight(round(target_px(scale)))
 
-    def sizeHint(self) -> QSize:  # noqa: N802
-        """Return a size in which steps can be distinguished."""
+    def sizeHint(self) -> QSize:
         return QSize(round(240 * self._scale), round(target_px(self._scale)))
 
     def show_step(self, step: int) -> None:
@@ -57,7 +56,7 @@ class Line(QSlider):
         self.blockSignals(False)
         self.update()
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         """Move by steps, or to the ends; the first key puts the handle into the middle, or to an end."""
         if event.key() in (Qt.Key.Key_Home, Qt.Key.Key_End):
             self._move(self.minimum() if event.key() == Qt.Key.Key_Home else self.maximum())
@@ -66,40 +65,35 @@ class Line(QSlider):
         else:
             event.ignore()
 
-    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802
-        """Put the handle where the pointer is."""
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
             self.setSliderDown(True)
             self._drag(event.position().x())
 
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802
-        """Let the handle follow the pointer."""
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self.isSliderDown():
             self._drag(event.position().x())
 
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         """Let the handle go: that is the answer."""
         if self.isSliderDown():
             self._drag(event.position().x())
             self.setSliderDown(False)
             self.set_to.emit(self.value())
 
-    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802
+    def wheelEvent(self, event: QWheelEvent) -> None:
         """Leave the wheel alone: it changes no answer by accident."""
         event.ignore()
 
-    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802
-        """Show the question's ring."""
+    def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
         self._repaint_question()
 
-    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802
-        """Hide it."""
+    def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
         self._repaint_question()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
-        """Draw line, ends and, once there is an answer, the handle."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = page_painter(self)
         theme, scale = PARTICIPANT, self._scale
         left, right, middle = self._left(), self.width() - self._left(), self.height() / 2
@@ -198,7 +192,6 @@ class SliderField(QuestionField):
             end.setFont(font("label", scale=scale, weight=600))
 
     def _tell_line(self) -> None:
-        """Say that there is no answer yet, until there is one."""
         self._ends[1].setText("" if self.is_answered else self._words.no_answer_yet)
         self.line.setAccessibleDescription(f"{self._slider.low} – {self._slider.high}, {self.accessibleDescription()}")
 

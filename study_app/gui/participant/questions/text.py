@@ -57,7 +57,6 @@ class TextField(TypedField):
         self.type_into(self.entry, WAIT_MS, self.finish)
 
     def show_answer(self, value: Value) -> None:
-        """Show a text that was typed."""
         self.kept(value)
         self.entry.blockSignals(True)
         self.entry.setPlainText(str(value))

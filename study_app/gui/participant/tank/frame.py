@@ -23,17 +23,17 @@ class TaskShown(Protocol):
     """What is drawn of a task (see ``session.tasks.TaskView``)."""
 
     @property
-    def lit(self) -> int | None: ...  # noqa: D102
+    def lit(self) -> int | None: ...
     @property
-    def reached(self) -> int: ...  # noqa: D102
+    def reached(self) -> int: ...
     @property
-    def of(self) -> int | None: ...  # noqa: D102
+    def of(self) -> int | None: ...
     @property
-    def dwell(self) -> float: ...  # noqa: D102
+    def dwell(self) -> float: ...
     @property
-    def elapsed_s(self) -> float: ...  # noqa: D102
+    def elapsed_s(self) -> float: ...
     @property
-    def target_m(self) -> Point | None: ...  # noqa: D102
+    def target_m(self) -> Point | None: ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,7 +27,7 @@ class Pane(QOpenGLWidget):
         self._paint = paint
         self.frameSwapped.connect(self.swapped)
 
-    def paintGL(self) -> None:  # noqa: N802 - Qt's name
+    def paintGL(self) -> None:
         """Paint the whole surface: what was on it before is not kept."""
         painter = page_painter(self)
         self._paint(painter, QRegion(QRect(0, 0, self.width(), self.height())))

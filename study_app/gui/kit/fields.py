@@ -1,0 +1,224 @@
+"""Forms made from descriptions: a `Field` describes one value, an `Editor` is its label, control and line below."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QAbstractButton, QComboBox, QFileDialog, QLineEdit, QSpinBox, QWidget
+
+from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
+from study_app.gui.widgets.controls import ActionButton, Check, Choice, Number, Toggle
+from study_app.gui.widgets.labels import label, set_ink
+from study_app.gui.widgets.number_field import read_number, write_number
+from study_app.session.start import MAX_SEED
+
+LEAST_WORDS = 280  # narrower, wrapped words would ask for room that they do not need
+UNIT_WIDTH = 28
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One value of a form.
+
+    Attributes
+    ----------
+    options
+        What can be chosen, and its words.
+    limits
+        Of a count.
+    hint
+        The line below; ``aside`` stands at the right of the label.
+    parse, write
+        Read what is typed (a ValueError says what is wrong with it), and its inverse.
+    """
+
+    name: str
+    label: str
+    kind: Literal["line", "count", "choice", "switch", "check", "file", "folder"] = "line"
+    options: tuple[tuple[Any, str], ...] = ()
+    limits: tuple[int, int] = (0, 0)
+    unit: str = ""
+    hint: str = ""
+    aside: str = ""
+    placeholder: str = ""
+    file_filter: str = ""
+    longest: int = 32767
+    enabled: bool = True
+    parse: Callable[[str], Any] = str
+    write: Callable[[Any], str] = str
+
+
+def number(name: str, label: str, unit: str, limits: tuple[float, float]) -> Field:
+    """Return the field of a number within limits; None where it is empty."""
+
+    def parse(text: str) -> float | None:
+        value = read_number(text) if text else None
+        if text and (value is None or not limits[0] <= value <= limits[1]):
+            raise ValueError(f"A number from {limits[0]:g} to {limits[1]:g} {unit}; leave empty if unknown.")
+        return value
+
+    return Field(
+        name, label, unit=unit, parse=parse, write=lambda value: "" if value is None else write_number(value, 1)
+    )
+
+
+def seed(aside: str = "") -> Field:
+    """Return the field of a seed."""
+
+    def parse(text: str) -> int:
+        if not (text.isascii() and text.isdecimal() and int(text) <= MAX_SEED):
+            raise ValueError(f"the seed is a whole number from 0 to {MAX_SEED}")
+        return int(text)
+
+    return Field("seed", "Seed", aside=aside, parse=parse)
+
+
+class Line(QLineEdit):
+    """A line that is shown as it was at Esc; ``restored`` asks for it."""
+
+    restored = Signal()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape and self.isModified():
+            self.restored.emit()
+        else:
+            super().keyPressEvent(event)
+
+
+class Editor(QWidget):
+    """A label, a control with its unit or a button, and a line below.
+
+    ``changed(name, value)`` comes for a value that was chosen or typed to its end and is permitted, ``edited(name)`` at
+    every key, too.
+    """
+
+    changed = Signal(str, object)
+    edited = Signal(str)
+
+    def __init__(self, field: Field, button: QWidget | None = None) -> None:
+        super().__init__()
+        self.field, self._text, self._hint = field, "", field.hint
+        self.aside = label(field.aside, "small", "text3")
+        self.below = label("", "small", "text2", wraps=True)
+        self.below.setMinimumWidth(LEAST_WORDS)
+        self.control = self._made()
+        self.control.setFont(font("label" if field.unit else "body", tabular=bool(field.unit)))
+        self.control.setEnabled(field.enabled)
+        if isinstance(self.control, QAbstractButton):
+            vbox(self.control, margins=0, parent=self)
+            return
+        self.control.setAccessibleName(f"{field.label} in {field.unit}" if field.unit else field.label)
+        named = label(field.label, "label", "text" if field.unit else "text2")
+        named.setBuddy(self.control)
+        if field.kind in {"file", "folder"}:
+            button = ActionButton("", "Choose …" if field.kind == "file" else "Change …", height=40)
+            button.setAutoDefault(False)
+            button.clicked.connect(self._browse)
+        if field.unit:
+            unit = label(field.unit, "label", "text2")
+            unit.setFixedWidth(UNIT_WIDTH)
+            rows = [hbox((named, 1), self.control, unit, spacing=8)]
+        else:
+            beside = () if button is None else (button,)
+            rows = [hbox(named, STRETCH, self.aside), hbox((self.control, 1), *beside, spacing=8)]
+        vbox(*rows, self.below, spacing=6, margins=0, parent=self)
+        self.show_refusal("")
+
+    def _made(self) -> QWidget:
+        match self.field.kind:
+            case "count":
+                count = Number(*self.field.limits, self.field.limits[0])
+                count.valueChanged.connect(lambda _value: self.edited.emit(self.field.name))
+                return count
+            case "choice":
+                choice = Choice()
+                for value, words in self.field.options:
+                    choice.addItem(words, value)
+                choice.currentIndexChanged.connect(lambda _at: self.edited.emit(self.field.name))
+                choice.activated.connect(lambda _at: self.changed.emit(self.field.name, choice.currentData()))
+                return choice
+            case "switch" | "check":
+                mark = (Toggle if self.field.kind == "switch" else Check)(self.field.label)
+                mark.toggled.connect(lambda _on: self.edited.emit(self.field.name))
+                mark.clicked.connect(lambda on: self.changed.emit(self.field.name, on))
+                return mark
+        line = Line()
+        line.setMaxLength(self.field.longest)
+        line.setPlaceholderText(self.field.placeholder)
+        if self.field.unit:
+            line.setProperty("dense", "true")
+            line.setFixedWidth(96)
+            line.setAlignment(Qt.AlignmentFlag.AlignRight)
+        line.editingFinished.connect(self._take)
+        line.textChanged.connect(lambda _text: self.edited.emit(self.field.name))
+        line.restored.connect(lambda: self._show_text(self._text))
+        return line
+
+    @property
+    def value(self) -> Any:
+        """What stands in the control; a ValueError says why it is not permitted."""
+        match self.control:
+            case QAbstractButton():
+                return self.control.isChecked()
+            case QComboBox():
+                return self.control.currentData()
+            case QSpinBox():
+                return self.control.value()
+            case QLineEdit():
+                return self.field.parse(self.control.text().strip())
+
+    def show_value(self, value: Any, hint: str | None = None) -> None:
+        """Show a value, and a hint below; what is being typed stays."""
+        self._hint = self.field.hint if hint is None else hint
+        match self.control:
+            case QAbstractButton():
+                self.control.setChecked(value)
+            case QComboBox():
+                self.control.setCurrentIndex(self.control.findData(value))
+            case QSpinBox():
+                self.control.setValue(value)
+            case QLineEdit():
+                self._text = self.field.write(value)
+                if not self.control.isModified():
+                    self._show_text(self._text)
+
+    def show_refusal(self, why: str) -> None:
+        self.below.setText(why or self._hint)
+        self.below.setVisible(bool(why or self._hint))
+        set_ink(self.below, "bad" if why else "text2")
+        self.control.setProperty("state", "refused" if why else "")
+        self.control.style().unpolish(self.control)
+        self.control.style().polish(self.control)
+
+    def _show_text(self, text: str) -> None:
+        assert isinstance(self.control, QLineEdit)  # noqa: S101 - only lines are typed
+        self.control.setText(text)  # also no longer modified
+        self.control.setCursorPosition(0)
+        self.show_refusal("")
+
+    def _take(self) -> None:
+        assert isinstance(self.control, QLineEdit)  # noqa: S101 - only lines are typed
+        if not self.control.isModified():
+            return
+        try:
+            value = self.value
+        except ValueError as refusal:
+            self.show_refusal(str(refusal))
+            return
+        self.control.setModified(False)
+        self.show_refusal("")
+        self.changed.emit(self.field.name, value)
+
+    def _browse(self) -> None:
+        assert isinstance(self.control, QLineEdit)  # noqa: S101 - files are typed, too
+        if self.field.kind == "file":
+            chosen, _ = QFileDialog.getOpenFileName(self, self.field.label, self.control.text(), self.field.file_filter)
+        else:
+            chosen = QFileDialog.getExistingDirectory(self, self.field.label, self.control.text())
+        if chosen:
+            self.control.setText(chosen)
+            self.changed.emit(self.field.name, str(Path(chosen)))
