@@ -123,10 +123,10 @@ class TestDeviceOfAnotherPackage:
         dialog = NewSessionDialog(study_facts("demo"), tmp_path / "results")
         qtbot.addWidget(dialog)
         dialog.open()
-        field = dialog.device_options.fields["toy-mass"]
+        field = dialog.editors["toy-mass"].control
         assert not field.isVisible()
-        dialog.device.setCurrentIndex(dialog.device.findData("toy-hand"))
-        assert dialog.device.currentText() == "Toy hand (simulated)"
+        dialog.editors["device"].control.setCurrentIndex(dialog.editors["device"].control.findData("toy-hand"))
+        assert dialog.editors["device"].control.currentText() == "Toy hand (simulated)"
         assert field.isVisible()
         field.setText("250")
         chosen = dialog.chosen()

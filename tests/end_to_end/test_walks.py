@@ -121,8 +121,9 @@ def test_the_whole_study_by_keys_alone_from_home_to_home(program: Visitor, plan:
     person.press(*["Tab"] * tabs_to(main, thesis(plan).new), "Return")
     person.take_keyboard(program.window("^New session$"))
     dialog = dialog_of(plan, program.size(person.window))
-    to_device = tabs_to(dialog, dialog.device)
-    down = dialog.device.findData("scripted") - dialog.device.currentIndex()
+    device = dialog.editors["device"].control
+    to_device = tabs_to(dialog, device)
+    down = device.findData("scripted") - device.currentIndex()
     person.press(*["Tab"] * to_device, *["Down"] * down, *["Tab"] * tabs_to(dialog, dialog.begin), "Return")
     dialog.reject()
     person.take_keyboard(preflight_window(program))

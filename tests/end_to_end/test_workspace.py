@@ -72,10 +72,10 @@ def test_windows_show_the_same_sessions_and_suggest_the_same_id_from_two_start_f
         qtbot.waitUntil(lambda home=home: not home.reading)
         shown.append([facts.participant for facts in home.sessions.shown])
         home.ask_for_session(study_facts("demo"))
-        ids.append((home.dialog.participant.text(), home.dialog.results.text()))
-        assert home.dialog.where.text() == "in the workspace"
-        home.dialog.results.setText(str(tmp_path / "other"))
-        assert home.dialog.where.text().startswith("outside the workspace")
+        ids.append(tuple(home.dialog.editors[name].value for name in ("participant", "results")))
+        assert home.dialog.editors["results"].aside.text() == "in the workspace"
+        home.dialog.editors["results"].show_value(str(tmp_path / "other"))
+        assert home.dialog.editors["results"].aside.text().startswith("outside the workspace")
         home.dialog.reject()
         assert home.folder.accessibleName() == f"Workspace: {kept.folder}"
         visit.end()

@@ -144,7 +144,14 @@ SETTINGS: Actions = {
     "port refused": typed("editors.triggers.control", "COM3"),
     "port taken": typed("editors.triggers.control", "serial:COM3"),
     "switched": in_turn(
-        clicked("editors.sound.control", "editors.photodiode.control", "editors.lsl_markers.control", "devices", "check", "screens.radios.0"),
+        clicked(
+            "editors.sound.control",
+            "editors.photodiode.control",
+            "editors.lsl_markers.control",
+            "devices",
+            "check",
+            "screens.radios.0",
+        ),
         *(
             lambda place, name=name: chosen_at(place.editors[name].control, 1)
             for name in ("lsl_samples", "theme", "device")
@@ -271,16 +278,18 @@ def new_session(qtbot: Any) -> Any:
 
 
 NEW_SESSION: Actions = {
-    "no id": text("participant", "P-7"),
-    "an id of pilots": text("participant", "test"),
-    "pilot": clicked("pilot"),
-    "no pilot, no seed": in_turn(clicked("pilot"), text("participant", "P009"), text("seed", "")),
-    "another seed, Dutch": in_turn(text("seed", "4711"), chosen("language", "nl")),
-    "session 2": lambda dialog: dialog.session.setValue(2),
-    "simulated hand": chosen("device", "scripted"),
-    "Falcon": in_turn(chosen("device", "falcon"), clicked("windowed")),
-    "firmware gone": text("device_options.fields.firmware", "gone.bin"),
-    "own folder": in_turn(text("device_options.fields.firmware", ""), text("results", "mine")),
+    "no id": text("editors.participant.control", "P-7"),
+    "an id of pilots": text("editors.participant.control", "test"),
+    "pilot": clicked("editors.pilot.control"),
+    "no pilot, no seed": in_turn(
+        clicked("editors.pilot.control"), text("editors.participant.control", "P009"), text("editors.seed.control", "")
+    ),
+    "another seed, Dutch": in_turn(text("editors.seed.control", "4711"), chosen("editors.language.control", "nl")),
+    "session 2": lambda dialog: dialog.editors["session"].show_value(2),
+    "simulated hand": chosen("editors.device.control", "scripted"),
+    "Falcon": in_turn(chosen("editors.device.control", "falcon"), clicked("editors.windowed.control")),
+    "firmware gone": text("editors.firmware.control", "gone.bin"),
+    "own folder": in_turn(text("editors.firmware.control", ""), text("editors.results.control", "mine")),
 }
 HELP: Actions = {
     "search": lambda place: QTest.keyClicks(place.words, "photodiode"),

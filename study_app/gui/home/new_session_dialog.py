@@ -1,36 +1,63 @@
 """The questions before a session. Nothing is created until Begin; Cancel leaves everything as it was."""
 
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QIntValidator
-from PySide6.QtWidgets import QDialog, QFileDialog, QGridLayout, QVBoxLayout, QWidget
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import QDialog, QGridLayout, QLineEdit, QWidget
 
-from study_app.devices.registry import list_devices
-from study_app.errors import StudyError
+from study_app.devices.registry import descriptor_of, list_devices
+from study_app.errors import StoreError, StudyError
 from study_app.gui.display.screens import screens_shown
-from study_app.gui.home.device_option_fields import DeviceOptionFields
-from study_app.gui.home.form_fields import add_field, field_with_button, text_field
-from study_app.gui.home.study_folder_state import StudyFolderState, read_study_folder_state
-from study_app.gui.theme.theme import LIGHT, Theme, font
+from study_app.gui.kit.fields import Editor, Field, choice, seed
+from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.background import Background
-from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Icon, Rule, scrolled
-from study_app.gui.widgets.controls import ActionButton, Check, Choice, Number
+from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.protocol.groups import refuse_beyond_last
+from study_app.protocol.model import Protocol
 from study_app.protocol.wording.languages import language_name
 from study_app.session.start import NewSession, check_row, draw_seed, study_results
-from study_app.store.sessions.begin import MAX_SESSION, check_participant
+from study_app.store.blinded.blinding import check_conditions
+from study_app.store.folders import StudyFolder
+from study_app.store.sessions.begin import MAX_SESSION, UsedIds, check_participant, used_ids
+from study_app.store.tables.study_files import check_study
 from study_app.store.workstation import DEFAULTS, MachineSettings
-from study_app.viewmodels.devices.list_view import device_label, device_or_default
+from study_app.viewmodels.devices.list_view import device_label, device_or_default, window_options
 from study_app.viewmodels.home import StudyFacts
 from study_app.workspace import workspace
 
 FRAME = 60  # of a window, at most
+INSIDE, OUTSIDE = "in the workspace", "outside the workspace: Home will not list its sessions"
 ROW_HINT = "the session takes that participant's row of the square; empty: its own row"
+
+
+@dataclass(frozen=True, slots=True)
+class StudyFolderState:
+    """A study's folder when it was read: which ids are used, and why no session of the study can be put there."""
+
+    path: Path
+    used: UsedIds
+    fault: str
+
+
+def read_study_folder_state(path: Path, protocol: Protocol) -> StudyFolderState:
+    """Read the folder of a study; a folder that cannot be used has a ``fault``."""
+    folder, fault = StudyFolder(path), ""
+    used = UsedIds(path, frozenset(), ())
+    try:
+        check_study(folder, protocol.study.name)
+        used = used_ids(folder)
+        check_conditions(path, protocol)
+    except StoreError as error:
+        fault = str(error)
+    return StudyFolderState(path, used, fault)
 
 
 class NewSessionDialog(QDialog):
@@ -56,127 +83,121 @@ class NewSessionDialog(QDialog):
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self.facts = facts
-        self._machine = machine
+        self.facts, self._all_results = facts, results
         self._state: StudyFolderState | None = None
         self._reader = Background(self)
         self._reader.done.connect(self._take_state)
         self.setWindowTitle("New session")
         self.setModal(True)
         self.setMinimumWidth(736)
-        self._all_results = results
-        self._suggested = str(study_results(results, facts.protocol.study.name, device_or_default(machine.device)))
-        self.results = text_field("Results folder of this study")
-        self.results.setText(self._suggested)
-        self.where = label("", "small", "text3")
-        self.participant = text_field("Participant")
-        self.session = Number(1, MAX_SESSION, 1)
-        self.seed = text_field("Seed")
-        self.operator = text_field("Operator")
-        self.row_of = text_field("Replaces participant")
-        self.language = Choice()
-        self.device = Choice()
-        self.device_options = DeviceOptionFields(machine.device_options)
-        self.screen_choice = Choice()
-        self.windowed = Check("In a window instead of full screen")
-        self.pilot = Check("Pilot: marked by a frame, stored separately")
-        self.verdict_icon = Icon("check", "ok", 18)
-        self.verdict = label("", "label", "ok", wraps=True)
+        self.verdict_icon, self.verdict = Icon("check", "ok", 18), label("", "label", "ok", wraps=True)
         self._free = 1, ""
         self._windowed_without_pilot = False
-        self.ways = [ActionButton("", "", height=34) for _ in range(2)]
+        self.ways = another, new = ActionButton("", "", height=34), ActionButton("", "", height=34)
         self.begin = ActionButton("play", "Begin", role="primary", height=46)
         self.cancel = ActionButton("", "Cancel", height=46)
-        self._fill()
+        self._make_editors(machine)
         self._lay_out()
         apply_theme(self, theme)
-        self._check()
-        self.participant.setFocus()
-        self.participant.selectAll()
-
-    def _fill(self) -> None:
-        study = self.facts.protocol.study
-        self.participant.setText(self._state_now().used.suggested())
-        self.session.setAccessibleName("Session")
-        self.seed.setText(str(draw_seed()))
-        self.seed.setValidator(QIntValidator(0, 2_147_483_647, self))
-        self.operator.setPlaceholderText("Initials, such as AK")
-        self.operator.setMaxLength(40)
-        self.operator.setText(self._machine.operator)
-        for code in study.languages:
-            self.language.addItem(language_name(code), code)
-        preferred = device_or_default(self._machine.device)
-        for name in dict.fromkeys((*list_devices(), preferred)):
-            self.device.addItem(device_label(name), name)
-        self.device.setCurrentIndex(self.device.findData(preferred))
-        self.device_options.show_device(preferred)
-        screens = screens_shown()
-        for screen in screens:
-            self.screen_choice.addItem(f"Screen {screen.number}: {screen.words}", screen.number)
-        self.screen_choice.setCurrentIndex(self._machine.screen_among([screen.name for screen in screens]) - 1)
-        self.windowed.setChecked(len(screens) == 1)
-        for name, widget in (("Language", self.language), ("Device", self.device), ("Screen", self.screen_choice)):
-            widget.setAccessibleName(name)
-        fields: tuple[QWidget, ...] = (
-            self.session,
-            self.language,
-            self.device,
-            self.screen_choice,
-            self.windowed,
-            self.pilot,
-        )
-        for field in fields:
-            field.setFont(font("body"))
-        self.device.currentIndexChanged.connect(self._choose_device)
-        self.device_options.changed.connect(self._check)
-        self.pilot.toggled.connect(self._choose_pilot)
-        self.participant.textChanged.connect(self._check)
-        self.session.valueChanged.connect(self._check)
-        self.seed.textChanged.connect(self._check)
-        self.row_of.textChanged.connect(self._check)
-        self.results.textChanged.connect(self._check)
-        self.ways[0].clicked.connect(lambda: self.session.setValue(self._free[0]))
-        self.ways[1].clicked.connect(lambda: self.participant.setText(self._free[1]))
+        for name, editor in self.editors.items():
+            editor.edited.connect({"device": self._choose_device, "pilot": self._choose_pilot}.get(name, self._check))
+        another.clicked.connect(lambda: self.editors["session"].show_value(self._free[0]))
+        new.clicked.connect(lambda: self.editors["participant"].show_value(self._free[1]))
         self.begin.clicked.connect(self.accept)
         self.cancel.clicked.connect(self.reject)
-        self.begin.setDefault(True)
-        self.cancel.setAutoDefault(False)
+        self._check()
+        participant = self.editors["participant"].control
+        assert isinstance(participant, QLineEdit)  # noqa: S101 - an id is typed
+        participant.setFocus()
+        participant.selectAll()
+
+    def _make_editors(self, machine: MachineSettings) -> None:
+        study, screens, device = self.facts.protocol.study, screens_shown(), device_or_default(machine.device)
+        self._suggested = str(study_results(self._all_results, study.name, device))
+        devices = dict.fromkeys((*list_devices(), device))
+        languages = {code: language_name(code) for code in study.languages}
+        fields = (
+            Field("participant", "Participant", aside="letters and digits, no name"),
+            Field("session", "Session", "count", limits=(1, MAX_SESSION)),
+            seed("determines every order; recorded"),
+            Field("operator", "Operator", longest=40, placeholder="Initials, such as AK"),
+            choice("language", "Language of the participant's pages", languages),
+            choice("device", "Device", {name: device_label(name) for name in devices}),
+            choice(
+                "screen", "Participant's screen", {one.number: f"Screen {one.number}: {one.words}" for one in screens}
+            ),
+            Field("windowed", "In a window instead of full screen", "check"),
+            Field("pilot", "Pilot: marked by a frame, stored separately", "check"),
+            Field("results", "Results folder of this study", "folder"),
+            Field("row_of", "Replaces participant", aside=ROW_HINT, parse=lambda text: text or None),
+            *(
+                Field(
+                    option.name, option.title, "file" if option.file_filter else "line", aside=option.hint,
+                    placeholder=option.placeholder, file_filter=option.file_filter,
+                    parse=partial(_file, option.name) if option.file_filter else str,
+                )
+                for option in window_options()
+            ),
+        )  # fmt: skip
+        redraw = ActionButton("repeat", "Draw another", height=40)
+        redraw.setAutoDefault(False)
+        redraw.clicked.connect(lambda: self.editors["seed"].show_value(draw_seed()))
+        self.editors: dict[str, Editor] = {
+            one.name: Editor(one, redraw if one.name == "seed" else None, judges=True) for one in fields
+        }
+        values = {
+            "seed": draw_seed(),
+            "operator": machine.operator,
+            "device": device,
+            "windowed": len(screens) == 1,
+            "screen": machine.screen_among([one.name for one in screens]),
+            "results": self._suggested,
+            **machine.device_options,
+        }
+        for name, value in values.items():
+            self.editors[name].show_value(value)
+        self.editors["participant"].show_value(self._state_now().used.suggested())
+        self.editors["row_of"].setVisible(self.facts.protocol.assigns_rows)
 
     def _lay_out(self) -> None:
-        self._inside = QWidget()
+        self._ways_row, self._inside = QWidget(), QWidget()
+        hbox(*self.ways, STRETCH, margins=(26, 0, 0, 0), parent=self._ways_row)
+        for button in (*self.ways, self.cancel):
+            button.setAutoDefault(False)
+        self.begin.setDefault(True)
+        verdict = hbox((self.verdict_icon, 0, Qt.AlignmentFlag.AlignTop), (self.verdict, 1), spacing=8)
+        judged, checks, e = QWidget(), QWidget(), self.editors
+        vbox(verdict, self._ways_row, spacing=6, margins=0, parent=judged)
+        vbox(e["windowed"], e["pilot"], spacing=2, margins=(0, 4, 0, 0), parent=checks)
+        pairs = (
+            (e["participant"], e["session"]),
+            (judged,),
+            (e["seed"], e["operator"]),
+            (e["language"], e["device"]),
+            (e["screen"], checks),
+            (e["results"],),
+            (e["row_of"],),
+            *((e[option.name],) for option in window_options()),
+        )
         grid = QGridLayout(self._inside)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(16)
-        grid.setVerticalSpacing(6)
-        for place in (0, 1):
-            grid.setColumnStretch(place, 1)
-        another = ActionButton("repeat", "Draw another", height=40)
-        another.setAutoDefault(False)
-        another.clicked.connect(lambda: self.seed.setText(str(draw_seed())))
-        change = ActionButton("", "Change …", height=40)
-        change.setAutoDefault(False)
-        change.clicked.connect(self._choose_folder)
-        add_field(grid, 0, 0, "Participant", self.participant, hint="letters and digits, no name")
-        add_field(grid, 0, 1, "Session", self.session)
-        add_layout(grid, self._judge(), 2, 0, 1, 2)
-        add_field(grid, 4, 0, "Seed", field_with_button(self.seed, another), hint="determines every order; recorded")
-        add_field(grid, 4, 1, "Operator", self.operator)
-        add_field(grid, 6, 0, "Language of the participant's pages", self.language)
-        add_field(grid, 6, 1, "Device", self.device)
-        add_field(grid, 8, 0, "Participant's screen", self.screen_choice)
-        add_layout(grid, vbox(self.windowed, self.pilot, spacing=2), 8, 1, 2, 1, Qt.AlignmentFlag.AlignBottom)
-        folder = field_with_button(self.results, change)
-        add_field(grid, 10, 0, "Results folder of this study", folder, hint=self.where, across=2)
-        if self.facts.protocol.assigns_rows:
-            add_field(grid, 12, 0, "Replaces participant", self.row_of, hint=ROW_HINT, across=2)
-        grid.addWidget(self.device_options, 14, 0, 1, 2)
+        grid.setVerticalSpacing(12)
+        grid.setRowStretch(len(pairs), 1)
+        for row, pair in enumerate(pairs):
+            for column, part in enumerate(pair):
+                grid.setColumnStretch(column, 1)
+                grid.addWidget(part, row, column, 1, 3 - len(pair))
         self._area = scrolled(self._inside)
-        head = label("New session", "title_dense")
         about = f"{self.facts.title}  ·  {self.facts.extent}  ·  {self.facts.duration}"
-        told = label(about, "body", "text2", wraps=True)
+        head, told = label("New session", "title_dense"), label(about, "body", "text2", wraps=True)
         note = label("Nothing is created until you begin.", "label", "text2")
         foot = hbox(self.cancel, note, STRETCH, self.begin, spacing=16)
         vbox(head, told, 6, (self._area, 1), 10, Rule(), 4, foot, spacing=10, margins=(32, 28, 32, 24), parent=self)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        QTimer.singleShot(0, self, self._fit)  # once the parts have their style
 
     def _fit(self) -> None:
         """Be as high as the questions are, but no higher than the screen: then they scroll, and the foot stays."""
@@ -190,130 +211,103 @@ class NewSessionDialog(QDialog):
         self._area.setMinimumHeight(min(needed, self.screen().availableSize().height() - FRAME - around))
         self.adjustSize()
 
-    def _judge(self) -> QVBoxLayout:
-        """Return the place of the verdict, and below it the ways on where an id is used."""
-        verdict = hbox((self.verdict_icon, 0, Qt.AlignmentFlag.AlignTop), (self.verdict, 1), spacing=8)
-        self._ways_row = QWidget()
-        hbox(*self.ways, STRETCH, margins=(26, 0, 0, 0), parent=self._ways_row)
-        for way in self.ways:
-            way.setAutoDefault(False)
-        return vbox(verdict, self._ways_row, spacing=6)
-
-    def _choose_folder(self) -> None:
-        chosen = QFileDialog.getExistingDirectory(self, "Results folder of this study", self.results.text())
-        if chosen:
-            self.results.setText(chosen)
-
     def _choose_device(self) -> None:
-        """Ask for the options of the device, and for another folder where it is simulated."""
-        self.device_options.show_device(self.device.currentData())
+        """Ask for another folder where the device is simulated."""
         self._suggest_folder()
         self._check()
 
     def _suggest_folder(self) -> None:
         """Keep pilots and a simulated hand's sessions apart, unless the operator chose a folder."""
-        if self.results.text() == self._suggested:
-            study, pilot = self.facts.protocol.study.name, self.pilot.isChecked()
-            folder = study_results(self._all_results, study, self.device.currentData(), pilot=pilot)
-            self._suggested = str(folder)
-            self.results.setText(self._suggested)
+        if self._value("results") == self._suggested:
+            study, device, pilot = self.facts.protocol.study.name, self._value("device"), self._value("pilot")
+            self._suggested = str(study_results(self._all_results, study, device, pilot=pilot))
+            self.editors["results"].show_value(self._suggested)
 
-    def _choose_pilot(self, pilot: bool) -> None:
+    def _choose_pilot(self) -> None:
         """Put a pilot in a framed window and suggest its folder; restore both choices if it is no pilot."""
+        pilot, windowed = self._value("pilot"), self.editors["windowed"]
         if pilot:
-            self._windowed_without_pilot = self.windowed.isChecked()
-        self.windowed.setChecked(pilot or self._windowed_without_pilot)
-        self.windowed.setEnabled(not pilot)
+            self._windowed_without_pilot = windowed.value
+        windowed.show_value(pilot or self._windowed_without_pilot)
+        windowed.setEnabled(not pilot)
         self._suggest_folder()
         self._check()
 
+    def _value(self, name: str) -> Any:
+        return self.editors[name].value
+
     def _check(self) -> None:
-        """Judge what stands there, and look whether the folder has changed since."""
+        """Judge what stands there, and look outside the window's thread whether the folder has changed since."""
         self._show_verdict()
-        self._look()
-
-    def _show_verdict(self) -> None:
-        fault = self._fault()
-        inside = Path(self.results.text()).resolve().is_relative_to(workspace().folder.resolve())
-        self.where.setText("in the workspace" if inside else "outside the workspace: Home will not list its sessions")
-        self._offer_ways()
-        if fault:
-            self._say(fault, good=False)
-        else:
-            self._say(f"{self.participant.text().strip()} is free, session {self.session.value()}", good=True)
-        self._fit()
-
-    def _look(self) -> None:
-        """Read the study's folder again, outside the window's thread: another program may use it, too."""
-        if text := self.results.text().strip():
+        if text := self._value("results"):
             self._reader.run(partial(read_study_folder_state, Path(text), self.facts.protocol))
 
     def _take_state(self, state: StudyFolderState) -> None:
-        if state.path == Path(self.results.text().strip()) and state != self._state:
+        if state.path == Path(self._value("results")) and state != self._state:
             self._state = state
             self._show_verdict()
 
     def _state_now(self) -> StudyFolderState:
         """Return the study's folder as it was last read; one that was just chosen is read at once."""
-        path = Path(self.results.text().strip() or ".")
+        path = Path(self._value("results") or ".")
         if self._state is None or self._state.path != path:
             self._state = read_study_folder_state(path, self.facts.protocol)
         return self._state
 
-    def _fault(self) -> str:
-        """Return why this cannot begin; nothing is touched to find out."""
-        if not self.results.text().strip():
-            return "choose a results folder"
-        participant, state = self.participant.text().strip(), self._state_now()
+    def _show_verdict(self) -> None:
+        inside = Path(self._value("results")).resolve().is_relative_to(workspace().folder.resolve())
+        self.editors["results"].aside.setText(INSIDE if inside else OUTSIDE)
+        for option in window_options():
+            self.editors[option.name].setVisible(option.name in self._asked())
+        participant, session, used = self._value("participant"), self._value("session"), self._state_now().used
+        numbers = used.numbers(participant)
+        self._ways_row.setVisible(session in numbers)
+        if session in numbers:  # ways to go on that need no thought; resuming is for home
+            self._free = min(max(numbers) + 1, MAX_SESSION), used.suggested()
+            self.ways[0].show_action("", f"Session {self._free[0]} of {participant}")
+            self.ways[1].show_action("", f"New participant {self._free[1]}")
+        fault = ""
         try:
-            check_participant(participant, pilot=self.pilot.isChecked())
-            if state.fault:
-                return state.fault
-            state.used.check_unused(participant, self.session.value())
-            check_row(self._row_of(), self.facts.protocol)
-            refuse_beyond_last(self.facts.protocol, self.session.value())
-        except StudyError as error:
-            return str(error)
-        if missing := self.device_options.fault():
-            return missing
-        return "" if self.seed.hasAcceptableInput() else "the seed is a whole number from 0 to 2147483647"
-
-    def _row_of(self) -> str | None:
-        return self.row_of.text().strip() or None
-
-    def _offer_ways(self) -> None:
-        """Where the id is used, offer the ways to go on that need no thought; going on with its session is for home."""
-        participant, used = self.participant.text().strip(), self._state_now().used
-        held = used.numbers(participant)
-        self._ways_row.setVisible(self.session.value() in held)
-        if self.session.value() not in held:
-            return
-        self._free = min(max(held) + 1, MAX_SESSION), used.suggested()
-        another, new = self.ways
-        another.show_action("", f"Session {self._free[0]} of {participant}")
-        new.show_action("", f"New participant {self._free[1]}")
-
-    def _say(self, words: str, *, good: bool) -> None:
-        by_id = words.startswith(f"{self.participant.text().strip()} ")  # an id stands as it was typed
+            self._refuse()
+        except (StudyError, ValueError) as error:
+            fault = str(error)
+        words = fault or f"{participant} is free, session {session}"
+        by_id = words.startswith(f"{participant} ")  # an id stands as it was typed
         self.verdict.setText(words if by_id else words[:1].upper() + words[1:])
-        set_ink(self.verdict, "ok" if good else "bad")
-        self.verdict_icon.show_icon(*(("check", "ok") if good else ("warning", "bad")))
-        self.begin.setEnabled(good)
+        set_ink(self.verdict, "bad" if fault else "ok")
+        self.verdict_icon.show_icon(*(("warning", "bad") if fault else ("check", "ok")))
+        self.begin.setEnabled(not fault)
+        self._fit()
+
+    def _refuse(self) -> None:
+        """Raise an error if this cannot begin; nothing is touched to find out."""
+        if not self._value("results"):
+            raise ValueError("choose a results folder")
+        participant, session, state = self._value("participant"), self._value("session"), self._state_now()
+        check_participant(participant, pilot=self._value("pilot"))
+        if state.fault:
+            raise ValueError(state.fault)
+        state.used.check_unused(participant, session)
+        check_row(self._value("row_of"), self.facts.protocol)
+        refuse_beyond_last(self.facts.protocol, session)
+        self.chosen()
+
+    def _asked(self) -> set[str]:
+        return {option.name for option in descriptor_of(self._value("device")).window_options}
 
     def chosen(self) -> NewSession:
-        """Return what was chosen."""
+        """Return what was chosen; a ValueError says what is not permitted."""
+        asked, options = self._asked(), {option.name for option in window_options()}
+        values = {name: editor.value for name, editor in self.editors.items() if name in asked or name not in options}
+        chosen = {name: values.pop(name) for name in asked}
         return NewSession(
+            **values | {"results": Path(values["results"])},
             source=self.facts.source,
-            participant=self.participant.text().strip(),
-            session=self.session.value(),
-            seed=int(self.seed.text()),
-            operator=self.operator.text().strip(),
-            language=self.language.currentData(),
-            device=self.device.currentData(),
-            windowed=self.windowed.isChecked(),
-            screen=self.screen_choice.currentData(),
-            results=Path(self.results.text().strip()),
-            pilot=self.pilot.isChecked(),
-            device_options=self.device_options.values(),
-            row_of=self._row_of(),
+            device_options={name: value for name, value in chosen.items() if value},
         )
+
+
+def _file(name: str, text: str) -> Path | None:
+    if text and not Path(text).is_file():
+        raise ValueError(f"there is no {name} in {text}: choose the file, or leave the field empty")
+    return Path(text) if text else None

@@ -5,12 +5,14 @@ from pathlib import Path
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QDialog, QProgressBar, QWidget
 
+from study_app.gui.kit.fields import Editor, Field
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme
-from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox, vbox
-from study_app.gui.widgets.controls import ActionButton, Number
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
+from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.session.simulated.rehearsal_worker import TASK, RehearsalClient, RehearsalOrder
+from study_app.session.start import MAX_SEED
 from study_app.store.folders import rehearsal_folder
 from study_app.viewmodels.home import StudyFacts
 from study_app.workers.client import WorkerClient
@@ -41,8 +43,12 @@ class RehearsalDialog(QDialog):
         self.setMinimumWidth(520)
         self._facts = facts
         self.folder = rehearsal_folder(results, facts.protocol.study.name)
-        self.participants = Number(1, MAX_PARTICIPANTS, 5)
-        self.seed = Number(0, 2_147_483_647, 1)
+        self.participants = Editor(
+            Field("participants", "Simulated participants", "count", limits=(1, MAX_PARTICIPANTS))
+        )
+        self.seed = Editor(Field("seed", "Seed", "count", limits=(0, MAX_SEED)))
+        self.participants.show_value(5)
+        self.seed.show_value(1)
         self.said = label(
             "Whole sessions run faster than real time, with simulated participants. "
             f"They are marked as simulated and stored separately, in {self.folder}.",
@@ -62,21 +68,15 @@ class RehearsalDialog(QDialog):
         self._done: list[str] = []
         self._stopping = False
         self.over = False
-        self._lay_out()
+        row, foot = hbox((self.participants, 1), (self.seed, 1), spacing=16), hbox(self.cancel, STRETCH, self.start)
+        title = label(f"Rehearse {facts.title}", "title_dense")
+        vbox(title, self.said, row, self.progress, 6, foot, spacing=12, margins=(28, 24, 28, 24), parent=self)
         apply_theme(self, theme)
         self.start.clicked.connect(self._start)
         self.cancel.clicked.connect(self.reject)
         self._listening = QTimer(self)
         self._listening.setInterval(LISTEN_MS)
         self._listening.timeout.connect(self._listen)
-
-    def _lay_out(self) -> None:
-        row = hbox(spacing=16)
-        for name, field in (("Simulated participants", self.participants), ("Seed", self.seed)):
-            field.setAccessibleName(name)
-            add_layout(row, vbox(label(name, "label", "text2"), field, spacing=6), 1)
-        title, foot = label(f"Rehearse {self._facts.title}", "title_dense"), hbox(self.cancel, STRETCH, self.start)
-        vbox(title, self.said, row, self.progress, 6, foot, spacing=12, margins=(28, 24, 28, 24), parent=self)
 
     def _start(self) -> None:
         if self.over:
@@ -86,7 +86,7 @@ class RehearsalDialog(QDialog):
             return
         for field in (self.participants, self.seed, self.start):
             field.setEnabled(False)
-        self.progress.setRange(0, self.participants.value())
+        self.progress.setRange(0, self.participants.value)
         self.progress.show()
         self._show_done()
         try:
@@ -94,7 +94,7 @@ class RehearsalDialog(QDialog):
         except OSError as error:
             self._fail(str(error))
             return
-        self.worker.order(RehearsalOrder(self._facts.source, self.participants.value(), self.seed.value(), self.folder))
+        self.worker.order(RehearsalOrder(self._facts.source, self.participants.value, self.seed.value, self.folder))
         self._listening.start()
 
     def _listen(self) -> None:
@@ -117,13 +117,13 @@ class RehearsalDialog(QDialog):
     def _show_done(self) -> None:
         """Show how many participants are done, and what was said of the last one."""
         self.progress.setValue(len(self._done))
-        counted = f"{len(self._done)} of {self.participants.value()}"
+        counted = f"{len(self._done)} of {self.participants.value}"
         self.said.setText(f"{counted}: {self._done[-1]}" if self._done else f"{counted}: rehearsing …")
 
     def _finish(self) -> None:
         self._let_go()
         self.over = True
-        self.said.setText(f"Done: {self.participants.value()} simulated sessions, stored in {self.folder}.")
+        self.said.setText(f"Done: {self.participants.value} simulated sessions, stored in {self.folder}.")
         self.start.show_action("", "Open results")
         self.start.setEnabled(True)
         self.start.setFocus()

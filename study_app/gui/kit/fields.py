@@ -1,6 +1,6 @@
 """Forms made from descriptions: a `Field` describes one value, an `Editor` is its label, control and line below."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -47,9 +47,13 @@ class Field:
     placeholder: str = ""
     file_filter: str = ""
     longest: int = 32767
-    enabled: bool = True
     parse: Callable[[str], Any] = str
     write: Callable[[Any], str] = str
+
+
+def choice(name: str, label: str, options: Mapping[Any, str]) -> Field:
+    """Return the field of a choice between values with their words."""
+    return Field(name, label, "choice", tuple(options.items()))
 
 
 def number(name: str, label: str, unit: str, limits: tuple[float, float]) -> Field:
@@ -93,21 +97,20 @@ class Editor(QWidget):
     """A label, a control with its unit or a button, and a line below.
 
     ``changed(name, value)`` comes for a value that was chosen or typed to its end and is permitted, ``edited(name)`` at
-    every key, too.
+    every key, too. What is not permitted is said below, unless the form ``judges`` it elsewhere.
     """
 
     changed = Signal(str, object)
     edited = Signal(str)
 
-    def __init__(self, field: Field, button: QWidget | None = None) -> None:
+    def __init__(self, field: Field, button: QWidget | None = None, *, judges: bool = False) -> None:
         super().__init__()
-        self.field, self._text, self._hint = field, "", field.hint
+        self.field, self._text, self._hint, self._judges = field, "", field.hint, judges
         self.aside = label(field.aside, "small", "text3")
         self.below = label("", "small", "text2", wraps=True)
         self.below.setMinimumWidth(LEAST_WORDS)
         self.control = self._made()
         self.control.setFont(font("label" if field.unit else "body", tabular=bool(field.unit)))
-        self.control.setEnabled(field.enabled)
         if isinstance(self.control, QAbstractButton):
             vbox(self.control, margins=0, parent=self)
             return
@@ -207,7 +210,8 @@ class Editor(QWidget):
         try:
             value = self.value
         except ValueError as refusal:
-            self.show_refusal(str(refusal))
+            if not self._judges:
+                self.show_refusal(str(refusal))
             return
         self.control.setModified(False)
         self.show_refusal("")

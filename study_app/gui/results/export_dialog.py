@@ -5,13 +5,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QDialog, QFileDialog, QLineEdit, QWidget
+from PySide6.QtWidgets import QDialog, QWidget
 
-from study_app.gui.theme.theme import Theme, font
+from study_app.gui.kit.fields import Editor, Field
+from study_app.gui.theme.theme import Theme
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Bar
-from study_app.gui.widgets.controls import ActionButton, Check
+from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.number_text import counted
 
@@ -67,16 +68,12 @@ class WriteDialog(QDialog):
         self._opens = opens
         self._result: Path | None = None
         self._working = False
-        self.extras = {extra.name: Check(extra.words) for extra in extras}
+        self.extras = {extra.name: Editor(Field(extra.name, extra.words, "check")) for extra in extras}
         for extra in extras:
-            check = self.extras[extra.name]
-            check.setFont(font("body"))
-            check.setEnabled(not extra.why_not)
-            check.setToolTip(extra.why_not)
-        self.to = QLineEdit(str(to))
-        self.to.setAccessibleName("Folder")
-        self.to.setFont(font("body"))
-        self.choose = ActionButton("", "Choose …", height=40)
+            self.extras[extra.name].setEnabled(not extra.why_not)
+            self.extras[extra.name].setToolTip(extra.why_not)
+        self.to = Editor(Field("to", "Folder", "folder", hint="Existing files will be overwritten."))
+        self.to.show_value(str(to))
         self.said = label(explanation, "body", "text2", wraps=True)
         self.bar = Bar()
         self.bar.hide()
@@ -84,23 +81,15 @@ class WriteDialog(QDialog):
         self.go_on = ActionButton("", go_on, role="primary")
         self.go_on.setDefault(True)
         self.cancel.setAutoDefault(False)
-        self.choose.setAutoDefault(False)
-        self._lay_out(title, [extra.why_not for extra in extras if extra.why_not])
-        apply_theme(self, theme)
-        self.choose.clicked.connect(self._choose)
-        self.go_on.clicked.connect(self._go_on)
-        self.cancel.clicked.connect(self.reject)
-
-    def _lay_out(self, title: str, why_not: Sequence[str]) -> None:
-        reasons = [label(sentence, "small", "text2", wraps=True) for sentence in why_not]
-        where = hbox((self.to, 1), self.choose, spacing=10)
-        warning = label("Existing files will be overwritten.", "small", "text2")
-        folder = label("Folder", "label", "text2"), where, warning
+        reasons = [label(extra.why_not, "small", "text2", wraps=True) for extra in extras if extra.why_not]
         self._form = QWidget()
-        vbox(*self.extras.values(), *reasons, 4, *folder, spacing=6, margins=0, parent=self._form)
+        vbox(*self.extras.values(), *reasons, 4, self.to, spacing=6, margins=0, parent=self._form)
         foot = hbox(self.cancel, STRETCH, self.go_on)
         parts = label(title, "title_dense"), self.said, self._form, self.bar, 6, foot
         vbox(*parts, spacing=12, margins=(28, 24, 28, 24), parent=self)
+        apply_theme(self, theme)
+        self.go_on.clicked.connect(self._go_on)
+        self.cancel.clicked.connect(self.reject)
 
     def show_progress(self, what: str, share: float) -> None:
         self.said.setText(f"{what[:1].upper()}{what[1:]} …")
@@ -131,17 +120,12 @@ class WriteDialog(QDialog):
         self.cancel.setEnabled(True)
         self._shrink()
 
-    def _choose(self) -> None:
-        chosen = QFileDialog.getExistingDirectory(self, "Folder", self.to.text())
-        if chosen:
-            self.to.setText(chosen)
-
     def _go_on(self) -> None:
         if self._result is not None:
             self.open_asked.emit(self._result)
             return
-        if not self.to.text().strip():
-            self.to.setFocus()
+        if not self.to.value:
+            self.to.control.setFocus()
             return
         self._working = True
         self._form.hide()
@@ -149,9 +133,9 @@ class WriteDialog(QDialog):
         set_ink(self.said, "text2")
         self.show_progress("beginning", 0.0)
         self.bar.show()
-        extras = tuple(name for name, check in self.extras.items() if check.isChecked())
+        extras = tuple(name for name, check in self.extras.items() if check.value)
         self._shrink()
-        self.write_asked.emit(Path(self.to.text().strip()).expanduser(), extras)
+        self.write_asked.emit(Path(self.to.value).expanduser(), extras)
 
     def _shrink(self) -> None:
         """Shrink the dialog to the height of its present contents."""

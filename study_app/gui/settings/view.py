@@ -22,7 +22,7 @@ from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QFileDialog, QWidget
 
 from study_app.devices.registry import list_devices, title_of
 from study_app.gui.display.screens import ScreenShown, screens_shown
-from study_app.gui.kit.fields import LEAST_WORDS, Editor, Field, number
+from study_app.gui.kit.fields import LEAST_WORDS, Editor, Field, choice, number
 from study_app.gui.settings.display_test import DisplayTest, OffsetForm
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
@@ -56,21 +56,21 @@ def _port(text: str) -> str:
     return text
 
 
-SAMPLES = (
-    ("off", "Off"),
-    ("single-blind", "On, but off in double-blind studies"),
-    ("always", "On, also in double-blind studies"),
-)
+SAMPLES = {
+    "off": "Off",
+    "single-blind": "On, but off in double-blind studies",
+    "always": "On, also in double-blind studies",
+}
 FIELDS = (
     number("viewing_distance_mm", "Viewing distance, eye to screen", "mm", DISTANCE_MM),
     number("screen_width_mm", "Width of the picture on the screen", "mm", WIDTH_MM),
     Field("lsl_markers", "Markers over the Lab Streaming Layer (LSL)", "switch"),
-    Field("lsl_samples", "Samples of position and force over LSL", "choice", SAMPLES),
+    choice("lsl_samples", "Samples of position and force over LSL", SAMPLES),
     Field("triggers", "Trigger port", hint=PORTS, parse=_port),
     Field("photodiode", "Square for a photodiode in the tank's corner", "switch"),
-    Field("device", "Device", "choice", tuple((name, title_of(name)) for name in list_devices())),
+    choice("device", "Device", {name: title_of(name) for name in list_devices()}),
     Field("camera", "Camera of conditions that show one", longest=CAMERA_LENGTH, placeholder=USUAL),
-    Field("theme", "Theme of the operator's windows", "choice", (("light", "Light"), ("dark", "Dark"))),
+    choice("theme", "Theme of the operator's windows", {"light": "Light", "dark": "Dark"}),
     Field("sound", "Sound when a device needs attention", "switch"),
 )
 

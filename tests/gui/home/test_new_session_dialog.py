@@ -55,7 +55,7 @@ def use(results: Path, participant: str, session: int = 1) -> None:
 def test_what_another_program_began_meanwhile_is_refused(dialog, results, qtbot):
     settle(qtbot, dialog)
     use(results, "P001")
-    dialog.seed.setText("7")
+    dialog.editors["seed"].control.setText("7")
     qtbot.waitUntil(lambda: not dialog.begin.isEnabled())
     assert "already has session 1" in dialog.verdict.text()
 
@@ -73,25 +73,25 @@ def test_a_free_id_is_suggested(opened, results):
     use(results, "P001")
     use(results, "P004")
     made = opened()
-    assert int(made.seed.text()) in range(1, MAX_SEED + 1)
-    assert not made.row_of.isVisible(), "no rows are assigned in this study"
-    assert made.windowed.isChecked(), "there is one screen for both windows"
-    assert made.participant.text() == "P005"
+    assert int(made.editors["seed"].control.text()) in range(1, MAX_SEED + 1)
+    assert not made.editors["row_of"].control.isVisible(), "no rows are assigned in this study"
+    assert made.editors["windowed"].control.isChecked(), "there is one screen for both windows"
+    assert made.editors["participant"].control.text() == "P005"
     assert made.begin.isEnabled()
     assert "free" in made.verdict.text()
 
 
 def test_an_id_no_file_name_can_take_and_a_folder_of_another_study_are_refused(dialog, tmp_path):
     for wrong in ("P-007", "P 7", "", "P_7", "Zoë", "x" * 33):
-        dialog.participant.setText(wrong)
+        dialog.editors["participant"].control.setText(wrong)
         assert not dialog.begin.isEnabled()
         assert repr(wrong) in dialog.verdict.text()
         assert "P007" in dialog.verdict.text()
-    dialog.participant.setText("P007")
+    dialog.editors["participant"].control.setText("P007")
     other = tmp_path / "other"
     other.mkdir()
     (other / "dataset_description.json").write_text('{"name": "otherstudy"}')
-    dialog.results.setText(str(other))
+    dialog.editors["results"].control.setText(str(other))
     assert not dialog.begin.isEnabled()
     assert "otherstudy" in dialog.verdict.text()
 
@@ -104,22 +104,22 @@ def test_a_falcon_by_its_serial_number_can_be_preferred_and_an_unknown_device_is
 
 def test_a_used_id_is_refused_with_the_ways_to_go_on_until_one_is_taken(dialog, results, qtbot):
     use(results, "P007")
-    dialog.participant.setText("P007")
+    dialog.editors["participant"].control.setText("P007")
     settle(qtbot, dialog)
     assert not dialog.begin.isEnabled()
     for way in ("new session number (2)", "resume", "another id"):
         assert way in dialog.verdict.text()
-    dialog.session.setValue(2)
+    dialog.editors["session"].control.setValue(2)
     assert dialog.begin.isEnabled()
-    dialog.session.setValue(1)
+    dialog.editors["session"].control.setValue(1)
     before = {path: path.read_bytes() for path in results.rglob("*") if path.is_file()}
     another, new = dialog.ways
     another.click()
-    assert (dialog.participant.text(), dialog.session.value()) == ("P007", 2)
+    assert (dialog.editors["participant"].control.text(), dialog.editors["session"].control.value()) == ("P007", 2)
     assert dialog.begin.isEnabled()
-    dialog.session.setValue(1)
+    dialog.editors["session"].control.setValue(1)
     new.click()
-    assert (dialog.participant.text(), dialog.session.value()) == ("P008", 1)
+    assert (dialog.editors["participant"].control.text(), dialog.editors["session"].control.value()) == ("P008", 1)
     assert dialog.begin.isEnabled()
     assert not dialog.ways[0].isVisibleTo(dialog)
     assert before == {path: path.read_bytes() for path in results.rglob("*") if path.is_file()}
@@ -136,17 +136,17 @@ def test_a_study_whose_conditions_were_changed_since_is_refused_with_what_to_do(
     made = opened(replace(facts, protocol=changed))
     assert not made.begin.isEnabled()
     assert "undo that change" in made.verdict.text()
-    assert made.participant.text() == "P002"
+    assert made.editors["participant"].control.text() == "P002"
 
 
 def test_begin_creates_nothing_by_itself_and_gives_what_was_chosen(dialog, results, qtbot):
-    dialog.participant.setText(" P009 ")
-    dialog.session.setValue(3)
-    dialog.seed.setText("4711")
-    dialog.operator.setText("AK")
-    dialog.language.setCurrentIndex(dialog.language.findData("nl"))
-    dialog.device.setCurrentIndex(dialog.device.findData("scripted"))
-    dialog.windowed.setChecked(True)
+    dialog.editors["participant"].control.setText(" P009 ")
+    dialog.editors["session"].control.setValue(3)
+    dialog.editors["seed"].control.setText("4711")
+    dialog.editors["operator"].control.setText("AK")
+    dialog.editors["language"].control.setCurrentIndex(dialog.editors["language"].control.findData("nl"))
+    dialog.editors["device"].control.setCurrentIndex(dialog.editors["device"].control.findData("scripted"))
+    dialog.editors["windowed"].control.setChecked(True)
     with qtbot.waitSignal(dialog.accepted):
         qtbot.mouseClick(dialog.begin, Qt.MouseButton.LeftButton)
     chosen = dialog.chosen()
@@ -158,14 +158,14 @@ def test_begin_creates_nothing_by_itself_and_gives_what_was_chosen(dialog, resul
 
 def test_enter_begins_only_what_can_begin(dialog, qtbot):
     for participant, seed in (("P-9", "12"), ("test", "12"), ("P9", "")):
-        dialog.participant.setText(participant)
-        dialog.seed.setText(seed)
+        dialog.editors["participant"].control.setText(participant)
+        dialog.editors["seed"].control.setText(seed)
         assert not dialog.begin.isEnabled()
     with qtbot.assertNotEmitted(dialog.accepted):
-        qtbot.keyClick(dialog.participant, Qt.Key.Key_Return)
-    dialog.seed.setText("12")
+        qtbot.keyClick(dialog.editors["participant"].control, Qt.Key.Key_Return)
+    dialog.editors["seed"].control.setText("12")
     with qtbot.waitSignal(dialog.accepted):
-        qtbot.keyClick(dialog.participant, Qt.Key.Key_Return)
+        qtbot.keyClick(dialog.editors["participant"].control, Qt.Key.Key_Return)
 
 
 def test_a_session_begins_with_what_is_set_for_this_machine_unless_its_firmware_is_gone(tmp_path, monkeypatch, opened):
@@ -176,16 +176,16 @@ def test_a_session_begins_with_what_is_set_for_this_machine_unless_its_firmware_
     set_here = {"device": "falcon", "screen": "B", "screen_number": 2, "firmware": str(firmware), "operator": "AK"}
     made = opened(**set_here)
     assert made.chosen().operator == "AK"
-    assert made.device_options.fields["firmware"].isVisible()
+    assert made.editors["firmware"].control.isVisible()
     chosen = made.chosen()
     assert (chosen.device, chosen.screen, chosen.device_options) == ("falcon", 2, {"firmware": firmware})
-    made.device.setCurrentIndex(made.device.findData("mouse"))
-    assert not made.device_options.fields["firmware"].isVisible()
+    made.editors["device"].control.setCurrentIndex(made.editors["device"].control.findData("mouse"))
+    assert not made.editors["firmware"].control.isVisible()
     assert made.chosen().device_options == {}
     made = opened(device="falcon", firmware=str(tmp_path / "gone.bin"))
     assert not made.begin.isEnabled()
     assert "gone.bin" in made.verdict.text()
-    made.device_options.fields["firmware"].clear()
+    made.editors["firmware"].control.clear()
     assert made.begin.isEnabled()
     assert made.chosen().device_options == {}
 
@@ -194,10 +194,10 @@ def test_a_session_beyond_the_last_is_refused(qtbot, tmp_path, opened):
     source = tmp_path / "grouped.toml"
     source.write_text(STUDY.replace("format = 2\n", 'format = 2\nsequences = [["hello", "thin"], ["thick", "end"]]\n'))
     made = opened(study_facts(str(source)))
-    made.session.setValue(2)
+    made.editors["session"].control.setValue(2)
     settle(qtbot, made)
     assert made.begin.isEnabled()
-    made.session.setValue(3)
+    made.editors["session"].control.setValue(3)
     assert not made.begin.isEnabled()
     assert "permitted: 1 to 2" in made.verdict.text()
 
@@ -207,13 +207,13 @@ def test_replaced_participant_is_asked_for_where_rows_are_dealt(qtbot, tmp_path,
     study.write_text(source_bytes("demo").decode().replace('\norder = "shuffled"', '\norder = "latin"'))
     dialog = opened(study_facts(str(study)))
     settle(qtbot, dialog)
-    assert dialog.row_of.isVisible()
+    assert dialog.editors["row_of"].control.isVisible()
     for part in dialog.findChildren(QWidget):  # no part is wider than there is room for
         assert not part.isVisible() or part.visibleRegion().boundingRect().width() == part.width(), part
     assert dialog.chosen().row_of is None
-    qtbot.keyClicks(dialog.row_of, "P002")
+    qtbot.keyClicks(dialog.editors["row_of"].control, "P002")
     assert dialog.begin.isEnabled()
     assert dialog.chosen().row_of == "P002"
-    dialog.row_of.setText("anna")
+    dialog.editors["row_of"].control.setText("anna")
     assert "rows are assigned by the number" in dialog.verdict.text()
     assert not dialog.begin.isEnabled()

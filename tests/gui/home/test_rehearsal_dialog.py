@@ -1,6 +1,7 @@
 """The dialog of a rehearsal: it counts participants, says why it failed, and stops."""
 
 from collections.abc import Callable
+from operator import attrgetter
 from typing import Any
 
 import pytest
@@ -57,7 +58,7 @@ def test_a_failed_rehearsal_says_why_and_stays(
 
 def test_a_rehearsal_counts_participants_and_leads_to_its_results(qtbot: Any, opened: Any) -> None:
     dialog = opened("two")
-    dialog.participants.setValue(2)
+    dialog.participants.show_value(2)
     qtbot.mouseClick(dialog.start, LEFT)
     qtbot.waitUntil(lambda: dialog.progress.value() == 1, timeout=20_000)
     assert dialog.said.text() == "1 of 2: R1: 8 responses (simulated)"
@@ -72,12 +73,12 @@ def test_a_rehearsal_counts_participants_and_leads_to_its_results(qtbot: Any, op
         qtbot.mouseClick(dialog.start, LEFT)
 
 
-@pytest.mark.parametrize("at", ["participants", "seed", "start", "dialog"])
+@pytest.mark.parametrize("at", ["participants.control", "seed.control", "start", "dialog"])
 def test_enter_begins_the_rehearsal_wherever_the_keyboard_is_and_the_end_of_the_program_ends_it(
     qtbot: Any, opened: Any, at: str
 ) -> None:
     dialog = opened()
-    pressed = dialog if at == "dialog" else getattr(dialog, at)
+    pressed = dialog if at == "dialog" else attrgetter(at)(dialog)
     pressed.setFocus()
     qtbot.keyClick(pressed, Qt.Key.Key_Return)
     assert dialog.worker.works

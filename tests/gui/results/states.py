@@ -71,7 +71,7 @@ def writing(qtbot: Any) -> QWidget:
 
 
 WRITING: Actions = {
-    "begun": lambda dialog: (dialog.extras["wide"].click(), dialog.go_on.click()),
+    "begun": lambda dialog: (dialog.extras["wide"].control.click(), dialog.go_on.click()),
     "progress": lambda dialog: dialog.show_progress("making the tables", 0.3),
     "refused": lambda dialog: dialog.show_refused("/somewhere cannot be written"),
     "again": lambda dialog: dialog.go_on.click(),
