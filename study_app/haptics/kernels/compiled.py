@@ -1,9 +1,10 @@
 """How this package compiles: one decorator, and one cache that is never stale after an edit.
 
 numba keys its on-disk cache on the file of the outermost function alone, so it would miss a change in a function that
-it calls. The cache is therefore a folder named after a digest of every source file that may contain kernels; old
-folders of other sources are removed. Within the folder a function is found by its path relative to the package, so that
-the package may be moved. A program that ships with a filled cache (see docs/install.md) starts with a copy of it.
+it calls, or in a constant that it reads. The cache is therefore a folder named after a digest of every module that
+compiles a function and of what these modules import; old folders of other sources are removed. Within the folder a
+function is found by its path relative to the package, so that the package may be moved. A program that ships with a
+filled cache (see docs/install.md) starts with a copy of it.
 """
 
 from __future__ import annotations
@@ -28,13 +29,16 @@ from platformdirs import user_cache_path
 log = logging.getLogger(__name__)
 
 _PACKAGE = Path(__file__).resolve().parents[2]
-_KERNEL_FOLDERS = ("haptics", "devices", "evidence")
+KERNEL_FOLDERS = ("haptics", "devices", "evidence")
+"""Compiled functions, and all constants that they read, are in these; `tests.haptics.kernels.test_compiled` checks."""
 SHIPPED_CACHE = _PACKAGE / "compiled"
 """Caches that came with the program; only the bundle has them."""
 
 KEPT_FOLDERS = 8  # caches kept at any age
 UNUSED_S = 86_400.0  # a program that started less than a day ago keeps its cache
 SWEPT_AT_ONCE = 8  # removals per start, which they delay
+_COMPILES = (b"compiled import", b"import compiled", b"import numba")
+_IMPORTS = re.compile(r"from study_app\.([\w.]+) import \(?((?<=\()[^)]*|[^\n]*)")
 _DIGEST = re.compile(r"[0-9a-f]{16}")
 _HALF_REMOVED = re.compile(r"\.[0-9a-f]{16}\.[0-9a-f]{8}\.gone")
 
@@ -45,12 +49,36 @@ _NO_MEMORY: dict[str, Any] = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def _digest_of_sources() -> str:
+def compiled_sources(package: Path) -> dict[str, bytes]:
+    """Return the modules with compiled functions and all that they import within `KERNEL_FOLDERS`, by name."""
+    sources = {}
+    for top in KERNEL_FOLDERS:
+        for folder, _, files in os.walk(package / top):  # several times as fast as Path.rglob, at every start
+            within = folder[len(str(package)) + 1 :].replace(os.sep, ".")
+            for file in files:
+                if file.endswith(".py"):
+                    sources[f"{within}.{file[:-3]}"] = Path(folder, file).read_bytes()
+    covered: set[str] = set()
+    left = {name for name, source in sources.items() if any(words in source for words in _COMPILES)}
+    while left:
+        covered |= left
+        imported: set[str] = set()
+        for name in left:
+            if b"iter_modules" in sources[name]:  # it imports all modules of its folder
+                imported.update(each for each in sources if each.rpartition(".")[0] == name.rpartition(".")[0])
+            for module, names in _IMPORTS.findall(sources[name].decode()):
+                imported.update((module, *(f"{module}.{each}" for each in names.replace(",", " ").split())))
+        imported |= {f"{name}.__init__" for name in imported}
+        left = (imported & sources.keys()) - covered
+    return {name: sources[name] for name in sorted(covered)}
+
+
+def digest_of(sources: dict[str, bytes]) -> str:
+    """Return the name of the cache of these modules."""
     digest = hashlib.sha256()
-    for folder in _KERNEL_FOLDERS:
-        for source in sorted((_PACKAGE / folder).rglob("*.py")):
-            digest.update(source.relative_to(_PACKAGE).as_posix().encode())
-            digest.update(source.read_bytes())
+    for name, source in sources.items():
+        digest.update(name.encode())
+        digest.update(source)
     return digest.hexdigest()[:16]
 
 
@@ -60,7 +88,7 @@ def _use_own_cache() -> Path | None:
         *map(Path, filter(None, [os.environ.get("NUMBA_CACHE_DIR")])),
         user_cache_path("liquid-study", appauthor=False, opinion=False),
     ]
-    digest = _digest_of_sources()
+    digest = digest_of(SOURCES)
     for place in wanted:
         copy_shipped(place / digest)
         if _writable(place / digest):
@@ -128,6 +156,7 @@ def remove_cache(path: Path, used_at: float) -> None:
             shutil.rmtree(gone)
 
 
+SOURCES = compiled_sources(_PACKAGE)
 CACHE: Path | None = _use_own_cache()
 """The folder of compiled code; None if no folder is writable."""
 _OPTIONS["cache"] = CACHE is not None
@@ -151,7 +180,10 @@ class PackageCacheLocator(UserProvidedCacheLocator):
     def from_function(cls, py_func: Callable[..., Any], py_file: str) -> PackageCacheLocator | None:
         """Return the locator of a function, or None where its file is not covered by the digest."""
         file = Path(py_file).resolve()
-        if not file.is_relative_to(_PACKAGE) or file.relative_to(_PACKAGE).parts[0] not in _KERNEL_FOLDERS:
+        if (
+            not file.is_relative_to(_PACKAGE)
+            or ".".join(file.relative_to(_PACKAGE).with_suffix("").parts) not in SOURCES
+        ):
             return None
         found = super().from_function(py_func, py_file)  # type: ignore[no-untyped-call]
         return cast("PackageCacheLocator | None", found)

@@ -1,3 +1,4 @@
+import ast
 import os
 import shutil
 import subprocess
@@ -148,3 +149,59 @@ def test_a_cache_is_removed_unless_a_program_started_with_it_meanwhile(tmp_path:
     assert list(tmp_path.iterdir()) == [cache]
     compiled.remove_cache(cache, seen_at)
     assert list(tmp_path.iterdir()) == []
+
+
+def digest_with(package: Path, file: str, old: str, new: str) -> str:
+    """Return the digest of the sources after a change of one file, which is then undone."""
+    path = package / file
+    text = path.read_text(encoding="utf-8")
+    assert old in text, (file, old)
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    digest = compiled.digest_of(compiled.compiled_sources(package))
+    path.write_text(text, encoding="utf-8")
+    return digest
+
+
+def test_a_changed_constant_of_a_kernel_changes_the_digest_and_a_word_elsewhere_does_not(tmp_path: Path) -> None:
+    package = copy_of_package(tmp_path)
+    digest = compiled.digest_of(compiled.compiled_sources(package))
+    assert digest == compiled.digest_of(compiled.SOURCES)
+    for file, old, new in (
+        ("haptics/kernels/safety.py", '"""', '"""The '),  # its own file
+        ("haptics/model/layout.py", "LIMITER_NORM = 1 << 3", "LIMITER_NORM = 1 << 13"),  # imported by it
+        ("haptics/model/estimators/kalman.py", "CODE = ", "CODE = 1 + "),  # imported by what it imports
+    ):
+        assert digest_with(package, file, old, new) != digest, file
+    assert digest_with(package, "haptics/model/paths.py", '"""', '"""The ') == digest
+    (package / "haptics/model/effects/unlisted.py").write_text("")  # found by `iter_modules`
+    assert compiled.digest_of(compiled.compiled_sources(package)) != digest
+
+
+def compiled_functions(tree: ast.Module) -> list[ast.FunctionDef]:
+    return [
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef)
+        and {ast.unparse(it).removeprefix("compiled.") for it in node.decorator_list} & {"kernel", "part", "workings"}
+    ]
+
+
+def test_compiled_functions_freeze_only_what_the_digest_covers() -> None:
+    """Values are frozen into compiled functions, or into the constants of a module that they read."""
+    outside = set()
+    for path in PACKAGE.rglob("*.py"):
+        name = ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        if name not in compiled.SOURCES:
+            assert not compiled_functions(tree), name
+            continue
+        frozen = [statement for function in compiled_functions(tree) for statement in function.body]
+        frozen += [statement for statement in tree.body if isinstance(statement, ast.Assign | ast.AnnAssign)]
+        read = {node.id for each in frozen for node in ast.walk(each) if isinstance(node, ast.Name)}
+        for node in ast.walk(tree):
+            assert not (isinstance(node, ast.Import) and "study_app" in ast.unparse(node)), f"{name}: import by from"
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("study_app"):
+                top = [*str(node.module).split("."), node.names[0].name][1]
+                bound = {it.asname or it.name for it in node.names}
+                outside |= {f"{name}: {it}" for it in bound & read if top not in compiled.KERNEL_FOLDERS}
+    assert outside == set()
