@@ -42,21 +42,34 @@ from study_app.store.blinded.blinding import Key, as_recorded, opened, whole_pro
 from study_app.store.delivered import Delivered, delivered, delivered_error, judged
 from study_app.store.folders import locate
 from study_app.store.journals import journal
-from study_app.store.journals.journal import Line
-from study_app.store.progress import is_of_intervals, named
+from study_app.store.journals.journal_events import (
+    DeviceReconnected,
+    Event,
+    IntervalEnded,
+    IntervalStarted,
+    Recorded,
+    RecordingLost,
+    SessionResumed,
+    Stepped,
+    TrialEnded,
+    TrialStarted,
+    Which,
+    start_of,
+)
+from study_app.store.progress import named
 
 TOLERANCE: Final = 1e-9
 
 
-def scene_presented(protocol: Protocol, key: Key, started: Line, link_seed: int) -> Scene:
+def scene_presented(protocol: Protocol, key: Key, started: TrialStarted, interval: int | None, link_seed: int) -> Scene:
     """Return the presented scene: of a condition, or of an interval of a trial whose sealed line is opened.
 
     ``link_seed`` is that of jitter and loss of the force.
     """
-    if "interval" not in started:
-        return scene_of(protocol, Stimulated(key.condition(started["block"], started["code"])), link_seed)
-    due = presented_by(protocol, key.codes, started)
-    return scene_of(protocol, due.intervals[started["interval"] - 1], link_seed)
+    if interval is None:
+        return scene_of(protocol, Stimulated(key.condition(started.block, started.code)), link_seed)
+    due = presented_by(protocol, key.codes, started.fields())
+    return scene_of(protocol, due.intervals[interval - 1], link_seed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,25 +80,26 @@ class Step:
     scene: Scene
 
 
-def steps_of(protocol: Protocol, key: Key, started: Line, lines: Sequence[Line]) -> tuple[Step, ...]:
+def steps_of(
+    protocol: Protocol, key: Key, started: TrialStarted, interval: int | None, lines: Sequence[Event]
+) -> tuple[Step, ...]:
     """Return the steps of an interval that a force depends on, in order; none where no level was set.
 
-    ``started`` is the opened line on the trial's beginning, of a trial of intervals with the ``interval``; ``lines`` is
-    the session's journal.
+    ``started`` is the opened line on the trial's beginning; ``interval`` is None in a trial without intervals;
+    ``lines`` is the session's journal.
     """
-    if "interval" not in started:
+    if interval is None or started.level is None or interval != len(started.arrangement or ""):
         return ()
-    presented = presented_by(protocol, key.codes, started).intervals[started["interval"] - 1]
-    which = started["trial"], started["attempt"]
-    made = [line for line in lines if line["event"] == "stepped" and (line["trial"], line["attempt"]) == which]
-    setting = adjusting_of(protocol, protocol.blocks[started["block"]], started["standard"], started["level"])
-    if setting is None or started["interval"] != len(started["arrangement"]):
+    presented = presented_by(protocol, key.codes, started.fields()).intervals[interval - 1]
+    made = [line for line in lines if isinstance(line, Stepped) and line.which == started.which]
+    setting = adjusting_of(protocol, protocol.blocks[started.block], started.standard, started.level)
+    if setting is None:
         return ()
     place, steps = 0, []
     for line in made:
-        place = setting.moved(place, line["steps"])
-        if line["scene"] is not None:
-            steps.append(Step(line["scene"], scene_of(protocol, replace(presented, value=setting.comparison(place)))))
+        place = setting.moved(place, line.steps)
+        if line.scene is not None:
+            steps.append(Step(line.scene, scene_of(protocol, replace(presented, value=setting.comparison(place)))))
     return tuple(steps)
 
 
@@ -116,16 +130,20 @@ def interval_samples(samples: Any, duration_s: float) -> Any:
 
 
 def delivered_again(
-    protocol: Protocol, presented: Stimulated, started: Mapping[str, Any], samples: Any, ended: Mapping[str, Any]
+    protocol: Protocol,
+    presented: Stimulated,
+    started: TrialStarted,
+    interval: int,
+    samples: Any,
+    measured: Mapping[str, Any],
 ) -> Delivered:
     """Return the delivered values of an interval, from the samples of its recording.
 
-    ``started`` and ``ended`` are the opened lines on the beginning of the trial, with the ``interval``, and on the
-    interval's end.
+    ``started`` is the opened line on the beginning of the trial, ``measured`` the measures on the interval's end.
     """
-    block = protocol.blocks[started["block"]]
-    adjusted = design_of(protocol, block).adjusts and started["interval"] == len(started["arrangement"])
-    own = judged(interval_samples(samples, ended["duration_s"]))
+    block = protocol.blocks[started.block]
+    adjusted = design_of(protocol, block).adjusts and interval == len(started.arrangement or "")
+    own = judged(interval_samples(samples, measured["duration_s"]))
     return delivered(protocol, presented, protocol.tasks[block.task], own, adjusted=adjusted)
 
 
@@ -206,38 +224,41 @@ def replay(session_folder: Path) -> Replayed:
     protocol, devices, (drawn_from, participant) = _ran(session.receipt, kept, key, lines)
     _again(records(SAMPLE, 0), Scene(), devices[None], None)  # loads the compiled code: no part of what is measured
     found = _Found()
-    ends = {_which(line): line for line in lines if line["event"] in ("trial_ended", "interval_ended")}
+    ends = {line.which: line for line in lines if isinstance(line, TrialEnded | IntervalEnded)}
     before: _Before | None = None
     resumed_at: str | None = None
-    for started, line, resumed in _presented(lines):
+    for started, which, line, resumed in _presented(lines):
         if resumed != resumed_at:  # the servo was started anew: nothing goes on from the recording before
             before, resumed_at = None, resumed
         if resumed not in devices:
             raise StoreError(f"{session.receipt} lacks the device since {resumed}: restore it from a copy")
-        name = named(started)
-        if line is None or line["event"] == "recording_lost":
-            why = "the journal gives no reason" if line is None else line["reason"]
+        name = named(*which)
+        if not isinstance(line, Recorded):
+            why = "the journal gives no reason" if line is None else line.reason
             found.uncompared.append(f"{name}: has no recording: {why}")
             continue
-        path = session.path / line["recording"]
+        path = session.path / line.recording
         if not is_there(path):
-            found.missing.append(f"{name}: {line['recording']} is missing, but the journal mentions it")
+            found.missing.append(f"{name}: {line.recording} is missing, but the journal mentions it")
             continue
-        seed = link_seed(drawn_from, participant, *_which(started))
-        scene, steps = scene_presented(protocol, key, started, seed), steps_of(protocol, key, started, lines)
+        seed = link_seed(drawn_from, participant, *which)
+        interval = which[-1]
+        scene = scene_presented(protocol, key, started, interval, seed)
+        steps = steps_of(protocol, key, started, interval, lines)
         recorded, checks = recordings.read_samples(path), recordings.read_checks(path)
         start = time.perf_counter()
         samples = as_one_scene(recorded, steps)
         before = _again(samples, scene, devices[resumed], before, places_of(recorded, steps))
         found.compare(name, samples, before, checks)
-        if (ended := ends.get(_which(started))) is not None and _until_gap(samples.tick) == len(samples):
+        if (ended := ends.get(which)) is not None and _until_gap(samples.tick) == len(samples):
             again: dict[str, float | None] = {}
-            if "interval" in started:
-                interval = presented_by(protocol, key.codes, started).intervals[started["interval"] - 1]
-                again |= delivered_again(protocol, interval, started, samples, ended).columns
-            if ended.get("delivered_error") is not None and ended["outcome"] != "interrupted":
-                again["delivered_error"] = error_again(scene, protocol.device.rate_hz, samples, ended)
-            found.differences += [f"{name}: the column {column} differs" for column in different(again, ended)]
+            measured = ended.others
+            if interval is not None:
+                presented = presented_by(protocol, key.codes, started.fields()).intervals[interval - 1]
+                again |= delivered_again(protocol, presented, started, interval, samples, measured).columns
+            if measured.get("delivered_error") is not None and ended.outcome != "interrupted":
+                again["delivered_error"] = error_again(scene, protocol.device.rate_hz, samples, measured)
+            found.differences += [f"{name}: the column {column} differs" for column in different(again, measured)]
         found.computed_s += time.perf_counter() - start
     return found.replayed(time.perf_counter() - began)
 
@@ -432,35 +453,32 @@ def _listed(seconds: list[int]) -> str:
     return f"second {shown}{more}"
 
 
-def _which(line: Line) -> tuple[int, int, int | None]:
-    return line["trial"], line["attempt"], line.get("interval")
-
-
-def _presented(lines: Sequence[Line]) -> Iterator[tuple[Line, Line | None, str | None]]:
-    """Yield the line of each presentation that was to be recorded, and the line about its recording, if there is one.
+def _presented(
+    lines: Sequence[Event],
+) -> Iterator[tuple[TrialStarted, Which, Recorded | RecordingLost | None, str | None]]:
+    """Yield the start of each trial or interval that was to be recorded, which it is, and the line about its recording.
 
     In the order of presentation, each with the time at which the session had been resumed, or its device connected
     again, last; None before that.
     """
-    events = ("recorded", "recording_lost")
-    ends = {_which(line): line for line in lines if line["event"] in events}
-    if not lines or not lines[0].get("recordings"):
+    ends = {line.which: line for line in lines if isinstance(line, Recorded | RecordingLost)}
+    if not lines or not start_of(lines).recordings:
         return
     resumed_at: str | None = None
-    started: Line = {}
+    started: TrialStarted | None = None
     for line in lines:
-        if line["event"] in ("session_resumed", "device_reconnected"):
-            resumed_at = line["at"]
-        elif line["event"] == "trial_started" and not is_of_intervals(line):
-            yield line, ends.get(_which(line)), resumed_at
-        elif line["event"] == "trial_started":
+        if isinstance(line, SessionResumed | DeviceReconnected):
+            resumed_at = line.at
+        elif isinstance(line, TrialStarted):
             started = line
-        elif line["event"] == "interval_started":
-            yield {**started, "interval": line["interval"]}, ends.get(_which(line)), resumed_at
+            if not line.has_intervals:
+                yield line, line.which, ends.get(line.which), resumed_at
+        elif isinstance(line, IntervalStarted) and started is not None:
+            yield started, line.which, ends.get(line.which), resumed_at
 
 
 def _ran(
-    path: Path, kept: Mapping[str, Any], key: blinding.Key, lines: Sequence[Line]
+    path: Path, kept: Mapping[str, Any], key: blinding.Key, lines: Sequence[Event]
 ) -> tuple[Protocol, dict[str | None, _Device], tuple[int, str]]:
     """Return what ran, by the receipt that was ``kept`` at ``path``: protocol, devices, and seed with participant.
 
@@ -468,7 +486,7 @@ def _ran(
     """
     try:
         described = {None: kept["device"]} | {entry["at"]: entry["device"] for entry in kept.get("resumed", ())}
-        described |= {line["at"]: line["described"] for line in lines if line["event"] == "device_reconnected"}
+        described |= {line.at: line.described for line in lines if isinstance(line, DeviceReconnected)}
         devices = {
             at: _Device(float(device.get("force_limit_n", np.inf)), dynamics_from(device), rules_from(device))
             for at, device in described.items()

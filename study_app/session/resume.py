@@ -12,10 +12,9 @@ from study_app.protocol.load import at_hand, parse, protocol_hash, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial, build_schedule
 from study_app.protocol.trials.methods import Heard
-from study_app.protocol.trials.presentation import heard_in
 from study_app.store.blinded.blinding import Key, opened
-from study_app.store.journals.journal import Line
-from study_app.store.progress import Progress, progress_of
+from study_app.store.journals.journal_events import Event, SessionStarted
+from study_app.store.progress import Progress, heard_in, progress_of
 from study_app.store.sessions.recovery import sealed_source
 from study_app.store.workstation import recent_protocols
 
@@ -40,7 +39,7 @@ FIRST = Start()
 
 
 def resume_at(
-    protocol: Protocol, schedule: Schedule, lines: Iterable[Line], key: Key | None = None, *, exactly: bool = False
+    protocol: Protocol, schedule: Schedule, lines: Iterable[Event], key: Key | None = None, *, exactly: bool = False
 ) -> Start:
     """Return where the session with these journal lines goes on.
 
@@ -69,9 +68,9 @@ def resume_at(
     return Start(step, progress.presented, heard, progress.invalid if step == progress.step == reached else 0)
 
 
-def begun_schedule(protocol: Protocol, start: Line) -> Schedule:
+def begun_schedule(protocol: Protocol, start: SessionStarted) -> Schedule:
     """Return the steps of the session whose journal begins with the line ``start``."""
-    return build_schedule(protocol, start["participant"], start["seed"], start.get("row_of"))
+    return build_schedule(protocol, start.participant, start.seed, start.row_of)
 
 
 def is_rehearsal(session_receipt: Mapping[str, Any]) -> bool:
@@ -85,7 +84,7 @@ def source_to_resume(session_folder: Path, name: str) -> bytes:
 
 
 def find_protocol(
-    start: Line, candidates: Iterable[str] | None = None, read: Callable[[str], bytes] = source_bytes
+    start: SessionStarted, candidates: Iterable[str] | None = None, read: Callable[[str], bytes] = source_bytes
 ) -> str:
     """Return the file or name of the protocol that a session began with, from its journal's first line.
 
@@ -98,13 +97,13 @@ def find_protocol(
         with contextlib.suppress(ProtocolError):  # a file that cannot be read is no study's
             sources[name] = read(name)
     for name, source in sources.items():
-        if protocol_hash(source) == start["protocol_hash"]:
+        if protocol_hash(source) == start.protocol_hash:
             return name
     for name, source in sources.items():
         with contextlib.suppress(ProtocolError):
-            if parse(source, name).study.name == start["study"]:
+            if parse(source, name).study.name == start.study:
                 return name
-    raise SessionError(f"no known protocol belongs to the study {start['study']!r}: name its file with --protocol FILE")
+    raise SessionError(f"no known protocol belongs to the study {start.study!r}: name its file with --protocol FILE")
 
 
 def _next_step(protocol: Protocol, schedule: Schedule, progress: Progress) -> int:

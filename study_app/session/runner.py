@@ -15,6 +15,7 @@ again until it is done, in order and once. Then the session is paused, and goes 
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,7 @@ from study_app.session.transitions.state import FINAL, Phase, SessionState, Stal
 from study_app.session.transitions.table import advance, open_session
 from study_app.session.trial import Recording, RunningTrial, TankView, ball_is_back, resting_view
 from study_app.store.delivered import broken_limits, delivered, undelivered
+from study_app.store.journals.journal_events import TargetReached
 
 RETRY_S = 1.0  # a disk that took nothing is tried again so often
 
@@ -253,18 +255,18 @@ class Runner:
                 servo.rest()
             case events.FadeIn():
                 servo.fade_in()
-            case events.Write(event, fields, measured, waits):
-                journal.append(event, t_s=at_s, waits=waits, **({**self._measured, **fields} if measured else fields))
+            case events.Write(line, measured, waits):
+                journal.append(replace(line, others=self._measured) if measured else line, t_s=at_s, waits=waits)
             case events.CheckFlushed():
                 journal.check_flushed()
             case events.WriteTables():
                 journal.write_tables()
             case events.StartTrial():
                 self._running = self._prepared(command)
-            case events.Adjust(presented, delay_s, fields):
+            case events.Adjust(presented, delay_s, stepped):
                 other = None if presented.vary == DELAY else scene_of(self._protocol, presented)
                 scene = None if self._running is None else self._running.adjust(other, delay_s)
-                journal.append("stepped", t_s=at_s, waits=False, **fields, scene=scene)
+                journal.append(replace(stepped, scene=scene), t_s=at_s, waits=False)
             case events.ShowPage(page):
                 self._page_since_ns = servo.now_ns()
                 self._ports.present(page)
@@ -307,7 +309,7 @@ class Runner:
             return
         self._carry_out_all(
             [
-                events.Write("target_reached", {"trial": running.trial, "target": one.target, "t_task_s": one.t_task_s})
+                events.Write(TargetReached(trial=running.trial, target=one.target, t_task_s=one.t_task_s))
                 for one in running.follow(samples)
             ],
             self._ports.clock(),

@@ -26,8 +26,10 @@ from study_app.store import workstation
 from study_app.store.blinded.allocation import check_session
 from study_app.store.blinded.blinding import check_conditions
 from study_app.store.folders import ID_PATTERN, StudyFolder, locate, study_folder
+from study_app.store.journals import journal
 from study_app.store.journals.journal import SessionClock
-from study_app.store.progress import progress
+from study_app.store.journals.journal_events import start_of
+from study_app.store.progress import progress_of
 from study_app.store.sessions.begin import SessionStart, begin, check_participant, check_unused, refuse_never_begun
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import check_can_go_on, reopen
@@ -113,33 +115,33 @@ def resumed(
     """
     study, folder = locate(session_folder)
     refuse_never_begun(folder)
-    done = progress(session_folder)
+    lines = journal.read(folder.journal)
+    start, done = start_of(lines), progress_of(lines)
     if done.ended is not None:
         raise StoreError(
             f"{folder.path} is finished ({done.ended}) and cannot be resumed; use a new session number for another "
             "visit"
         )
-    start = done.start
     read = partial(source_to_resume, session_folder)
     chosen = protocol if protocol is not None else find_protocol(start, candidates, read)
     source = read(chosen)
     check_can_go_on(session_folder, parse(source, chosen), source)
     return NewSession(
         source=chosen,
-        participant=start["participant"],
-        session=start["session"],
-        seed=start["seed"],
+        participant=start.participant,
+        session=start.session,
+        seed=start.seed,
         operator=operator,
         language=done.language,
-        device=device if device is not None else start["device"],
-        windowed=windowed or start["pilot"],
+        device=device if device is not None else start.device or "",
+        windowed=windowed or start.pilot,
         screen=screen,
         results=study.path,
-        pilot=start["pilot"],
-        recordings=bool(start.get("recordings")),
+        pilot=start.pilot,
+        recordings=start.recordings,
         resumes=session_folder,
         device_options=device_options or {},
-        row_of=start.get("row_of"),
+        row_of=start.row_of,
     )
 
 

@@ -3,30 +3,49 @@
 Code that resumes, shows or checks a session uses this module, so that all agree.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
-from study_app.errors import StoreError
+from study_app.protocol.model import Protocol
+from study_app.protocol.trials.methods import Heard
+from study_app.protocol.trials.presentation import arrangement_of, heard_of
+from study_app.protocol.trials.tracks import design_of
 from study_app.store.delivered import Broken, beyond_limits
-from study_app.store.folders import locate
-from study_app.store.journals import journal
-from study_app.store.journals.journal import Line
-
-UNDELIVERED: Final = "invalid"
-"""The outcome of a trial of which an interval was not delivered as requested."""
-
-
-@dataclass(frozen=True, slots=True)
-class Given:
-    """The answer to a statement so far; times on the session's clock [s], None before the event."""
-
-    onset_s: float | None = None
-    first_s: float | None = None
-    last_s: float | None = None
-    changes: int = 0
-    value: Any = None
+from study_app.store.journals.journal_events import (
+    UNDELIVERED,
+    Answer,
+    AnswerRemoved,
+    Broke,
+    Choice,
+    DeviceReconnected,
+    Event,
+    FormAnswered,
+    FormShown,
+    IntervalEnded,
+    IntervalStarted,
+    ItemShown,
+    LanguageChosen,
+    Note,
+    OutletLost,
+    PageLeft,
+    PageShown,
+    PassedOver,
+    Paused,
+    Recorded,
+    RecordingLost,
+    Repeat,
+    Responses,
+    Resumed,
+    SessionEnded,
+    SessionResumed,
+    SessionStarted,
+    TargetReached,
+    TrialEnded,
+    TrialStarted,
+    Which,
+    start_of,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,13 +90,13 @@ class Progress:
     every attempt that was not delivered as requested.
     """
 
-    start: Line = field(default_factory=dict)
+    start: SessionStarted | None = None
     step: int = 0
     page: str | None = None
     trial: int | None = None
     attempt: int = 0
     task_done: bool = False
-    answers: dict[str, Given] = field(default_factory=dict)
+    answers: dict[str, Answer] = field(default_factory=dict)
     invalid: int = 0
     presented: dict[int, int] = field(default_factory=dict)
     steps: dict[int, int] = field(default_factory=dict)
@@ -98,7 +117,7 @@ class Progress:
     lost: dict[int, str] = field(default_factory=dict)
     lacking: dict[int, int] = field(default_factory=dict)
     outlets_lost: dict[str, str] = field(default_factory=dict)
-    notes: list[NoteLine] = field(default_factory=list)
+    notes: list[Note] = field(default_factory=list)
     repeats: int = 0
     paused: bool = False
     broke: str = ""
@@ -107,81 +126,85 @@ class Progress:
     repeated: dict[int, tuple[str, ...]] = field(default_factory=dict)
     undelivered: dict[int, tuple[str, ...]] = field(default_factory=dict)
     _reason: str = ""
-    _left_open: dict[tuple[int, int], dict[str, Given]] = field(default_factory=dict)
+    _left_open: dict[tuple[int, int], dict[str, Answer]] = field(default_factory=dict)
 
     @property
-    def unconfirmed(self) -> dict[tuple[int, int], dict[str, Given]]:
+    def unconfirmed(self) -> dict[tuple[int, int], dict[str, Answer]]:
         """The choices without a confirmation, by trial and attempt."""
         found = dict(self._left_open)
-        chosen = {item: given for item, given in self.answers.items() if given.first_s is not None}
+        chosen = {item: answer for item, answer in self.answers.items() if answer.given}
         if self.trial is not None and chosen:
             found[self.trial, self.attempt] = chosen
         return found
 
-    def take(self, line: Line) -> None:
+    def take(self, line: Event) -> None:
         """Process one more line."""
-        at_s = line["t_s"]
-        match line["event"]:
-            case "session_started":
-                self.start, self.language = line, line.get("language", "")
-            case "page_shown":
-                self._show_page(line["page"], at_s)
-            case "form_shown":
-                self._show_page(line["form"], at_s)
+        at_s = line.t_s
+        match line:
+            case SessionStarted():
+                self.start, self.language = line, line.language
+            case PageShown(page=page):
+                self._show_page(page, at_s)
+            case FormShown(form=form):
+                self._show_page(form, at_s)
                 self.answers = {}
-            case "page_left":
+            case PageLeft():
                 self._leave()
-            case "trial_started":
-                self._start_trial(line["trial"], line["attempt"], at_s)
-                self._note_repetition(line)
-            case "trial_ended":
+            case TrialStarted():
+                self._start_trial(line)
+            case TrialEnded():
                 self._end_trial(line)
-            case "interval_ended" if line.get("invalid"):
-                self.undelivered[line["trial"]] = (*self.undelivered.get(line["trial"], ()), *line["invalid"])
-            case "target_reached":
+            case IntervalEnded(trial=trial, invalid=limits) if limits:
+                self.undelivered[trial] = (*self.undelivered.get(trial, ()), *limits)
+            case TargetReached():
                 self.targets += 1
-            case "item_shown" | "choice":
-                self.answers[line["item"]] = _answered(self.answers.get(line["item"], Given()), line)
-            case "answer_removed":
-                self.answers[line["item"]] = Given(onset_s=self.answers.get(line["item"], Given()).onset_s)
-            case "responses" | "form_answered":
-                self.answered[line["form"] if "form" in line else line["trial"]] = len(line["items"])
-                if self.of_intervals is not None and line.get("trial") == self.of_intervals:
-                    item = line["items"][0]
-                    onset_s, first_s = item.get("onset_s"), item.get("first_s")
-                    seconds = None if onset_s is None or first_s is None else first_s - onset_s
-                    self.trial_answers[self.of_intervals] = TrialAnswer(item.get("value"), seconds)
-                self.answers = {}
+            case ItemShown(item=item):
+                self.answers[item] = self.answers.get(item, Answer()).shown(at_s)
+            case Choice(item=item):
+                self.answers[item] = self.answers.get(item, Answer()).chosen(at_s, line.value)
+            case AnswerRemoved(item=item):
+                self.answers[item] = self.answers.get(item, Answer()).removed()
+            case Responses() | FormAnswered():
+                self._confirm(line)
+            case PassedOver():
+                self._go_to(line.page, line.trial)
                 self._leave()
-            case "passed_over":
-                self._go_to(line.get("page"), line.get("trial"))
-                self._leave()
-            case "recorded" if line["samples_unrecorded"]:
-                self.lacking[line["trial"]] = line["samples_unrecorded"]
-            case "recording_lost":
-                self.lost[line["trial"]] = line["reason"]
-            case "outlet_lost":
-                self.outlets_lost[line["outlet"]] = line["reason"]
-            case "note":
-                self.notes.append(NoteLine(at_s - self.away_s, line["kind"], line["text"]))
-            case "repeat":
-                self._forget(line["trial"])
+            case Recorded() if line.samples_unrecorded:
+                self.lacking[line.trial] = line.samples_unrecorded
+            case RecordingLost():
+                self.lost[line.trial] = line.reason
+            case OutletLost():
+                self.outlets_lost[line.outlet] = line.reason
+            case Note():
+                self.notes.append(replace(line, t_s=at_s - self.away_s))
+            case Repeat():
+                self._forget(line.trial)
                 self.repeats += 1
-                self._reason = str(line["reason"])
-            case "paused" | "resumed":
-                self.paused = line["event"] == "paused"
-            case "broke":
-                self.broke = str(line["what"])
-            case "device_reconnected":
+                self._reason = line.reason
+            case Paused() | Resumed():
+                self.paused = isinstance(line, Paused)
+            case Broke():
+                self.broke = line.what
+            case DeviceReconnected():
                 self.broke = ""
-            case "language_chosen":
-                self.language = line["language"]
-            case "session_resumed":
+            case LanguageChosen():
+                self.language = line.language
+            case SessionResumed():
                 self._resume(max(0.0, at_s - self.t_s))
-            case "session_ended":
+            case SessionEnded():
                 self._close(at_s)
-                self.ended, self.fingerprint, self.paused = line["status"], line.get("fingerprint", ""), False
+                self.ended, self.fingerprint, self.paused = line.status, line.others.get("fingerprint", ""), False
         self.t_s = max(self.t_s, at_s)
+
+    def _confirm(self, line: Responses | FormAnswered) -> None:
+        """Take the answers of a trial or a form as confirmed."""
+        self.answered[line.form if isinstance(line, FormAnswered) else line.trial] = len(line.items)
+        if isinstance(line, Responses) and line.trial == self.of_intervals:
+            answer = line.items[0].answer
+            seconds = None if answer.onset_s is None or answer.first_s is None else answer.first_s - answer.onset_s
+            self.trial_answers[line.trial] = TrialAnswer(answer.value, seconds)
+        self.answers = {}
+        self._leave()
 
     def _go_to(self, page: str | None, trial: int | None) -> None:
         """Go to a step, unless it is the current one, which is then shown again."""
@@ -204,33 +227,30 @@ class Progress:
         self._enter(at_s)
         self.trial_since_s = self.trial_lasted_s = None
 
-    def _start_trial(self, trial: int, attempt: int, at_s: float) -> None:
-        """Present a trial; an earlier one is repeated if its whole block is."""
+    def _start_trial(self, line: TrialStarted) -> None:
+        """Present a trial, perhaps again; an earlier one is repeated if its whole block is."""
+        trial = line.trial
         self._go_to(None, trial)
         self._drop_answers()
         self._forget(trial)
         self.step = self.steps.setdefault(trial, self.step)
-        self.attempt, self.task_done = attempt, False
-        self.presented[trial] = max(attempt, self.presented.get(trial, 0))
-        self._enter(at_s)
-        self.trial_since_s, self.trial_lasted_s, self.targets, self.paused = at_s, None, 0, False
-
-    def _end_trial(self, line: Line) -> None:
-        self.trial_lasted_s = None if self.trial_since_s is None else line["t_s"] - self.trial_since_s
-        self.task_done = line["outcome"] in ("complete", "timeout")
-        self.invalid += line["outcome"] == UNDELIVERED
-        if self.task_done:
-            self.broken[line["trial"]] = beyond_limits(line, self.start.get("limits", {}))
-        else:
-            self._reason = str(line["outcome"])
-
-    def _note_repetition(self, line: Line) -> None:
-        """Store why a trial of intervals is presented again."""
-        trial = line["trial"]
-        self.of_intervals = trial if is_of_intervals(line) else None
-        if self.of_intervals is not None and line["attempt"] > 1 and self._reason != UNDELIVERED:
+        self.attempt, self.task_done = line.attempt, False
+        self.presented[trial] = max(line.attempt, self.presented.get(trial, 0))
+        self._enter(line.t_s)
+        self.trial_since_s, self.trial_lasted_s, self.targets, self.paused = line.t_s, None, 0, False
+        self.of_intervals = trial if line.has_intervals else None
+        if line.has_intervals and line.attempt > 1 and self._reason != UNDELIVERED:
             self.repeated[trial] = (*self.repeated.get(trial, ()), self._reason or "interrupted")
         self._reason = ""
+
+    def _end_trial(self, line: TrialEnded) -> None:
+        self.trial_lasted_s = None if self.trial_since_s is None else line.t_s - self.trial_since_s
+        self.task_done = line.outcome in ("complete", "timeout")
+        self.invalid += line.outcome == UNDELIVERED
+        if self.task_done:
+            self.broken[line.trial] = beyond_limits(line.others, {} if self.start is None else self.start.limits)
+        else:
+            self._reason = line.outcome
 
     def _forget(self, trial: int) -> None:
         """Clear the state of an earlier attempt of a trial."""
@@ -257,19 +277,7 @@ class Progress:
             self.durations_s[self.here] = at_s - self.here_since_s
 
 
-def progress(session_folder: Path) -> Progress:
-    """Return the progress of the session in ``session_folder``; an incomplete last line of its journal is ignored.
-
-    Raises
-    ------
-    StoreError
-        It is not a session folder, or its journal is missing, empty or damaged.
-    """
-    _, session = locate(session_folder)
-    return progress_of(journal.read(session.journal))
-
-
-def progress_of(lines: Sequence[Line]) -> Progress:
+def progress_of(lines: Sequence[Event]) -> Progress:
     """Return the progress of a session from its journal's lines.
 
     Raises
@@ -277,42 +285,46 @@ def progress_of(lines: Sequence[Line]) -> Progress:
     StoreError
         They do not begin as a session's do.
     """
-    if not lines or lines[0]["event"] != "session_started":
-        raise StoreError(
-            "the journal does not begin with session_started: restore it from a copy, or use a new session number"
-        )
+    start_of(lines)
     now = Progress()
     for line in lines:
         now.take(line)
     return now
 
 
-def _answered(given: Given, line: Line) -> Given:
-    at_s = line["t_s"]
-    if line["event"] == "item_shown":
-        return given if given.onset_s is not None else replace(given, onset_s=at_s)
-    if given.first_s is None:
-        return replace(given, first_s=at_s, last_s=at_s, value=line["value"])
-    if given.value == line["value"]:
-        return given
-    return replace(given, last_s=at_s, value=line["value"], changes=given.changes + 1)
+def heard_in(protocol: Protocol, lines: Iterable[Event]) -> tuple[Heard, ...]:
+    """Return the answered trials, each at the level that was presented, by number; the last answer counts.
+
+    Lines that do not fit the study, or whose sealed fields are not opened, raise KeyError or ValueError.
+    """
+    started: dict[tuple[int, int], TrialStarted] = {}
+    found: dict[int, Heard] = {}
+    for line in lines:
+        if isinstance(line, TrialStarted):
+            started[line.trial, line.attempt] = line
+        elif isinstance(line, Responses):
+            start = started[line.trial, line.attempt]
+            block = protocol.blocks[start.block]
+            if block.design is None:
+                continue
+            if start.arrangement is None:
+                raise KeyError("arrangement")
+            arrangement = arrangement_of(design_of(protocol, block), start.arrangement)
+            answer: Any = line.items[0].answer.value
+            of_trial = line.trial, start.code, start.level, arrangement
+            found[line.trial] = heard_of(protocol, block, *of_trial, answer, catch=bool(start.catch))
+    return tuple(found[number] for number in sorted(found))
 
 
-def is_of_intervals(started: Mapping[str, Any]) -> bool:
-    """Return whether the line of a trial's start is of a trial of intervals, whose contents it lists."""
-    return "sealed" in started or "arrangement" in started
-
-
-def recordable(lines: Iterable[Line]) -> list[tuple[int, int, int | None]]:
+def recordable(lines: Iterable[Event]) -> list[Which]:
     """Return trial, attempt and interval of all planned or existing recordings; the interval is None for a trial."""
     return [
-        (line["trial"], line["attempt"], line.get("interval"))
+        line.which
         for line in lines
-        if line["event"] == "interval_started" or (line["event"] == "trial_started" and not is_of_intervals(line))
+        if isinstance(line, IntervalStarted) or (isinstance(line, TrialStarted) and not line.has_intervals)
     ]
 
 
-def named(line: Mapping[str, Any]) -> str:
-    """Return the subject of a line: "trial 3, attempt 1", in a trial of intervals with the interval."""
-    interval = line.get("interval")
-    return f"trial {line['trial']}, attempt {line['attempt']}" + ("" if interval is None else f", interval {interval}")
+def named(trial: int, attempt: int, interval: int | None) -> str:
+    """Return the words for an attempt: "trial 3, attempt 1", in a trial of intervals with the interval."""
+    return f"trial {trial}, attempt {attempt}" + ("" if interval is None else f", interval {interval}")

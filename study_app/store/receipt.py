@@ -19,8 +19,7 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import block_codes, order_of
 from study_app.store.atomic import parse_json, read_own, study_root, write_file
-from study_app.store.journals.journal import plain
-from study_app.store.journals.journal_events import holds, shortened
+from study_app.store.journals.journal_events import SessionStarted, holds, plain, shortened
 
 GENERATOR = (
     "random.Random (Mersenne Twister), one per named stream, seeded by SHA-256 of (seed, name); only .random() is "
@@ -121,9 +120,9 @@ def began_at(receipt: Mapping[str, Any]) -> str | None:
     return first.get("at") if isinstance(first, dict) and skipped else receipt.get("started_at")
 
 
-def other_format(receipt: Mapping[str, Any], start: Mapping[str, Any]) -> bool:
+def other_format(receipt: Mapping[str, Any], start: SessionStarted) -> bool:
     """Return whether the journal that begins with the line ``start`` has another format than its receipt says."""
-    return bool(receipt.get("format", 1) != start.get("format", 1))
+    return bool(receipt.get("format", 1) != (start.format or 1))
 
 
 def _holds(name: str, value: object) -> bool:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from study_app.store.atomic import cause, sync_folder
-from study_app.store.journals.journal import Line
+from study_app.store.journals.journal_events import Event, Recorded, RecordingLost, Which
 
 if TYPE_CHECKING:
     from study_app.store.recordings import SamplesFile, Written
@@ -33,43 +33,13 @@ PATIENCE_S = 30.0  # how long the end of a session waits for the disk
 LEAVING_S = 2.0  # the same without an end of the session: ending the program must not be delayed
 
 
-@dataclass(frozen=True, slots=True)
-class Recorded:
-    """A recording that is whole on the disk."""
-
-    trial: int
-    attempt: int
-    samples: Written
-    frames: Written
-    dropped: int
-    interval: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Lost:
-    """A recording that could not be stored, and the reason."""
-
-    trial: int
-    attempt: int
-    reason: str
-    interval: int | None = None
-
-
-Kept: TypeAlias = Recorded | Lost
-_Which: TypeAlias = tuple[int, int, int | None]
+Kept: TypeAlias = Recorded | RecordingLost
 
 
 @dataclass(frozen=True, slots=True)
 class _Begin:
-    trial: int
-    attempt: int
+    which: Which
     rate_hz: float
-    interval: int | None
-
-    @property
-    def which(self) -> _Which:
-        """Trial, attempt and interval."""
-        return self.trial, self.attempt, self.interval
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,9 +88,9 @@ class Recorder:
         self._closing = False
         self._patient_until_s = 0.0
         self._kept: list[Kept] = []
-        self._lost: list[Lost] = []
-        self._underway: _Which | None = None
-        self._expected: dict[_Which, None] = {}
+        self._lost: list[RecordingLost] = []
+        self._underway: Which | None = None
+        self._expected: dict[Which, None] = {}
         self._frames = array("q")
         self._dropped = 0
 
@@ -138,7 +108,7 @@ class Recorder:
                 self._underway = None
                 return
             self._expected[trial, attempt, interval] = None
-            self._queue.append(_Begin(trial, attempt, rate_hz, interval))
+            self._queue.append(_Begin((trial, attempt, interval), rate_hz))
             if not self._works():
                 self.thread = threading.Thread(target=self._work, name="recorder", daemon=True)
                 try:
@@ -184,7 +154,7 @@ class Recorder:
         return self._dropped
 
     @property
-    def lost(self) -> tuple[Lost, ...]:
+    def lost(self) -> tuple[RecordingLost, ...]:
         """All recordings that could not be stored so far, updated as soon as one is lost."""
         with self.changed:
             return tuple(self._lost)
@@ -218,7 +188,7 @@ class Recorder:
             self.thread.join(max(0.0, min(patience_s, self._patient_until_s - time.monotonic())))
         with self.changed:
             reason = "the disk was too slow" if self._works() else "its thread had ended"
-            self._kept += [Lost(trial, attempt, reason, interval) for trial, attempt, interval in self._expected]
+            self._kept += [lost(which, reason) for which in self._expected]
             self._expected.clear()
 
     def _works(self) -> bool:
@@ -235,9 +205,9 @@ class Recorder:
 
     def _lose_all(self, reason: str) -> None:
         """Count everything that is being written or waits as lost; the caller holds the lock."""
-        lost = [Lost(trial, attempt, reason, interval) for trial, attempt, interval in self._expected]
-        self._kept += lost
-        self._lost += lost
+        failed = [lost(which, reason) for which in self._expected]
+        self._kept += failed
+        self._lost += failed
         self._expected.clear()
         self._queue.clear()
         self._waiting, self._underway, self.thread = 0, None, None
@@ -253,7 +223,7 @@ class Recorder:
                 if begin.which in self._expected:
                     del self._expected[begin.which]
                     self._kept.append(kept)
-                    if isinstance(kept, Lost):
+                    if isinstance(kept, RecordingLost):
                         self._lost.append(kept)
                     self.changed.notify_all()
                 else:  # `close` gave it up: no file without a line of the journal
@@ -263,7 +233,10 @@ class Recorder:
     def _record(self, begin: _Begin) -> Kept:
         """Write one trial's files; the queue is then past the trial's end, even if they were not written."""
         samples_path, frames_path = recording_files(self._folder, *begin.which)
-        facts = {**self._facts, **_keys(*begin.which)}
+        trial, attempt, interval = begin.which
+        facts = {**self._facts, "trial": trial, "attempt": attempt}
+        if interval is not None:
+            facts["interval"] = interval
         file: SamplesFile | None = None
         shown: Written | None = None
         end: _End | None = None
@@ -275,7 +248,7 @@ class Recorder:
             end = self._give_samples(file.write)
             frames = np.frombuffer(end.frames, np.int64).reshape(-1, 5)
             shown = self._files.write_frames(frames_path, frames, facts)
-            return Recorded(begin.trial, begin.attempt, file.finish(end.dropped), shown, end.dropped, begin.interval)
+            return recorded(begin.which, file.finish(end.dropped), shown, end.dropped)
         except Exception as error:  # noqa: BLE001 - whatever it is, the next trial's recording is still to be written
             with contextlib.suppress(Exception):  # a check of the folder reports files that cannot be removed either
                 if file is not None:
@@ -286,7 +259,7 @@ class Recorder:
             if end is None:
                 self._give_samples(lambda _: None)
             reason = cause(error) if isinstance(error, OSError) else f"{type(error).__name__}: {error}"
-            return Lost(begin.trial, begin.attempt, reason, begin.interval)
+            return lost(begin.which, reason)
 
     def _give_samples(self, take: Callable[[Any], object]) -> _End:
         """Give the queued samples of a trial to ``take``; return the trial's end, an empty one without it."""
@@ -310,36 +283,33 @@ class Recorder:
             return thing
 
 
-def event_of(kept: Kept) -> tuple[str, dict[str, Any]]:
-    """Return the journal's event and fields about a recording; files by their path in the session's folder."""
-    which = _keys(kept.trial, kept.attempt, kept.interval)
-    if not isinstance(kept, Recorded):
-        return "recording_lost", {**which, "reason": kept.reason}
-    samples, frames = kept.samples, kept.frames
-    return "recorded", {
-        **which,
-        "recording": f"{samples.path.parent.name}/{samples.path.name}",
-        "recording_frames": f"{frames.path.parent.name}/{frames.path.name}",
-        "samples_recorded": samples.rows,
-        "samples_unrecorded": kept.dropped,
-        "frames_recorded": frames.rows,
-        "sha256": samples.sha256,
-        "frames_sha256": frames.sha256,
-    }
+def recorded(which: Which, samples: Written, frames: Written, dropped: int) -> Recorded:
+    """Return the journal's line about a recording that is complete; files by their path in the session's folder."""
+    trial, attempt, interval = which
+    return Recorded(
+        trial=trial,
+        attempt=attempt,
+        interval=interval,
+        recording=f"{samples.path.parent.name}/{samples.path.name}",
+        recording_frames=f"{frames.path.parent.name}/{frames.path.name}",
+        samples_recorded=samples.rows,
+        samples_unrecorded=dropped,
+        frames_recorded=frames.rows,
+        sha256=samples.sha256,
+        frames_sha256=frames.sha256,
+    )
 
 
-def _keys(trial: int, attempt: int, interval: int | None) -> dict[str, int]:
-    """Return the fields that identify the subject of a recording."""
-    which = {"trial": trial, "attempt": attempt}
-    return which if interval is None else {**which, "interval": interval}
+def lost(which: Which, reason: str) -> RecordingLost:
+    """Return the journal's line about a recording that could not be stored."""
+    trial, attempt, interval = which
+    return RecordingLost(trial=trial, attempt=attempt, interval=interval, reason=reason)
 
 
-def hashes_of(lines: Sequence[Line]) -> dict[str, str]:
+def hashes_of(lines: Sequence[Event]) -> dict[str, str]:
     """Return path in the session's folder → SHA-256 of every recording in the journal."""
-    recorded = [line for line in lines if line["event"] == "recorded"]
-    return {line["recording"]: line["sha256"] for line in recorded} | {
-        line["recording_frames"]: line["frames_sha256"] for line in recorded
-    }
+    kept = [line for line in lines if isinstance(line, Recorded)]
+    return {line.recording: line.sha256 for line in kept} | {line.recording_frames: line.frames_sha256 for line in kept}
 
 
 def recording_files(folder: Path, trial: int, attempt: int, interval: int | None = None) -> tuple[Path, Path]:

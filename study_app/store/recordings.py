@@ -34,7 +34,7 @@ from study_app.haptics.model.layout import (
     records,
 )
 from study_app.store.atomic import cannot_read, parse_json, sync_folder, temporary_path
-from study_app.store.journals.journal import plain
+from study_app.store.journals.journal_events import plain
 from study_app.store.tables.csv_files import Column
 
 _AXES = (("x", "to the right"), ("y", "up"), ("z", "toward the participant"))

@@ -23,7 +23,7 @@ from study_app.store import receipt
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.folders import locate
 from study_app.store.journals import journal
-from study_app.store.progress import progress_of
+from study_app.store.journals.journal_events import start_of
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.workstation import recent_protocols
 from study_app.viewmodels.extent import counted_each, extent_of
@@ -253,18 +253,18 @@ def interrupted(
             if is_rehearsal(receipt.read(folder.receipt)):
                 continue
             lines = journal.read(folder.journal)
-            begun = progress_of(lines)
+            begun = start_of(lines)
             read = partial(source_to_resume, session.folder)
-            source = find_protocol(begun.start, candidates, read)
+            source = find_protocol(begun, candidates, read)
             protocol = parse(read(source), source)
             study = locate(session.folder)[0]
-            protocol = session_protocol(study, protocol, session.participant, begun.start["session"])
-            schedule = begun_schedule(protocol, begun.start)
+            protocol = session_protocol(study, protocol, session.participant, begun.session)
+            schedule = begun_schedule(protocol, begun)
             step = resume_at(protocol, schedule, lines).step
         except StudyError:
             continue  # what is wrong with it is said when it is asked for by its folder
         where = place_words(protocol, schedule, step)
-        stopped = started_words(datetime.fromisoformat(lines[-1]["at"]).astimezone(now.tzinfo), now)
+        stopped = started_words(datetime.fromisoformat(lines[-1].at).astimezone(now.tzinfo), now)
         whole = f" of {session.answers_of}" if session.answers_of is not None else ""
         kind = "Pilot " if session.pilot else ""
         return Interrupted(

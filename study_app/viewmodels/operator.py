@@ -13,7 +13,8 @@ from study_app.protocol.orders.schedule import FormStep, Schedule, Trial
 from study_app.protocol.trials.tracks import design_of
 from study_app.protocol.wording.languages import words
 from study_app.store.delivered import Broken
-from study_app.store.progress import NoteLine, Progress
+from study_app.store.journals.journal_events import Note
+from study_app.store.progress import Progress
 from study_app.store.tables.columns import SEALED
 from study_app.viewmodels.force_traces import ForceFigures, force_rows
 from study_app.viewmodels.number_words import grouped, minutes
@@ -102,7 +103,7 @@ class OperatorView:
     counts: tuple[tuple[str, str], ...]
     tiles: tuple[Tile, ...]
     device: DeviceView
-    notes: tuple[NoteLine, ...]
+    notes: tuple[Note, ...]
     force_on: bool
     may_pause: bool
     may_resume: bool

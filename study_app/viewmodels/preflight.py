@@ -17,7 +17,7 @@ from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import Schedule, Trial
 from study_app.session.preflight import Check, Facts
 from study_app.session.resume import resume_at
-from study_app.store.journals.journal import Line
+from study_app.store.journals.journal_events import Event
 from study_app.store.progress import progress_of
 from study_app.viewmodels.extent import extent_of
 from study_app.viewmodels.session.stages import operator_language, step_title
@@ -96,7 +96,7 @@ def preflight_view(
     )
 
 
-def resumed_rows(protocol: Protocol, schedule: Schedule, lines: Iterable[Line]) -> tuple[tuple[str, str], ...]:
+def resumed_rows(protocol: Protocol, schedule: Schedule, lines: Iterable[Event]) -> tuple[tuple[str, str], ...]:
     """Return where the session with these journal lines goes on, and how much of it is kept.
 
     Raises

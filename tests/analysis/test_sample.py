@@ -38,7 +38,7 @@ def known(session: SessionFolder, folder: Path) -> list[dict[str, float]]:
     return [
         {name: it for name, it in line.items() if name.startswith(measured) and it is not None and name not in LATER}
         for line in opened(journal.read(session.journal), read_key(folder))
-        if line["event"] == "trial_ended"
+        if line.event == "trial_ended"
     ]
 
 

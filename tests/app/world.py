@@ -15,6 +15,7 @@ from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import TaskPage
 from study_app.session.transitions.events import Continue
+from study_app.store.journals import journal_events
 from study_app.store.progress import Progress
 from study_app.viewmodels.operator import Session
 from study_app.viewmodels.session.stages import stages
@@ -65,10 +66,10 @@ class World:
     def seconds(self):
         return self.now_s
 
-    def append(self, event, *, t_s=None, waits=True, **fields):
+    def append(self, event, *, t_s=None, waits=True):
         if self.full:
             raise StoreError("no space left on the disk: free some")
-        self.done.append((event, fields))
+        self.done.append((event.event, event.fields()))
 
     def check_flushed(self):
         pass
@@ -77,7 +78,7 @@ class World:
         pass
 
     def finish(self, status, reason=""):
-        self.append("session_ended", status=status, reason=reason)
+        self.append(journal_events.SessionEnded(status=status, reason=reason))
 
     def events(self):
         return [done[0] for done in self.done if isinstance(done, tuple)]

@@ -46,11 +46,11 @@ class CutOff:
         self._store = store
         self._left = lines
 
-    def append(self, event: str, **fields: Any) -> None:
+    def append(self, event: Any, **about: Any) -> None:
         if self._left == 0:
             raise CutOffError
         self._left -= 1
-        self._store.append(event, waits=False, **fields)
+        self._store.append(event, waits=False, **about)
 
     def finish(self, _status: str, _reason: str = "") -> None:
         raise CutOffError
@@ -88,7 +88,7 @@ def cut_off_and_resumed(study: Protocol, source: bytes, results: Path, felt: Con
     lines = journal.read(store.folder.journal)
     passed = SimulatedTime(progress_of(lines).t_s)
     again = {"operator": "", "device": DEVICE, "screens": REHEARSED_SCREENS, "now_ns": passed.ns}
-    with reopen(store.folder.path, study, source, now=datetime.fromisoformat(lines[-1]["at"]), **again) as store:
+    with reopen(store.folder.path, study, source, now=datetime.fromisoformat(lines[-1].at), **again) as store:
         run(study, store, store, felt, passed)
     ended = journal.read(store.folder.journal)[-1]
     assert ended["status"] == "completed" or ended["reason"].startswith("the criterion of block")

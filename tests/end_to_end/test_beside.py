@@ -34,9 +34,9 @@ class Stepwise:
         self.store, self.ended = store, threading.Event()
         self._allowed, self._written = threading.Semaphore(0), threading.Semaphore(0)
 
-    def append(self, event: str, **fields: Any) -> None:
+    def append(self, event: Any, **about: Any) -> None:
         self._allowed.acquire()
-        self.store.append(event, **fields)
+        self.store.append(event, **about)
         self._written.release()
 
     def finish(self, status: str, reason: str = "") -> None:

@@ -64,7 +64,7 @@ def test_sessions_are_complete_and_every_response_is_there_once(rehearsed: tuple
         assert {row["outcome"] for row in trials} == {"complete"}
         assert {(row["samples_dropped"], row["overruns"]) for row in trials} == {("0", "0")}
         lines = opened(journal.read(session.journal), read_key(folder.path))
-        measured = [line for line in lines if line["event"] == "trial_ended"]
+        measured = [line for line in lines if line.event == "trial_ended"]
         assert len(measured) == len(trials)
         assert {line["limiter_non_finite"] for line in measured} == {0}
         assert all(abs(line["delay_error_mean_ms"]) < 10 and line["frames"] > 100 for line in measured)
@@ -84,7 +84,7 @@ def test_a_rehearsed_study_is_sound_and_every_force_of_it_comes_out_again(rehear
 
 
 def journal_events(session: SessionFolder, name: str) -> list[dict[str, Any]]:
-    return [line for line in journal.read(session.journal) if line["event"] == name]
+    return [line for line in journal.read(session.journal) if line.event == name]
 
 
 def test_answers_follow_what_was_seen(rehearsal_of: Callable[[str], Path]) -> None:
@@ -117,9 +117,10 @@ from study_app.store.sessions.open_session import SessionStore
 
 kept = SessionStore.append
 
-def append(self, event, **fields):
-    kept(self, event, **fields)
-    print(event, fields.get("trial", 0), fields.get("item", "-"), fields.get("value", "-"), flush=True)
+def append(self, event, **about):
+    kept(self, event, **about)
+    fields = event.fields()
+    print(event.event, fields.get("trial", 0), fields.get("item", "-"), fields.get("value", "-"), flush=True)
 
 SessionStore.append = append
 rehearse("rek2024", participants=1, seed=1, results=sys.argv[1])
@@ -149,7 +150,7 @@ def test_a_kill_during_part_2_leaves_every_earlier_answer_readable(tmp_path: Pat
     (session,) = StudyFolder(tmp_path / "rek2024").sessions()
     lines = journal.read(session.journal)
     choices: list[list[Any]] = [
-        ["choice", str(line["trial"]), line["item"], str(line["value"])] for line in lines if line["event"] == "choice"
+        ["choice", str(line.trial), line.item, str(line.value)] for line in lines if line.event == "choice"
     ]
     expected = [entry for entry in told if entry[0] == "choice"]
     assert choices[: len(expected)] == expected

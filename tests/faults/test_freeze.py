@@ -43,8 +43,8 @@ def held_with_a_freeze(folder: Path, how: str) -> tuple[dict[str, str], dict[str
         program.wait()
     (session,) = StudyFolder(folder / "results").sessions()
     lines = journal.read(session.journal)
-    assert [line["by"] for line in lines if line["event"] == "paused"] == ["program"]
-    assert not any(line["event"] == "broke" for line in lines)
+    assert [line.by for line in lines if line.event == "paused"] == ["program"]
+    assert not any(line.event == "broke" for line in lines)
     assert verify(folder / "results").errors == ()
     with session.table("demo", "trials").open(newline="", encoding="utf-8") as file:
         frozen, again = csv.DictReader(file)

@@ -79,9 +79,9 @@ def test_killed_at_random_moments_a_session_is_completed_as_if_nothing_had_been(
         lines = journal.read(session(study).journal)
         *before, _torn = outcome["held"].split("\n")
         assert lines[: len(before)] == [json.loads(line) for line in before]
-        resumed = [line["event"] for line in lines].count("session_resumed")
+        resumed = [line.event for line in lines].count("session_resumed")
         assert resumed == ("\n" in outcome["held"] and "session_ended" not in outcome["held"])
-        assert lines[-1]["status"] == "completed"
+        assert lines[-1].status == "completed"
         assert answers(study) == answers(whole)
         assert last_attempts(study) == last_attempts(whole)
         assert len(answers(study)) == short.ANSWERS == orders_of(load(str(tmp_path / "short.toml"))).answers
@@ -95,5 +95,5 @@ def told_answers(held: list[str], found: list[dict[str, str]]) -> None:
     """Assert that every answer that was confirmed before the kill stands in the table, with the value it had."""
     table = {(row["trial"], row["attempt"], row["item"]): row["response"] for row in found}
     for line in map(json.loads, held):
-        for given in line["items"] if line["event"] == "responses" else ():
-            assert table[str(line["trial"]), str(line["attempt"]), given["item"]] == str(given["value"])
+        for given in line.items if line.event == "responses" else ():
+            assert table[str(line.trial), str(line.attempt), given["item"]] == str(given["value"])

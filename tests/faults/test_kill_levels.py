@@ -38,8 +38,10 @@ def told(study: Path) -> dict[tuple[Any, ...], Any]:
     (session,) = StudyFolder(study).sessions()
     found: dict[tuple[Any, ...], Any] = {}
     for line in opened(journal.read(session.journal), read_key(study)):
-        if line["event"] in OF_TRIALS:
-            found[line["event"], line.get("trial", line.get("page")), line.get("interval")] = comparable(line)
+        if line.event in OF_TRIALS:
+            found[line.event, getattr(line, "trial", line.get("page")), getattr(line, "interval", None)] = comparable(
+                line
+            )
     return found
 
 
@@ -98,6 +100,6 @@ def test_one_session_killed_again_and_again_equals_one_that_was_not(tmp_path: Pa
     assert outcome["kills"] > 0.8 * KILLS
     study = Path(outcome["folder"])
     (session,) = StudyFolder(study).sessions()
-    events = [line["event"] for line in journal.read(session.journal)]
+    events = [line.event for line in journal.read(session.journal)]
     assert events.count("session_resumed") > 0.5 * KILLS
     equals(study, told(tmp_path / "whole"))

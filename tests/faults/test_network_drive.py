@@ -18,6 +18,7 @@ from study_app.session.runner import RETRY_S
 from study_app.session.transitions.events import Note
 from study_app.session.transitions.state import Phase
 from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal_events
 from study_app.store.sessions import folder_lock
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import reopen
@@ -98,8 +99,8 @@ def test_a_drive_that_is_full_or_gone_at_a_flush_is_waited_for(
         assert os.strerror(number) in (world.runner.stalled or "")
     world.run(RETRY_S + 0.1)
     world.until(Phase.COMPLETE)
-    assert [line["n"] for line in world.lines] == list(range(1, len(world.lines) + 1))
-    assert sum(len(line["items"]) for line in world.lines if line["event"] == "responses") == small.RESPONSES
+    assert [line.n for line in world.lines] == list(range(1, len(world.lines) + 1))
+    assert sum(len(line.items) for line in world.lines if line.event == "responses") == small.RESPONSES
     assert verify(tmp_path / "study").sound
 
 
@@ -171,10 +172,10 @@ def test_of_two_programs_that_do_not_see_each_others_lock_the_first_writes_no_li
     (marker,) = folder_lock.markers(first.folder.path)
     with hide(marker):
         second = reopen(first.folder.path, small.protocol(), b"small", operator="AB", device={}, screens={})
-    second.append("note", kind="note", text="of the second")
+    second.append(journal_events.Note(kind="note", text="of the second"))
     with pytest.raises(StoreError, match=r"journal\.jsonl was written by another program"):
-        first.append("note", kind="note", text="of the first")
+        first.append(journal_events.Note(kind="note", text="of the first"))
     second.finish("completed")
     first.close()
-    assert [line.get("text") for line in second.lines][-2] == "of the second"
+    assert [getattr(line, "text", None) for line in second.lines][-2] == "of the second"
     assert verify(tmp_path / "study").errors == ()

@@ -39,8 +39,8 @@ def test_a_free_text_survives_journal_tables_and_readers(tmp_path: Path, text: s
     world.runner.post(RepeatAsked(world.clock(), f"again: {text}"))
     world.runner.post(EndAsked(world.clock(), "withdrawn", text))
     lines = journal.read(world.store.folder.journal)
-    assert [line["text"] for line in lines if line["event"] == "note"] == [text]
-    assert lines[-1]["reason"] == text
+    assert [line.text for line in lines if line.event == "note"] == [text]
+    assert lines[-1].reason == text
     path = world.store.folder.table("small", "trials")
     with path.open(newline="", encoding="utf-8") as file:
         first, _ = list(csv.DictReader(file))

@@ -125,7 +125,7 @@ def test_of_two_programs_exactly_one_gets_each_id_and_both_have_the_same_key(tmp
         assert free == [won, won]
         study = StudyFolder(tmp_path / str(number))
         (line,) = journal.read(study.session("P001", 1).journal)
-        assert line["event"] == "session_started"
+        assert line.event == "session_started"
         table = study.participants("small").read_text(encoding="utf-8").splitlines()
         assert [row.split(",")[1] for row in table[1:]] == ["P001", "P002", "P003"]
         assert not list(study.path.rglob("*.tmp"))

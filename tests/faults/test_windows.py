@@ -18,7 +18,7 @@ from study_app.gui.participant.window import ParticipantWindow
 from study_app.session import start
 from study_app.session.pages import PausePage, TaskPage
 from study_app.store.folders import StudyFolder
-from study_app.store.journals import journal
+from study_app.store.journals import journal, journal_events
 from study_app.store.progress import progress_of
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
@@ -68,14 +68,14 @@ def test_the_participants_window_that_is_closed_is_a_pause(tmp_path: Path, machi
             done.append("closed")
             return True
         if done == ["closed"] and isinstance(participant.page, PausePage):
-            done.append("paused")
+            done.append(journal_events.Paused())
             operator.resume_asked.emit()
             return True
         return False
 
     code, lines = hold(tmp_path, watch)
     assert (code, done) == (0, ["closed", "paused"])
-    assert lines[-1]["status"] == "completed"
+    assert lines[-1].status == "completed"
 
 
 @pytest.mark.nightly
@@ -96,8 +96,8 @@ def test_escape_again_and_again_loses_nothing(tmp_path: Path) -> None:
 
     code, lines = hold(tmp_path, watch)
     assert code == 0
-    assert sum(len(line["items"]) for line in lines if line["event"] == "responses") == short.ANSWERS
-    assert any(line["event"] == "paused" for line in lines)
+    assert sum(len(line.items) for line in lines if line.event == "responses") == short.ANSWERS
+    assert any(line.event == "paused" for line in lines)
 
 
 def test_the_operators_window_that_is_closed_twice_leaves_the_session_unfinished(
@@ -114,7 +114,7 @@ def test_the_operators_window_that_is_closed_twice_leaves_the_session_unfinished
 
     _, lines = hold(tmp_path, watch)
     assert not any(forces)
-    assert "session_ended" not in [line["event"] for line in lines]
+    assert "session_ended" not in [line.event for line in lines]
 
 
 def test_a_request_to_terminate_in_a_trial_interrupts_it_and_can_be_resumed(
@@ -129,7 +129,7 @@ def test_a_request_to_terminate_in_a_trial_interrupts_it_and_can_be_resumed(
     code, lines = hold(tmp_path, watch)
     assert code == 128 + signal.SIGTERM
     ended, paused, _ = lines[-3:]
-    assert [line["event"] for line in lines[-3:]] == ["trial_ended", "paused", "recorded"]
+    assert [line.event for line in lines[-3:]] == ["trial_ended", "paused", "recorded"]
     assert (ended["outcome"], paused["by"]) == ("interrupted", "program")
     assert progress_of(lines).ended is None
     assert not machines[0].servo.force_is_on
@@ -156,4 +156,4 @@ def test_a_device_that_vanishes_is_a_calm_page_a_reason_and_a_broken_session(
     calm, reason = seen[0]
     assert "stopped responding" in reason
     assert "device" not in calm
-    assert lines[-1]["status"] == "broken"
+    assert lines[-1].status == "broken"

@@ -10,7 +10,7 @@ import pytest
 from study_app.outlets import markers as module
 from study_app.outlets.markers import CODES, HANGS_S, SinkThread, marker_of
 from study_app.outlets.streams import ClockMapping
-from study_app.store.journals.journal_events import EVENT_NAMES
+from study_app.store.journals.journal_events import EVENTS
 from tests.haptics.running import wait_until
 from tests.outlets.sinks import Sink, marker
 
@@ -49,7 +49,7 @@ def test_a_marker_holds_no_answer_measure_text_or_sealed_field(event: str, field
 
 
 def test_codes_are_bytes_of_events_of_the_journal_and_differ() -> None:
-    assert set(CODES) <= EVENT_NAMES
+    assert set(CODES) <= set(EVENTS)
     assert len(set(CODES.values())) == len(CODES)
     assert all(1 <= code <= 255 for code in CODES.values())
     for event, fields in (("recorded", {"trial": 1}), ("preflight", {"checks": []})):

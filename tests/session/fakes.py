@@ -14,6 +14,7 @@ from study_app.session.ports import Ports
 from study_app.session.runner import Runner
 from study_app.session.transitions.events import Begin, Chosen, Continue, Submitted
 from study_app.session.transitions.state import Phase, SessionState
+from study_app.store.journals.journal_events import Event
 from tests.session import small
 
 LEFT, RIGHT, AWAY = (-0.02, 0.0, 0.0), (0.02, 0.0, 0.0), (0.0, 0.01, 0.0)
@@ -106,12 +107,12 @@ class FakeJournal:
         self.fingerprint = ""
         self._log = log
 
-    def append(self, event: str, *, t_s: float | None = None, waits: bool = True, **fields: Any) -> None:
+    def append(self, event: Event, *, t_s: float | None = None, waits: bool = True) -> None:
         if self.fails_after is not None and len(self.lines) >= self.fails_after:
             raise StoreError("disk full")
-        self._log.append(event)
-        self.waited += [event] if waits else []
-        self.lines.append({"event": event, "t_s": t_s, **fields})
+        self._log.append(event.event)
+        self.waited += [event.event] if waits else []
+        self.lines.append({"event": event.event, "t_s": t_s, **event.fields()})
 
     def check_flushed(self) -> None:
         if self.unflushed is not None:

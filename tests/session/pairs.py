@@ -97,7 +97,9 @@ def whole(state: SessionState, right: bool = True) -> list[dict[str, Any]]:
     at_s = 0.0
     while state.phase not in FINAL:
         state, commands = advance(state, next_event(state, at_s, right))
-        lines += [{"event": one.event, "t_s": at_s, **one.fields} for one in commands if isinstance(one, Write)]
+        lines += [
+            {"event": one.line.event, "t_s": at_s, **one.line.fields()} for one in commands if isinstance(one, Write)
+        ]
         lines += [{"event": "end", "status": one.status} for one in commands if isinstance(one, Finish)]
         at_s += 100.0
     return lines

@@ -35,6 +35,7 @@ from study_app.store.progress import progress_of
 from study_app.store.tables import session_tables
 from study_app.store.verification.verify_session import wrong_responses
 from tests.faults.support.worlds import StoredWorld
+from tests.journal_lines import event_from
 from tests.protocol.forms.mixed import mixed_file
 from tests.session import small
 from tests.session.transitions.states import shown, state_in
@@ -93,10 +94,12 @@ class Walked:
         for command in commands:
             if isinstance(command, Write):
                 number = len(self.lines) + 1
-                self.lines.append({"event": command.event, "t_s": self.clock, "n": number, **command.fields})
+                self.lines.append(
+                    {"event": command.line.event, "t_s": self.clock, "n": number, **command.line.fields()}
+                )
             if isinstance(command, ShowPage):
                 self.page = command.page
-        return [command.event for command in commands if isinstance(command, Write)]
+        return [command.line.event for command in commands if isinstance(command, Write)]
 
 
 @pytest.fixture
@@ -117,22 +120,22 @@ def test_form_is_written_with_kinds_and_without_hidden_questions(walked: Walked)
         ("hand", 2, "choice", "left"),
         ("used", 4, "choice", ("mouse", "falcon")),
     ]
-    assert list(wrong_responses(walked.lines)) == []
+    assert list(wrong_responses(list(map(event_from, walked.lines)))) == []
 
 
 def test_interrupted_form_is_shown_again_from_its_beginning(walked: Walked) -> None:
     walked.do(Chosen, "age", 20)
-    start = resume_at(walked.study, walked.schedule, walked.lines)
+    start = resume_at(walked.study, walked.schedule, map(event_from, walked.lines))
     assert start.step == 0
     walked.lines.append({"event": "form_shown", "t_s": 99.0, "n": 99, "form": "start"})
-    assert progress_of(walked.lines).answers == {}
+    assert progress_of(list(map(event_from, walked.lines))).answers == {}
 
 
 def test_session_goes_on_after_an_answered_form(walked: Walked) -> None:
     walked.do(Chosen, "age", 20)
     walked.do(Chosen, "hand", "left")
     walked.do(Submitted)
-    assert resume_at(walked.study, walked.schedule, walked.lines).step == 1
+    assert resume_at(walked.study, walked.schedule, map(event_from, walked.lines)).step == 1
 
 
 FAULT = "the device 'memory' stopped responding"
@@ -160,12 +163,14 @@ def test_the_rows_of_the_trial_and_of_its_repetition_say_that_the_device_failed(
     world.runner.post(ResumeAsked(world.clock(), "operator"))
     assert world.servo.force_is_on
     world.until(Phase.ANSWERING)
-    first, again = [row for row in session_tables.trials(world.lines) if row["trial"] == number]
+    first, again = [row for row in session_tables.trials(list(map(event_from, world.lines))) if row["trial"] == number]
     assert (first["attempt"], first["outcome"], again["attempt"], again["outcome"]) == (1, "interrupted", 2, "complete")
     assert first["notes"] == f"the device failed and was connected again ({FAULT})"
     assert again["notes"] == f"presented again: the device failed and was connected again ({FAULT})"
     world.until(Phase.COMPLETE)
-    others = [row["notes"] for row in session_tables.trials(world.lines) if row["trial"] != number]
+    others = [
+        row["notes"] for row in session_tables.trials(list(map(event_from, world.lines))) if row["trial"] != number
+    ]
     assert set(others) == {None}
 
 
@@ -187,5 +192,5 @@ def test_in_a_study_with_videos_journal_and_tables_do_not_say_what_failed(what: 
 
 
 def fields_of(commands: Sequence[Command], event: str) -> Mapping[str, Any]:
-    (written,) = [one for one in commands if isinstance(one, Write) and one.event == event]
-    return written.fields
+    (written,) = [one for one in commands if isinstance(one, Write) and one.line.event == event]
+    return written.line.fields()

@@ -24,6 +24,7 @@ from study_app.store.journals import journal
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
+from tests.journal_lines import event_from, event_of
 from tests.session import small
 
 STARTED = {"event": "session_started", "t_s": 0.0}
@@ -43,7 +44,7 @@ def told(until: int) -> tuple[SessionState, list[dict[str, Any]]]:
         at_s += 1.0
         for command in commands:
             if isinstance(command, Write):
-                lines.append({"event": command.event, "t_s": at_s, **command.fields})
+                lines.append({"event": command.line.event, "t_s": at_s, **command.line.fields()})
                 if len(lines) == until:
                     return state, lines
     return state, lines
@@ -56,7 +57,7 @@ def opened_again(resume: str, lines: list[dict[str, Any]]) -> tuple[SessionState
     """Resume and begin; return the state and the commands."""
     plan = small.opened().plan
     protocol = study(resume)
-    start = resume_at(protocol, plan.schedule, lines)
+    start = resume_at(protocol, plan.schedule, map(event_from, lines))
     state = open_session(protocol, plan.schedule, plan.key, "en", start)
     return advance(state, Begin(100.0))
 
@@ -76,7 +77,7 @@ def test_no_trial_begins_before_somebody_is_ready_for_it(count: int, resume: str
     assert isinstance(commands[-1], ShowPage)
     if isinstance(state.step, Trial):
         assert commands[-1] == ShowPage(PausePage(force_off=False))
-        assert commands[0] == Write("paused", {"by": "program"})
+        assert commands[0] == Write(event_of("paused", by="program"))
         state, commands = begun(resume, lines)
         (start,) = [command for command in commands if isinstance(command, StartTrial)]
         assert (start.trial, start.attempt, state.attempt) == (state.trial.number, state.attempt, start.attempt)
@@ -142,12 +143,12 @@ def test_a_session_that_goes_on_by_block_goes_on_again_after_the_next_interrupti
         which = {"t_s": 101.0, "trial": trial, "attempt": 2}
         lines.append({"event": "trial_started", **which})
         presented[trial] = 2
-        start = resume_at(again, schedule, lines)
+        start = resume_at(again, schedule, map(event_from, lines))
         first = schedule.steps[start.step]
         assert isinstance(first, Trial)
         assert (first.block, first.index) == ("feeling", 1)
         assert {number: start.presented[number] for number in presented} == presented
-        by_trial = resume_at(protocol, schedule, lines)
+        by_trial = resume_at(protocol, schedule, map(event_from, lines))
         here = schedule.steps[by_trial.step]
         assert isinstance(here, Trial)
         assert here.number == trial
@@ -176,7 +177,7 @@ def test_a_break_within_a_block_belongs_to_it() -> None:
             lines.append({"event": "trial_ended", **which, "outcome": "complete"})
             lines += [{"event": "responses", **which, "items": []}] if step.block == "feeling" else []
     lines.append({"event": "page_shown", "t_s": 2.0, "page": "rest"})
-    start = resume_at(protocol, schedule, lines)
+    start = resume_at(protocol, schedule, map(event_from, lines))
     first = schedule.steps[start.step]
     assert isinstance(first, Trial)
     assert (first.block, first.index) == ("feeling", 1)
@@ -184,19 +185,23 @@ def test_a_break_within_a_block_belongs_to_it() -> None:
 
 def test_a_journal_of_another_order_is_refused() -> None:
     plan = small.opened().plan
-    lines = [STARTED, {"event": "trial_started", "t_s": 1.0, "trial": 3, "attempt": 1}]
+    lines = [event_from(STARTED), event_of("trial_started", t_s=1.0, trial=3, attempt=1)]
     with pytest.raises(SessionError, match="does not follow the order"):
         resume_at(study(), plan.schedule, lines)
+
+
+def began(study: str, protocol_hash: str = "0") -> Any:
+    return event_of("session_started", study=study, protocol_hash=protocol_hash)
 
 
 def test_the_protocol_is_found_by_its_hash_then_by_its_study(tmp_path: Path) -> None:
     changed = tmp_path / "mine.toml"
     changed.write_bytes(source_bytes("demo") + b"\n# changed\n")
-    exact = {"study": "demo", "protocol_hash": protocol_hash(changed.read_bytes())}
+    exact = began("demo", protocol_hash(changed.read_bytes()))
     assert find_protocol(exact, ["demo", str(changed)]) == str(changed)
-    assert find_protocol(exact | {"protocol_hash": "0"}, ["rek2024", "demo"]) == "demo"
+    assert find_protocol(began("demo"), ["rek2024", "demo"]) == "demo"
     with pytest.raises(SessionError, match="--protocol"):
-        find_protocol({"study": "gone", "protocol_hash": "0"}, ["demo"])
+        find_protocol(began("gone"), ["demo"])
 
 
 @pytest.mark.slow
@@ -207,10 +212,10 @@ def test_a_protocol_at_hand_that_cannot_be_read_is_passed_over(tmp_path: Path, m
     (own / "broken.toml").write_bytes(b"[study")
     (own / "mine.toml").write_bytes(source_bytes("demo") + b"\n# changed\n")
     monkeypatch.chdir(tmp_path)
-    assert find_protocol({"study": "demo", "protocol_hash": protocol_hash((own / "mine.toml").read_bytes())}) == "mine"
-    assert find_protocol({"study": "demo", "protocol_hash": "0"}) in ("mine", "demo")
+    assert find_protocol(began("demo", protocol_hash((own / "mine.toml").read_bytes()))) == "mine"
+    assert find_protocol(began("demo")) in ("mine", "demo")
     with pytest.raises(SessionError, match="--protocol"):
-        find_protocol({"study": "gone", "protocol_hash": "0"})
+        find_protocol(began("gone"))
 
 
 def test_a_receipt_without_screens_is_of_no_rehearsal() -> None:

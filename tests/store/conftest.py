@@ -13,9 +13,11 @@ import pytest
 from study_app.haptics.model.layout import LIMITER_NAMES, SAMPLE
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
+from study_app.store.journals import journal_events
 from study_app.store.journals.journal import SessionClock
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
+from tests.journal_lines import event_of
 
 SEVEN = ("Completely disagree", "Mostly", "Somewhat", "Neutral", "Somewhat agree", "Mostly agree", "Completely agree")
 
@@ -156,8 +158,8 @@ def choose(store: SessionStore, trial: int, items: list[dict[str, Any]]) -> None
     """Journal the choices that the answers ``items`` came from."""
     for item in items:
         told = {"trial": trial, "item": item["item"]}
-        store.append("item_shown", t_s=item["onset_s"], **told)
-        store.append("choice", t_s=item["first_s"], value=item["value"], **told)
+        store.append(journal_events.ItemShown(**told), t_s=item["onset_s"])
+        store.append(journal_events.Choice(value=item["value"], **told), t_s=item["first_s"])
 
 
 def summary_of_trial() -> dict[str, Any]:
@@ -197,8 +199,8 @@ def attend(protocol: Protocol) -> Attend:
         for trial in build_schedule(protocol, "P007", 11).trials:
             which = {"trial": trial.number, "attempt": 1}
             told = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
-            store.append("trial_started", **which, **told)
-            store.append("trial_ended", **which, outcome="complete", **summary_of_trial())
+            store.append(journal_events.TrialStarted(**which, **told))
+            store.append(event_of("trial_ended", **which, outcome="complete", **summary_of_trial()))
             store.write_tables()
             if trial.items:
                 items = [
@@ -214,7 +216,7 @@ def attend(protocol: Protocol) -> Attend:
                     for number, item in enumerate(trial.items, start=1)
                 ]
                 choose(store, trial.number, items)
-                store.append("responses", **which, items=items)
+                store.append(event_of("responses", **which, items=items))
                 store.write_tables()
 
     return attended

@@ -11,17 +11,22 @@ from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import PageStep, build_schedule
 from study_app.protocol.streams import stream
+from study_app.session.start import resumed
 from study_app.store.blinded.blinding import open_or_draw_key, read_key, whole_protocol
-from study_app.store.progress import Given, Progress, progress, progress_of
+from study_app.store.journals import journal_events
+from study_app.store.journals.journal import read
+from study_app.store.journals.journal_events import Event
+from study_app.store.progress import Progress, progress_of
 from study_app.store.receipt import without_conditions
+from tests.journal_lines import event_from
 from tests.protocol.trials.level_studies import text_of
 from tests.store.conftest import Attend, Start
 
 
-def lines_of(*events: dict[str, Any]) -> list[dict[str, Any]]:
-    start = {"event": "session_started", "participant": "P007", "seed": 11}
+def lines_of(*events: dict[str, Any]) -> list[Event]:
+    start = {"event": "session_started", "participant": "P007", "seed": 11, "language": ""}
     numbered = enumerate((start, *events), start=1)
-    return [{"n": number, "t_s": number / 2, **event} for number, event in numbered]
+    return [event_from({"n": number, "t_s": number / 2, **event}) for number, event in numbered]
 
 
 def shown(page: str) -> dict[str, Any]:
@@ -97,8 +102,8 @@ def test_choices_of_the_attempt_are_told_as_they_would_be_answered() -> None:
         chosen("wet", None, 7.0),
     )
     told = progress_of(lines)
-    assert told.answers["wet"] == Given(onset_s=3.0, first_s=3.5, last_s=7.0, changes=2, value=None)
-    assert told.answers["calm"] == Given(onset_s=4.0)
+    assert told.answers["wet"] == journal_events.Answer(onset_s=3.0, first_s=3.5, last_s=7.0, changes=2, value=None)
+    assert told.answers["calm"] == journal_events.Answer(onset_s=4.0)
 
 
 def test_choices_that_no_confirmation_followed_are_kept_by_attempt() -> None:
@@ -107,10 +112,10 @@ def test_choices_that_no_confirmation_followed_are_kept_by_attempt() -> None:
     lines = lines_of(started(1), ended(1), chosen("wet", 5, 5.0), *second)
     assert progress_of(lines_of(started(1), ended(1), chosen("wet", 5, 5.0), started(1, 2))).answers == {}
     assert unconfirmed(lines) == {(1, 1): {"wet": 5}, (1, 2): {"calm": None}}
-    assert unconfirmed(lines_of(*lines[1:], ANSWERED | {"attempt": 2})) == {(1, 1): {"wet": 5}}
+    assert unconfirmed([*lines, event_from(ANSWERED | {"attempt": 2})]) == {(1, 1): {"wet": 5}}
 
 
-def unconfirmed(lines: list[dict[str, Any]]) -> dict[tuple[int, int], dict[str, Any]]:
+def unconfirmed(lines: list[Event]) -> dict[tuple[int, int], dict[str, Any]]:
     found = progress_of(lines).unconfirmed
     return {which: {item: given.value for item, given in chosen.items()} for which, chosen in found.items()}
 
@@ -120,8 +125,8 @@ def test_wherever_a_session_stops_it_stands_where_its_schedule_was(
 ) -> None:
     """Cut after every line of a whole session: steps are left one by one, in the schedule's order."""
     store = start()
-    store.append("page_shown", page="consent")
-    store.append("page_left", page="consent")
+    store.append(journal_events.PageShown(page="consent"))
+    store.append(journal_events.PageLeft(page="consent"))
     attend(store)
     steps = build_schedule(protocol, "P007", 11).steps
     stands = [progress_of(store.lines[:count]) for count in range(1, len(store.lines) + 1)]
@@ -172,11 +177,12 @@ def test_the_protocol_is_whole_again_with_its_key_whoever_has_which_steps(tmp_pa
 
 def test_of_a_folder_a_torn_line_does_not_count_and_what_is_no_session_is_named(tmp_path: Path, start: Start) -> None:
     with start() as store:
-        store.append("page_shown", page="consent")
+        store.append(journal_events.PageShown(page="consent"))
     with store.folder.journal.open("ab") as file:
         file.write(b'{"n":3,"event":"page_left"')
-    assert (progress(store.folder.path).step, progress(store.folder.path).page) == (0, "consent")
+    told = progress_of(read(store.folder.journal))
+    assert (told.step, told.page) == (0, "consent")
     with pytest.raises(StoreError, match="is not a session folder: name one such as"):
-        progress(tmp_path)
+        resumed(tmp_path)
     with pytest.raises(StoreError, match="does not begin with session_started"):
         progress_of([])

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from study_app.store import recordings
-from study_app.store.recorder import Lost, Recorded, Recorder
+from study_app.store.journals.journal_events import Recorded, RecordingLost
+from study_app.store.recorder import Recorder, lost
 from study_app.store.recordings import SamplesFile, read_facts, read_frames, read_samples
 from tests.store.conftest import FullDisk, Make
 
@@ -64,14 +65,20 @@ def test_a_trial_is_on_the_disk_under_its_name_after_its_end(
     recorder.close()
     (kept,) = recorder.kept()
     assert isinstance(kept, Recorded)
-    assert (kept.trial, kept.attempt, kept.dropped, kept.samples.rows, kept.frames.rows) == (3, 1, 0, 70_001, 2)
+    assert (kept.trial, kept.attempt, kept.samples_unrecorded, kept.samples_recorded, kept.frames_recorded) == (
+        3,
+        1,
+        0,
+        70_001,
+        2,
+    )
     assert sorted(path.name for path in (tmp_path / "recordings").iterdir()) == [
         "trial-003.parquet",
         "trial-003_frames.parquet",
     ]
-    assert np.array_equal(read_samples(kept.samples.path)["position_m"], samples["position_m"])
-    assert read_frames(kept.frames.path)["age_ns"].tolist() == [1_000, 1_500]
-    assert read_facts(kept.samples.path).items() >= {**FACTS, "trial": 3, "attempt": 1, "dropped": 0}.items()
+    assert np.array_equal(read_samples(tmp_path / kept.recording)["position_m"], samples["position_m"])
+    assert read_frames(tmp_path / kept.recording_frames)["age_ns"].tolist() == [1_000, 1_500]
+    assert read_facts(tmp_path / kept.recording).items() >= {**FACTS, "trial": 3, "attempt": 1, "dropped": 0}.items()
     assert recorder.kept() == ()
 
 
@@ -85,7 +92,7 @@ def test_the_same_samples_give_the_same_file_however_they_came(tmp_path: Path, s
         recorder.close()
         (kept,) = recorder.kept()
         assert isinstance(kept, Recorded)
-        sums.add((kept.samples.sha256, kept.frames.sha256))
+        sums.add((kept.sha256, kept.frames_sha256))
     assert len(sums) == 1
 
 
@@ -95,7 +102,7 @@ def test_beginning_the_next_trial_ends_the_one_before(recorder: Recorder, sample
     recorder.start(2, 1, 1000.0)
     recorder.append(samples_of(20))
     recorder.close()
-    assert [kept.samples.rows for kept in recorder.kept() if isinstance(kept, Recorded)] == [10, 20]
+    assert [kept.samples_recorded for kept in recorder.kept() if isinstance(kept, Recorded)] == [10, 20]
     record(recorder, samples_of(10))  # after its end
     recorder.close()
     assert recorder.kept() == ()
@@ -117,9 +124,9 @@ def test_a_disk_that_stands_still_holds_nobody_up_and_drops_are_counted(
     recorder.close()
     (kept,) = recorder.kept()
     assert isinstance(kept, Recorded)
-    assert (kept.dropped, kept.samples.rows) == (30_000, 70_000)
-    assert read_samples(kept.samples.path)["tick"].tolist() == list(range(70_000))
-    assert read_facts(kept.samples.path)["dropped"] == 30_000
+    assert (kept.samples_unrecorded, kept.samples_recorded) == (30_000, 70_000)
+    assert read_samples(tmp_path / kept.recording)["tick"].tolist() == list(range(70_000))
+    assert read_facts(tmp_path / kept.recording)["dropped"] == 30_000
 
 
 def test_in_a_rehearsal_handing_over_waits_for_room_instead(tmp_path: Path, samples_of: Make) -> None:
@@ -128,7 +135,7 @@ def test_in_a_rehearsal_handing_over_waits_for_room_instead(tmp_path: Path, samp
     recorder.close()
     (kept,) = recorder.kept()
     assert isinstance(kept, Recorded)
-    assert (kept.dropped, kept.samples.rows) == (0, 90_000)
+    assert (kept.samples_unrecorded, kept.samples_recorded) == (0, 90_000)
 
 
 @pytest.mark.parametrize("size", [200, 500_000], ids=["from the first byte", "after a while"])
@@ -140,7 +147,7 @@ def test_a_full_disk_loses_a_recording_with_its_reason_and_the_next_is_kept(
         record(recorder, samples_of(70_000), trial=1)
         with recorder.changed:
             assert recorder.changed.wait_for(lambda: recorder.lost, 20)
-    assert recorder.kept() == (Lost(1, 1, "File too large"),)
+    assert recorder.kept() == (lost((1, 1, None), "File too large"),)
     record(recorder, samples_of(200), trial=2)
     recorder.close()
     (kept,) = recorder.kept()
@@ -170,7 +177,7 @@ def test_the_end_of_a_session_does_not_wait_for_ever(tmp_path: Path, samples_of:
     record(recorder, samples_of(40_000), chunk=5_000)
     assert disk.asked.wait(20)
     recorder.close(patience_s=0.0)
-    assert recorder.kept() == (Lost(3, 1, "the disk was too slow"),)
+    assert recorder.kept() == (lost((3, 1, None), "the disk was too slow"),)
     disk.works.set()
     recorder.close()
     assert recorder.kept() == ()
@@ -190,7 +197,7 @@ def test_a_disk_that_never_comes_back_is_given_up_without_waiting(
     monkeypatch.setattr("study_app.store.recorder.time.monotonic", lambda: later)
     assert recorder.settled()
     recorder.close()
-    assert recorder.kept() == (Lost(3, 1, "the disk was too slow"),)
+    assert recorder.kept() == (lost((3, 1, None), "the disk was too slow"),)
     disk.works.set()
     assert recorder.thread is not None
     recorder.thread.join(20)
@@ -216,15 +223,15 @@ def test_a_thread_that_ends_loses_its_trial_at_once_and_the_next_trial_starts_an
         with recorder.changed:
             assert recorder.changed.wait_for(lambda: recorder.lost, 10.0)
         threads[0].join(10.0)
-        assert recorder.lost == (Lost(1, 1, "its thread ended: Ended: pulled"),)
+        assert recorder.lost == (lost((1, 1, None), "its thread ended: Ended: pulled"),)
         recorder.append(samples_of(10))
         recorder.stop()
     record(recorder, samples_of(20), trial=2)
     recorder.close()
-    lost, kept = recorder.kept()
-    assert lost == Lost(1, 1, "its thread ended: Ended: pulled")
+    missing, kept = recorder.kept()
+    assert missing == lost((1, 1, None), "its thread ended: Ended: pulled")
     assert isinstance(kept, Recorded)
-    assert (kept.trial, kept.samples.rows) == (2, 20)
+    assert (kept.trial, kept.samples_recorded) == (2, 20)
 
 
 def test_a_thread_that_cannot_be_started_loses_recordings_and_not_the_session(
@@ -236,8 +243,8 @@ def test_a_thread_that_cannot_be_started_loses_recordings_and_not_the_session(
     with monkeypatch.context() as patched:
         patched.setattr(threading.Thread, "start", refuses)
         record(recorder, samples_of(10), trial=1)
-    assert [lost.trial for lost in recorder.lost] == [1]
+    assert [one.trial for one in recorder.lost] == [1]
     assert "can't start new thread" in recorder.lost[0].reason
     record(recorder, samples_of(20), trial=2)
     recorder.close()
-    assert [type(kept) for kept in recorder.kept()] == [Lost, Recorded]
+    assert [type(kept) for kept in recorder.kept()] == [RecordingLost, Recorded]

@@ -128,9 +128,9 @@ def test_it_is_resumed_with_a_chain_that_covers_the_lines_before(study: Path) ->
     rehearsal.resume(folder.path, protocol=HELD / "rek2024.toml")
     assert folder.journal.read_bytes().startswith(before)
     lines = journal.read(folder.journal)
-    assert lines[-1]["status"] == "completed"
-    resumed = next(line["n"] for line in lines if line["event"] == "session_resumed")
-    assert [line["n"] for line in lines if "previous" in line] == list(range(resumed, len(lines) + 1))
+    assert lines[-1].status == "completed"
+    resumed = next(line.n for line in lines if line.event == "session_resumed")
+    assert [line.n for line in lines if "previous" in line] == list(range(resumed, len(lines) + 1))
     assert len(StudyFolder(study).fingerprints.read_text().splitlines()) == 1
     assert "data: 1 journal is of format 1" in warned(study)
     content = folder.journal.read_bytes()

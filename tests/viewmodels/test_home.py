@@ -14,6 +14,7 @@ from study_app.protocol.load import load, source_bytes
 from study_app.protocol.orders.schedule import PageStep, build_schedule
 from study_app.session.resume import REHEARSED_SCREENS
 from study_app.store.exclusions import exclude
+from study_app.store.journals import journal_events
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.viewmodels.home import (
@@ -29,6 +30,7 @@ from study_app.viewmodels.home import (
 from study_app.viewmodels.session.columns import incidents, matching, states_of, status_chip, validity_chip
 from study_app.viewmodels.session.record import read_record
 from study_app.viewmodels.sessions import sessions, started_words
+from tests.journal_lines import event_of
 from tests.protocol.groups.grouped import GROUPS, STUDY
 
 pytestmark = pytest.mark.slow
@@ -57,15 +59,15 @@ def stop_at(results, participant, steps, *, screens=None, source="demo", then=()
     protocol, store = begun(results, participant, source, screens=screens or {"participant": {}})
     for step in build_schedule(protocol, participant, 1).steps[:steps]:
         if isinstance(step, PageStep):
-            store.append("page_shown", page=step.page_id)
-            store.append("page_left", page=step.page_id)
+            store.append(journal_events.PageShown(page=step.page_id))
+            store.append(journal_events.PageLeft(page=step.page_id))
             continue
         told = {name: getattr(step, name) for name in ("block", "phase", "part", "index", "of", "code")}
-        store.append("trial_started", trial=step.number, attempt=1, **told)
-        store.append("trial_ended", trial=step.number, attempt=1, outcome="complete")
+        store.append(journal_events.TrialStarted(trial=step.number, attempt=1, **told))
+        store.append(event_of("trial_ended", trial=step.number, attempt=1, outcome="complete"))
         answer = {"value": 4, "onset_s": 1, "first_s": 1, "last_s": 1, "changes": 0}
         rows = [{"item": item, "number": number, **answer} for number, item in enumerate(step.items, 1)]
-        store.append("responses", trial=step.number, attempt=1, items=rows)
+        store.append(event_of("responses", trial=step.number, attempt=1, items=rows))
     for event, said in then:
         store.append(event, **said)
     store.close()

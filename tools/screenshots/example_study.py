@@ -7,6 +7,7 @@ from typing import Final
 from study_app.protocol.load import load, source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded import blinding
+from study_app.store.journals.journal_events import PageShown
 from study_app.store.sessions.begin import SessionStart, begin
 
 STUDY: Final = "rek2024"
@@ -35,7 +36,7 @@ def rehearsed(folder: Path) -> Path:
             pilot=True,
         ),
     ) as store:
-        store.append("page_shown", page="consent")
+        store.append(PageShown(page="consent"))
         store.close()
     return results
 

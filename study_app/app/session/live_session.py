@@ -35,6 +35,7 @@ from study_app.gui.widgets.dialogs import Notice
 from study_app.protocol.load import parse
 from study_app.session.preflight import Check, checks, refused
 from study_app.session.start import NewSession, Ready, check, measured, open_outlets, open_store, videos_of
+from study_app.store.journals import journal_events
 
 if TYPE_CHECKING:
     from study_app.app.session.bridge import SessionBridge
@@ -243,7 +244,7 @@ class LiveSession(QObject):
             with suppress(StoreError):  # only the designer's comparisons would miss it
                 keep_content(source)
         self._crash_trace = CrashTrace(store.folder.crash)
-        store.append("preflight", checks=[one.entry for one in found])
+        store.append(journal_events.Preflight(checks=[one.entry for one in found]))
         plan = session_windows.planned(chosen, protocol, store)
         self.bridge = session_windows.connect_windows(
             chosen, plan, store, rig, operator, participant, refresh_hz=rate_hz, videos=made.videos

@@ -82,7 +82,7 @@ class NotesCard(Card):
             shown = index < min(len(view.notes), self._shown)
             row.setVisible(shown)
             if shown:
-                row.show_note(view.notes[index].kind, minutes(view.notes[index].at_s), view.notes[index].text)
+                row.show_note(view.notes[index].kind, minutes(view.notes[index].t_s), view.notes[index].text)
         for button in (self.add, self.mark):
             button.setEnabled(not view.over)
         self.field.setEnabled(not view.over)

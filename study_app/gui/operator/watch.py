@@ -1,9 +1,10 @@
 """A journal that reports its lines to the operator's window: what was written counts as progress, nothing else."""
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import replace
 
 from study_app.session.ports import JournalPort
+from study_app.store.journals.journal_events import Event, SessionEnded
 from study_app.store.progress import Progress
 
 
@@ -15,10 +16,10 @@ class WatchedJournal:
         self._store = store
         self._clock = clock
 
-    def append(self, event: str, *, t_s: float | None = None, waits: bool = True, **fields: Any) -> None:
+    def append(self, event: Event, *, t_s: float | None = None, waits: bool = True) -> None:
         """Put an event into the journal (StoreError: nothing has changed)."""
-        self._store.append(event, t_s=t_s, waits=waits, **fields)
-        self.progress.take({"event": event, "t_s": self._clock() if t_s is None else t_s, **fields})
+        self._store.append(event, t_s=t_s, waits=waits)
+        self.progress.take(replace(event, t_s=self._clock() if t_s is None else t_s))
 
     @property
     def fingerprint(self) -> str:
@@ -38,5 +39,5 @@ class WatchedJournal:
         try:
             self._store.finish(status, reason)
         finally:
-            facts = {"status": status, "reason": reason, "fingerprint": self._store.fingerprint}
-            self.progress.take({"event": "session_ended", "t_s": self._clock(), **facts})
+            proof = {"fingerprint": self._store.fingerprint}
+            self.progress.take(SessionEnded(status=status, reason=reason, t_s=self._clock(), others=proof))

@@ -21,7 +21,7 @@ williams latin  a row of a square, assigned by the number in the participant's i
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from study_app.protocol.blocks import Phase
@@ -201,30 +201,6 @@ class RecordedTrial:
     code: str
     items: tuple[str, ...] | None = None
     may_hide: bool = False
-
-
-def recorded_trials(lines: Iterable[Mapping[str, Any]]) -> tuple[RecordedTrial | int, ...]:
-    """Return what the lines of a journal say was presented: every attempt, in the order of time.
-
-    A trial that was passed over is its number alone. KeyError says that a line lacks what lines of its event hold, or
-    answers a trial that never started.
-    """
-    attempts: list[RecordedTrial | int] = []
-    place: dict[tuple[int, int], int] = {}
-    for line in lines:
-        if line["event"] == "trial_started":
-            place[line["trial"], line["attempt"]] = len(attempts)
-            attempts.append(RecordedTrial(line["trial"], *(line[name] for name in _TOLD)))
-        elif line["event"] == "responses":
-            rows = sorted(line["items"], key=lambda row: int(row["number"]))
-            index = place[line["trial"], line["attempt"]]
-            attempt = attempts[index]
-            assert isinstance(attempt, RecordedTrial)  # noqa: S101 - only these have a place
-            items, may_hide = tuple(row["item"] for row in rows), any("kind" in row for row in rows)
-            attempts[index] = replace(attempt, items=items, may_hide=may_hide)
-        elif line["event"] == "passed_over" and "trial" in line:
-            attempts.append(line["trial"])
-    return tuple(attempts)
 
 
 def reproduce(

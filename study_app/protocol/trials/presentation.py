@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -236,24 +236,3 @@ def heard_of(
     correct = design.is_correct(arrangement, answer) if has_correct_answer(design, stimulus) else None
     success, noise = design.success(arrangement, answer), not any(design.arrangements[arrangement])
     return Heard(trial, code, level or 0.0, success, correct, catch, noise)
-
-
-def heard_in(protocol: Protocol, lines: Iterable[Mapping[str, Any]]) -> tuple[Heard, ...]:
-    """Return the answered trials, each at the level that was presented, by number; the last answer counts.
-
-    Lines that do not fit the study, or whose sealed fields are not opened, raise KeyError or ValueError.
-    """
-    started: dict[tuple[int, int], Mapping[str, Any]] = {}
-    found: dict[int, Heard] = {}
-    for line in lines:
-        if line["event"] == "trial_started":
-            started[line["trial"], line["attempt"]] = line
-        elif line["event"] == "responses":
-            start = started[line["trial"], line["attempt"]]
-            block = protocol.blocks[start["block"]]
-            if block.design is None:
-                continue
-            arrangement = arrangement_of(design_of(protocol, block), start["arrangement"])
-            of_trial = line["trial"], start["code"], start["level"], arrangement, line["items"][0]["value"]
-            found[line["trial"]] = heard_of(protocol, block, *of_trial, catch=start.get("catch", False))
-    return tuple(found[number] for number in sorted(found))

@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from study_app.errors import SessionError
 from study_app.protocol.blocks import Block
@@ -51,6 +51,8 @@ from study_app.session.transitions.state import FINAL, SessionState
 from study_app.session.transitions.table import advance, open_session
 from study_app.store.folders import rehearsal_folder
 from study_app.store.journals.journal import SessionClock
+from study_app.store.journals.journal_events import Event as Line
+from study_app.store.journals.journal_events import FormShown, Note, PageShown, TrialStarted
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.simulated_sessions import SimulatedStudy
 from study_app.workspace import workspace
@@ -58,7 +60,7 @@ from study_app.workspace import workspace
 DEVICE = {"name": "answers-only", "measured": False}
 SAY_EVERY_S = 5.0
 REACH_S = 1.0  # from target to target, without a hand
-BEGINS: Final = frozenset({"page_shown", "form_shown", "trial_started"})
+BEGINS: Final = (PageShown, FormShown, TrialStarted)
 """The lines that begin a step."""
 
 
@@ -127,7 +129,7 @@ def _answer(study: Protocol, who: str, seed: int, kept: SimulatedStudy, felt: Co
 class Kept(typing.Protocol):
     """Where the events of a session go."""
 
-    def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None: ...  # noqa: D102
+    def append(self, event: Line, *, t_s: float | None = None) -> None: ...  # noqa: D102
     def finish(self, status: str, reason: str = "") -> None: ...  # noqa: D102
 
 
@@ -235,14 +237,14 @@ class Answering(SimulatedParticipant):
 
     def _carry_out(self, command: Command, at_s: float) -> None:
         match command:
-            case Write(event, fields):
-                self._store.append(event, t_s=at_s, **fields)
+            case Write(line):
+                self._store.append(line, t_s=at_s)
             case StartTrial(trial=trial, presented=presented):
                 self._sense(trial, presented)
-            case Adjust(presented=presented, fields=fields):
-                self._sensed_in[fields["trial"]].pop()
-                self._sense(fields["trial"], presented)
-                self._store.append("stepped", t_s=at_s, **fields, scene=None)
+            case Adjust(presented=presented, line=line):
+                self._sensed_in[line.trial].pop()
+                self._sense(line.trial, presented)
+                self._store.append(line, t_s=at_s)
             case ShowPage(page):
                 self.page = page
             case Finish(status, reason):
@@ -302,9 +304,9 @@ def begin_at(results: Path, study: Protocol, source: bytes, start: SessionStart,
             raise SessionError(f"{results} holds sessions with another seed: use a new folder")
         if step:
             text = f"Steps 1 to {step} were answered by a simulated participant, without force."
-            store.append("note", t_s=0.0, waits=False, kind="note", text=text)
-        for event, at_s, fields in lines.kept:
-            store.append(event, t_s=at_s, waits=False, **fields)
+            store.append(Note(kind="note", text=text), t_s=0.0, waits=False)
+        for event, at_s in lines.kept:
+            store.append(event, t_s=at_s, waits=False)
         return store.folder.path
 
 
@@ -312,18 +314,18 @@ def begin_at(results: Path, study: Protocol, source: bytes, start: SessionStart,
 class _Lines:
     """The lines of the steps before one; what begins that one is left to whoever resumes."""
 
-    kept: list[tuple[str, float, dict[str, Any]]] = field(default_factory=list)
+    kept: list[tuple[Line, float]] = field(default_factory=list)
     reason: str = ""
     session: Answering | None = None
     until: int = 0
     _begun: bool = False
 
-    def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None:
+    def append(self, event: Line, *, t_s: float | None = None) -> None:
         """Keep a line unless the step has begun."""
         assert self.session is not None  # noqa: S101 - set before the session runs
-        self._begun = self._begun or (event in BEGINS and self.session.state.index >= self.until)
+        self._begun = self._begun or (isinstance(event, BEGINS) and self.session.state.index >= self.until)
         if not self._begun:
-            self.kept.append((event, t_s or 0.0, fields))
+            self.kept.append((event, t_s or 0.0))
 
     def finish(self, _status: str, reason: str = "") -> None:
         """Keep why the session ended before the step."""

@@ -55,7 +55,8 @@ from study_app.store.blinded.blinding import Key
 from study_app.store.folders import StudyFolder, locate, rehearsal_folder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import SessionClock
-from study_app.store.progress import progress_of
+from study_app.store.journals.journal_events import Event as Line
+from study_app.store.journals.journal_events import start_of
 from study_app.store.sessions.begin import SessionStart, begin, check_unused
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import reopen
@@ -84,7 +85,7 @@ class DiscardingStore:
         self.clock = SessionClock(now_ns)
         self.key = Key(hash="", drawn="seed", codes=codes, tables={}, tables_hash="", nonce=secret)
 
-    def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None:
+    def append(self, event: Line, *, t_s: float | None = None, waits: bool = True) -> None:
         """Keep nothing."""
 
     def check_flushed(self) -> None:
@@ -411,13 +412,13 @@ def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
         No protocol at hand is the session's, or the session broke; what was kept before is safe.
     """
     lines = journal.read(locate(session_folder)[1].journal)
-    begun = progress_of(lines).start
+    begun = start_of(lines)
     read = partial(source_to_resume, session_folder)
     name = find_protocol(begun, read=read) if protocol is None else str(protocol)
     source = read(name)
     study = parse(source, name)
-    person, seed = begun["participant"], begun["seed"]
-    with rehearsal_rig(study, person, seed, begun["device"]) as rig:
+    person, seed = begun.participant, begun.seed
+    with rehearsal_rig(study, person, seed, begun.device or "") as rig:
         store = reopen(
             session_folder,
             study,
@@ -426,9 +427,9 @@ def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
             device=rig.described,
             screens=REHEARSED_SCREENS,
             now_ns=rig.servo.now_ns,
-            now=max(datetime.now().astimezone(), datetime.fromisoformat(lines[-1]["at"])),
+            now=max(datetime.now().astimezone(), datetime.fromisoformat(lines[-1].at)),
         )
-        own = session_protocol(locate(session_folder)[0], store.as_recorded(study), person, begun["session"])
+        own = session_protocol(locate(session_folder)[0], store.as_recorded(study), person, begun.session)
         schedule = build_schedule(own, person, seed)
         _run(own, schedule, rig, store, resume_at(own, schedule, lines, store.key), OBSERVER)
 

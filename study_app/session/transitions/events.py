@@ -5,7 +5,6 @@ order given: safety of the hand first (``StopForce``, ``StopTrial``, ``Rest``), 
 ``WriteTables``), then what the participant feels and sees (``FadeIn``, ``StartTrial``, ``ShowPage``).
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
@@ -14,6 +13,8 @@ from study_app.protocol.questions import Value
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tasks import AnyTask
 from study_app.session.pages import Page
+from study_app.store.journals.journal_events import Event as Line
+from study_app.store.journals.journal_events import Stepped as SteppedLine
 
 Status: TypeAlias = Literal["completed", "withdrawn", "aborted", "broken"]
 
@@ -54,7 +55,7 @@ class Adjust:
 
     presented: Stimulated = field(repr=False)
     delay_s: float = field(repr=False)
-    fields: Mapping[str, Any]
+    line: SteppedLine
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,11 +88,10 @@ class Write:
     """Put one line into the journal; with ``waits``, as for answers and notes, on the disk before the next command.
 
     Other lines are flushed in the background, so that nothing drawn waits for the disk. With ``measured`` the runner
-    adds what it measured of the trial that was stopped (``fields`` win).
+    adds what it measured of the trial that was stopped.
     """
 
-    event: str
-    fields: Mapping[str, Any]
+    line: Line
     measured: bool = False
     waits: bool = False
 

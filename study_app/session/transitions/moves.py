@@ -55,6 +55,7 @@ from study_app.session.transitions.steps import (
     which,
 )
 from study_app.store.delivered import delay_error_ms, missed
+from study_app.store.journals import journal_events as journal
 from study_app.store.journals.journal_events import CAUSE_WITHHELD
 
 STOPPABLE = {Phase.READING, Phase.TASK, Phase.RESTING, Phase.ANSWERING, Phase.FEEDBACK, Phase.PAUSED}
@@ -67,7 +68,7 @@ def begin(state: SessionState, event: Begin) -> Result:
     if start == FIRST or reached.phase is Phase.ENDED or not isinstance(reached.step, Trial):
         return enter_reached(reached, done)
     waiting = replace(reached, phase=Phase.PAUSED, interrupted=Phase.TASK, attempt=reached.attempt - 1)
-    return waiting, (*done, Write("paused", {"by": "program"}), WriteTables(), show(waiting))
+    return waiting, (*done, Write(journal.Paused(by="program")), WriteTables(), show(waiting))
 
 
 def read_on(state: SessionState, event: Continue) -> Result:
@@ -75,11 +76,11 @@ def read_on(state: SessionState, event: Continue) -> Result:
     if state.stays_until_s is not None and event.at_s < state.stays_until_s:
         return state, ()
     text = state.plan.protocol.pages[state.page_id]
-    left = Write("page_left", {"page": state.page_id})
-    if text.kind == "consent":
-        agreed = {"text_sha256": consent_hash(state, text), "study_version": state.plan.protocol.study.version}
-        left = Write("page_left", {"page": state.page_id, **agreed}, waits=True)
-    return enter(state, state.index + 1, (left,), at_s=event.at_s)
+    left = journal.PageLeft(page=state.page_id)
+    if agreed := text.kind == "consent":
+        version = state.plan.protocol.study.version
+        left = replace(left, text_sha256=consent_hash(state, text), study_version=version)
+    return enter(state, state.index + 1, (Write(left, waits=agreed),), at_s=event.at_s)
 
 
 def choose_language(state: SessionState, event: LanguageChosen) -> Result:
@@ -90,7 +91,7 @@ def choose_language(state: SessionState, event: LanguageChosen) -> Result:
         offered = f"choose {' or '.join(state.languages)}" if state.languages else "it is chosen before the consent"
         raise SessionError(f"language {event.language!r} cannot be chosen now: {offered}")
     chosen = replace(state, plan=replace(state.plan, language=event.language))
-    return chosen, (Write("language_chosen", {"language": event.language}), WriteTables(), show(chosen))
+    return chosen, (Write(journal.LanguageChosen(language=event.language)), WriteTables(), show(chosen))
 
 
 def leave_task(state: SessionState, _event: Continue) -> Result:
@@ -107,7 +108,7 @@ def step(state: SessionState, event: Stepped) -> Result:
     presented = replace(due.intervals[state.interval - 1], value=setting.comparison(place))
     delay_s = delay_s_of(state.plan.protocol, presented)
     moved = replace(state, steps=state.steps + event.steps, place=place)
-    return moved, (Adjust(presented, delay_s, {**which(state), "steps": event.steps}),)
+    return moved, (Adjust(presented, delay_s, journal.Stepped(**which(state), steps=event.steps, scene=None)),)
 
 
 def confirm_setting(state: SessionState, _event: Submitted) -> Result:
@@ -121,24 +122,26 @@ def end_task(state: SessionState, event: TaskDone) -> Result:
     A trial that was not delivered as requested is not asked about, but presented again.
     """
     done: Commands = (StopTrial(), Rest())
-    measured = {"outcome": event.outcome, **event.summary}
+    measures = dict(event.summary)
     if (due := state.due) is not None and (design := state.design) is not None:
         error_ms = delay_error_ms(due.intervals[state.interval - 1], event.summary)
         state = replace(state, errors_ms=(*state.errors_ms, error_ms))
         holds, protocol = design.arrangements[due.arrangement], state.plan.protocol
         reasons = (*event.invalid, *missed(protocol.limits, due, holds, state.errors_ms, protocol.device.rate_hz))
-        invalid = {"invalid": reasons} if reasons else {}
         if (setting := state.adjusting) is not None:
-            measured["setting"] = setting.level(state.place)
-        done = (*done, Write("interval_ended", {**which(state), "interval": state.interval, **measured, **invalid}))
+            measures["setting"] = setting.level(state.place)
+        ended = journal.IntervalEnded(
+            **which(state), interval=state.interval, outcome=event.outcome, invalid=reasons or None, others=measures
+        )
+        done = (*done, Write(ended))
         if reasons:
             return present_again(state, done, event.at_s)
-        measured = {"outcome": event.outcome}  # the numbers are those of the intervals
-        if design.adjusts and state.interval == design.intervals:
-            return keep_setting(state, (*done, Write("trial_ended", {**which(state), **measured})), event.at_s)
+        measures = {}  # they are those of the intervals
         if state.interval < design.intervals:
             return rest(replace(state, interval=state.interval + 1), done, event.at_s + FADE_OUT_S + design.pause_s)
-    done = (*done, Write("trial_ended", {**which(state), **measured}))
+    done = (*done, Write(journal.TrialEnded(**which(state), outcome=event.outcome, others=measures)))
+    if state.adjusts:
+        return keep_setting(state, done, event.at_s)
     if not state.asks:
         return enter(state, state.index + 1, done, at_s=event.at_s)
     asking = replace(state, phase=Phase.ANSWERING, answers={})
@@ -159,7 +162,7 @@ def pause(state: SessionState, event: PauseAsked) -> Result:
     """Show the pause; a task under way is over as an attempt."""
     held: Hold | None = "pause" if event.by == "operator" else None
     paused = replace(state, phase=Phase.PAUSED, interrupted=state.phase, held=held)
-    return paused, (*break_off(state), Write("paused", {"by": event.by}), WriteTables(), show(paused))
+    return paused, (*break_off(state), Write(journal.Paused(by=event.by)), WriteTables(), show(paused))
 
 
 def pause_again(state: SessionState, event: PauseAsked) -> Result:
@@ -167,7 +170,7 @@ def pause_again(state: SessionState, event: PauseAsked) -> Result:
     if event.by != "operator" or state.held is not None:
         return state, ()
     paused = replace(state, held="pause")
-    return paused, (Write("paused", {"by": event.by}), WriteTables(), show(paused))
+    return paused, (Write(journal.Paused(by=event.by)), WriteTables(), show(paused))
 
 
 def resume(state: SessionState, event: ResumeAsked) -> Result:
@@ -175,9 +178,9 @@ def resume(state: SessionState, event: ResumeAsked) -> Result:
     if state.held is not None and event.by != "operator":
         what = "switched the force off" if state.held == "force" else "paused the session"
         raise SessionError(f"the operator {what}: the operator resumes it, not the {event.by}")
-    back: Commands = (Write("resumed", {"by": event.by}),)
+    back: Commands = (Write(journal.Resumed(by=event.by)),)
     if state.force_off:
-        back = (*back, Write("force_restored", {"by": event.by}), FadeIn())
+        back = (*back, Write(journal.ForceRestored(by=event.by)), FadeIn())
     state = replace(state, phase=state.interrupted or Phase.READING, interrupted=None, force_off=False, held=None)
     if state.phase in {Phase.TASK, Phase.RESTING}:
         return start_trial(replace(state, attempt=state.attempt + 1), back, event.at_s)
@@ -188,19 +191,19 @@ def resume(state: SessionState, event: ResumeAsked) -> Result:
 
 def stop_force(state: SessionState, event: ForceStopped) -> Result:
     """Switch the force off and pause."""
-    stopped = Write("force_stopped", {"by": event.by})
+    stopped = Write(journal.ForceStopped(by=event.by))
     held: Hold | None = "force" if event.by == "operator" else state.held
     if state.phase is Phase.PAUSED:
         paused = replace(state, force_off=True, held=held)
         return paused, (StopForce(), stopped, show(paused))
     paused = replace(state, phase=Phase.PAUSED, interrupted=state.phase, force_off=True, held=held)
-    pausing = (Write("paused", {"by": event.by}), WriteTables(), show(paused))
+    pausing = (Write(journal.Paused(by=event.by)), WriteTables(), show(paused))
     return paused, (StopForce(), *break_off(state), stopped, *pausing)
 
 
 def stop_force_again(state: SessionState, event: ForceStopped) -> Result:
     """Switch off a force that is off already, and say who wanted so."""
-    return state, (StopForce(), Write("force_stopped", {"by": event.by}))
+    return state, (StopForce(), Write(journal.ForceStopped(by=event.by)))
 
 
 def stop_force_after_end(state: SessionState, _event: ForceStopped) -> Result:
@@ -212,13 +215,13 @@ def repeat(state: SessionState, event: RepeatAsked) -> Result:
     """Present the trial again, keeping the attempt that was."""
     if not event.reason.strip():
         raise SessionError("repeating a trial needs a reason: enter one")
-    asked = Write("repeat", {"trial": state.trial.number, "reason": event.reason}, waits=True)
+    asked = Write(journal.Repeat(trial=state.trial.number, reason=event.reason), waits=True)
     return start_trial(replace(state, attempt=state.attempt + 1), (*break_off(state), asked), event.at_s)
 
 
 def note(state: SessionState, event: Note) -> Result:
     """Keep what the operator noted; what was typed is on the disk first."""
-    written = Write("note", {"kind": event.kind, "text": event.text}, waits=event.kind == "note")
+    written = Write(journal.Note(kind=event.kind, text=event.text), waits=event.kind == "note")
     return state, (written, WriteTables())
 
 
@@ -242,7 +245,7 @@ def call_operator(state: SessionState, event: Broke) -> Result:
     trouble = replace(state, phase=Phase.TROUBLE, interrupted=interrupted, force_off=True)
     videos = any(one.shows_video for one in state.plan.protocol.conditions.values())
     what = CAUSE_WITHHELD if videos and event.by == "device" else event.what
-    written = (Write("broke", {"what": what}), WriteTables())
+    written = (Write(journal.Broke(what=what)), WriteTables())
     return trouble, (StopForce(), *break_off(state), *written, show(trouble))
 
 
@@ -251,9 +254,14 @@ def reconnect(state: SessionState, event: Reconnected) -> Result:
     if not state.lost_device:
         raise SessionError("the session was not stopped by its device: end it now and resume it later")
     paused = replace(state, phase=Phase.PAUSED, held="force")
-    facts = {"device": event.described.get("name"), "described": event.described}
-    reconnected = Write("device_reconnected", facts, waits=True)
-    return paused, (StopForce(), reconnected, Write("paused", {"by": "program"}), WriteTables(), show(paused))
+    opened = journal.DeviceReconnected(device=event.described.get("name"), described=event.described)
+    return paused, (
+        StopForce(),
+        Write(opened, waits=True),
+        Write(journal.Paused(by="program")),
+        WriteTables(),
+        show(paused),
+    )
 
 
 def stall(state: SessionState, event: WriteFailed) -> Result:

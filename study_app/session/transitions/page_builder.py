@@ -18,7 +18,8 @@ from study_app.protocol.trials.designs import ORDINALS
 from study_app.protocol.trials.tracks import design_of
 from study_app.protocol.wording.languages import Words, words
 from study_app.session import pages
-from study_app.session.transitions.state import Answer, Phase, Plan, SessionState
+from study_app.session.transitions.state import Phase, Plan, SessionState
+from study_app.store.journals.journal_events import Answer
 
 PARTICIPANT: Final = "P001"
 SEED: Final = 1

@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 from study_app.errors import SessionError
 from study_app.protocol.model import Protocol, Questionnaire
 from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial
-from study_app.protocol.questions import Context, Question, Value, shown
+from study_app.protocol.questions import Context, Question, shown
 from study_app.protocol.streams import Key
 from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.methods import Adjusting, Adjustment, Heard
@@ -17,6 +17,7 @@ from study_app.protocol.trials.tasks import AnyTask, lasting
 from study_app.protocol.trials.tracks import adjusting_of, design_of, method_of
 from study_app.session.resume import FIRST, Start
 from study_app.session.transitions.events import Command
+from study_app.store.journals.journal_events import Answer
 
 
 class Phase(Enum):
@@ -62,26 +63,6 @@ class Plan:
     def condition(self, trial: Trial) -> str:
         """Return the condition behind a trial's code."""
         return self.key[trial.block][trial.code]
-
-
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """How one statement was answered; times are seconds on the session's clock.
-
-    ``first_s`` is None until the first choice; ``value`` None then means "cannot judge". ``last_s`` is the last time
-    the value changed, ``changes`` how often it did after the first choice.
-    """
-
-    onset_s: float | None = None
-    first_s: float | None = None
-    last_s: float | None = None
-    changes: int = 0
-    value: Value = None
-
-    @property
-    def given(self) -> bool:
-        """Whether anything was chosen."""
-        return self.first_s is not None
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,5 @@
 """How a step of the schedule is entered, and what the machine does with answers. Pure."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final, TypeAlias
 
@@ -31,7 +30,9 @@ from study_app.session.transitions.events import (
     Write,
     WriteTables,
 )
-from study_app.session.transitions.state import Answer, Phase, SessionState
+from study_app.session.transitions.state import Phase, SessionState
+from study_app.store.journals import journal_events as journal
+from study_app.store.journals.journal_events import UNDELIVERED, Answer, Response
 
 Commands: TypeAlias = tuple[Command, ...]
 Result: TypeAlias = tuple[SessionState, Commands]
@@ -68,7 +69,7 @@ def reach(state: SessionState, index: int, *, at_s: float) -> Result:
         skipped = _passed_over(state, before, step, due)
         if skipped is None:
             break
-        passed.append(Write("passed_over", skipped))
+        passed.append(Write(skipped))
         index += 1
     state = replace(state, index=index, attempt=1, answers={}, since_s=at_s, due=due, interval=1, until_s=None)
     state = replace(state, invalid=start.invalid if index == start.step else 0)
@@ -92,9 +93,9 @@ def enter_reached(state: SessionState, done: Commands) -> Result:
         return start_trial(state, done, state.since_s, rest_until_s=rest_until_s)
     if isinstance(step, FormStep):
         state = replace(state, phase=Phase.ANSWERING)
-        return state, (*done, Write("form_shown", {"form": step.form}), WriteTables(), show(state))
+        return state, (*done, Write(journal.FormShown(form=step.form)), WriteTables(), show(state))
     state = replace(state, phase=Phase.READING)
-    return state, (*done, Write("page_shown", {"page": state.page_id}), WriteTables(), show(state))
+    return state, (*done, Write(journal.PageShown(page=state.page_id)), WriteTables(), show(state))
 
 
 def start_trial(state: SessionState, done: Commands, at_s: float, *, rest_until_s: float | None = None) -> Result:
@@ -103,19 +104,15 @@ def start_trial(state: SessionState, done: Commands, at_s: float, *, rest_until_
     trial = state.trial
     fields: dict[str, Any] = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
     if state.due is not None and state.design is not None:
-        fields |= {
-            "level": state.due.level,
-            "standard": state.due.standard,
-            "arrangement": arrangement_text(state.design, state.due.arrangement),
-            "catch": state.due.catch,
-        }
-    begun = (*done, Write("trial_started", {**which(state), **fields}), WriteTables())
+        fields |= {name: getattr(state.due, name) for name in ("level", "standard", "catch")}
+        fields["arrangement"] = arrangement_text(state.design, state.due.arrangement)
+    begun = (*done, Write(journal.TrialStarted(**which(state), **fields)), WriteTables())
     return start_interval(state, begun, at_s) if rest_until_s is None else rest(state, begun, rest_until_s)
 
 
 def present_again(state: SessionState, done: Commands, at_s: float) -> Result:
     """Present a trial again that was not delivered as requested, as often as the study's limits permit; else go on."""
-    done = (*done, Write("trial_ended", {**which(state), "outcome": "invalid"}))
+    done = (*done, Write(journal.TrialEnded(**which(state), outcome=UNDELIVERED)))
     state = replace(state, invalid=state.invalid + 1)
     if state.invalid >= (state.plan.protocol.limits.attempts or 1):
         return enter(state, state.index + 1, done, at_s=at_s)
@@ -131,11 +128,11 @@ def start_interval(state: SessionState, done: Commands, at_s: float) -> Result:
         presented = Stimulated(state.plan.condition(state.trial))
     else:
         presented = state.due.intervals[state.interval - 1]
-        done = (*done, Write("interval_started", {**which(state), "interval": state.interval}))
+        done = (*done, Write(journal.IntervalStarted(**which(state), interval=state.interval)))
     if state.adjusts:
         item = state.items[0]
         state = replace(state, answers={item: Answer(onset_s=at_s)})
-        done = (*done, Write("item_shown", {"trial": state.trial.number, "item": item}))
+        done = (*done, Write(journal.ItemShown(trial=state.trial.number, item=item)))
     start = StartTrial(
         trial=state.trial.number,
         attempt=state.attempt,
@@ -164,12 +161,11 @@ def break_off(state: SessionState) -> Commands:
     """End a trial that is under way, in its task or in a rest, with what was measured of it until now."""
     if state.phase not in {Phase.TASK, Phase.RESTING}:
         return ()
-    ended: Mapping[str, Any] = {**which(state), "outcome": "interrupted"}
-    if state.due is None:
-        return (StopTrial(), Rest(), Write("trial_ended", ended, measured=True))
-    of_interval = Write("interval_ended", {**ended, "interval": state.interval}, measured=True)
-    lines = (of_interval,) if state.phase is Phase.TASK else ()
-    return (StopTrial(), Rest(), *lines, Write("trial_ended", ended))
+    ended = Write(journal.TrialEnded(**which(state), outcome="interrupted"), measured=state.due is None)
+    if state.due is None or state.phase is Phase.RESTING:
+        return (StopTrial(), Rest(), ended)
+    of_interval = journal.IntervalEnded(**which(state), interval=state.interval, outcome="interrupted")
+    return (StopTrial(), Rest(), Write(of_interval, measured=True), ended)
 
 
 def which(state: SessionState) -> dict[str, Any]:
@@ -186,17 +182,19 @@ def _block(state: SessionState, trial: Trial) -> Block:
     return state.plan.protocol.blocks[trial.block]
 
 
-def _passed_over(state: SessionState, before: Step | None, step: Step | None, due: Due | None) -> dict[str, Any] | None:
-    """Return the fields of the line on a step that is passed over: a trial that is not due, a break after one."""
+def _passed_over(
+    state: SessionState, before: Step | None, step: Step | None, due: Due | None
+) -> journal.PassedOver | None:
+    """Return the line on a step that is passed over: a trial that is not due, a break after one."""
     if isinstance(step, Trial):
         block = _block(state, step)
         if block.design is None or due is not None:
             return None
-        return {"trial": step.number, "reason": _reason(state, block)}
+        return journal.PassedOver(trial=step.number, reason=_reason(state, block))
     if isinstance(step, PageStep) and isinstance(before, Trial):
         block = _block(state, before)
         if block.design is not None and step.page_id == block.break_page and not _presented(state, before):
-            return {"page": step.page_id, "reason": _reason(state, block)}
+            return journal.PassedOver(page=step.page_id, reason=_reason(state, block))
     return None
 
 
@@ -235,10 +233,8 @@ def _missed_criterion(state: SessionState, before: Step | None, step: Step | Non
 def show_item(state: SessionState, event: ItemShown) -> Result:
     """Keep when a statement was first shown."""
     _check_item(state, event.item)
-    answer = state.answers.get(event.item, Answer())
-    if answer.onset_s is None:
-        answer = replace(answer, onset_s=event.at_s)
-    written = Write("item_shown", {**_page(state), "item": event.item})
+    answer = state.answers.get(event.item, Answer()).shown(event.at_s)
+    written = Write(journal.ItemShown(**_page(state), item=event.item))
     return _with_answer(state, event.item, answer), (written,)
 
 
@@ -247,14 +243,9 @@ def choose(state: SessionState, event: Chosen) -> Result:
     _check_shown(state, event.item)
     if (problem := state.questionnaire.item(event.item).problem(event.value, state.context)) is not None:
         raise SessionError(problem)
-    answer = state.answers.get(event.item, Answer())
-    if not answer.given:
-        answer = replace(answer, first_s=event.at_s, last_s=event.at_s, value=event.value)
-    elif answer.value != event.value:
-        answer = replace(answer, last_s=event.at_s, value=event.value, changes=answer.changes + 1)
-    fields = {"item": event.item, **_kind(state, event.item), "value": event.value}
-    written = Write("choice", {**_page(state), **fields}, waits=True)
-    return _without_hidden(_with_answer(state, event.item, answer), (written,))
+    answer = state.answers.get(event.item, Answer()).chosen(event.at_s, event.value)
+    line = journal.Choice(**_page(state), item=event.item, kind=_kind(state, event.item), value=event.value)
+    return _without_hidden(_with_answer(state, event.item, answer), (Write(line, waits=True),))
 
 
 def retract(state: SessionState, event: Retracted) -> Result:
@@ -265,12 +256,20 @@ def retract(state: SessionState, event: Retracted) -> Result:
 
 def submit(state: SessionState, event: Submitted) -> Result:
     """Keep the responses and go on, if every required statement has its answer."""
-    if missing := _missing(state):
+    shown = state.shown
+    answers = {item: state.answers.get(item, Answer()) for item in state.items}
+    numbered = [(number, item) for number, item in enumerate(state.items, start=1) if item in shown]
+    missing = [n for n, item in numbered if state.questionnaire.item(item).required and not answers[item].given]
+    if missing:
         listed = ", ".join(map(str, missing))
         raise SessionError(f"not every required statement is answered: answer {listed} first")
-    about = {"form": state.step.form} if isinstance(state.step, FormStep) else which(state)
-    answered = "form_answered" if "form" in about else "responses"
-    written = Write(answered, {**about, "items": _responses(state)}, waits=True)
+    items = tuple(Response(item, number, answers[item], _kind(state, item)) for number, item in numbered)
+    line: journal.Event = (
+        journal.FormAnswered(form=state.step.form, items=items)
+        if isinstance(state.step, FormStep)
+        else journal.Responses(**which(state), items=items)
+    )
+    written = Write(line, waits=True)
     if state.due is not None:
         return _heard(state, written, event.at_s)
     return enter(state, state.index + 1, (written,), at_s=event.at_s)
@@ -294,7 +293,7 @@ def _heard(state: SessionState, written: Write, at_s: float) -> Result:
     if heard.correct is None or not design.shows_feedback(trial.phase == "practice"):
         return enter(state, state.index + 1, (written,), at_s=at_s)
     shown = replace(state, phase=Phase.FEEDBACK, until_s=at_s + design.feedback_s)
-    return shown, (written, Write("feedback_shown", which(shown)), show(shown))
+    return shown, (written, Write(journal.FeedbackShown(**which(shown))), show(shown))
 
 
 def _with_answer(state: SessionState, item: str, answer: Answer) -> SessionState:
@@ -306,9 +305,9 @@ def _page(state: SessionState) -> dict[str, Any]:
     return {"form": state.step.form} if isinstance(state.step, FormStep) else {"trial": state.trial.number}
 
 
-def _kind(state: SessionState, item: str) -> dict[str, str]:
-    """Return the field that says of which kind a question is; format 1 has one kind and no such field."""
-    return {"kind": state.questionnaire.item(item).kind_id} if state.plan.protocol.format > 1 else {}
+def _kind(state: SessionState, item: str) -> str | None:
+    """Return the kind of a question; format 1 has one kind and no such field."""
+    return state.questionnaire.item(item).kind_id if state.plan.protocol.format > 1 else None
 
 
 def _check_item(state: SessionState, item: str) -> None:
@@ -328,8 +327,8 @@ def _removed(state: SessionState, item: str) -> Result:
     answer = state.answers.get(item, Answer())
     if not answer.given:
         return state, ()
-    written = Write("answer_removed", {**_page(state), "item": item}, waits=True)
-    return _with_answer(state, item, Answer(onset_s=answer.onset_s)), (written,)
+    written = Write(journal.AnswerRemoved(**_page(state), item=item), waits=True)
+    return _with_answer(state, item, answer.removed()), (written,)
 
 
 def _without_hidden(state: SessionState, done: Commands) -> Result:
@@ -339,35 +338,3 @@ def _without_hidden(state: SessionState, done: Commands) -> Result:
         state, written = _removed(state, item)
         done = (*done, *written)
     return state, done
-
-
-def _missing(state: SessionState) -> list[int]:
-    """Return the numbers of the required questions without an answer."""
-    shown = state.shown
-    return [
-        number
-        for number, item in enumerate(state.items, start=1)
-        if item in shown and state.questionnaire.item(item).required and not state.answers.get(item, Answer()).given
-    ]
-
-
-def _responses(state: SessionState) -> list[dict[str, Any]]:
-    """Return every question that is shown, in its order; one that was left out has no ``first_s``."""
-    rows = []
-    shown = state.shown
-    for number, item in enumerate(state.items, start=1):
-        if item not in shown:
-            continue
-        answer = state.answers.get(item, Answer())
-        times = {"onset_s": answer.onset_s, "first_s": answer.first_s, "last_s": answer.last_s}
-        rows.append(
-            {
-                "item": item,
-                "number": number,
-                **_kind(state, item),
-                "value": answer.value,
-                **times,
-                "changes": answer.changes,
-            }
-        )
-    return rows

@@ -25,7 +25,7 @@ import hmac
 import json
 import secrets
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 from types import MappingProxyType
@@ -41,8 +41,18 @@ from study_app.store import receipt
 from study_app.store.atomic import append_line, create_folder, is_there, parse_json, read_own
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
-from study_app.store.journals.journal import Line, plain
-from study_app.store.journals.journal_events import holds
+from study_app.store.journals.journal_events import (
+    Allocated,
+    Event,
+    IntervalEnded,
+    SessionStarted,
+    TrialEnded,
+    TrialStarted,
+    holds,
+    plain,
+    read_event,
+    start_of,
+)
 from study_app.store.tables.columns import SEALED
 
 Codes: TypeAlias = dict[str, dict[str, str]]
@@ -52,11 +62,11 @@ _FORMATS: Final = (1, 2)
 _OF_DESIGNS: Final = ("conditions", "standard", "stimulus", "standards", "method")
 _OF_RECEIPT: Final = ("codes", "slots", "order", "compares")
 """Keys that a receipt adds to a block with a design."""
-_SEALED_IN: Final[Mapping[str, frozenset[str]]] = {
-    "trial_started": frozenset({"level", "standard", "arrangement", "catch"}),
-    "interval_ended": SEALED,
-    "allocated": frozenset({"group"}),
-    "trial_ended": SEALED,
+_SEALED_IN: Final[Mapping[type[Event], frozenset[str]]] = {
+    TrialStarted: frozenset({"level", "standard", "arrangement", "catch"}),
+    IntervalEnded: SEALED,
+    Allocated: frozenset({"group"}),
+    TrialEnded: SEALED,
 }
 """The fields that each event's lines hold sealed."""
 _TAG_BYTES = 16
@@ -307,7 +317,7 @@ def _published_hash(session: SessionFolder) -> str | None:
         return str(receipt.read(session.receipt)["key_hash"])
     with contextlib.suppress(StoreError):
         for line in journal.scan(session.journal).lines[:1]:
-            return str(line.get("key_hash"))
+            return line.key_hash if isinstance(line, SessionStarted) else None
     return None
 
 
@@ -397,14 +407,14 @@ def whole_protocol(published: Mapping[str, Any], key: Key) -> Protocol:
     return Protocol.model_validate(whole)
 
 
-def sealed(start: Mapping[str, Any], event: str, fields: dict[str, Any], key: Key) -> dict[str, Any]:
-    """Return the fields of a line as the journal of a session that began with the line ``start`` holds them."""
-    names = _SEALED_IN.get(event, frozenset())
+def sealed(start: SessionStarted, event: Event, key: Key) -> Event:
+    """Return an event as the journal of a session that began with ``start`` holds it."""
+    fields, names = event.fields(), _SEALED_IN.get(type(event), frozenset())
     measured = {name: value for name, value in fields.items() if name in names}
-    if not start.get("measures_sealed") or not measured:
-        return fields
-    text = seal(_whose(start, {**fields, "event": event}), measured, key)
-    return {**{name: value for name, value in fields.items() if name not in names}, "sealed": text}
+    if not start.measures_sealed or not measured:
+        return event
+    rest = {name: value for name, value in fields.items() if name not in names}
+    return read_event({"event": event.event, **rest, "sealed": seal(_whose(start, event), measured, key)})
 
 
 def seal(whose: Sequence[object], values: Mapping[str, Any], key: Key) -> str:
@@ -426,7 +436,7 @@ def open_text(whose: Sequence[object], text: str, key: Key, names: frozenset[str
     return _measured(said, names) if hmac.compare_digest(tag, _tag(whose, said, key)) else None
 
 
-def opened(lines: Iterable[Line], key: Key | None) -> list[Line]:
+def opened(lines: Iterable[Event], key: Key | None) -> list[Event]:
     """Return a journal's lines with their sealed values; unchanged without a ``key``.
 
     Raises
@@ -437,10 +447,10 @@ def opened(lines: Iterable[Line], key: Key | None) -> list[Line]:
     lines = list(lines)
     if key is None or not lines:
         return lines
-    start, *rest = lines
-    if "entry" in start:
-        start = start | {"group": group_of(key.groups, key.nonce, start["entry"])}
-    return [start, *(_opened(start, line, key) if "sealed" in line else line for line in rest)]
+    start = start_of(lines)
+    if start.entry is not None:
+        start = replace(start, group=group_of(key.groups, key.nonce, start.entry))
+    return [start, *(_opened(start, line, key) for line in lines[1:])]
 
 
 def opened_key(folder: StudyFolder) -> Key | None:
@@ -454,14 +464,17 @@ def opened_key(folder: StudyFolder) -> Key | None:
     return read_key(folder.path) if reveals(folder.path) else None
 
 
-def _opened(start: Line, line: Line, key: Key) -> Line:
-    measured = open_text(_whose(start, line), line["sealed"], key, _SEALED_IN.get(line["event"], frozenset()))
+def _opened(start: SessionStarted, line: Event, key: Key) -> Event:
+    text = getattr(line, "sealed", None)
+    if text is None:
+        return line
+    measured = open_text(_whose(start, line), text, key, _SEALED_IN.get(type(line), frozenset()))
     if measured is None:
         raise StoreError(
-            f"line {line['n']} of the journal cannot be decrypted with the study's key: it was changed; restore it "
+            f"line {line.n} of the journal cannot be decrypted with the study's key: it was changed; restore it "
             "from a copy"
         )
-    return {**{name: value for name, value in line.items() if name != "sealed"}, **measured}
+    return read_event({**line.line(), **measured, "sealed": None})
 
 
 def _measured(said: bytes, names: frozenset[str]) -> dict[str, Any]:
@@ -474,12 +487,13 @@ def _measured(said: bytes, names: frozenset[str]) -> dict[str, Any]:
     return {name: value for name, value in items if name in names and holds(name, value)}
 
 
-def _whose(start: Mapping[str, Any], line: Mapping[str, Any]) -> list[object]:
+def _whose(start: SessionStarted, line: Any) -> list[object]:
     """Return the owner of a line's sealed text: an attempt at a trial, or a participant's entry."""
-    if "entry" in line:
-        return ["allocated", line["entry"], start["participant"]]
-    whose = [start["participant"], start["session"], line["trial"], line["attempt"]]
-    return whose if line["event"] == "trial_ended" else [*whose, line["event"], line.get("interval")]
+    if isinstance(line, Allocated):
+        return ["allocated", line.entry, start.participant]
+    trial, attempt, interval = line.which
+    whose = [start.participant, start.session, trial, attempt]
+    return whose if isinstance(line, TrialEnded) else [*whose, line.event, interval]
 
 
 def _tag(whose: Sequence[object], said: bytes, key: Key) -> bytes:

@@ -13,7 +13,6 @@ from typing import Final
 
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
-from study_app.protocol.trials.presentation import heard_in
 from study_app.store import receipt
 from study_app.store.atomic import is_there, write_file
 from study_app.store.blinded.blinding import Codes, Key, opened, read_key, reveal, reveals, verified_key, whole_protocol
@@ -21,7 +20,8 @@ from study_app.store.checksums import replace_checksums
 from study_app.store.exclusions import Exclusion, exclude, exclusions, reversals
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
-from study_app.store.journals.journal import Line
+from study_app.store.journals.journal_events import Event, TrialStarted, start_of
+from study_app.store.progress import heard_in
 from study_app.store.sessions.folder_lock import is_open, open_alone
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.sites.merged import folders_of
@@ -158,7 +158,7 @@ def _missed(session: SessionFolder, key: Key) -> Iterator[str]:
         return
     protocol = whole_protocol(published, key)
     lines = opened(journal.read(session.journal), key)
-    blocks = {line["trial"]: line["block"] for line in lines if line["event"] == "trial_started"}
+    blocks = {line.trial: line.block for line in lines if isinstance(line, TrialStarted)}
     heard = [one for one in heard_in(protocol, lines) if one.catch]
     for block in protocol.blocks.values():
         answered = [one for one in heard if blocks[one.trial] == block.id]
@@ -175,13 +175,13 @@ def _open_tables(study: StudyFolder, session: SessionFolder, key: Key) -> list[s
     if not is_there(session.journal):
         return []
     lines = journal.read(session.journal)
-    if not lines or not lines[0].get("measures_sealed"):
+    if not lines or not start_of(lines).measures_sealed:
         return []
     with open_alone(session.path):
-        return list(_rewrite(Place(study, session, lines[0]["study"]), lines, key))
+        return list(_rewrite(Place(study, session, start_of(lines).study), lines, key))
 
 
-def _rewrite(place: Place, lines: list[Line], key: Key) -> list[str]:
+def _rewrite(place: Place, lines: list[Event], key: Key) -> list[str]:
     """Write the sealed columns; a table of an earlier version stays without columns unknown to it."""
     left: list[str] = []
     ours: dict[str, tuple[bytes, bytes]] = {}

@@ -14,27 +14,24 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-import math
 import os
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from itertools import count
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO, TypeAlias
+from typing import Any, BinaryIO
 
 import study_app
 from study_app.errors import StoreError
 from study_app.store.atomic import cannot_write, parse_json, read_own, study_root, sync_folder, write_file, write_whole
-from study_app.store.journals.journal_events import EVENT_NAMES, problem, shortened
+from study_app.store.journals.journal_events import EVENTS, Event, problem, read_event, shortened
 
-Line: TypeAlias = dict[str, Any]
 FORMAT = 2
 """Of the journal and the receipt; since 2 the lines have ``previous``."""
-_OWN = ("n", "at", "previous")
 RETRY_S = 1.0
 """The background thread repeats a failed flush after this time."""
 
@@ -81,7 +78,7 @@ class Contents:
     SHA-256 of the complete lines, with which the next line continues.
     """
 
-    lines: list[Line]
+    lines: list[Event]
     whole_bytes: int
     torn_bytes: int = 0
     damage: str | None = None
@@ -97,7 +94,7 @@ def count_events(path: Path, *kinds: str) -> tuple[int, ...]:
     return tuple(content.count(b'"event":"%s",' % kind.encode()) for kind in kinds)
 
 
-def read(path: Path) -> list[Line]:
+def read(path: Path) -> list[Event]:
     """Return the complete lines of the journal, in order, without an incomplete one at the end (`scan` reports it).
 
     Raises
@@ -120,7 +117,7 @@ def scan(path: Path) -> Contents:
     """Read the journal to its last complete line, check each with its event and the lines before; report the rest."""
     content = read_own(path, study_root(path))
     *pieces, tail = content.split(b"\n")
-    lines: list[Line] = []
+    lines: list[Event] = []
     whole_bytes = 0
     hashed = hashlib.sha256()
     chained = False
@@ -142,21 +139,21 @@ def scan(path: Path) -> Contents:
             return Contents(lines, whole_bytes, damage=damage)
         if (wrong := _break(line, hashed.hexdigest(), chained=chained)) is not None:
             return Contents(lines[:-1], whole_bytes, damage=f"{path}, line {number} {wrong}")
-        lines.append(line)
+        lines.append(read_event(line))
         whole_bytes += len(piece) + 1
         hashed.update(piece + b"\n")
         chained = "previous" in line
     return Contents(lines, whole_bytes, torn_bytes=len(tail), hash=hashed)
 
 
-def _unknown(line: Line, version: Any) -> str | None:
+def _unknown(line: Mapping[str, Any], version: Any) -> str | None:
     """Return a message if a line claims this program's version but has an event unknown to it, else None."""
-    if version != study_app.__version__ or line["event"] in EVENT_NAMES:
+    if version != study_app.__version__ or line["event"] in EVENTS:
         return None
     return f"has an event {shortened(line['event'])}, which version {version} does not write"
 
 
-def _break(line: Line, before: str, *, chained: bool) -> str | None:
+def _break(line: Mapping[str, Any], before: str, *, chained: bool) -> str | None:
     """Return how a line contradicts the lines before it, whose SHA-256 is ``before``, or None.
 
     ``chained`` tells whether the line before has ``previous``: then this one must have it. The first line of a journal
@@ -175,43 +172,19 @@ def _break(line: Line, before: str, *, chained: bool) -> str | None:
     return None
 
 
-def line_of(
-    number: int, event: str, clock: SessionClock, t_s: float | None, fields: Mapping[str, Any], *, previous: str
-) -> Line:
-    """Return a line of a journal; ``t_s`` is when it happened, by default now on ``clock``.
+def line_of(event: Event, number: int, clock: SessionClock, t_s: float | None, *, previous: str) -> dict[str, Any]:
+    """Return the line of an event; ``t_s`` is when it happened, by default now on ``clock``.
 
     ``previous`` is the SHA-256 of all lines before it, as `line_bytes` gives them.
     """
-    if not fields.keys().isdisjoint(_OWN):
-        raise ValueError(f"{event}: fields {_OWN} are the journal's own")
     moment = clock.seconds() if t_s is None else t_s
-    return {
-        "n": number,
-        "event": event,
-        "t_s": round(moment, 6),
-        "at": clock.at(moment),
-        **{name: plain(value) for name, value in fields.items()},
-        "previous": previous,
-    }
+    return replace(event, n=number, t_s=round(moment, 6), at=clock.at(moment), previous=previous).line()
 
 
-def line_bytes(line: Line) -> bytes:
+def line_bytes(line: Mapping[str, Any]) -> bytes:
     """Return a line as in the file, with its newline."""
     text = json.dumps(line, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.encode("utf-8", "backslashreplace") + b"\n"
-
-
-def plain(value: Any) -> Any:
-    """Return ``value`` for JSON: numpy numbers as plain ones, tuples as lists, non-finite numbers as None."""
-    if isinstance(value, dict):
-        return {str(name): plain(item) for name, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if hasattr(value, "tolist"):  # a numpy array or number
-        return plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 class Journal:
@@ -287,12 +260,11 @@ class Journal:
         journal._hash = contents.hash.copy()
         return journal
 
-    def append(self, event: str, *, t_s: float | None = None, waits: bool = True, **fields: Any) -> Line:
-        """Write one line and wait for the disk; return the line as readers get it.
+    def append(self, event: Event, *, t_s: float | None = None, waits: bool = True) -> Event:
+        """Write one line and wait for the disk; return the event as readers get it.
 
         Without ``waits`` it returns when the system has the line, and the line is flushed in the background.
         ``t_s`` is when it happened, by default now. Infinite and undefined numbers become null, numpy numbers plain.
-        Fields cannot be called ``n``, ``at`` or ``previous``, which are the journal's own.
 
         Raises
         ------
@@ -302,8 +274,10 @@ class Journal:
             can be appended to again.
         """
         if self.file.closed:
-            raise StoreError(f"{self.path} is closed: {event!r} came after the session's end and was not recorded")
-        line = line_of(self._lines + 1, event, self.clock, t_s, fields, previous=self._hash.hexdigest())
+            raise StoreError(
+                f"{self.path} is closed: {event.event!r} came after the session's end and was not recorded"
+            )
+        line = line_of(event, self._lines + 1, self.clock, t_s, previous=self._hash.hexdigest())
         if (wrong := problem(line)) is not None:
             raise StoreError(
                 f"{self.path}, line {line['n']} {wrong}: it was not written; report this to the developers"
@@ -320,7 +294,7 @@ class Journal:
         self._hash.update(content)
         if not waits:
             self._flush_later()
-        return line
+        return read_event(line)
 
     def check_flushed(self) -> None:
         """Raise if lines that were not waited for could not be flushed, and are still not on the disk.

@@ -1,135 +1,46 @@
-"""The journal's dictionary: every event, its meaning, and its fields besides ``n``, ``event``, ``t_s`` and ``at``."""
+"""The events of a session's journal: one frozen class for each kind of line, which reads, writes and documents itself.
 
+The docstring of a class and the names of its required fields are its row in the dictionary of data. A field with a
+default may be missing from a line; one that may be None without a default is then written as null. Fields that a class
+does not declare (the measures of a task, fields of another version) are in ``others``.
+"""
+
+import dataclasses
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
-from typing import Any
+from typing import Annotated, Any, ClassVar, TypeAlias, dataclass_transform, get_args, get_type_hints
 
+from study_app.errors import StoreError
 from study_app.store.folders import PARTICIPANT_ID, RECORDING_NAME, STUDY_NAME
 from study_app.store.tables.columns import DELIVERED, TRIALS, VIDEO
 
 SHOWN = 200  # characters of a bad value shown in messages
 
 CAUSE_WITHHELD = "the session was stopped"
-"""Text of `broke` for a failed device or video in a study with videos: the cause would reveal the condition."""
+"""Text of `Broke` for a failed device or video in a study with videos: the cause would reveal the condition."""
 
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """One kind of line: its name, its meaning, the fields that every one of its lines has, and of ``one_of`` one."""
-
-    name: str
-    description: str
-    fields: tuple[str, ...] = ()
-    one_of: tuple[str, ...] = ()
-
-
-_SESSION = ("participant", "session", "study", "seed", "language", "operator", "simulated", "pilot", "recordings")
-_HASHES = ("key_hash", "protocol_hash", "version")
-_WHICH = ("trial", "attempt")
-_PAGE = ("trial", "form")
-
-EVENTS: tuple[Event, ...] = (
-    Event(
-        "session_started",
-        "The session began: always the first line; `measures_sealed` says whether sealed columns are encrypted.",
-        (*_SESSION, *_HASHES, "device", "limits"),
-    ),
-    Event(
-        "session_resumed",
-        "It was resumed after its program had ended; `gap_s` is the time since the line before.",
-        ("gap_s", "torn_bytes", "operator", "device", "version"),
-    ),
-    Event(
-        "allocated",
-        "The participant has this entry in the allocation to groups; `sealed` holds the group. Once per participant.",
-        ("entry", "sealed"),
-    ),
-    Event("preflight", "The checks before the first page, as accepted by the operator.", ("checks",)),
-    Event("page_shown", "A page of text was shown.", ("page",)),
-    Event(
-        "page_left",
-        "The participant left it; of a consent `text_sha256` is the SHA-256 of title and paragraphs as they were read, "
-        "in UTF-8 with blank lines between them, and `study_version` the version of the study.",
-        ("page",),
-    ),
-    Event("language_chosen", "The participant chose another language of the study.", ("language",)),
-    Event(
-        "trial_started",
-        "A trial was presented; with a design `sealed` contains level, standard, arrangement and catch, encrypted.",
-        (*_WHICH, "block", "phase", "part", "index", "of", "code"),
-    ),
-    Event("interval_started", "An interval of a trial was presented.", (*_WHICH, "interval")),
-    Event(
-        "interval_ended",
-        "The interval's task ended, with its measures; `sealed` contains the sealed columns, encrypted. `invalid` "
-        "names the limits that it breaks: the trial is then presented again.",
-        (*_WHICH, "interval", "outcome"),
-    ),
-    Event("feedback_shown", "The participant saw whether the answer was correct.", _WHICH),
-    Event("passed_over", "A trial, or the break after it, was not due.", ("reason",), ("trial", "page")),
-    Event(
-        "stepped",
-        "The participant adjusted the level by so many steps, more of the varied number above 0; `scene` is the number "
-        "of the presented scene from then on, n/a where no force depends on it.",
-        (*_WHICH, "steps", "scene"),
-    ),
-    Event("target_reached", "A target was reached, on the task's clock.", ("trial", "target", "t_task_s")),
-    Event(
-        "trial_ended",
-        "The trial's task ended, with its measures; `sealed` contains the sealed columns, encrypted.",
-        (*_WHICH, "outcome"),
-    ),
-    Event(
-        "recorded",
-        "The trial's recording is complete on the disk, with these names and checksums.",
-        (
-            *_WHICH,
-            "recording",
-            "recording_frames",
-            "samples_recorded",
-            "samples_unrecorded",
-            "frames_recorded",
-            "sha256",
-            "frames_sha256",
-        ),
-    ),
-    Event("recording_lost", "The trial's recording could not be stored.", (*_WHICH, "reason")),
-    Event("outlet_lost", "Markers or samples no longer reach other programs by this outlet.", ("outlet", "reason")),
-    Event("form_shown", "A questionnaire was shown on its own.", ("form",)),
-    Event("item_shown", "A question was shown, of a trial or a form.", ("item",), _PAGE),
-    Event("choice", "An answer was chosen; the last one counts.", ("item", "value"), _PAGE),
-    Event("answer_removed", "An answer was taken back, or an earlier one hid its question.", ("item",), _PAGE),
-    Event("responses", "The page of questions was confirmed: every answer.", (*_WHICH, "items")),
-    Event("form_answered", "The form was confirmed: every answer.", ("form", "items")),
-    Event("paused", "The session was paused.", ("by",)),
-    Event("resumed", "The pause ended.", ("by",)),
-    Event("force_stopped", "The force was stopped.", ("by",)),
-    Event("force_restored", "The force was turned on again.", ("by",)),
-    Event("note", "The operator wrote a note, or marked the trial.", ("kind", "text")),
-    Event("repeat", "The operator repeated the trial.", ("trial", "reason")),
-    Event(
-        "broke",
-        "Device, servo or program failed. In a study with videos `what` does not say whether a device or a video did.",
-        ("what",),
-    ),
-    Event(
-        "device_reconnected",
-        "The failed device, or video, was opened again; `described` is the device from then on. The force stayed off "
-        "until `resumed`.",
-        ("device", "described"),
-    ),
-    Event("session_ended", "The session ended: always the last line.", ("status", "reason")),
-)
-
-_OF_ALL = ("n", "event", "t_s", "at")
-_BY_NAME = {event.name: event for event in EVENTS}
-EVENT_NAMES = frozenset(_BY_NAME)
+UNDELIVERED = "invalid"
+"""The outcome of a trial of which an interval was not delivered as requested."""
 
 _MOST_SECONDS = 1e9  # of a session's clock
 _MOST = 10**30  # greatest integer that the program writes
+_MAY_BE_NULL = (
+    "level", "standard", "part", "value", "answer", "onset_s", "first_s", "last_s", "gap_s", "device",
+    "t_task_s", "scene",
+)  # fmt: skip
+_OF_ALL = ("n", "t_s", "at", "previous", "others")
+_ANSWER = ("item", "number", "value", "onset_s", "first_s", "last_s", "changes")
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """What a field may be: in words, and whether a value is so."""
+
+    words: str
+    holds: Callable[[object], bool]
 
 
 def _is_integer(value: object) -> bool:
@@ -157,7 +68,7 @@ def _are_texts(value: object) -> bool:
 def _are_answers(value: object) -> bool:
     return isinstance(value, list) and all(
         isinstance(answer, dict)
-        and all(name in answer and holds(_field(answer, name), answer[name]) for name in _ANSWER)
+        and all(name in answer and holds(_kind_name(answer, name), answer[name]) for name in _ANSWER)
         for answer in value
     )
 
@@ -166,52 +77,483 @@ def _matches(pattern: re.Pattern[str]) -> Callable[[object], bool]:
     return lambda value: isinstance(value, str) and pattern.fullmatch(value) is not None
 
 
-_ANSWER = ("item", "number", "value", "onset_s", "first_s", "last_s", "changes")
-_KINDS: Mapping[str, Callable[[object], bool]] = {
-    "text": lambda value: isinstance(value, str),
-    "study's name": _matches(STUDY_NAME),
-    "participant's id": _matches(PARTICIPANT_ID),
-    "recording's name": _matches(RECORDING_NAME),
-    "flag": lambda value: isinstance(value, bool),
-    "integer": _is_integer,
-    "number": _is_number,
-    "time": _is_time,
-    "object": lambda value: isinstance(value, dict),
-    "list of objects": lambda value: isinstance(value, list) and all(isinstance(one, dict) for one in value),
-    "table of numbers": lambda value: isinstance(value, dict) and all(map(_is_number, value.values())),
-    "answer": lambda value: isinstance(value, str) or _is_number(value) or _are_texts(value),
-    "list of answers": _are_answers,
-    "list of texts": _are_texts,
-}
-_MAY_BE_NULL = (
-    "level", "standard", "part", "value", "answer", "onset_s", "first_s", "last_s", "gap_s", "device",
-    "t_task_s", "scene",
-)  # fmt: skip
-_KIND_OF: dict[str, tuple[str, bool]] = {
-    column.name: (column.kind, True) for column in (*TRIALS, *DELIVERED, *VIDEO)
-} | {
-    name: (kind, name in _MAY_BE_NULL)
-    for kind, names in {
-        "text": "language operator key_hash protocol_hash version device page block phase code item "
-        "outcome form group sealed arrangement sha256 frames_sha256 reason by kind text what status previous outlet",
-        "study's name": "study",
-        "participant's id": "participant row_of",
-        "recording's name": "recording recording_frames",
-        "flag": "simulated pilot recordings measures_sealed intervals",
-        "integer": "n format session entry seed torn_bytes trial attempt interval part index of target "
-        "samples_recorded samples_unrecorded frames_recorded number value changes protocol_format steps scene",
-        "answer": "answer",
-        "number": "level standard t_s gap_s t_task_s onset_s first_s last_s",
-        "time": "at",
-        "object": "described",
-        "list of objects": "checks",
-        "table of numbers": "limits",
-        "list of answers": "items",
-        "list of texts": "invalid",
-    }.items()
-    for name in names.split()
-}
-"""The type of a field of that name, in any event that this version knows, and whether it may be null."""
+Text: TypeAlias = Annotated[str, Kind("text", lambda value: isinstance(value, str))]
+StudyName: TypeAlias = Annotated[str, Kind("study's name", _matches(STUDY_NAME))]
+ParticipantId: TypeAlias = Annotated[str, Kind("participant's id", _matches(PARTICIPANT_ID))]
+RecordingName: TypeAlias = Annotated[str, Kind("recording's name", _matches(RECORDING_NAME))]
+Flag: TypeAlias = Annotated[bool, Kind("flag", lambda value: isinstance(value, bool))]
+Integer: TypeAlias = Annotated[int, Kind("integer", _is_integer)]
+Number: TypeAlias = Annotated[float, Kind("number", _is_number)]
+Time: TypeAlias = Annotated[str, Kind("time", _is_time)]
+Described: TypeAlias = Annotated[Mapping[str, Any], Kind("object", lambda value: isinstance(value, dict))]
+Checks: TypeAlias = Annotated[
+    Sequence[Mapping[str, Any]],
+    Kind("list of objects", lambda value: isinstance(value, list) and all(isinstance(one, dict) for one in value)),
+]
+Numbers: TypeAlias = Annotated[
+    Mapping[str, float],
+    Kind("table of numbers", lambda value: isinstance(value, dict) and all(map(_is_number, value.values()))),
+]
+Texts: TypeAlias = Annotated[Sequence[str], Kind("list of texts", _are_texts)]
+Answers: TypeAlias = Annotated[Sequence["Response"], Kind("list of answers", _are_answers)]
+AnyAnswer: TypeAlias = Annotated[
+    Any, Kind("answer", lambda value: isinstance(value, str) or _is_number(value) or _are_texts(value))
+]
+OldAnswer: TypeAlias = Annotated[Any, Kind("integer", _is_integer)]
+"""Of a question without a kind, in format 1."""
+
+
+Which: TypeAlias = tuple[int, int, int | None]
+"""Trial, attempt and interval, which is None for a trial."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """How a question was answered so far; times are seconds on the session's clock, None before the event.
+
+    ``value`` None after the first choice means "cannot judge"; ``last_s`` is when the value changed last, ``changes``
+    how often it did after the first choice.
+    """
+
+    onset_s: Number | None = None
+    first_s: Number | None = None
+    last_s: Number | None = None
+    changes: Integer = 0
+    value: OldAnswer | None = None
+
+    @property
+    def given(self) -> bool:
+        """Whether anything was chosen."""
+        return self.first_s is not None
+
+    def shown(self, at_s: float) -> "Answer":
+        """Return it after its question was shown, perhaps again."""
+        return self if self.onset_s is not None else dataclasses.replace(self, onset_s=at_s)
+
+    def chosen(self, at_s: float, value: Any) -> "Answer":
+        """Return it after a choice; the last one counts."""
+        if not self.given:
+            return dataclasses.replace(self, first_s=at_s, last_s=at_s, value=value)
+        if self.value == value:
+            return self
+        return dataclasses.replace(self, last_s=at_s, value=value, changes=self.changes + 1)
+
+    def removed(self) -> "Answer":
+        """Return it after it was taken back."""
+        return Answer(onset_s=self.onset_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """A confirmed answer; ``number`` is its question's on the page, ``kind`` the kind of question, since format 2."""
+
+    item: Text
+    number: Integer
+    answer: Answer
+    kind: Text | None = None
+
+    def fields(self) -> dict[str, Any]:
+        """Return it as written in a line."""
+        times = {name: getattr(self.answer, name) for name in ("onset_s", "first_s", "last_s")}
+        kind = {} if self.kind is None else {"kind": self.kind}
+        which = {"item": self.item, "number": self.number, **kind}
+        return {**which, "value": self.answer.value, **times, "changes": self.answer.changes}
+
+    @classmethod
+    def read(cls, row: Mapping[str, Any]) -> "Response":
+        """Return what was written in a line."""
+        answer = Answer(*(row[name] for name in ("onset_s", "first_s", "last_s", "changes", "value")))
+        return cls(row["item"], row["number"], answer, row.get("kind"))
+
+
+def _journal_name(kind: type) -> str:
+    return re.sub("(?<=[a-z])(?=[A-Z])", "_", kind.__name__).lower()
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True)
+@dataclass(frozen=True, kw_only=True)
+class Event:
+    """A line of a journal; ``n``, ``at`` and ``previous`` are set when it is written (see `journal`)."""
+
+    one_of: ClassVar[tuple[str, ...]] = ()
+    """Fields of which every line has one."""
+    declared: ClassVar[tuple[str, ...]] = ()
+    required: ClassVar[tuple[str, ...]] = ()
+    n: Integer = 0
+    t_s: Number = 0.0
+    at: Time = ""
+    previous: Text | None = None
+    others: Mapping[str, Any] = field(default_factory=dict)
+
+    def __init_subclass__(cls, *, group: bool = False) -> None:
+        declared = [
+            one for one in dataclasses.fields(dataclass(frozen=True, kw_only=True)(cls)) if one.name not in _OF_ALL
+        ]
+        cls.declared = tuple(one.name for one in declared)
+        cls.required = tuple(one.name for one in declared if one.default is dataclasses.MISSING)
+        if not group:
+            EVENTS[_journal_name(cls)] = cls
+
+    @property
+    def event(self) -> str:
+        """The name in the journal."""
+        return _journal_name(type(self))
+
+    def fields(self) -> dict[str, Any]:
+        """Return the event's own fields in the order in which they are written."""
+        given = {name: getattr(self, name) for name in self.declared}
+        held = {name: value for name, value in given.items() if value is not None or name in self.required}
+        if "items" in held:
+            held["items"] = [response.fields() for response in held["items"]]
+        last: dict[str, Any] = {name: held.pop(name) for name in ("invalid", "sealed") if name in held}
+        return {**held, **self.others, **last}
+
+    def line(self) -> dict[str, Any]:
+        """Return the whole line as it is written."""
+        line = {"n": self.n, "event": self.event, "t_s": self.t_s, "at": self.at, **plain(self.fields())}
+        return line if self.previous is None else {**line, "previous": self.previous}
+
+
+EVENTS: dict[str, type[Event]] = {}
+"""The class of each event by its name in the journal."""
+
+
+class UnknownEvent(Event, group=True):
+    """An event of another version: its name and all its fields are in ``others``."""
+
+    @property
+    def event(self) -> str:
+        """The name in the journal."""
+        return str(self.others["event"])
+
+
+class OfAttempt(Event, group=True):
+    """An event of an attempt at a trial."""
+
+    trial: Integer
+    attempt: Integer
+
+    @property
+    def which(self) -> Which:
+        """Trial, attempt and interval; the interval is None for a trial."""
+        return self.trial, self.attempt, getattr(self, "interval", None)
+
+
+class EndOfTask(OfAttempt, group=True):
+    """The end of a task, with its measures in ``others``."""
+
+    def fields(self) -> dict[str, Any]:
+        """Return the event's own fields in the order in which they are written: measures first if interrupted."""
+        fields = super().fields()
+        if fields["outcome"] != "interrupted":
+            return fields
+        which: dict[str, Any] = {
+            name: fields[name] for name in ("trial", "attempt", "outcome", "interval") if name in fields
+        }
+        return {**self.others, **which, **fields}
+
+
+class SessionStarted(Event):
+    """The session began: always the first line; `measures_sealed` says whether sealed columns are encrypted."""
+
+    format: Integer | None = None
+    participant: ParticipantId
+    session: Integer
+    study: StudyName
+    seed: Integer
+    language: Text
+    operator: Text
+    simulated: Flag
+    pilot: Flag
+    recordings: Flag
+    key_hash: Text
+    protocol_hash: Text
+    version: Text
+    row_of: ParticipantId | None = None
+    device: Text | None
+    limits: Numbers
+    measures_sealed: Flag | None = None
+    protocol_format: Integer | None = None
+    intervals: Flag | None = None
+    entry: Integer | None = None
+    group: Text | None = None
+
+
+class SessionResumed(Event):
+    """It was resumed after its program had ended; `gap_s` is the time since the line before."""
+
+    gap_s: Number | None
+    operator: Text
+    torn_bytes: Integer
+    device: Text | None
+    version: Text
+
+
+class Allocated(Event):
+    """The participant has this entry in the allocation to groups; `sealed` holds the group. Once per participant."""
+
+    entry: Integer
+    group: Text | None = None
+    sealed: Text
+
+
+class Preflight(Event):
+    """The checks before the first page, as accepted by the operator."""
+
+    checks: Checks
+
+
+class PageShown(Event):
+    """A page of text was shown."""
+
+    page: Text
+
+
+class PageLeft(Event):
+    """The participant left it.
+
+    Of a consent `text_sha256` is the SHA-256 of title and paragraphs as they were read, in UTF-8 with blank
+    lines between them, and `study_version` the version of the study.
+    """
+
+    page: Text
+    text_sha256: Any = None
+    study_version: Any = None
+
+
+class LanguageChosen(Event):
+    """The participant chose another language of the study."""
+
+    language: Text
+
+
+class TrialStarted(OfAttempt):
+    """A trial was presented; with a design `sealed` contains level, standard, arrangement and catch, encrypted."""
+
+    block: Text
+    phase: Text
+    part: Integer | None
+    index: Integer
+    of: Integer
+    code: Text
+    level: Number | None = None
+    standard: Number | None = None
+    arrangement: Text | None = None
+    catch: Any = None
+    sealed: Text | None = None
+
+    @property
+    def has_intervals(self) -> bool:
+        """Whether it is a trial of intervals, whose contents the line lists."""
+        return self.sealed is not None or self.arrangement is not None
+
+    def fields(self) -> dict[str, Any]:
+        """Return the event's own fields in the order in which they are written: without a level null stands for it."""
+        fields = super().fields()
+        if self.arrangement is None:
+            return fields
+        presented = {name: getattr(self, name) for name in ("level", "standard", "arrangement", "catch")}
+        return {**{name: value for name, value in fields.items() if name not in presented}, **presented}
+
+
+class IntervalStarted(OfAttempt):
+    """An interval of a trial was presented."""
+
+    interval: Integer
+
+
+class IntervalEnded(EndOfTask):
+    """The interval's task ended, with its measures; `sealed` contains the sealed columns, encrypted.
+
+    `invalid` names the limits that it breaks: the trial is then presented again.
+    """
+
+    interval: Integer
+    outcome: Text
+    invalid: Texts | None = None
+    sealed: Text | None = None
+
+
+class FeedbackShown(OfAttempt):
+    """The participant saw whether the answer was correct."""
+
+
+class PassedOver(Event):
+    """A trial, or the break after it, was not due."""
+
+    one_of = ("trial", "page")
+    trial: Integer | None = None
+    page: Text | None = None
+    reason: Text
+
+
+class Stepped(OfAttempt):
+    """The participant adjusted the level by so many steps, more of the varied number above 0.
+
+    `scene` is the number of the presented scene from then on, n/a where no force depends on it.
+    """
+
+    steps: Integer
+    scene: Integer | None
+
+
+class TargetReached(Event):
+    """A target was reached, on the task's clock."""
+
+    trial: Integer
+    target: Integer
+    t_task_s: Number | None
+
+
+class TrialEnded(EndOfTask):
+    """The trial's task ended, with its measures; `sealed` contains the sealed columns, encrypted."""
+
+    outcome: Text
+    sealed: Text | None = None
+
+
+class Recorded(OfAttempt):
+    """The trial's recording is complete on the disk, with these names and checksums."""
+
+    interval: Integer | None = None
+    recording: RecordingName
+    recording_frames: RecordingName
+    samples_recorded: Integer
+    samples_unrecorded: Integer
+    frames_recorded: Integer
+    sha256: Text
+    frames_sha256: Text
+
+
+class RecordingLost(OfAttempt):
+    """The trial's recording could not be stored."""
+
+    interval: Integer | None = None
+    reason: Text
+
+
+class OutletLost(Event):
+    """Markers or samples no longer reach other programs by this outlet."""
+
+    outlet: Text
+    reason: Text
+
+
+class FormShown(Event):
+    """A questionnaire was shown on its own."""
+
+    form: Text
+
+
+class OfItem(Event, group=True):
+    """An event of a question, of a trial or a form."""
+
+    one_of = ("trial", "form")
+    trial: Integer | None = None
+    form: Text | None = None
+    item: Text
+
+
+class ItemShown(OfItem):
+    """A question was shown, of a trial or a form."""
+
+
+class Choice(OfItem):
+    """An answer was chosen; the last one counts."""
+
+    kind: Text | None = None
+    value: OldAnswer | None
+
+
+class AnswerRemoved(OfItem):
+    """An answer was taken back, or an earlier one hid its question."""
+
+
+class Responses(OfAttempt):
+    """The page of questions was confirmed: every answer."""
+
+    items: Answers
+
+
+class FormAnswered(Event):
+    """The form was confirmed: every answer."""
+
+    form: Text
+    items: Answers
+
+
+class OfPerson(Event, group=True):
+    """Something that a person, or the program, did."""
+
+    by: Text
+
+
+class Paused(OfPerson):
+    """The session was paused."""
+
+
+class Resumed(OfPerson):
+    """The pause ended."""
+
+
+class ForceStopped(OfPerson):
+    """The force was stopped."""
+
+
+class ForceRestored(OfPerson):
+    """The force was turned on again."""
+
+
+class Note(Event):
+    """The operator wrote a note, or marked the trial."""
+
+    kind: Text
+    text: Text
+
+
+class Repeat(Event):
+    """The operator repeated the trial."""
+
+    trial: Integer
+    reason: Text
+
+
+class Broke(Event):
+    """Device, servo or program failed. In a study with videos `what` does not say whether a device or a video did."""
+
+    what: Text
+
+
+class DeviceReconnected(Event):
+    """The failed device, or video, was opened again; `described` is the device from then on.
+
+    The force stayed off until `resumed`.
+    """
+
+    device: Text | None
+    described: Described
+
+
+class SessionEnded(Event):
+    """The session ended: always the last line."""
+
+    status: Text
+    reason: Text
+
+
+def _known_kinds() -> Iterator[tuple[str, tuple[Kind, bool]]]:
+    aliases: tuple[Any, ...] = (Text, Time, Number, Integer, Flag)
+    of_columns = {alias.__metadata__[0].words: alias.__metadata__[0] for alias in aliases}
+    yield from ((column.name, (of_columns[column.kind], True)) for column in (*TRIALS, *DELIVERED, *VIDEO))
+    for owner in (Response, Answer, Event, *EVENTS.values()):
+        for name, hint in get_type_hints(owner, include_extras=True).items():
+            for part in (hint, *get_args(hint)):
+                yield from ((name, (kind, name in _MAY_BE_NULL)) for kind in getattr(part, "__metadata__", ()))
+    yield "answer", (AnyAnswer.__metadata__[0], True)
+
+
+_KINDS = dict(_known_kinds())
+"""The kind of a field of that name, in any event that this version knows, and whether it may be null."""
 
 
 def problem(line: Mapping[str, Any]) -> str | None:
@@ -223,18 +565,47 @@ def problem(line: Mapping[str, Any]) -> str | None:
     event = line.get("event")
     if not isinstance(event, str):
         return "it names no event"
-    known = _BY_NAME.get(event)
-    if lacking := [name for name in (*_OF_ALL, *(known.fields if known else ())) if name not in line]:
+    kind = EVENTS.get(event, UnknownEvent)
+    if lacking := [name for name in ("n", "event", "t_s", "at", *kind.required) if name not in line]:
         return f"({event}) lacks {', '.join(lacking)}"
-    if known is not None and known.one_of and sum(name in line for name in known.one_of) != 1:
-        return f"({event}) is not about one of {', '.join(known.one_of)}"
+    if kind.one_of and sum(name in line for name in kind.one_of) != 1:
+        return f"({event}) is not about one of {', '.join(kind.one_of)}"
     for name in line:
-        if not holds(field := _field(line, name), line[name]):
-            return f"({event}) holds {name} {shortened(line[name])}, expected: {_KIND_OF[field][0]}"
+        if not holds(known := _kind_name(line, name), line[name]):
+            return f"({event}) holds {name} {shortened(line[name])}, expected: {_KINDS[known][0].words}"
     return None if 0 <= line["t_s"] <= _MOST_SECONDS else f"({event}) has t_s {line['t_s']:g}"
 
 
-def _field(held: Mapping[str, Any], name: str) -> str:
+def read_event(line: Mapping[str, Any]) -> Event:
+    """Return the event of a line that has no `problem`."""
+    kind = EVENTS.get(line["event"])
+    if kind is None:
+        return UnknownEvent(**_split(line, _OF_ALL))
+    return kind(**_split({name: value for name, value in line.items() if name != "event"}, (*_OF_ALL, *kind.declared)))
+
+
+def _split(line: Mapping[str, Any], declared: Sequence[str]) -> dict[str, Any]:
+    """Return the declared fields, and the rest as ``others``."""
+    own = {name: value for name, value in line.items() if name in declared}
+    if "items" in own:
+        own["items"] = tuple(map(Response.read, own["items"]))
+    return {**own, "others": {name: value for name, value in line.items() if name not in declared}}
+
+
+def plain(value: Any) -> Any:
+    """Return ``value`` for JSON: numpy numbers as plain ones, tuples as lists, non-finite numbers as None."""
+    if isinstance(value, dict):
+        return {str(name): plain(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if hasattr(value, "tolist"):  # a numpy array or number
+        return plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _kind_name(held: Mapping[str, Any], name: str) -> str:
     """Return whose entry says what a name holds: without a kind of question an answer is a whole number."""
     return "answer" if name == "value" and "kind" in held else name
 
@@ -245,14 +616,29 @@ def shortened(value: object) -> str:
     return shown if len(shown) <= SHOWN else f"{shown[:SHOWN]}…"
 
 
-def unknown_events(lines: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+def unknown_events(lines: Sequence[Event]) -> Iterator[str]:
     """Yield the names of events that are not in the dictionary, each once."""
-    yield from {line["event"]: None for line in lines if line["event"] not in EVENT_NAMES}
+    yield from {line.event: None for line in lines if isinstance(line, UnknownEvent)}
 
 
 def holds(name: str, value: object) -> bool:
     """Return whether ``value`` has the type of the field ``name``; an unknown field may have any."""
-    if name not in _KIND_OF:
+    if name not in _KINDS:
         return True
-    kind, may_be_null = _KIND_OF[name]
-    return may_be_null if value is None else _KINDS[kind](value)
+    kind, may_be_null = _KINDS[name]
+    return may_be_null if value is None else kind.holds(value)
+
+
+def start_of(lines: Sequence[Event]) -> SessionStarted:
+    """Return the first line of a session's journal.
+
+    Raises
+    ------
+    StoreError
+        It is another.
+    """
+    if not lines or not isinstance(start := lines[0], SessionStarted):
+        raise StoreError(
+            "the journal does not begin with session_started: restore it from a copy, or use a new session number"
+        )
+    return start

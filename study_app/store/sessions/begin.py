@@ -22,6 +22,7 @@ from study_app.store.blinded.blinding import Key, open_or_draw_key, reveals, sea
 from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import FORMAT, Journal, SessionClock
+from study_app.store.journals.journal_events import Allocated, SessionStarted, start_of
 from study_app.store.recorder import Recorder
 from study_app.store.sessions.folder_lock import Opening, abandoned, create_opened, sweep_claims, take_over
 from study_app.store.sessions.open_session import Place, SessionStore
@@ -149,9 +150,9 @@ def first_words(
     measures_sealed: bool,
     clock: SessionClock,
     allocation: Allocation | None = None,
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the fields of a session's first line, and its receipt as it is before the first trial."""
-    facts = {
+) -> tuple[SessionStarted, dict[str, Any]]:
+    """Return a session's first line, and its receipt as it is before the first trial."""
+    facts: dict[str, Any] = {
         "participant": start.participant,
         "session": start.session,
         "study": protocol.study.name,
@@ -167,14 +168,16 @@ def first_words(
         **({} if start.row_of is None else {"row_of": start.row_of}),
     }
     limits = protocol.limits.model_dump(mode="json")
-    started = {"format": FORMAT, **facts, "device": start.device.get("name"), "limits": limits}
-    started["measures_sealed"] = measures_sealed
-    if protocol.format > 1:
-        started["protocol_format"] = protocol.format
-    if any(block.design is not None for block in protocol.blocks.values()):
-        started["intervals"] = True
-    if allocation is not None:
-        started["entry"] = allocation.entry
+    started = SessionStarted(
+        **facts,
+        format=FORMAT,
+        device=start.device.get("name"),
+        limits=limits,
+        measures_sealed=measures_sealed,
+        protocol_format=protocol.format if protocol.format > 1 else None,
+        intervals=True if any(block.design is not None for block in protocol.blocks.values()) else None,
+        entry=None if allocation is None else allocation.entry,
+    )
     first_receipt = {
         "format": FORMAT,
         "status": receipt.UNFINISHED,
@@ -193,23 +196,25 @@ def first_words(
 def note_allocation(store: SessionStore) -> None:
     """Journal the allocation of the session's participant, unless a session of the participant has done so."""
     study, folder = store.place.study_folder, store.place.folder
-    if "entry" not in store.lines[0]:
+    if start_of(store.lines).entry is None:
         return
     sessions = [one for one in study.sessions() if one.participant == folder.participant]
     known = [line for one in sessions if is_there(one.journal) for line in journal.scan(one.journal).lines]
-    if any(line["event"] == "allocated" for line in known):
+    if any(isinstance(line, Allocated) for line in known):
         return
     allocation = allocate(study, store.key, folder.participant)
     if allocation is not None:
-        store.append("allocated", entry=allocation.entry, sealed=allocation.sealed)
+        store.append(Allocated(entry=allocation.entry, sealed=allocation.sealed))
 
 
-def make_recorder(place: Place, start: Mapping[str, Any], clock: SessionClock) -> Recorder | None:
+def make_recorder(place: Place, start: SessionStarted, clock: SessionClock) -> Recorder | None:
     """Return the recorder of a session as its first line says, or None where it keeps no recordings."""
-    if not start.get("recordings"):
+    if not start.recordings:
         return None
-    facts = {name: start[name] for name in ("study", "participant", "session", "simulated", "pilot", "version")}
-    return Recorder(place.folder.recordings, {**facts, "origin_ns": clock.origin_ns}, waits=start["simulated"])
+    facts = {
+        name: getattr(start, name) for name in ("study", "participant", "session", "simulated", "pilot", "version")
+    }
+    return Recorder(place.folder.recordings, {**facts, "origin_ns": clock.origin_ns}, waits=start.simulated)
 
 
 def surroundings(
@@ -393,7 +398,7 @@ def _open(
     clock: SessionClock,
     key: Key,
     session_receipt: dict[str, Any],
-    started: Mapping[str, Any],
+    started: SessionStarted,
     protocol: Protocol,
 ) -> SessionStore:
     """Write receipt, first line, tables and description into the claimed folder."""
@@ -409,7 +414,7 @@ def _open(
     store = SessionStore(place, journal, key, session_receipt, opening, recorder=recorder)
     with contextlib.ExitStack() as failing:
         failing.callback(journal.close)
-        store.append("session_started", t_s=0.0, **started)
+        store.append(started, t_s=0.0)
         note_allocation(store)
         store.write_tables()
         if store.behind is not None:

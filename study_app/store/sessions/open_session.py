@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -21,14 +21,20 @@ from study_app.store import receipt
 from study_app.store.blinded.blinding import Key, as_recorded, opened, opened_key, sealed
 from study_app.store.checksums import fingerprint, note_fingerprint, write_checksums
 from study_app.store.folders import SessionFolder, StudyFolder
-from study_app.store.journals.journal import Journal, Line
-from study_app.store.recorder import LEAVING_S, Kept, Recorder, event_of, hashes_of
+from study_app.store.journals.journal import Journal
+from study_app.store.journals.journal_events import (
+    Event,
+    OutletLost,
+    SessionEnded,
+    SessionResumed,
+    SessionStarted,
+    start_of,
+)
+from study_app.store.recorder import LEAVING_S, Kept, Recorder, hashes_of
 from study_app.store.sessions.folder_lock import Opening
 from study_app.store.tables import csv_files, session_tables
 from study_app.store.tables.session_tables import GrowingTables
 from study_app.store.tables.study_files import write_participants
-
-BEGINNINGS = ("session_started", "session_resumed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +64,7 @@ class SessionStore:
         session_receipt: dict[str, Any],
         opening: Opening,
         *,
-        lines: Sequence[Line] = (),
+        lines: Sequence[Event] = (),
         recorder: Recorder | None = None,
     ) -> None:
         self.place = place
@@ -70,7 +76,7 @@ class SessionStore:
         self.journal = journal
         self._receipt = session_receipt
         self.opening = opening
-        self._lines: list[Line] = list(lines)
+        self._lines: list[Event] = list(lines)
         self._tables = GrowingTables(lambda name: place.folder.table(place.study, name))
         self._kept: list[Kept] = []
         self._over = False
@@ -85,7 +91,7 @@ class SessionStore:
         return self.place.folder
 
     @property
-    def lines(self) -> tuple[Line, ...]:
+    def lines(self) -> tuple[Event, ...]:
         """The journal so far."""
         return tuple(self._lines)
 
@@ -102,10 +108,9 @@ class SessionStore:
     def attach(self, outlets: Outlets) -> None:
         """Send markers of the session's events from now on, first of its beginning or resumption."""
         self.outlets = outlets
-        began = next(line for line in reversed(self._lines) if line["event"] in BEGINNINGS)
-        self._mark(began["event"], began["t_s"], began)
+        self._mark(next(line for line in reversed(self._lines) if isinstance(line, SessionStarted | SessionResumed)))
 
-    def append(self, event: str, *, t_s: float | None = None, waits: bool = True, **fields: Any) -> None:
+    def append(self, event: Event, *, t_s: float | None = None, waits: bool = True) -> None:
         """Add an event to the journal; with ``waits`` it is on the disk when this returns, else soon after.
 
         ``t_s`` is its time [s since the clock's origin], by default now. Fields that reveal a condition are sealed.
@@ -116,17 +121,17 @@ class SessionStore:
             It was not written, or is not on the disk; the journal is as before and can be tried again.
         """
         if self._lines:
-            fields = sealed(self._lines[0], event, fields, self.key)
-        moment_s = self.clock.seconds() if t_s is None else t_s
-        self._mark(event, moment_s, fields)
-        self._lines.append(self.journal.append(event, t_s=moment_s, waits=waits, **fields))
+            event = sealed(start_of(self._lines), event, self.key)
+        event = replace(event, t_s=self.clock.seconds() if t_s is None else t_s)
+        self._mark(event)
+        self._lines.append(self.journal.append(event, t_s=event.t_s, waits=waits))
         self._marked = None
 
-    def _mark(self, event: str, t_s: float, fields: Mapping[str, Any]) -> None:
+    def _mark(self, event: Event) -> None:
         """Send the marker of an event, before waiting for the disk; only once, even if its line is written again."""
         if self.outlets is None:
             return
-        marker = marker_of(event, t_s, self.clock.origin_ns, fields)
+        marker = marker_of(event.event, event.t_s, self.clock.origin_ns, event.fields())
         if marker is not None and marker != self._marked:
             self.outlets.mark(marker)
             self._marked = marker
@@ -173,9 +178,9 @@ class SessionStore:
             self._ended_s = (
                 self.clock.seconds() if self._ended_s is None else self._ended_s
             )  # the same when tried again
-            self.append("session_ended", t_s=self._ended_s, status=status, reason=reason)
+            self.append(SessionEnded(status=status, reason=reason), t_s=self._ended_s)
             self.journal.close()
-            self._receipt |= {"status": status, "reason": reason, "ended_at": self._lines[-1]["at"]}
+            self._receipt |= {"status": status, "reason": reason, "ended_at": self._lines[-1].at}
         self.write_tables()
         failures = [] if self.behind is None else [self.behind]
         for write in (self._write_receipt, self._write_participants, self._write_checksums):
@@ -235,12 +240,11 @@ class SessionStore:
         if self.recorder is not None:
             self._kept += self.recorder.kept()
         while self._kept:
-            event, fields = event_of(self._kept[0])
-            self.append(event, waits=False, **fields)
+            self.append(self._kept[0], waits=False)
             del self._kept[0]
         for outlet, reason in ({} if self.outlets is None else self.outlets.lost).items():
             if outlet not in self._outlets_lost:
-                self.append("outlet_lost", waits=False, outlet=outlet, reason=reason)
+                self.append(OutletLost(outlet=outlet, reason=reason), waits=False)
                 self._outlets_lost.add(outlet)
 
     def __enter__(self) -> SessionStore:
@@ -257,7 +261,7 @@ class SessionStore:
             error.add_note(str(failed))
 
 
-def table_files(place: Place, lines: Sequence[Line], key: Key | None) -> tuple[tuple[Path, bytes], ...]:
+def table_files(place: Place, lines: Sequence[Event], key: Key | None) -> tuple[tuple[Path, bytes], ...]:
     """Return the session's tables as files: paths and contents, from the journal's lines alone.
 
     ``key`` is the study's once it was opened; without it the sealed columns are left out.

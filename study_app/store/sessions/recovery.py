@@ -36,10 +36,19 @@ from study_app.store.checksums import (
 )
 from study_app.store.folders import RECORDING_NAME, SessionFolder, StudyFolder, locate
 from study_app.store.journals import journal
-from study_app.store.journals.journal import Contents, Journal, Line, SessionClock
-from study_app.store.journals.journal_events import unknown_events
+from study_app.store.journals.journal import Contents, Journal, SessionClock
+from study_app.store.journals.journal_events import (
+    Event,
+    Recorded,
+    RecordingLost,
+    SessionEnded,
+    SessionResumed,
+    SessionStarted,
+    start_of,
+    unknown_events,
+)
 from study_app.store.progress import progress_of, recordable
-from study_app.store.recorder import Lost, Recorded, event_of, hashes_of, recording_files
+from study_app.store.recorder import hashes_of, lost, recorded, recording_files
 from study_app.store.sessions.begin import make_recorder, note_allocation, refuse_never_begun, surroundings
 from study_app.store.sessions.folder_lock import open_alone, refuse_if_open
 from study_app.store.sessions.open_session import Place, SessionStore, table_files
@@ -136,18 +145,14 @@ def reopen(
     with contextlib.ExitStack() as failing:
         failing.callback(store.close)
         at_s = round(clock.seconds(), 6)
-        facts: dict[str, Any] = {
-            "torn_bytes": contents.torn_bytes,
-            "device": device.get("name"),
-            "version": study_app.__version__,
-        }
-        store.append("session_resumed", t_s=at_s, **gap, **facts)
+        version, name = study_app.__version__, device.get("name")
+        store.append(SessionResumed(**gap, torn_bytes=contents.torn_bytes, device=name, version=version), t_s=at_s)
         note_allocation(store)
         sweep(folder.path)
         if is_there(folder.recordings):
             sweep(folder.recordings)
-        for event, fields in _recordings_found(folder, contents.lines) if left.start.get("recordings") else ():
-            store.append(event, **fields)
+        for event in _recordings_found(folder, contents.lines) if left.start.recordings else ():
+            store.append(event)
         around = surroundings(device, screens, clock, motors_masked, outlets, video)
         store.note_resumed({"at": clock.at(at_s), **gap, **around})
         store.write_tables()
@@ -203,7 +208,7 @@ def rebuild(session_folder: Path) -> Rebuilt:
     study_folder, folder = locate(session_folder)
     with open_alone(folder.path):
         contents = journal.whole(folder.journal)
-        place = Place(study_folder, folder, progress_of(contents.lines).start["study"])
+        place = Place(study_folder, folder, start_of(contents.lines).study)
         refuse_if_cut(place, contents.lines)
         swept = sweep(folder.path) + (sweep(folder.recordings) if is_there(folder.recordings) else ())
         table = study_folder.participants(place.study)
@@ -216,13 +221,13 @@ def rebuild(session_folder: Path) -> Rebuilt:
         rewritten += _renew_receipt(folder, contents.lines)
         write_participants(study_folder, place.study, whole=True)
         rewritten += [table] if _content(table) != before else []
-        ended = contents.lines[-1]["event"] == "session_ended"
+        ended = isinstance(contents.lines[-1], SessionEnded)
         if ended:
             rewritten += _renew_proof(place, contents.lines, rewritten)
         return Rebuilt(tuple(rewritten), swept, contents.torn_bytes)
 
 
-def refuse_if_cut(place: Place, lines: Sequence[Line]) -> None:
+def refuse_if_cut(place: Place, lines: Sequence[Event]) -> None:
     """Reject a journal with less information than the session's other files, which would be replaced."""
     for name in unknown_events(lines):
         raise StoreError(
@@ -233,18 +238,18 @@ def refuse_if_cut(place: Place, lines: Sequence[Line]) -> None:
         raise StoreError(f"{path} {what}: {RESTORE}")
 
 
-def beyond(place: Place, lines: Sequence[Line]) -> Iterator[tuple[Path, str]]:
+def beyond(place: Place, lines: Sequence[Event]) -> Iterator[tuple[Path, str]]:
     """Yield each of receipt, checksums and tables that contains more than the journal, with a description.
 
     A session that has ended has a complete journal. After a power cut the trials table may have one more trial, since
     the line of a trial's start is not flushed at once; answers are.
     """
     folder = place.folder
-    ended = lines[-1]["event"] == "session_ended"
+    ended = isinstance(lines[-1], SessionEnded)
     held = receipt.read(folder.receipt) if is_there(folder.receipt) else {}
     if not ended and (status := held.get("status", receipt.UNFINISHED)) != receipt.UNFINISHED:
         yield folder.receipt, f"its status is {status!r}, the journal's {receipt.UNFINISHED!r}"
-    if len(held.get("resumed", ())) > sum(line["event"] == "session_resumed" for line in lines):
+    if len(held.get("resumed", ())) > sum(isinstance(line, SessionResumed) for line in lines):
         yield folder.receipt, "says that the session was resumed more often than the journal does"
     if ended:
         return
@@ -260,10 +265,10 @@ def beyond(place: Place, lines: Sequence[Line]) -> Iterator[tuple[Path, str]]:
             yield path, f"has {there} rows, and the journal gives {len(rows)}"
 
 
-def _ended_or_recorded(place: Place, lines: Sequence[Line]) -> Iterator[tuple[Path, str]]:
+def _ended_or_recorded(place: Place, lines: Sequence[Event]) -> Iterator[tuple[Path, str]]:
     """Yield the study's fingerprints and the recordings that contain more than a journal without an end."""
     folder, study = place.folder, place.study_folder
-    if lines[-1]["event"] == "session_ended":
+    if isinstance(lines[-1], SessionEnded):
         return
     if place_of(study, folder) in {session for _, session in listed(study.fingerprints)}:
         yield study.fingerprints, f"lists {place_of(study, folder)} as ended, but its journal has no end"
@@ -289,7 +294,7 @@ class _Left:
 
     place: Place
     contents: Contents
-    start: Line
+    start: SessionStarted
     receipt: dict[str, Any]
     key: Key
 
@@ -298,17 +303,17 @@ def _left(study_folder: StudyFolder, folder: SessionFolder, protocol: Protocol, 
     """Read the data of an interrupted session; reject one that cannot be resumed with this protocol."""
     contents = journal.whole(folder.journal)
     start = _unfinished(folder, contents.lines)
-    place = Place(study_folder, folder, start["study"])
+    place = Place(study_folder, folder, start.study)
     first = receipt.read(folder.receipt)
     if receipt.other_format(first, start):
         raise StoreError(f"{folder.journal} has another format than its receipt states: restore it from a copy")
     refuse_if_cut(place, contents.lines)
     _same_protocol(place, first, start, protocol, source)
-    draw = stream(start["seed"], "blinding").random if start["simulated"] else None
+    draw = stream(start.seed, "blinding").random if start.simulated else None
     return _Left(place, contents, start, first, open_or_draw_key(study_folder.path, protocol, draw))
 
 
-def _unfinished(folder: SessionFolder, lines: list[Line]) -> Line:
+def _unfinished(folder: SessionFolder, lines: list[Event]) -> SessionStarted:
     """Return the first line of a session that can be resumed."""
     if not lines:
         raise StoreError(
@@ -320,12 +325,14 @@ def _unfinished(folder: SessionFolder, lines: list[Line]) -> Line:
             f"{folder.path} is finished ({done.ended}) and cannot be resumed; use a new session number for another "
             "visit"
         )
-    return done.start
+    return start_of(lines)
 
 
-def _same_protocol(place: Place, first: Mapping[str, Any], start: Line, protocol: Protocol, source: bytes) -> None:
+def _same_protocol(
+    place: Place, first: Mapping[str, Any], start: SessionStarted, protocol: Protocol, source: bytes
+) -> None:
     """Reject a protocol whose file is not the one the session began with, with the differences."""
-    if protocol_hash(source) == start["protocol_hash"]:
+    if protocol_hash(source) == start.protocol_hash:
         return
     found = list(differences(first["protocol"], json.loads(json.dumps(receipt.without_conditions(protocol)))))
     if not same_conditions(place.study_folder.path, protocol):
@@ -340,59 +347,57 @@ def _same_protocol(place: Place, first: Mapping[str, Any], start: Line, protocol
     )
 
 
-def _go_on(lines: list[Line], now_ns: Callable[[], int], now: datetime | None) -> tuple[float | None, SessionClock]:
+def _go_on(lines: list[Event], now_ns: Callable[[], int], now: datetime | None) -> tuple[float | None, SessionClock]:
     """Return the gap since the last line, if known [s], and the clock that continues after it."""
     now = now if now is not None else datetime.now().astimezone()
-    gap_s = (now - datetime.fromisoformat(lines[-1]["at"])).total_seconds()
+    gap_s = (now - datetime.fromisoformat(lines[-1].at)).total_seconds()
     known = 0 <= gap_s <= MOST_GAP_S
     shown_s = progress_of(lines).t_s + (gap_s if known else 0.0)
     clock = SessionClock(now_ns, now - timedelta(seconds=shown_s), shown_s=shown_s)
     return (round(gap_s, 3) if known else None), clock
 
 
-def _recordings_found(folder: SessionFolder, lines: list[Line]) -> Iterator[tuple[str, dict[str, Any]]]:
+def _recordings_found(folder: SessionFolder, lines: list[Event]) -> Iterator[Event]:
     """Yield the lines about recordings that the ended program did not write: complete or lost."""
     from study_app.store import recordings  # noqa: PLC0415 - loads the Parquet library, where there are recordings
 
-    events = ("recorded", "recording_lost")
-    known = {(line["trial"], line["attempt"], line.get("interval")) for line in lines if line["event"] in events}
-    for trial, attempt, interval in recordable(lines):
-        if (trial, attempt, interval) in known:
+    known = {line.which for line in lines if isinstance(line, Recorded | RecordingLost)}
+    for which in recordable(lines):
+        if which in known:
             continue
-        samples, frames = recording_files(folder.recordings, trial, attempt, interval)
+        samples, frames = recording_files(folder.recordings, *which)
         try:
             facts = recordings.read_facts(samples)
             shown = recordings.Written(frames, recordings.read_facts(frames)["rows"], sha256(frames))
-            felt = recordings.Written(samples, facts["rows"], sha256(samples))
-            yield event_of(Recorded(trial, attempt, felt, shown, facts["dropped"], interval))
+            yield recorded(which, recordings.Written(samples, facts["rows"], sha256(samples)), shown, facts["dropped"])
         except StoreError:
             if not is_there(samples):  # frames are put in their place first, and are no recording alone
                 with contextlib.suppress(OSError):
                     frames.unlink(missing_ok=True)
-            yield event_of(Lost(trial, attempt, "the program ended before it was complete", interval))
+            yield lost(which, "the program ended before it was complete")
 
 
-def _renew_receipt(folder: SessionFolder, lines: list[Line]) -> list[Path]:
+def _renew_receipt(folder: SessionFolder, lines: list[Event]) -> list[Path]:
     """Set the receipt's end from the journal; a missing receipt cannot be recreated."""
     last = lines[-1]
-    if last["event"] != "session_ended" or not is_there(folder.receipt):
+    if not isinstance(last, SessionEnded) or not is_there(folder.receipt):
         return []
     held = receipt.read(folder.receipt)
-    ended = {"status": last["status"], "reason": last["reason"], "ended_at": last["at"]}
+    ended = {"status": last.status, "reason": last.reason, "ended_at": last.at}
     if all(held.get(name) == value for name, value in ended.items()):
         return []
     receipt.write(folder.receipt, held | ended)
     return [folder.receipt]
 
 
-def _renew_proof(place: Place, lines: list[Line], rewritten: list[Path]) -> list[Path]:
+def _renew_proof(place: Place, lines: list[Event], rewritten: list[Path]) -> list[Path]:
     """Renew the checksums, and list the fingerprint where it is missing; return what was written.
 
     Sessions of format 1 have none.
     """
     study, folder = place.study_folder, place.folder
     there = {session for _, session in listed(study.fingerprints)}
-    has_none = "previous" in lines[-1] and place_of(study, folder) not in there
+    has_none = lines[-1].previous is not None and place_of(study, folder) not in there
     noted = [folder.rebuilt] if has_none else []
     if has_none:
         note_rebuilt(folder, f"{study.fingerprints.name} had no fingerprint of the session")

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -23,7 +24,8 @@ from study_app.store.blinded.allocation import allocate
 from study_app.store.blinded.blinding import open_or_draw_key, opened, opened_key, reveals, sealed
 from study_app.store.checksums import checksum_bytes, fingerprint, note_fingerprint
 from study_app.store.folders import StudyFolder
-from study_app.store.journals.journal import Line, SessionClock, line_bytes, line_of, plain
+from study_app.store.journals.journal import SessionClock, line_bytes, line_of
+from study_app.store.journals.journal_events import Allocated, Event, SessionEnded, plain, read_event, start_of
 from study_app.store.sessions.begin import (
     SessionStart,
     check_participant,
@@ -118,7 +120,7 @@ class SimulatedStudy:
         """
         place, lines, key = session.place, session.lines, opened_key(self.folder)
         identity = {"participant": place.folder.participant, "started_at": session.clock.at(0)}
-        ended = {"status": lines[-1]["status"], "reason": lines[-1]["reason"], "ended_at": lines[-1]["at"]}
+        ended = {**lines[-1].fields(), "ended_at": lines[-1].at}
         clock = {"origin_ns": session.clock.origin_ns, "origin_at": session.clock.at(0)}
         text = json.dumps({**self._receipt, **identity, **ended, "clock": clock}, indent=2, ensure_ascii=False)
         files = {
@@ -166,24 +168,24 @@ class SimulatedSession:
         name = study.protocol.study.name
         self.place = Place(study.folder, study.folder.session(participant, 1), name)
         self.clock = clock
-        self.lines: list[Line] = []
+        self.lines: list[Event] = []
         self.content = bytearray()  # of the journal
         self._hash = hashlib.sha256()
         self._study = study
         allocation = allocate(study.folder, study.key, participant, waits=False)
         self.protocol = own_protocol(study.protocol, None if allocation is None else allocation.group, 1)
-        entry = {} if allocation is None else {"entry": allocation.entry}
-        self.append("session_started", t_s=0.0, **{**study.started, "participant": participant, **entry})
+        entry = None if allocation is None else allocation.entry
+        self.append(replace(study.started, participant=participant, entry=entry), t_s=0.0)
         if allocation is not None:
-            self.append("allocated", entry=allocation.entry, sealed=allocation.sealed)
+            self.append(Allocated(entry=allocation.entry, sealed=allocation.sealed))
 
-    def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None:
+    def append(self, event: Event, *, t_s: float | None = None) -> None:
         """Keep a line of the journal; ``t_s`` is when it happened, by default now."""
         if self.lines:
-            fields = sealed(self.lines[0], event, fields, self._study.key)
-        previous = self._hash.hexdigest()
-        self.lines.append(line_of(len(self.lines) + 1, event, self.clock, t_s, fields, previous=previous))
-        content = line_bytes(self.lines[-1])
+            event = sealed(start_of(self.lines), event, self._study.key)
+        line = line_of(event, len(self.lines) + 1, self.clock, t_s, previous=self._hash.hexdigest())
+        self.lines.append(read_event(line))
+        content = line_bytes(line)
         self.content += content
         self._hash.update(content)
 
@@ -198,5 +200,5 @@ class SimulatedSession:
         StoreError
             It cannot be written, or is there already.
         """
-        self.append("session_ended", status=status, reason=reason)
+        self.append(SessionEnded(status=status, reason=reason))
         self._study.keep(self)

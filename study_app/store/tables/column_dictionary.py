@@ -79,9 +79,10 @@ def _journal() -> str:
         "| event | fields | meaning |",
         "| --- | --- | --- |",
     )
-    fields = [", ".join(f"`{name}`" for name in event.fields) for event in EVENTS]
     rows = [
-        f"| `{event.name}` | {listed} | {event.description} |" for event, listed in zip(EVENTS, fields, strict=True)
+        f"| `{name}` | {', '.join(f'`{field}`' for field in event.required)} | "
+        f"{' '.join((event.__doc__ or '').split())} |"
+        for name, event in EVENTS.items()
     ]
     return _section("Journal", "journal.jsonl", "one line per event", (*head, *rows))
 

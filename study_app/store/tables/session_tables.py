@@ -5,7 +5,7 @@ order, the same bytes for the same rows on every machine. While a session runs, 
 page; each table is replaced in one step.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,9 +13,30 @@ from study_app.errors import StoreError
 from study_app.store.atomic import write_file
 from study_app.store.blinded.blinding import Key, opened
 from study_app.store.delivered import within_limits
-from study_app.store.journals.journal import Line
-from study_app.store.journals.journal_events import CAUSE_WITHHELD
-from study_app.store.progress import is_of_intervals, progress_of
+from study_app.store.journals.journal_events import (
+    CAUSE_WITHHELD,
+    UNDELIVERED,
+    Broke,
+    DeviceReconnected,
+    Event,
+    FormAnswered,
+    IntervalEnded,
+    IntervalStarted,
+    Note,
+    OfAttempt,
+    Recorded,
+    RecordingLost,
+    Repeat,
+    Response,
+    Responses,
+    SessionEnded,
+    SessionResumed,
+    SessionStarted,
+    TrialEnded,
+    TrialStarted,
+    start_of,
+)
+from study_app.store.progress import progress_of
 from study_app.store.tables.columns import DELIVERED, INTERVALS, TRIALS, VIDEO, tables_of
 from study_app.store.tables.csv_files import Column, Row, header, header_bytes, records, unsealed
 
@@ -39,17 +60,18 @@ class SessionRows:
     with a design, ``changed_intervals`` is likewise the first of them that was added or changed.
     """
 
-    def __init__(self, lines: Sequence[Line]) -> None:
+    def __init__(self, lines: Sequence[Event]) -> None:
         self.responses: list[Row] = []
         self.trials: list[Row] = []
         self.intervals: list[Row] = []
         self.changed = 0
         self.changed_intervals = 0
-        self._session = _session(lines)
-        self._group = _group(lines)
+        self._start = start_of(lines)
+        self._session = _session(self._start)
+        self._group = _group(self._start)
         self._measured_names = (*_MEASURED, *header(VIDEO)) if self._group else _MEASURED
-        self._limits = lines[0].get("limits", {})
-        self._started: dict[tuple[int, int], Line] = {}
+        self._limits = self._start.limits
+        self._started: dict[tuple[int, int], TrialStarted] = {}
         self._places: dict[tuple[int, int], int] = {}  # in trials
         self._intervals: dict[tuple[int, int, int], int] = {}  # in intervals
         self._broke = self._reconnected = ""
@@ -60,91 +82,93 @@ class SessionRows:
         """Return the rows of the table of a name."""
         return {"responses": self.responses, "trials": self.trials, "intervals": self.intervals}[name]
 
-    def take(self, line: Line) -> None:
+    def take(self, line: Event) -> None:
         """Process one more line."""
-        match line["event"]:
-            case "trial_started":
+        match line:
+            case TrialStarted():
                 self._interrupt()
-                which = line["trial"], line["attempt"]
-                repeats = bool(self.trials) and self.trials[-1]["trial"] == line["trial"]
+                which = line.trial, line.attempt
+                repeats = bool(self.trials) and self.trials[-1]["trial"] == line.trial
                 self._started[which], self._places[which] = line, len(self.trials)
-                later = {**dict.fromkeys(header(VIDEO)), "intervals": 0 if is_of_intervals(line) else None}
+                later = {**dict.fromkeys(header(VIDEO)), "intervals": 0 if line.has_intervals else None}
                 self.trials.append(_trial(self._session, line) | (later if self._group else {}) | self._group)
                 if self._reconnected and repeats:
                     _note(self.trials[-1], f"presented again: {self._reconnected}")
                 self._reconnected = ""
-            case "trial_ended":
+            case TrialEnded(outcome=outcome):
                 row = self._row_of(line)
                 row |= self._measured(line)
-                valid = within_limits(row, self._limits) if line["outcome"] != "invalid" else False
-                row |= {"outcome": line["outcome"], "valid": valid}
-            case "responses":
-                if (trial := self._started.get((line["trial"], line["attempt"]))) is None:
+                valid = within_limits(row, self._start.limits) if outcome != UNDELIVERED else False
+                row |= {"outcome": outcome, "valid": valid}
+            case Responses():
+                if (trial := self._started.get((line.trial, line.attempt))) is None:
                     raise _never_started(line)
-                self.responses += [_response(self._session, trial, answer, line["at"]) for answer in line["items"]]
-            case "form_answered":
-                form = {**dict.fromkeys(_TRIAL_COLUMNS), "form": line["form"]}
-                self.responses += [_response(self._session, form, answer, line["at"]) for answer in line["items"]]
-            case "session_ended" | "session_resumed":
+                about = {name: getattr(trial, name) for name in _TRIAL_COLUMNS}
+                self.responses += [_response(self._session, about, answer, line.at) for answer in line.items]
+            case FormAnswered():
+                about = {**dict.fromkeys(_TRIAL_COLUMNS), "form": line.form}
+                self.responses += [_response(self._session, about, answer, line.at) for answer in line.items]
+            case SessionEnded() | SessionResumed():
                 self._interrupt()
-            case "interval_started":
+            case IntervalStarted():
                 self._begin_interval(line)
-            case "interval_ended":
-                row = self._interval_of(line)
-                row |= {name: line.get(name) for name in (*self._measured_names, *_DELIVERED)}
-                row["ended_s"] = line["t_s"]
-                reasons = line.get("invalid", ())
-                row |= {"outcome": line["outcome"], "invalid_reasons": " ".join(reasons) or None}
-                row |= {"valid": within_limits(row, self._limits) if not reasons else False}
-            case "recorded":
-                row = self._row_of(line) if "interval" not in line else self._interval_of(line)
-                row |= {name: line[name] for name in _RECORDED}
-            case "recording_lost":
-                row = self._row_of(line) if "interval" not in line else self._interval_of(line)
-                row["recording_lost"] = line["reason"]
-            case "broke":
-                self._broke = line["what"]
-            case "device_reconnected" if self.trials:
+            case IntervalEnded(outcome=outcome):
+                row, reasons = self._row_of(line), line.invalid or ()
+                row |= {name: line.others.get(name) for name in (*self._measured_names, *_DELIVERED)}
+                row["ended_s"] = line.t_s
+                row |= {"outcome": outcome, "invalid_reasons": " ".join(reasons) or None}
+                row |= {"valid": within_limits(row, self._start.limits) if not reasons else False}
+            case Recorded():
+                self._row_of(line).update((name, getattr(line, name)) for name in _RECORDED)
+            case RecordingLost():
+                self._row_of(line)["recording_lost"] = line.reason
+            case Broke():
+                self._broke = line.what
+            case DeviceReconnected() if self.trials:
                 withheld = self._broke == CAUSE_WITHHELD
                 failed = f"the device failed and was connected again ({self._broke})"
                 self._reconnected = f"{CAUSE_WITHHELD} and continued" if withheld else failed
                 _note(self._last(), self._reconnected)
-            case "note" if self.trials:
-                _note(self._last(), line["text"], mark=line["kind"] == "mark")
-            case "repeat" if self.trials:
-                _note(self._last(), f"repeated: {line['reason']}")
+            case Note() if self.trials:
+                _note(self._last(), line.text, mark=line.kind == "mark")
+            case Repeat() if self.trials:
+                _note(self._last(), f"repeated: {line.reason}")
 
-    def _row_of(self, line: Line) -> Row:
-        if (place := self._places.get((line["trial"], line["attempt"]))) is None:
+    def _row_of(self, line: OfAttempt) -> Row:
+        """Return the row that a line is about: of an interval, or of a trial."""
+        trial, attempt, interval = line.which
+        known = self._places.get((trial, attempt))
+        place = known if interval is None else self._intervals.get((trial, attempt, interval))
+        if place is None:
             raise _never_started(line)
-        self.changed = min(self.changed, place)
-        return self.trials[place]
+        if interval is None:
+            self.changed = min(self.changed, place)
+            return self.trials[place]
+        self.changed_intervals = min(self.changed_intervals, place)
+        return self.intervals[place]
 
-    def _begin_interval(self, line: Line) -> None:
-        which = line["trial"], line["attempt"]
-        before = self._intervals.get((*which, line["interval"] - 1))
-        self._intervals[*which, line["interval"]] = len(self.intervals)
+    def _begin_interval(self, line: IntervalStarted) -> None:
+        which, number = (line.trial, line.attempt), line.interval
+        if which not in self._places:
+            raise _never_started(line)
+        before = self._intervals.get((*which, number - 1))
+        self._intervals[*which, number] = len(self.intervals)
         earlier = None if before is None else self.intervals[before]
-        trial = self._row_of(line)
+        trial = self.trials[self._places[which]]
+        self.changed = min(self.changed, self._places[which])
         if trial.get("intervals") is None:
             raise StoreError(
-                f"the journal's line {line['n']} is an interval of trial {line['trial']}, which has none: "
+                f"the journal's line {line.n} is an interval of trial {line.trial}, which has none: "
                 "restore it from a copy"
             )
         trial["intervals"] += 1
         self.intervals.append(_interval_row(trial, self._started[which], line, earlier))
 
-    def _interval_of(self, line: Line) -> Row:
-        if (place := self._intervals.get((line["trial"], line["attempt"], line["interval"]))) is None:
-            raise _never_started(line)
-        self.changed_intervals = min(self.changed_intervals, place)
-        return self.intervals[place]
-
-    def _measured(self, line: Line) -> Row:
+    def _measured(self, line: TrialEnded) -> Row:
         """Return the measures of a trial that ended; with a design, from all its intervals."""
-        which = line["trial"], line["attempt"]
-        if not is_of_intervals(self._started[which]):
-            return {name: line.get(name) for name in self._measured_names}
+        which = line.trial, line.attempt
+        if not self._started[which].has_intervals:
+            return {name: line.others.get(name) for name in self._measured_names}
         intervals = (self.intervals[at] for key, at in self._intervals.items() if key[:2] == which)
         return _measures_of(intervals, self._measured_names)
 
@@ -171,7 +195,7 @@ class GrowingTables:
         self._taken = 0  # lines of the journal
         self._opened = False
 
-    def write(self, lines: Sequence[Line], key: Key | None, *, whole: bool = False) -> None:
+    def write(self, lines: Sequence[Event], key: Key | None, *, whole: bool = False) -> None:
         """Bring the tables up to date with the journal's ``lines``, which are those of before and new ones.
 
         Parameters
@@ -206,48 +230,43 @@ class GrowingTables:
         rows.changed, rows.changed_intervals = len(rows.trials), len(rows.intervals)
 
 
-def responses(lines: Sequence[Line]) -> list[Row]:
+def responses(lines: Sequence[Event]) -> list[Row]:
     """Return one row per response, in the order of confirmation."""
     return SessionRows(lines).responses
 
 
-def trials(lines: Sequence[Line]) -> list[Row]:
+def trials(lines: Sequence[Event]) -> list[Row]:
     """Return one row per presentation of a trial, in order; the running one has no outcome yet."""
     return SessionRows(lines).trials
 
 
-def table_columns(lines: Sequence[Line], *, opened: bool) -> dict[str, tuple[Column, ...]]:
+def table_columns(lines: Sequence[Event], *, opened: bool) -> dict[str, tuple[Column, ...]]:
     """Return the columns of a session's tables by name: without the sealed ones where they are sealed, not ``opened``.
 
     Only a study with designs has a table of intervals.
     """
-    tables = tables_of(protocol_format(lines))
-    names = ("responses", "trials", "intervals") if lines[0].get("intervals") else ("responses", "trials")
-    shows = opened or not lines[0].get("measures_sealed")
+    tables = tables_of(start_of(lines).protocol_format or 1)
+    names = ("responses", "trials", "intervals") if start_of(lines).intervals else ("responses", "trials")
+    shows = opened or not start_of(lines).measures_sealed
     return {name: tables[name] if shows else unsealed(tables[name]) for name in names}
 
 
-def protocol_format(lines: Sequence[Line]) -> int:
-    """Return the format of the protocol of a session with these journal lines."""
-    return int(lines[0].get("protocol_format", 1))
-
-
-def participant(lines: Sequence[Line]) -> Row:
+def participant(lines: Sequence[Event]) -> Row:
     """Return the session's row of the participants table."""
-    start, rows, done = lines[0], SessionRows(lines), progress_of(lines)
+    start, rows, done = start_of(lines), SessionRows(lines), progress_of(lines)
     main = [row for row in latest(rows.trials) if row["phase"] == "main" and row["outcome"] in ("complete", "timeout")]
     after_main = latest(row for row in rows.responses if row["phase"] == "main")
     in_forms = (row for row in rows.responses if row.get("form") is not None)
     answered = [row for row in (*after_main, *in_forms) if row["first_choice_s"] is not None]
     verdicts = [row["valid"] for row in main if row["valid"] is not None]
     return {
-        **_session(lines),
-        **_group(lines),
+        **_session(start),
+        **_group(start),
         "status": "unfinished" if done.ended is None else done.ended,
-        "session_started_at": start["at"],
-        "session_ended_at": next((line["at"] for line in reversed(lines) if line["event"] == "session_ended"), None),
+        "session_started_at": start.at,
+        "session_ended_at": next((line.at for line in reversed(lines) if isinstance(line, SessionEnded)), None),
         "resumed": done.resumed,
-        "device": start.get("device"),
+        "device": start.device,
         "language": done.language,
         "trials": len(main),
         "responses": len(answered),
@@ -271,20 +290,20 @@ def response_text(value: Any) -> str | None:
     return None if value is None else str(value)
 
 
-def _interval_row(trial: Row, started: Mapping[str, Any], line: Mapping[str, Any], before: Row | None) -> Row:
+def _interval_row(trial: Row, started: TrialStarted, line: IntervalStarted, before: Row | None) -> Row:
     """Return the row of an interval that begins."""
     row: Row = {name: trial.get(name) for name in header(INTERVALS)} | dict.fromkeys(_OF_THE_END)
-    number = line["interval"]
+    number = line.interval
     ended_s = None if before is None else before["ended_s"]
-    arrangement = started.get("arrangement")
+    arrangement = started.arrangement
     return row | {
         "interval": number,
-        "interval_started_s": line["t_s"],
-        "gap_s": None if ended_s is None else round(line["t_s"] - ended_s, 6),
+        "interval_started_s": line.t_s,
+        "gap_s": None if ended_s is None else round(line.t_s - ended_s, 6),
         "presented": None if arrangement is None else _PRESENTED[arrangement[number - 1]],
-        "standard": started.get("standard"),
-        "level": started.get("level"),
-        "catch": started.get("catch"),
+        "standard": started.standard,
+        "level": started.level,
+        "catch": started.catch,
     }
 
 
@@ -304,56 +323,46 @@ def _combined(name: str, values: list[Any]) -> Any:
     return round(found, 6) if isinstance(found, float) else found
 
 
-def _session(lines: Sequence[Line]) -> Row:
-    if not lines or lines[0]["event"] != "session_started":
-        raise StoreError("the journal does not begin with session_started: restore it from a copy")
-    return {name: lines[0][name] for name in _SESSION_COLUMNS}
+def _session(start: SessionStarted) -> Row:
+    return {name: getattr(start, name) for name in _SESSION_COLUMNS}
 
 
-def _group(lines: Sequence[Line]) -> Row:
+def _group(start: SessionStarted) -> Row:
     """Return the group of the session's participant, where it was opened; nothing in format 1."""
-    return {"group": lines[0].get("group")} if protocol_format(lines) > 1 else {}
+    return {"group": start.group} if (start.protocol_format or 1) > 1 else {}
 
 
-def _response(session: Row, trial: Mapping[str, Any], answer: Mapping[str, Any], answered_at: str) -> Row:
+def _response(session: Row, about: Row, response: Response, answered_at: str) -> Row:
     """Return the row of an answer; only in format 2 it says its kind, and the answer as text and as number."""
-    value = answer["value"]
-    if kind := answer.get("kind"):
-        cells = {
-            "form": trial.get("form"),
-            "kind": kind,
-            "response": response_text(value),
-            "value": value if isinstance(value, int | float) else None,
-        }
-    else:
-        cells = {"response": value}
+    answer, value = response.answer, response.answer.value
     row = {
         **session,
-        **{name: trial[name] for name in _TRIAL_COLUMNS},
-        **cells,
-        "item": answer["item"],
-        "number": answer["number"],
-        "cannot_judge": value is None and answer["first_s"] is not None,
-        "onset_s": answer["onset_s"],
-        "first_choice_s": answer["first_s"],
-        "last_change_s": answer["last_s"],
-        "changes": answer["changes"],
+        "form": None,
+        **about,
+        "kind": response.kind,
+        "response": value if response.kind is None else response_text(value),
+        "value": value if isinstance(value, int | float) else None,
+        "item": response.item,
+        "number": response.number,
+        "cannot_judge": value is None and answer.given,
+        "onset_s": answer.onset_s,
+        "first_choice_s": answer.first_s,
+        "last_change_s": answer.last_s,
+        "changes": answer.changes,
         "answered_at": answered_at,
     }
-    return {name: row[name] for name in header(tables_of(2 if kind else 1)["responses"])}
+    return {name: row[name] for name in header(tables_of(2 if response.kind else 1)["responses"])}
 
 
-def _trial(session: Row, line: Line) -> Row:
-    row: Row = dict.fromkeys(header(TRIALS))
-    row |= session
-    row |= {name: line[name] for name in (*_TRIAL_COLUMNS, "of")}
-    row |= {"trial_started_at": line["at"], "trial_started_s": line["t_s"], "marked": False}
-    return row
+def _trial(session: Row, line: TrialStarted) -> Row:
+    row: Row = dict.fromkeys(header(TRIALS)) | session
+    row |= {name: getattr(line, name) for name in (*_TRIAL_COLUMNS, "of")}
+    return row | {"trial_started_at": line.at, "trial_started_s": line.t_s, "marked": False}
 
 
-def _never_started(line: Line) -> StoreError:
+def _never_started(line: OfAttempt) -> StoreError:
     return StoreError(
-        f"the journal's line {line['n']} is about trial {line['trial']}, which never started: restore it from a copy"
+        f"the journal's line {line.n} is about trial {line.trial}, which never started: restore it from a copy"
     )
 
 

@@ -128,11 +128,11 @@ def row_from(session: SessionFolder, contents: journal.Contents, key: Key | None
     try:
         row = session_tables.participant(opened(contents.lines, key))
     except StoreError:  # one session that cannot be read must not stop the others
-        return _damaged(session, contents.lines[0])
+        return _damaged(session, contents.lines[0].line())
     return row if contents.damage is None else row | {"status": "damaged"}
 
 
-def _damaged(session: SessionFolder, start: journal.Line) -> csv_files.Row:
+def _damaged(session: SessionFolder, start: Mapping[str, Any]) -> csv_files.Row:
     """Return the row of a session without one from its journal: from its folder, first line and receipt."""
     if not start:
         with contextlib.suppress(StoreError):

@@ -18,6 +18,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.trials.tracks import adjusting_of, design_of, method_of, standards_of, stimulus_of
 from study_app.store.atomic import cannot_read, parse_json, paths_in
 from study_app.store.folders import StudyFolder
+from study_app.store.journals.journal_events import Event, Stepped, TrialStarted
 
 Tables: TypeAlias = Mapping[str, Any]
 
@@ -78,7 +79,7 @@ def presented_numbers(protocol: Protocol) -> frozenset[float]:
     return frozenset(found - {0.0})
 
 
-def recorded_numbers(protocol: Protocol, opened: Iterable[Mapping[str, Any]]) -> frozenset[float]:
+def recorded_numbers(protocol: Protocol, opened: Iterable[Event]) -> frozenset[float]:
     """Return every level and comparison that the opened lines of a journal presented: methods may choose any level.
 
     Those that a participant set, step by step, are among them.
@@ -86,12 +87,12 @@ def recorded_numbers(protocol: Protocol, opened: Iterable[Mapping[str, Any]]) ->
     found: set[float] = set()
     setting, place = None, 0
     for line in opened:
-        if line["event"] == "trial_started" and line.get("level"):
-            block = protocol.blocks[line["block"]]
-            found |= {line["level"], stimulus_of(protocol, block).comparison(line["standard"], line["level"])}
-            setting, place = adjusting_of(protocol, block, line["standard"], line["level"]), 0
-        elif line["event"] == "stepped" and setting is not None:
-            place = setting.moved(place, line["steps"])
+        if isinstance(line, TrialStarted) and line.level:
+            block, standard = protocol.blocks[line.block], line.standard
+            found |= {line.level, stimulus_of(protocol, block).comparison(standard, line.level)}
+            setting, place = adjusting_of(protocol, block, standard, line.level), 0
+        elif isinstance(line, Stepped) and setting is not None:
+            place = setting.moved(place, line.steps)
             found |= {setting.level(place), setting.comparison(place)}
     return frozenset(found - {0.0})
 

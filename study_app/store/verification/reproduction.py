@@ -5,8 +5,8 @@ the key, in memory alone, and compared with those that follow from the answers b
 presented, so that a difference does not propagate. No level is printed.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +15,25 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of_receipt
 from study_app.protocol.orders.durations import own_protocol
-from study_app.protocol.orders.schedule import Schedule, build_schedule, recorded_trials, reproduce
+from study_app.protocol.orders.schedule import RecordedTrial, Schedule, build_schedule, reproduce
 from study_app.protocol.streams import Key, group_of
-from study_app.protocol.trials.presentation import arrangement_text, heard_in, next_level
+from study_app.protocol.trials.presentation import arrangement_text, next_level
 from study_app.protocol.trials.tracks import adjusting_of, design_of
 from study_app.store import receipt
 from study_app.store.blinded.blinding import opened, read_key, whole_protocol
 from study_app.store.folders import StudyFolder, locate
 from study_app.store.journals import journal
-from study_app.store.journals.journal import Line
+from study_app.store.journals.journal_events import (
+    Event,
+    IntervalEnded,
+    OfAttempt,
+    PassedOver,
+    Responses,
+    Stepped,
+    TrialStarted,
+    start_of,
+)
+from study_app.store.progress import heard_in
 
 
 @dataclass(slots=True)
@@ -60,12 +70,12 @@ def reproduced(session_folder: Path) -> Reproduced:
     except (KeyError, TypeError) as error:
         raise StoreError(f"{folder.path}: receipt or journal lack {error}: verify the study's folder") from error
     found = Reproduced([*differences])
-    if lines and lines[0].get("intervals"):
+    if lines and start_of(lines).intervals:
         _levels(study, ran, lines, found)
     return found
 
 
-def _levels(study: StudyFolder, ran: Mapping[str, Any], lines: list[Line], found: Reproduced) -> None:
+def _levels(study: StudyFolder, ran: Mapping[str, Any], lines: list[Event], found: Reproduced) -> None:
     """Compare what each trial of intervals presented with what was due."""
     try:
         key = read_key(study.path)
@@ -103,23 +113,22 @@ class _Compared:
         self._schedule = schedule
         self._planned = {trial.number: trial for trial in self._schedule.trials}
 
-    def take(self, line: Line, before: Sequence[Line]) -> None:
+    def take(self, line: Event, before: Sequence[Event]) -> None:
         """Compare one line with what follows from those before it."""
-        if line["event"] in {"interval_ended", "responses"}:
+        if isinstance(line, IntervalEnded | Responses):
             self._take_setting(line, before)
-        if line["event"] not in {"trial_started", "passed_over"} or line.get("trial") not in self._planned:
+        if not isinstance(line, TrialStarted | PassedOver) or line.trial not in self._planned:
             return
-        trial = self._planned[line["trial"]]
+        trial = self._planned[line.trial]
         block = self._protocol.blocks[trial.block]
         if block.design is None:
             return
-        heard = heard_in(self._protocol, before)
-        due = next_level(self._protocol, self._key, self._schedule, trial, heard)
-        if line["event"] == "passed_over":
+        due = next_level(self._protocol, self._key, self._schedule, trial, heard_in(self._protocol, before))
+        if isinstance(line, PassedOver):
             if due is not None:
                 self.differences.append(f"trial {trial.number}: passed over, though it was due by the answers")
             return
-        presented = (line["level"], line["standard"], line["arrangement"], line.get("catch", False))
+        presented = (line.level, line.standard, line.arrangement, bool(line.catch))
         follows = due is not None and presented == (
             due.level,
             due.standard,
@@ -130,28 +139,31 @@ class _Compared:
             what = (
                 "presented, though it was to be passed over" if due is None else "another level or arrangement was due"
             )
-            self.differences.append(f"trial {trial.number}, attempt {line['attempt']}: {what}")
+            self.differences.append(f"trial {trial.number}, attempt {line.attempt}: {what}")
         self._note(block, trial.number, follows)
 
-    def _take_setting(self, line: Line, before: Sequence[Line]) -> None:
+    def _take_setting(self, line: IntervalEnded | Responses, before: Sequence[Event]) -> None:
         """Compare the level that a participant set with the steps from where it started, and the answer with their sum.
 
         A line that is not about a setting is left alone.
         """
-        if line["event"] == "interval_ended" and line.get("setting") is None:
+        set_to = line.others.get("setting")
+        if isinstance(line, IntervalEnded) and set_to is None:
             return
-        which = line["trial"], line["attempt"]
-        own = [one for one in before if (one.get("trial"), one.get("attempt")) == which]
-        started = next(one for one in own if one["event"] == "trial_started")
-        block = self._protocol.blocks[started["block"]]
-        setting = adjusting_of(self._protocol, block, started["standard"], started["level"]) if block.stimulus else None
+        which = line.trial, line.attempt
+        own = [one for one in before if isinstance(one, OfAttempt) and (one.trial, one.attempt) == which]
+        started = next(one for one in own if isinstance(one, TrialStarted))
+        block = self._protocol.blocks[started.block]
+        if block.stimulus is None or started.level is None:
+            return
+        setting = adjusting_of(self._protocol, block, started.standard, started.level)
         if setting is None:
             return
-        steps = [one["steps"] for one in own if one["event"] == "stepped"]
-        if line["event"] == "responses":
-            follows = line["items"][0]["value"] == sum(steps)
+        steps = [one.steps for one in own if isinstance(one, Stepped)]
+        if isinstance(line, Responses):
+            follows = line.items[0].answer.value == sum(steps)
         else:
-            follows = line["setting"] == setting.level(setting.reached(steps))
+            follows = set_to == setting.level(setting.reached(steps))
         if not follows:
             self.differences.append(f"trial {which[0]}, attempt {which[1]}: its steps lead to another setting")
         self._note(block, which[0], follows)
@@ -161,9 +173,32 @@ class _Compared:
         of_block[trial] = follows and of_block.get(trial, True)
 
 
-def _group(study: StudyFolder, lines: list[Line]) -> str | None:
+def _group(study: StudyFolder, lines: Sequence[Event]) -> str | None:
     """Return the group that the participant's entry gives, None in a study without groups."""
-    if "entry" not in lines[0]:
+    entry = start_of(lines).entry
+    if entry is None:
         return None
     key = read_key(study.path)
-    return group_of(key.groups, key.nonce, lines[0]["entry"])
+    return group_of(key.groups, key.nonce, entry)
+
+
+def recorded_trials(lines: Iterable[Event]) -> tuple[RecordedTrial | int, ...]:
+    """Return what the lines of a journal say was presented: every attempt, in the order of time.
+
+    A trial that was passed over is its number alone. KeyError says that a line answers a trial that never started.
+    """
+    attempts: list[RecordedTrial | int] = []
+    place: dict[tuple[int, int], tuple[int, RecordedTrial]] = {}
+    for line in lines:
+        if isinstance(line, TrialStarted):
+            told = RecordedTrial(line.trial, line.block, line.phase, line.part, line.index, line.of, line.code)
+            place[line.trial, line.attempt] = len(attempts), told
+            attempts.append(told)
+        elif isinstance(line, Responses):
+            rows = sorted(line.items, key=lambda row: row.number)
+            index, told = place[line.trial, line.attempt]
+            items, may_hide = tuple(row.item for row in rows), any(row.kind is not None for row in rows)
+            attempts[index] = replace(told, items=items, may_hide=may_hide)
+        elif isinstance(line, PassedOver) and line.trial is not None:
+            attempts.append(line.trial)
+    return tuple(attempts)

@@ -23,9 +23,20 @@ from study_app.store.blinded.blinding import Key, opened, opened_key
 from study_app.store.checksums import files, fingerprint, hashed, read_checksums
 from study_app.store.folders import FINGERPRINTS, SessionFolder
 from study_app.store.journals import journal
-from study_app.store.journals.journal import Contents, Line
-from study_app.store.journals.journal_events import shortened, unknown_events
-from study_app.store.progress import Given, Progress, named, progress_of, recordable
+from study_app.store.journals.journal import Contents
+from study_app.store.journals.journal_events import (
+    Answer,
+    Event,
+    FormAnswered,
+    Recorded,
+    RecordingLost,
+    Responses,
+    SessionEnded,
+    shortened,
+    start_of,
+    unknown_events,
+)
+from study_app.store.progress import Progress, named, progress_of, recordable
 from study_app.store.recorder import recording_files
 from study_app.store.sessions.folder_lock import is_open, never_begun
 from study_app.store.sessions.open_session import Place, table_files
@@ -143,15 +154,16 @@ def _check(place: Place, key: Key | None, found: Gathered, *, running: bool, rec
         _receipt(folder, lines, key.hash if key else None, found)
     if not lines:
         return Checked(place, readable=running or never_begun(folder.path), running=running)
+    start = start_of(lines)
     expected = {"participant": folder.participant, "session": folder.number, "study": place.study}
     for name, value in expected.items():
-        if lines[0].get(name) != value:
-            found.error(folder.journal, f"is of {name} {lines[0].get(name)!r}, but is stored with those of {value!r}")
+        if (told := getattr(start, name)) != value:
+            found.error(folder.journal, f"is of {name} {told!r}, but is stored with those of {value!r}")
     with found.reading(folder.journal):
         opened(lines, key)
     for wrong in wrong_responses(lines):
         found.error(folder.journal, wrong)
-    ended = lines[-1]["event"] == "session_ended"
+    ended = isinstance(lines[-1], SessionEnded)
     hashes = {}
     if ended or not running:
         hashes = {name: _hash(folder, name) for name in files(folder) if recordings or not name.endswith(".parquet")}
@@ -169,7 +181,7 @@ def _check(place: Place, key: Key | None, found: Gathered, *, running: bool, rec
         place,
         readable=True,
         running=running,
-        chained="previous" in lines[-1],
+        chained=lines[-1].previous is not None,
         row=row_from(folder, contents, opened_or_none(place.study_folder)),
         trials=frozenset(progress_of(lines).presented),
         fingerprint=fingerprint(hashes) if ended and recordings else "",
@@ -215,12 +227,12 @@ def _journal(folder: SessionFolder, found: Gathered, *, running: bool) -> Conten
     if done.ended is None:
         if not running:
             found.warning(folder.path, "is unfinished: resume it, or leave it unfinished")
-    elif contents.lines[-1]["event"] != "session_ended":
+    elif not isinstance(contents.lines[-1], SessionEnded):
         found.error(folder.journal, "lines follow the session's end")
     return contents
 
 
-def _receipt(folder: SessionFolder, lines: list[Line], key_hash: str | None, found: Gathered) -> None:
+def _receipt(folder: SessionFolder, lines: list[Event], key_hash: str | None, found: Gathered) -> None:
     path = folder.receipt
     if not lines and not is_there(path):
         return  # claimed and never begun
@@ -235,46 +247,47 @@ def _receipt(folder: SessionFolder, lines: list[Line], key_hash: str | None, fou
         found.error(path, "contains the hash of another key")
     if not lines:
         return
+    start = start_of(lines)
     compared = [name for name in (*receipt.FACTS, "row_of") if name in held or name == "row_of"]
-    if differing := [name for name in compared if held.get(name) != lines[0].get(name)]:
+    if differing := [name for name in compared if held.get(name) != getattr(start, name)]:
         found.error(path, f"{', '.join(differing)}: differ from the journal")
-    if receipt.other_format(held, lines[0]):
+    if receipt.other_format(held, start):
         found.error(
             folder.journal, f"has another format than {path.name} states: it was changed; restore it from a copy"
         )
     last = lines[-1]
-    if last["event"] == "session_ended" and held.get("status") != last["status"]:
-        found.error(path, f"its status is {held.get('status')!r}, the journal's {last['status']!r}; rebuild renews it")
+    if isinstance(last, SessionEnded) and held.get("status") != last.status:
+        found.error(path, f"its status is {held.get('status')!r}, the journal's {last.status!r}; rebuild renews it")
 
 
-def wrong_responses(lines: Sequence[Line]) -> Iterator[str]:
+def wrong_responses(lines: Sequence[Event]) -> Iterator[str]:
     """Yield a sentence on each answer in ``responses`` that is not the one given by the choices before it."""
     now = Progress()
     for line in lines:
-        if line["event"] in ("responses", "form_answered"):
+        if isinstance(line, Responses | FormAnswered):
             chosen = dict(now.answers)
-            where = f"form {line['form']}" if "form" in line else f"trial {line['trial']}"
-            line_name = f"line {line['n']} ({line['event']})"
-            hides = any("kind" in row for row in line["items"])  # format 2: a question may have been shown for a while
-            for row in line["items"]:
-                if not _is_of(row, chosen.pop(row["item"], Given())):
+            where = f"form {line.form}" if isinstance(line, FormAnswered) else f"trial {line.trial}"
+            line_name = f"line {line.n} ({line.event})"
+            hides = any(row.kind is not None for row in line.items)  # format 2: it may have been shown for a while
+            for row in line.items:
+                if not _same_answer(row.answer, chosen.pop(row.item, Answer())):
                     wrong = "another answer than was chosen before: it was changed"
-                    yield f"{line_name} has for {row['item']!r} in {where} {wrong}"
-            for item, given in chosen.items():
-                if given.first_s is not None or not hides:
+                    yield f"{line_name} has for {row.item!r} in {where} {wrong}"
+            for item, answer in chosen.items():
+                if answer.given or not hides:
                     yield f"{line_name} lacks {item!r}, answered in {where}: it was changed"
         now.take(line)
 
 
-def _is_of(row: Mapping[str, Any], given: Given) -> bool:
-    """Return whether an answer in ``responses`` is what was ``given``; moments of a line are rounded to 1 µs."""
-    moments = ((row[name], getattr(given, name)) for name in ("onset_s", "first_s", "last_s"))
-    return (row["value"], row["changes"]) == (given.value, given.changes) and all(
+def _same_answer(listed_answer: Answer, given: Answer) -> bool:
+    """Return whether a confirmed answer is what was chosen; moments of a line are rounded to 1 µs."""
+    moments = ((getattr(listed_answer, name), getattr(given, name)) for name in ("onset_s", "first_s", "last_s"))
+    return (listed_answer.value, listed_answer.changes) == (given.value, given.changes) and all(
         listed == ours or (None not in (listed, ours) and abs(listed - ours) <= _ROUNDED_S) for listed, ours in moments
     )
 
 
-def _tables(place: Place, lines: list[Line], found: Gathered, *, ended: bool) -> None:
+def _tables(place: Place, lines: list[Event], found: Gathered, *, ended: bool) -> None:
     """Compare the tables with what the journal gives; one that tells more than the journal is named as such."""
     telling: set[Path] = set()
     with contextlib.suppress(StoreError):  # said of receipt or journal already
@@ -348,24 +361,22 @@ def _checksums(folder: SessionFolder, hashes: Mapping[str, str], found: Gathered
 
 
 def _recordings(
-    folder: SessionFolder, lines: list[Line], hashes: Mapping[str, str], found: Gathered, *, ended: bool
+    folder: SessionFolder, lines: list[Event], hashes: Mapping[str, str], found: Gathered, *, ended: bool
 ) -> None:
     """Check that every recording the journal tells of is there, whole and of this trial, and no other."""
     listed: set[str] = set()
-    known: set[tuple[int, int, int | None]] = set()
+    known = {line.which for line in lines if isinstance(line, Recorded | RecordingLost)}
     for line in lines:
-        if line["event"] not in ("recorded", "recording_lost"):
+        if isinstance(line, RecordingLost):
+            found.warning(folder.recordings, f"{named(*line.which)} has none: {line.reason}")
+        if not isinstance(line, Recorded):
             continue
-        which = named(line)
-        known.add((line["trial"], line["attempt"], line.get("interval")))
-        if line["event"] == "recording_lost":
-            found.warning(folder.recordings, f"{which} has none: {line['reason']}")
-            continue
-        if line["samples_unrecorded"]:
-            found.warning(folder.path / line["recording"], f"lacks {line['samples_unrecorded']} samples")
+        which = named(*line.which)
+        if line.samples_unrecorded:
+            found.warning(folder.path / line.recording, f"lacks {line.samples_unrecorded} samples")
         for kind, name, rows, digest in (
-            ("samples", line["recording"], line["samples_recorded"], line["sha256"]),
-            ("frames", line["recording_frames"], line["frames_recorded"], line["frames_sha256"]),
+            ("samples", line.recording, line.samples_recorded, line.sha256),
+            ("frames", line.recording_frames, line.frames_recorded, line.frames_sha256),
         ):
             listed.add(name)
             if name not in hashes:
@@ -374,11 +385,10 @@ def _recordings(
             if hashes[name] != digest:
                 found.error(folder.path / name, f"has changed since it was recorded ({which})")
             _facts(folder, line, kind, name, rows, found)
-    if lines[0].get("recordings"):
-        for trial, attempt, interval in recordable(lines)[: None if ended else -1]:
-            if (trial, attempt, interval) not in known:
-                which = named({"trial": trial, "attempt": attempt, "interval": interval})
-                found.warning(folder.recordings, f"{which} has none, and the journal gives no reason")
+    if start_of(lines).recordings:
+        for planned in recordable(lines)[: None if ended else -1]:
+            if planned not in known:
+                found.warning(folder.recordings, f"{named(*planned)} has none, and the journal gives no reason")
     of_trials = {
         path.relative_to(folder.path).as_posix()
         for recorded in recordable(lines)
@@ -392,12 +402,12 @@ def _recordings(
             found.warning(folder.path / name, f"is in no line of the journal{then}")
 
 
-def _facts(folder: SessionFolder, line: Line, kind: str, name: str, rows: int, found: Gathered) -> None:
+def _facts(folder: SessionFolder, line: Recorded, kind: str, name: str, rows: int, found: Gathered) -> None:
     from study_app.store import recordings  # noqa: PLC0415 - loads the Parquet library, where there are recordings
 
     path = folder.path / name
     expected = {"participant": folder.participant, "session": folder.number, "kind": kind, "rows": rows}
-    expected |= {"trial": line["trial"], "attempt": line["attempt"], "interval": line.get("interval")}
+    expected |= {"trial": line.trial, "attempt": line.attempt, "interval": line.interval}
     with found.reading(path):
         facts: dict[str, Any] = recordings.read_facts(path)
         for fact, value in expected.items():

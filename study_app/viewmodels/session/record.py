@@ -17,8 +17,8 @@ from study_app.store.delivered import beyond_limits
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folders import SessionFolder, locate
 from study_app.store.journals import journal
-from study_app.store.journals.journal import Line
-from study_app.store.progress import Given, progress_of
+from study_app.store.journals.journal_events import Answer, Event, Note, Repeat, TrialStarted, start_of
+from study_app.store.progress import progress_of
 from study_app.store.tables import session_tables
 from study_app.store.tables.study_files import row_of
 from study_app.viewmodels.session.columns import incidents
@@ -93,16 +93,14 @@ def read_record(folder: Path) -> SessionRecord:
     listed = exclusions(study.path)
     (facts,) = session_facts(study.path, row_of(session, key), listed, {})
     own = tuple(one for one in listed if one.what[:2] == (facts.participant, facts.session))
-    start = lines[0]
+    start = start_of(lines)
     rows = session_tables.trials(lines)
-    trials = _trials(session, rows, lines, start.get("limits", {}), own)
-    measured = any(
-        device.name == start.get("device") and not device.motion_shows_force for device in discover().devices
-    )
+    trials = _trials(session, rows, lines, start.limits, own)
+    measured = any(device.name == start.device and not device.motion_shows_force for device in discover().devices)
     return SessionRecord(
         facts=facts,
         about=_about(lines, incidents(facts)),
-        limits=limits_sentence(trials, sealed=key is None and bool(start.get("measures_sealed"))),
+        limits=limits_sentence(trials, sealed=key is None and bool(start.measures_sealed)),
         trials=trials,
         notes=tuple(_notes(lines)),
         files=tuple((name, (session.path / name).stat().st_size) for name in _files(session)),
@@ -146,7 +144,7 @@ def motion(recording: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def _trials(
     session: SessionFolder,
     rows: Sequence[Mapping[str, Any]],
-    lines: Sequence[Line],
+    lines: Sequence[Event],
     limits: Mapping[str, float],
     own: Sequence[Exclusion],
 ) -> tuple[TrialRecord, ...]:
@@ -175,7 +173,7 @@ def _trials(
     )
 
 
-def _choices(given: Mapping[str, Given]) -> tuple[str, ...]:
+def _choices(given: Mapping[str, Answer]) -> tuple[str, ...]:
     """Return choices as "item: value", in the order in which the items were first answered."""
     chosen = sorted(given.items(), key=lambda one: one[1].first_s or 0.0)
     return tuple(f"{item}: {'cannot judge' if one.value is None else one.value}" for item, one in chosen)
@@ -200,14 +198,14 @@ def _words(row: Mapping[str, Any]) -> str:
     return f"{phase}, {row['code']}{again}"
 
 
-def _about(lines: Sequence[Line], happened: str) -> str:
-    start, row = lines[0], session_tables.participant(lines)
+def _about(lines: Sequence[Event], happened: str) -> str:
+    start, row = start_of(lines), session_tables.participant(lines)
     ended = row["session_ended_at"]
     said = [
-        f"Device {start['device']}",
+        f"Device {start.device}",
         f"language {row['language']}",
-        f"operator {start['operator']}" if start["operator"] else "",
-        f"seed {start['seed']}",
+        f"operator {start.operator}" if start.operator else "",
+        f"seed {start.seed}",
         f"ended {datetime.fromisoformat(ended):%H:%M}" if ended else "not ended",
         counted(row["resumed"], "resume") if row["resumed"] else "",
         happened,
@@ -215,17 +213,16 @@ def _about(lines: Sequence[Line], happened: str) -> str:
     return "  ·  ".join(filter(None, said))
 
 
-def _notes(lines: Sequence[Line]) -> list[str]:
+def _notes(lines: Sequence[Event]) -> list[str]:
     trial, found = None, []
     for line in lines:
-        if line["event"] == "trial_started":  # recordings of the trial before are reported later
-            trial = line["trial"]
-        if line["event"] not in {"note", "repeat"}:
+        if isinstance(line, TrialStarted):  # recordings of the trial before are reported later
+            trial = line.trial
+        if not isinstance(line, Note | Repeat):
             continue
-        text = line.get("text") or line.get("reason") or "marked"
-        what = "repeated: " if line["event"] == "repeat" else ""
+        text = f"repeated: {line.reason}" if isinstance(line, Repeat) else line.text or "marked"
         where = "before the first trial" if trial is None else f"trial {trial}"
-        found.append(f"{datetime.fromisoformat(line['at']):%H:%M}, {where}: {what}{text}")
+        found.append(f"{datetime.fromisoformat(line.at):%H:%M}, {where}: {text}")
     return found
 
 

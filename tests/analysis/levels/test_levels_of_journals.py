@@ -49,12 +49,12 @@ def answered(folder: Path, block: str) -> list[Answered]:
     for session in StudyFolder(folder).sessions():
         started: dict[int, dict[str, Any]] = {}
         for line in opened(journal.read(session.journal), key):
-            if line["event"] == "trial_started" and line["block"] == block:
-                started[line["trial"]] = line
-            elif line["event"] == "responses" and line["trial"] in started:
-                (item,) = line["items"]
+            if line.event == "trial_started" and line.block == block:
+                started[line.trial] = line
+            elif line.event == "responses" and line.trial in started:
+                (item,) = line.items
                 seconds = item["first_s"] - item["onset_s"]
-                found.append(Answered(session.participant, started[line["trial"]], item["value"], seconds))
+                found.append(Answered(session.participant, started[line.trial], item["value"], seconds))
     return found
 
 
@@ -74,10 +74,10 @@ def test_tracks_have_a_row_per_trial_with_what_it_presented(opened_levels: Path,
     for block in BLOCKS:
         for one in answered(opened_levels, block):
             row, line = of_trial[one.participant, str(one.started["trial"])], one.started
-            assert (row["block"], row["arrangement"]) == (block, line["arrangement"])
-            assert row["track"] == key.codes[block][line["code"]]
-            assert row["level_asked"] == ("n/a" if line["level"] is None else str(line["level"]))
-            assert row["standard"] == ("n/a" if line["standard"] is None else str(line["standard"]))
+            assert (row["block"], row["arrangement"]) == (block, line.arrangement)
+            assert row["track"] == key.codes[block][line.code]
+            assert row["level_asked"] == ("n/a" if line.level is None else str(line.level))
+            assert row["standard"] == ("n/a" if line.standard is None else str(line.standard))
             assert row["response_s"] == str(round(one.response_s, 6))
             judged = block in ("viscosity", "pairs", "detect", "odd")
             assert row["right"] == (str(one.right).lower() if judged else "n/a"), block

@@ -15,9 +15,11 @@ from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal_events
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.viewmodels.session.record import MOTION_HIDDEN, read_record
 from study_app.viewmodels.sessions import sessions
+from tests.journal_lines import event_of
 
 pytestmark = pytest.mark.slow
 
@@ -45,8 +47,8 @@ def held(study):
 
 def trial(store, number, **measured):
     which = {"block": "feeling", "phase": "main", "part": 1, "of": 2}
-    store.append("trial_started", trial=number, attempt=1, index=number, code=f"L{number}", **which)
-    store.append("trial_ended", trial=number, attempt=1, outcome="complete", **measured)
+    store.append(journal_events.TrialStarted(trial=number, attempt=1, index=number, code=f"L{number}", **which))
+    store.append(event_of("trial_ended", trial=number, attempt=1, outcome="complete", **measured))
 
 
 def measured(study):
@@ -54,8 +56,8 @@ def measured(study):
     with held(study) as store:
         trial(store, 1, worst_gap_ms=3.0, lateness_p99_ms=0.2, first_frame_gap_ms=12.0)
         trial(store, 2, worst_gap_ms=41.26, lateness_p99_ms=2.5, first_frame_gap_ms=12.0)
-        store.append("recording_lost", trial=1, attempt=1, reason="its thread ended")
-        store.append("note", kind="note", text="phone rang")
+        store.append(journal_events.RecordingLost(trial=1, attempt=1, reason="its thread ended"))
+        store.append(journal_events.Note(kind="note", text="phone rang"))
         store.finish("completed")
     return StudyFolder(study).session("P007", 1).path
 
@@ -106,11 +108,11 @@ def test_choices_that_were_not_confirmed_stay_visible(qtbot, tmp_path):
         for number in (1, 2):
             trial(store, number)
             for value in (3, 5):
-                store.append("choice", trial=number, item="feels_liquid", value=value)
+                store.append(journal_events.Choice(trial=number, item="feels_liquid", value=value))
             if number == 1:
                 given = {"item": "feels_liquid", "number": 1, "value": 5, "changes": 1}
                 times = {"onset_s": 0.0, "first_s": 0.1, "last_s": 0.2}
-                store.append("responses", trial=1, attempt=1, items=[given | times])
+                store.append(event_of("responses", trial=1, attempt=1, items=[given | times]))
         store.finish("aborted")
     page = page_of(qtbot, tmp_path / "demo")
     assert [said(page, row, 4) for row in range(2)] == ["1", "0 + 1?"]

@@ -115,7 +115,7 @@ def test_the_error_of_the_force_sent_comes_out_again_and_another_is_named(
 ) -> None:
     study = StudyFolder(rehearsed)
     lines = opened(journal.read(session(rehearsed) / "journal.jsonl"), read_key(study.path))
-    errors = [line["delivered_error"] for line in lines if line["event"] == "trial_ended"]
+    errors = [line["delivered_error"] for line in lines if line.event == "trial_ended"]
     felt = [error for error in errors if error is not None]  # some of its trials are shorter than the fade-in
     assert len(felt) > 0
     assert all(0.005 < error < 1.0 for error in felt)

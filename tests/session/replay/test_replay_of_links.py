@@ -93,12 +93,12 @@ def test_the_session_measures_the_delays_that_were_requested(rehearsed: Path) ->
     (session,) = StudyFolder(rehearsed).sessions()
     key, protocol = read_key(rehearsed), parse(STUDY.encode(), "late.toml")
     lines = opened(journal.read(session.journal), key)
-    started = {line["trial"]: line for line in lines if line["event"] == "trial_started"}
-    ended = [line for line in lines if line["event"] == "interval_ended"]
+    started = {line.trial: line for line in lines if line.event == "trial_started"}
+    ended = [line for line in lines if line.event == "interval_ended"]
     assert len(ended) == 6
     errors_ms = []
     for line in ended:
-        interval = presented_by(protocol, key.codes, started[line["trial"]]).intervals[line["interval"] - 1]
+        interval = presented_by(protocol, key.codes, started[line.trial]).intervals[line.interval - 1]
         assert "invalid" not in line
         if interval.vary == "force_delay_ms":
             errors_ms.append(line["value_delivered"] - interval.value)

@@ -38,7 +38,7 @@ def numbers_of(folder: Path, block: str) -> Trials:
     codes = blinding.read_key(folder).codes[block]
 
     def condition(line: Line) -> str | None:
-        return codes[line["code"]] if line["block"] == block else None
+        return codes[line.code] if line.block == block else None
 
     found: Trials = {}
     for session in StudyFolder(folder).sessions():

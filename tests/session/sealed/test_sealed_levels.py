@@ -132,14 +132,14 @@ def operator_views(folder: Path, protocol: Path) -> list[Any]:
     (place,) = StudyFolder(folder).sessions()
     for line in journal.read(place.journal):
         progress.take(line)
-        views.append(operator_view(session, progress, Vitals(), now_s=line["t_s"], force_on=True))
+        views.append(operator_view(session, progress, Vitals(), now_s=line.t_s, force_on=True))
     return views
 
 
 def levels(folder: Path) -> list[Any]:
     (place,) = StudyFolder(folder).sessions()
     lines = blinding.opened(journal.read(place.journal), read_key(folder))
-    return [(line["level"], line["arrangement"]) for line in lines if line["event"] == "trial_started"]
+    return [(line.level, line.arrangement) for line in lines if line.event == "trial_started"]
 
 
 def test_sessions_under_two_keys_present_different_levels(first: Path, second: Path) -> None:
@@ -184,8 +184,8 @@ def numbers_of(folder: Path, what: str) -> Trials:
     found: Trials = {}
     for session in StudyFolder(folder).sessions():
         lines = journal.read(session.journal)
-        presented = {line["n"]: line for line in blinding.opened(lines, key)}
-        found |= every_number(session, "levels", lines, lambda line, of=presented: str(of[line["n"]][what]))
+        presented = {line.n: line for line in blinding.opened(lines, key)}
+        found |= every_number(session, "levels", lines, lambda line, of=presented: str(of[line.n][what]))
     return found
 
 

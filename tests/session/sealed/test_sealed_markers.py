@@ -55,13 +55,13 @@ def test_markers_are_the_journals_events_with_their_codes(rehearsed: tuple[Path,
     folder, collector = rehearsed
     (session,) = StudyFolder(folder).sessions()
     lines = journal.read(session.journal)
-    marked = [line for line in lines if line["event"] not in {"recorded", "preflight"}]
-    assert collector.events == [line["event"] for line in marked]
+    marked = [line for line in lines if line.event not in {"recorded", "preflight"}]
+    assert collector.events == [line.event for line in marked]
     assert {"trial_started", "trial_ended", "choice", "responses", "target_reached"} < set(collector.events)
     for marker, line in zip(collector.markers, marked, strict=True):
         said = json.loads(marker.text)
-        assert said["t_s"] == line["t_s"]
-        assert said.get("code") == line.get("code")
+        assert said["t_s"] == line.t_s
+        assert said.get("code") == getattr(line, "code", None)
     assert not any("sealed" in marker.text or "value" in marker.text for marker in collector.markers)
 
 

@@ -142,10 +142,7 @@ def test_a_servo_that_is_ended_from_outside_ends_the_rehearsal(monkeypatch: Any)
 def confirmed(lines: Iterable[Any]) -> dict[tuple[int, str], int]:
     """Return the answers by trial and item, those of the last attempt."""
     return {
-        (line["trial"], item["item"]): item["value"]
-        for line in lines
-        if line["event"] == "responses"
-        for item in line["items"]
+        (line.trial, item["item"]): item["value"] for line in lines if line.event == "responses" for item in line.items
     }
 
 

@@ -25,10 +25,11 @@ from study_app.session.transitions.events import (
 )
 from study_app.session.transitions.state import Phase, SessionState
 from study_app.session.transitions.table import advance
+from tests.journal_lines import event_of as line_of
 from tests.session import pairs, small
 
 EVENTS = get_args(Event)
-LEFT = Write("choice", {"trial": 2, "item": "liquid", "value": 5}, waits=True)
+LEFT = Write(line_of("choice", trial=2, item="liquid", value=5), waits=True)
 
 
 @cache
@@ -85,7 +86,7 @@ def event_of(kind: type[Any]) -> Any:
 
 
 def written(commands: tuple[Any, ...]) -> list[str]:
-    return [command.event for command in commands if isinstance(command, Write)]
+    return [command.line.event for command in commands if isinstance(command, Write)]
 
 
 def shown(commands: tuple[Any, ...]) -> Any:

@@ -12,6 +12,7 @@ from study_app.session.resume import resume_at
 from study_app.session.transitions.events import Begin, Finish, ResumeAsked, TaskDone, TimeUp, Write
 from study_app.session.transitions.state import FINAL, Phase, SessionState
 from study_app.session.transitions.table import advance
+from tests.journal_lines import event_from
 from tests.session import pairs
 from tests.session.transitions.states import written
 from tests.session.transitions.transcribed import to_trial
@@ -104,7 +105,7 @@ def test_a_break_after_trials_that_were_all_given_up_is_shown_in_a_resumed_sessi
     assert lines[ended + 1] == {"event": "page_shown", "t_s": lines[ended]["t_s"], "page": "rest"}
     began = {"event": "session_started", "t_s": 0.0, "language": "en"}
     schedule = pairs.opened(protocol).plan.schedule
-    start = resume_at(protocol, schedule, [began, *lines[: ended + 1]], NO_SEALS)
+    start = resume_at(protocol, schedule, map(event_from, [began, *lines[: ended + 1]]), NO_SEALS)
     state, commands = advance(pairs.opened(protocol, start=start), Begin(0.0))
     assert (state.phase, written(commands)) == (Phase.READING, ["page_shown"])
 
@@ -119,7 +120,7 @@ def events_of(state: SessionState, fails: frozenset[tuple[int, int]]) -> Iterato
         state, commands = advance(state, event)
         for one in commands:
             if isinstance(one, Write):
-                yield state, {"event": one.event, "t_s": at_s, **one.fields}
+                yield state, {"event": one.line.event, "t_s": at_s, **one.line.fields()}
         at_s += 100.0
 
 
@@ -139,7 +140,7 @@ def test_a_session_killed_after_any_line_gives_up_the_same_trials_as_one_that_wa
     whole, invalid = answers(lines), undelivered(lines)
     assert invalid == {8: 1, 9: 2, 10: 3}
     for count in range(1, len(lines)):
-        start = resume_at(protocol, schedule, [began, *lines[:count]], NO_SEALS)
+        start = resume_at(protocol, schedule, map(event_from, [began, *lines[:count]]), NO_SEALS)
         state, _ = advance(pairs.opened(protocol, start=start), Begin(0.0))
         if state.phase is Phase.PAUSED:
             state, _ = advance(state, ResumeAsked(0.0, "operator"))

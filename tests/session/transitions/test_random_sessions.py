@@ -80,12 +80,11 @@ def test_whatever_happens_no_answer_is_lost_and_the_session_can_be_ended(events:
         if isinstance(event, Submitted) and before.phase is Phase.ANSWERING:
             kept[before.trial.number] = latest[before.trial.number, before.attempt]
         state = after
-    confirmed = {write.fields["trial"]: write.fields["items"] for write in disk if write.event == "responses"}
+    confirmed = {write.line.trial: write.line.items for write in disk if write.line.event == "responses"}
     assert {
-        trial: {row["item"]: row["value"] for row in rows if row["first_s"] is not None}
-        for trial, rows in confirmed.items()
+        trial: {row.item: row.answer.value for row in rows if row.answer.given} for trial, rows in confirmed.items()
     } == kept
-    chosen = [write for write in disk if write.event == "choice"]
+    chosen = [write for write in disk if write.line.event == "choice"]
     assert len(chosen) >= sum(len(answers) for answers in kept.values())
     if state.phase is Phase.STALLED:
         state, _ = advance(state, WriteCompleted(998.0))
@@ -126,9 +125,9 @@ def test_every_trial_that_was_begun_is_ended_once_per_attempt(seed: int, data: s
             event = small.next_event(state, 1.0)
         state, commands = advance(state, event)
         for command in commands:
-            if isinstance(command, Write) and command.event in {"trial_started", "trial_ended"}:
-                which = (command.fields["trial"], command.fields["attempt"])
-                (begun if command.event == "trial_started" else ended).append(which)
+            if isinstance(command, Write) and command.line.event in {"trial_started", "trial_ended"}:
+                which = (command.line.trial, command.line.attempt)
+                (begun if command.line.event == "trial_started" else ended).append(which)
     assert begun == ended
     assert len(set(begun)) == len(begun)
     steps = state.plan.schedule.steps

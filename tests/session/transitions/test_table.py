@@ -33,7 +33,9 @@ def test_a_session_goes_through_its_schedule_and_ends_complete() -> None:
         page = shown(commands)
         if page is not None:
             pages.append(page)
-        trials += [command.fields for command in commands if isinstance(command, Write) and "of" in command.fields]
+        trials += [
+            command.line.fields() for command in commands if isinstance(command, Write) and hasattr(command.line, "of")
+        ]
     assert state.phase is Phase.COMPLETE
     assert [type(page) for page in pages] == [
         TextPage,
@@ -99,7 +101,7 @@ def test_nothing_that_is_printed_names_a_condition_a_liquid_or_a_delay() -> None
         state, commands = advance(state, small.next_event(state, 1.0))
         page = shown(commands)
         printed.append(f"{state!r} {commands!r} {page!r} {page}")
-        printed += [str(command.fields) for command in commands if isinstance(command, Write)]
+        printed += [str(command.line.fields()) for command in commands if isinstance(command, Write)]
     text = " ".join(printed)
     words = ["is_thin", "is_thick", "on_time", "is_late", "0.137", "137", "1013", "1450"]
     assert [word for word in words if word in text] == []

@@ -183,9 +183,9 @@ def _state(before: SessionState, after: SessionState) -> str:
 def said(command: Command) -> str:
     """Return a command in words, with what its own representation hides."""
     match command:
-        case Write(event, fields, measured, waits):
-            told = " ".join(f"{name}={_rounded(value)!r}" for name, value in fields.items())
-            return f"write {event} {told}{', measured' * measured}{', waits' * waits}"
+        case Write(line, measured, waits):
+            told = " ".join(f"{name}={_rounded(value)!r}" for name, value in line.fields().items())
+            return f"write {line.event} {told}{', measured' * measured}{', waits' * waits}"
         case ShowPage(page):
             return f"show {_page(page)}"
         case StartTrial():
@@ -197,8 +197,9 @@ def said(command: Command) -> str:
                 f"start {which}: {what}, {times}, "
                 f"{command.task.kind} for {command.task.limit_s:g} s{', adjusts' * command.adjusts}"
             )
-        case Adjust(presented, delay_s, fields):
-            return f"adjust to {_rounded(presented.value)}, delay {delay_s:g} s, {dict(fields)}"
+        case Adjust(presented, delay_s, line):
+            told = {name: value for name, value in line.fields().items() if name != "scene"}
+            return f"adjust to {_rounded(presented.value)}, delay {delay_s:g} s, {told}"
         case _:
             return repr(command)
 

@@ -51,7 +51,7 @@ def begun(folder: Path, participant: str, session: int = 1) -> SessionStore:
 
 
 def events(store: SessionStore) -> list[str]:
-    return [line["event"] for line in store.lines]
+    return [line.event for line in store.lines]
 
 
 def test_participants_have_entries_in_the_order_of_their_first_sessions(
@@ -61,7 +61,7 @@ def test_participants_have_entries_in_the_order_of_their_first_sessions(
     monkeypatch.setattr(allocation, "sync_folder", synced.append)
     for number, participant in enumerate(("P009", "P001", "X"), start=1):
         with begun(tmp_path / "s", participant) as store:
-            assert store.lines[0]["entry"] == number
+            assert store.lines[0].entry == number
             assert events(store) == ["session_started", "allocated"]
             assert allocate(StudyFolder(tmp_path / "s"), store.key, participant).entry == number  # type: ignore[union-attr]
     assert [claim.participant for claim in claims(StudyFolder(tmp_path / "s"))] == ["P009", "P001", "X"]
@@ -93,11 +93,11 @@ def test_no_file_names_a_group_of_a_participant(tmp_path: Path) -> None:
         study = StudyFolder(tmp_path / f"s{number}")
         with begun(study.path, "P001") as store:
             found = allocated(study, store.key, "P001")
-            line = next(line for line in store.lines if line["event"] == "allocated")
+            line = next(line for line in store.lines if line.event == "allocated")
             (claim,) = (json.loads(path.read_text()) for path in study.allocated.iterdir())
         assert found is not None
         assert set(line) == {"n", "event", "t_s", "at", "entry", "sealed", "previous"}
-        assert (claim.pop("sealed"), line["sealed"]) == (found.sealed, found.sealed)
+        assert (claim.pop("sealed"), line.sealed) == (found.sealed, found.sealed)
         assert claim == {"entry": 1, "participant": "P001"}
         readable[found.group] = found.sealed
         receipt = json.loads(store.folder.receipt.read_text())
@@ -138,7 +138,7 @@ def test_a_program_killed_between_claim_and_first_line_leaves_a_consistent_folde
     assert not found.errors
     assert any("who has no session yet" in str(warning) for warning in found.warnings)
     with begun(study.path, "P002") as other, begun(study.path, "P001") as store:
-        assert (store.lines[0]["entry"], other.lines[0]["entry"]) == (2, 3)
+        assert (store.lines[0].entry, other.lines[0].entry) == (2, 3)
         assert "allocated" in events(store)
 
 
@@ -189,7 +189,7 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
     assert extra is not None
     (study.allocated / "004.json").write_bytes(b"")  # of a program that ended before it wrote it
     with begun(study.path, "P005") as store:
-        assert store.lines[0]["entry"] == 5
+        assert store.lines[0].entry == 5
     assert errors() == ""
     assert "it stays unused" in "\n".join(map(str, verify(study.path).warnings))
 
@@ -213,7 +213,7 @@ def test_a_rehearsal_allocates_from_its_seed_and_reproduces(tmp_path: Path) -> N
         found = allocated(study, key, session.participant)
         assert found is not None
         own = own_protocol(grouped(), found.group, 1)
-        trials = [line["code"] for line in journal.read(session.journal) if line["event"] == "trial_started"]
+        trials = [line.code for line in journal.read(session.journal) if line.event == "trial_started"]
         assert trials == [trial.code for trial in build_schedule(own, session.participant, 3).trials]
         assert reproduced(session.path).differences == []
     assert not verify(folder).errors

@@ -15,8 +15,8 @@ from study_app.store.blinded.unblinding import unblind
 from study_app.store.checksums import write_checksums
 from study_app.store.exclusions import exclusions, include
 from study_app.store.folders import StudyFolder
+from study_app.store.journals.journal_events import TrialStarted
 from study_app.store.sessions.folder_lock import open_alone
-from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.protocol.trials.level_studies import SHORT, text_of
@@ -128,12 +128,11 @@ def test_levels_of_a_study_with_catch_trials_follow_and_the_tables_name_them(stu
 def test_sessions_of_versions_without_catch_trials_are_reproduced_and_unblinded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def append(store: SessionStore, event: str, **fields: Any) -> None:
-        fields.pop("catch", None)
-        append_all(store, event, **fields)
+    def fields_of(event: TrialStarted) -> dict[str, Any]:
+        return {name: value for name, value in fields(event).items() if name != "catch"}
 
-    append_all = SessionStore.append
-    monkeypatch.setattr(SessionStore, "append", append)
+    fields = TrialStarted.fields
+    monkeypatch.setattr(TrialStarted, "fields", fields_of)
     (tmp_path / "levels.toml").write_text(text_of(*SHORT))
     study = rehearse(tmp_path / "levels.toml", participants=1, seed=2, results=tmp_path / "study", recordings=False)
     (session,) = StudyFolder(study).sessions()

@@ -1,6 +1,7 @@
 """What tells a condition cannot be read in a journal, opens whole with the key, and not when it was changed."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,9 @@ from hypothesis import strategies as st
 from study_app.errors import StoreError
 from study_app.store.blinded.blinding import Key, opened, sealed
 from study_app.store.tables.columns import SEALED, TRIALS_2
+from tests.journal_lines import event_of
 
-START = {"n": 1, "event": "session_started", "participant": "P007", "session": 1, "measures_sealed": True}
+START = event_of("session_started", n=1, participant="P007", session=1, measures_sealed=True)
 WHICH = {"trial": 3, "attempt": 1, "outcome": "complete"}
 MEASURED = {
     column.name: 0 if column.kind == "integer" else 0.1 + 0.2
@@ -26,7 +28,12 @@ def key(nonce: bytes = bytes(32)) -> Key:
 
 
 def ended(measured: dict[str, Any], **changes: Any) -> dict[str, Any]:
-    return {"n": 2, "event": "trial_ended", **sealed(START, "trial_ended", WHICH | measured | changes, key())}
+    return sealed(START, event_of("trial_ended", **WHICH | measured | changes), key()).fields() | {"n": 2}
+
+
+def found_in(line: dict[str, Any], event: str = "trial_ended", *, used: Key | None = None, start: Any = START) -> Any:
+    """Return the fields of a line after the key was opened."""
+    return opened([start, event_of(event, **line)], used or key())[1].fields()
 
 
 def test_what_tells_a_condition_is_sealed_and_nothing_else() -> None:
@@ -35,23 +42,16 @@ def test_what_tells_a_condition_is_sealed_and_nothing_else() -> None:
     assert set(told) < SEALED
     assert not {"tick_rate_hz", "lateness_p99_ms", "worst_gap_ms", "overruns", "first_frame_gap_ms", "valid"} & SEALED
     line = ended(MEASURED, overruns=3)
-    assert line.keys() == {"n", "event", "sealed", "overruns", *WHICH}
+    assert line.keys() == {"n", "sealed", "overruns", *WHICH}
     assert line["overruns"] == 3
 
 
 def test_it_opens_whole_and_numpys_numbers_plain() -> None:
     line = ended(MEASURED | {"force_mean_n": np.float64(0.25), "ticks": np.int64(7), "withheld_share": math.nan})
-    _, there = opened([START, line], key())
-    assert there == {
-        "n": 2,
-        "event": "trial_ended",
-        **WHICH,
-        **MEASURED,
-        "force_mean_n": 0.25,
-        "ticks": 7,
-        "withheld_share": None,
-    }
-    assert opened([START, line], None) == [START, line]
+    found = {"force_mean_n": 0.25, "ticks": 7, "withheld_share": None}
+    assert found_in(line) == {**WHICH, **MEASURED, **found}
+    lines = [START, event_of("trial_ended", **line)]
+    assert opened(lines, None) == lines
 
 
 @pytest.mark.slow
@@ -69,7 +69,7 @@ def test_all_texts_are_equally_long_and_every_number_comes_back(measured: dict[s
     line = ended(measured)
     if measured:
         assert len(line["sealed"]) == len(ended(MEASURED)["sealed"])
-    assert opened([START, line], key())[1] == {"n": 2, "event": "trial_ended", **WHICH, **measured}
+    assert found_in(line) == {**WHICH, **measured}
 
 
 def test_equal_numbers_of_two_trials_look_different() -> None:
@@ -80,16 +80,14 @@ def test_equal_numbers_of_two_trials_look_different() -> None:
 
 def test_what_was_changed_or_moved_does_not_open_nor_with_another_key() -> None:
     line, place = ended(MEASURED), {"trial": 3, "attempt": 1, "interval": 1}
-    interval = {"n": 2, "event": "interval_ended"} | sealed(
-        START, "interval_ended", place | {"force_mean_n": 0.5}, key()
-    )
-    assert opened([START, interval], key())[1]["force_mean_n"] == 0.5
+    interval = sealed(START, event_of("interval_ended", **place, force_mean_n=0.5), key()).fields() | {"n": 2}
+    assert found_in(interval, "interval_ended")["force_mean_n"] == 0.5
     moved = [line | change for change in ({"sealed": "00" * 500}, {"sealed": ""}, {"sealed": "x"}, {"trial": 4})]
-    moved += [line | {"attempt": 2}, interval | {"interval": 2}, interval | {"event": "trial_ended"}]
-    for begun, found, used in (
-        *((START, one, key()) for one in moved),
-        (START, line, key(bytes([1] * 32))),
-        (START | {"participant": "P008"}, line, key()),
-    ):
+    moved += [line | {"attempt": 2}, interval]
+    others = [(one, "trial_ended", key(), START) for one in moved]
+    others.append((interval | {"interval": 2}, "interval_ended", key(), START))
+    others.append((line, "trial_ended", key(bytes([1] * 32)), START))
+    others.append((line, "trial_ended", key(), replace(START, participant="P008")))
+    for one, event, used, start in others:
         with pytest.raises(StoreError, match=r"line 2 of the journal cannot be decrypted with the study's key"):
-            opened([begun, found], used)
+            found_in(one, event, used=used, start=start)

@@ -11,13 +11,14 @@ from study_app.store.blinded.blinding import open_or_draw_key, opened, reveal
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.checksums import replace_checksums
 from study_app.store.folders import REBUILT, StudyFolder
-from study_app.store.journals import journal
+from study_app.store.journals import journal, journal_events
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import rebuild, reopen
 from study_app.store.tables.columns import SEALED, TRIALS
 from study_app.store.tables.csv_files import csv_bytes, header, read_table, unsealed
 from study_app.store.tables.study_files import description_bytes
 from study_app.store.verification.verify_study import verify
+from tests.journal_lines import event_of
 from tests.store.conftest import SOURCE, Attend, Start, ticking_clock
 from tests.store.forging import Lines, cover_up, forge
 
@@ -62,8 +63,12 @@ def test_unblinding_gives_what_an_open_study_would_have_held(
         for name in ("P007", "P008"):
             store = start(name, results=folder, clock=ticking_clock(), simulated=True)
             attend(store)
-            store.append("trial_started", trial=6, attempt=1, block="b", phase="main", part=2, index=9, of=9, code="D1")
-            store.append("trial_ended", trial=6, attempt=1, outcome="complete", withheld_share=0.9)
+            store.append(
+                journal_events.TrialStarted(
+                    trial=6, attempt=1, block="b", phase="main", part=2, index=9, of=9, code="D1"
+                )
+            )
+            store.append(event_of("trial_ended", trial=6, attempt=1, outcome="complete", withheld_share=0.9))
             store.finish("completed")
     before, sealed_tables = (tables_in(folder) for folder in folders)
     assert before.keys() == sealed_tables.keys()
@@ -129,7 +134,9 @@ def test_what_is_not_the_journals_is_left_and_named(tmp_path: Path, start: Start
     assert not SEALED & names(changed)
     assert names(stores["P004"].folder.table("brackish", "trials")) == set(header(TRIALS))
     damaged.write_bytes(whole)
-    stores["P002"].append("note", kind="note", text="the tables of a session that runs follow with its next page")
+    stores["P002"].append(
+        journal_events.Note(kind="note", text="the tables of a session that runs follow with its next page")
+    )
     stores["P002"].write_tables()
     assert names(stores["P002"].folder.table("brackish", "trials")) == set(header(TRIALS))
     stores["P002"].finish("completed")
@@ -145,8 +152,8 @@ def test_a_session_goes_on_as_it_began(tmp_path: Path, protocol: Protocol, start
     unblind(tmp_path / "study", "AB", "done")
     again = reopen(store.folder.path, protocol, SOURCE, operator="AB", device={"name": "scripted"}, screens={})
     told = {"block": "delays", "phase": "main", "part": 2, "index": 2, "of": 2, "code": "D1"}
-    again.append("trial_started", trial=6, attempt=1, **told)
-    again.append("trial_ended", trial=6, attempt=1, outcome="complete", force_mean_n=1.25)
+    again.append(journal_events.TrialStarted(trial=6, attempt=1, **told))
+    again.append(event_of("trial_ended", trial=6, attempt=1, outcome="complete", force_mean_n=1.25))
     again.finish("completed")
     assert "sealed" in journal.read(again.folder.journal)[-2]
     assert b",1.25," in again.folder.table("brackish", "trials").read_bytes().splitlines()[-1]

@@ -13,16 +13,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from study_app.errors import StoreError
+from study_app.store.journals import journal_events
 from study_app.store.journals.journal import Journal, SessionClock, read, scan
 from study_app.store.journals.journal_events import problem, unknown_events
+from tests.journal_lines import event_of
 from tests.store.conftest import AWKWARD, Start
 
 
 def three_answers(path: Path) -> Path:
     with Journal.create(path) as journal:
-        journal.append("began", participant="P007")
+        journal.append(event_of("began", participant="P007"))
         for trial in (1, 2, 3):
-            journal.append("counted", trial=trial, item="calm", value=trial, text='naïve 🌊, "q"\n')
+            journal.append(event_of("counted", trial=trial, item="calm", value=trial, text='naïve 🌊, "q"\n'))
     return path
 
 
@@ -30,11 +32,11 @@ def test_a_line_explains_itself_and_is_returned_as_it_will_be_read(tmp_path: Pat
     path = tmp_path / "journal.jsonl"
     with Journal.create(path, clock) as journal:
         written = [
-            journal.append("shown", page="consent"),
-            journal.append("counted", t_s=12.3456789, item="calm", value=None),
+            journal.append(event_of("shown", page="consent")),
+            journal.append(event_of("counted", item="calm", value=None), t_s=12.3456789),
         ]
     assert read(path) == written
-    assert written[1] == {
+    assert written[1].line() == {
         "n": 2,
         "event": "counted",
         "t_s": 12.345679,
@@ -108,16 +110,14 @@ def test_what_a_reader_would_call_damage_is_not_written(tmp_path: Path) -> None:
             ({"t_s": 1e10}, "(note) has t_s 1e+10"),
             ({"kind": 3}, "(note) holds kind 3, expected: text"),
         ):
+            note = journal_events.Note(kind=told.get("kind", "note"), text="x")
             with pytest.raises(StoreError, match=re.escape(f"line 1 {sentence}")):
-                journal.append("note", **({"kind": "note", "text": "x"} | told))
-        for own in ("n", "at", "previous"):
-            with pytest.raises(ValueError, match="are the journal's own"):
-                journal.append("said", **{own: 1})
+                journal.append(note, t_s=told.get("t_s"))
         mixed = {"a": np.int64(3), "b": np.float32(0.5), "c": float("nan"), "d": (np.inf, np.array([1.0, np.nan]))}
-        journal.append("note", kind="note", text="half \ud83c here", mixed=mixed)
+        journal.append(journal_events.Note(kind="note", text="half \ud83c here", others={"mixed": mixed}))
     (line,) = read(path)
-    assert line["mixed"] == {"a": 3, "b": 0.5, "c": None, "d": [None, [1.0, None]]}
-    assert json.loads(path.read_text(encoding="utf-8"))["text"] == line["text"] == "half \ud83c here"
+    assert line.others["mixed"] == {"a": 3, "b": 0.5, "c": None, "d": [None, [1.0, None]]}
+    assert json.loads(path.read_text(encoding="utf-8"))["text"] == line.text == "half \ud83c here"
 
 
 def test_times_come_from_the_monotonic_clock_which_may_go_on() -> None:
@@ -134,17 +134,17 @@ def test_times_come_from_the_monotonic_clock_which_may_go_on() -> None:
 def test_a_journal_that_is_no_longer_under_its_name_takes_no_line_until_it_is_back(tmp_path: Path) -> None:
     path, away = tmp_path / "journal.jsonl", tmp_path / "away.jsonl"
     with Journal.create(path) as journal:
-        journal.append("counted", value=1)
+        journal.append(event_of("counted", value=1))
         path.rename(away)
         for other in (None, b"", b"another"):
             if other is not None:
                 path.write_bytes(other)
             for waits in (True, False):
                 with pytest.raises(StoreError, match=r"journal\.jsonl was moved, deleted or replaced .*: put it back"):
-                    journal.append("counted", value=2, waits=waits)
+                    journal.append(event_of("counted", value=2), waits=waits)
         away.replace(path)
-        journal.append("counted", value=2)
-    assert [line["value"] for line in read(path)] == [1, 2]
+        journal.append(event_of("counted", value=2))
+    assert [line.others["value"] for line in read(path)] == [1, 2]
 
 
 json_values = st.recursive(
@@ -159,9 +159,9 @@ json_values = st.recursive(
 def test_any_value_comes_back(tmp_path_factory: pytest.TempPathFactory, value: Any) -> None:
     path = tmp_path_factory.mktemp("journal") / "journal.jsonl"
     with Journal.create(path) as journal:
-        journal.append("said", text=AWKWARD, said=value)
-        journal.append("said", text="")
-    assert [(line["text"], line.get("said")) for line in read(path)] == [(AWKWARD, value), ("", None)]
+        journal.append(event_of("said", text=AWKWARD, said=value))
+        journal.append(event_of("said", text=""))
+    assert [(line.text, line.others.get("said")) for line in read(path)] == [(AWKWARD, value), ("", None)]
     assert path.read_bytes().count(b"\n") == 2
 
 

@@ -18,6 +18,7 @@ from study_app.store import receipt
 from study_app.store.journals.journal import Journal, read, scan
 from study_app.store.sessions.recovery import check_can_go_on, rebuild
 from study_app.store.verification.verify_study import verify
+from tests.journal_lines import event_of
 from tests.store.conftest import AWKWARD, SOURCE, FullDisk, Start
 from tests.store.forging import Lines, forge
 from tests.store.sessions.conftest import every_byte
@@ -29,15 +30,15 @@ def test_after_a_full_disk_it_goes_on_where_it_was(
 ) -> None:
     path = tmp_path / "journal.jsonl"
     journal = Journal.create(path)
-    first = journal.append("counted", value=1)
+    first = journal.append(event_of("counted", value=1))
     with monkeypatch.context() as patched:
         if not mended:
             patched.setattr(journal, "file", NoTruncation(journal.file))
         with files_up_to(500), pytest.raises(StoreError, match=r"journal\.jsonl cannot be written \(File too large\)"):
-            journal.append("said", text=AWKWARD)
+            journal.append(event_of("said", text=AWKWARD))
     assert read(path) == [first]
     assert (scan(path).torn_bytes == 0) == mended
-    second = journal.append("counted", value=2)
+    second = journal.append(event_of("counted", value=2))
     journal.close()
     assert read(path) == [first, second]
 
@@ -102,13 +103,13 @@ def test_a_line_that_nobody_waits_for_is_flushed_behind_and_in_order(disk: Disk)
     journal = Journal.create(disk.path)
     before = disk.mine  # the folder's entry
     disk.free.clear()  # no flush ends
-    written = [journal.append("seen", waits=False, count=number) for number in range(9)]
+    written = [journal.append(event_of("seen", count=number), waits=False) for number in range(9)]
     assert read(disk.path) == written
     assert disk.mine == before
     disk.free.set()
-    answer = journal.append("counted", value=1)
+    answer = journal.append(event_of("counted", value=1))
     assert disk.content.count(b"\n") == 10
-    journal.append("shown", waits=False)
+    journal.append(event_of("shown"), waits=False)
     journal.close()
     assert disk.content == disk.path.read_bytes()
     assert read(disk.path)[9] == answer
@@ -120,32 +121,32 @@ def test_a_flush_that_fails_behind_is_told_with_the_next_line_and_loses_none(
 ) -> None:
     monkeypatch.setattr("study_app.store.journals.journal.RETRY_S", 3600.0)
     journal = Journal.create(disk.path)
-    first = journal.append("counted", value=1)
+    first = journal.append(event_of("counted", value=1))
     disk.fails = 2
-    shown = journal.append("seen", waits=False, item="calm")
+    shown = journal.append(event_of("seen", item="calm"), waits=False)
     assert disk.failed.wait(20)
     with pytest.raises(StoreError, match=r"journal\.jsonl cannot be written \(Input/output error\)"):
-        journal.append("seen", waits=False, item="strong")
-    second = journal.append("seen", waits=False, item="strong")  # waits, since one failed
+        journal.append(event_of("seen", item="strong"), waits=False)
+    second = journal.append(event_of("seen", item="strong"), waits=False)  # waits, since one failed
     assert disk.content == disk.path.read_bytes()
     disk.fails = -1  # every flush fails
-    third = journal.append("seen", waits=False, item="calm")
+    third = journal.append(event_of("seen", item="calm"), waits=False)
     with pytest.raises(StoreError, match="Input/output error"):
         journal.close()
     assert journal.closed
     journal.close()
     assert read(disk.path)[:3] == [first, shown, second]
-    assert [line["n"] for line in (first, shown, second, third)] == [1, 2, 3, 4]
+    assert [line.n for line in (first, shown, second, third)] == [1, 2, 3, 4]
 
 
 def test_a_flush_that_fails_in_the_background_is_told_and_repeated(disk: Disk, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("study_app.store.journals.journal.RETRY_S", 0.0)
     journal = Journal.create(disk.path)
-    journal.append("counted", value=1)
+    journal.append(event_of("counted", value=1))
     journal.check_flushed()
     disk.fails = -1  # every flush fails
     disk.flushed.clear()
-    shown = journal.append("seen", waits=False, item="calm")
+    shown = journal.append(event_of("seen", item="calm"), waits=False)
     for _ in range(3):
         assert disk.failed.wait(20)
         disk.failed.clear()
@@ -217,7 +218,7 @@ def test_what_was_acknowledged_survives_a_kill_at_any_moment(tmp_path: Path) -> 
         acknowledged = [int(program.stdout.readline()) for _ in range(200)]
         program.kill()
         acknowledged += [int(line) for line in program.stdout if line.endswith("\n")]
-    values = [line["value"] for line in read(path)]
+    values = [line.others["value"] for line in read(path)]
     assert values[: len(acknowledged)] == acknowledged
     assert len(values) <= len(acknowledged) + 1
 

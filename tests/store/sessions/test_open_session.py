@@ -12,9 +12,10 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.store import receipt
-from study_app.store.journals import journal
+from study_app.store.journals import journal, journal_events
 from study_app.store.recordings import read_facts
 from study_app.store.sessions.open_session import SessionStore
+from tests.journal_lines import event_of
 from tests.store.conftest import Make, Start
 
 
@@ -34,7 +35,7 @@ def test_a_table_or_receipt_that_cannot_be_written_at_the_end_is_reported_and_th
 def test_after_its_end_a_session_takes_nothing(start: Start) -> None:
     store = start()
     store.finish("completed")
-    for late in (lambda: store.append("note", kind="note", text="late"), lambda: store.finish("aborted")):
+    for late in (lambda: store.append(journal_events.Note(kind="note", text="late")), lambda: store.finish("aborted")):
         with pytest.raises(StoreError, match="came after the session's end"):
             late()
     assert receipt.read(store.folder.receipt)["status"] == "completed"
@@ -58,12 +59,12 @@ def test_recordings_are_kept_beside_the_journal_and_linked_from_the_trials_row(
     recorder = store.recorder
     assert recorder is not None
     for attempt, rows in ((1, 300), (2, 70_000)):
-        store.append("trial_started", **trial_of(3, attempt=attempt))
+        store.append(journal_events.TrialStarted(**trial_of(3, attempt=attempt)))
         recorder.start(3, attempt, 1000.0)
         recorder.append(samples_of(rows))
         recorder.frame(20, 3)
         recorder.stop()
-        store.append("trial_ended", trial=3, attempt=attempt, outcome="complete", **summary)
+        store.append(event_of("trial_ended", trial=3, attempt=attempt, outcome="complete", **summary))
         store.write_tables()
     store.finish("completed")
     rows_written = rows_of(store, "trials")
@@ -73,23 +74,23 @@ def test_recordings_are_kept_beside_the_journal_and_linked_from_the_trials_row(
         ("recordings/trial-003_attempt-2.parquet", "recordings/trial-003_attempt-2_frames.parquet", "70000"),
     ]
     assert [row["samples_unrecorded"] for row in rows_written] == ["0", "0"]
-    lines = [line for line in journal.read(store.folder.journal) if line["event"] == "recorded"]
+    lines = [line for line in journal.read(store.folder.journal) if line.event == "recorded"]
     for line in lines:
         for name, digest in (("recording", "sha256"), ("recording_frames", "frames_sha256")):
             assert hashlib.sha256((store.folder.path / line[name]).read_bytes()).hexdigest() == line[digest]
-    facts = read_facts(store.folder.path / lines[0]["recording"])
+    facts = read_facts(store.folder.path / lines[0].recording)
     assert (facts["participant"], facts["origin_ns"]) == ("P007", 5_000_000_000)
 
 
 def test_a_recording_that_is_lost_is_said_to_be(start: Start, samples_of: Make) -> None:
     store = start(recordings=True)
     store.folder.recordings.write_text("in the way")
-    store.append("trial_started", **trial_of(1))
+    store.append(journal_events.TrialStarted(**trial_of(1)))
     assert store.recorder is not None
     store.recorder.start(1, 1, 1000.0)
     store.recorder.append(samples_of(10))
     store.finish("completed")
-    (lost,) = [line for line in journal.read(store.folder.journal) if line["event"] == "recording_lost"]
+    (lost,) = [line for line in journal.read(store.folder.journal) if line.event == "recording_lost"]
     assert (lost["trial"], lost["attempt"], lost["reason"]) == (1, 1, "File exists")
     assert rows_of(store, "trials")[0]["recording"] == "n/a"
 
@@ -104,7 +105,7 @@ def test_an_end_that_was_half_written_is_finished_by_another_call(
         with pytest.raises(StoreError, match="no space"):
             store.finish("completed")
     store.finish("completed")
-    assert [line["event"] for line in store.lines].count("session_ended") == 1
+    assert [line.event for line in store.lines].count("session_ended") == 1
     assert store.folder.checksums.exists()
 
 
@@ -122,7 +123,7 @@ def test_while_it_runs_only_the_journal_is_waited_for_and_at_its_end_every_table
     if not Path("/proc/self/fd").exists():
         pytest.skip("the system does not name open files")
     monkeypatch.setattr(os, "fsync", watch)
-    store.append("note", kind="note", text="a note")
+    store.append(journal_events.Note(kind="note", text="a note"))
     store.write_tables()
     assert flushed == [store.folder.journal]
     store.finish("withdrawn")

@@ -5,12 +5,13 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.store import receipt
-from study_app.store.journals import journal
+from study_app.store.journals import journal, journal_events
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import SessionStore, table_files
 from study_app.store.sessions.recovery import Rebuilt, rebuild
 from study_app.store.verification.verify_session import doubts
 from study_app.store.verification.verify_study import verify
+from tests.journal_lines import event_of
 from tests.store.conftest import Attend, Start
 from tests.store.forging import forge
 from tests.store.sessions.conftest import every_byte
@@ -20,7 +21,7 @@ from tests.store.sessions.conftest import every_byte
 def ended(start: Start, attend: Attend) -> SessionStore:
     store = start()
     attend(store)
-    store.append("note", kind="note", text='comma, "quote"\nnew line, =SUM(A1) 🌊')
+    store.append(journal_events.Note(kind="note", text='comma, "quote"\nnew line, =SUM(A1) 🌊'))
     store.finish("completed")
     return store
 
@@ -117,10 +118,10 @@ def three_answers(store: SessionStore) -> None:
     told = {"block": "b", "phase": "main", "part": 1, "of": 3, "code": "L1"}
     times = {"onset_s": 1.5, "first_s": 2.25, "last_s": 2.25, "changes": 0}
     for number in (1, 2, 3):
-        store.append("trial_started", trial=number, attempt=1, index=number, **told)
-        store.append("trial_ended", trial=number, attempt=1, outcome="complete")
+        store.append(journal_events.TrialStarted(trial=number, attempt=1, index=number, **told))
+        store.append(event_of("trial_ended", trial=number, attempt=1, outcome="complete"))
         item = {"item": "wet", "number": 1, "value": number, **times}
-        store.append("responses", trial=number, attempt=1, items=[item])
+        store.append(event_of("responses", trial=number, attempt=1, items=[item]))
 
 
 @pytest.mark.nightly

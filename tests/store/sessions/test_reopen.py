@@ -18,14 +18,15 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial, build_schedule
 from study_app.store import receipt
-from study_app.store.journals import journal
-from study_app.store.recorder import event_of, recording_files
+from study_app.store.journals import journal, journal_events
+from study_app.store.recorder import recording_files
 from study_app.store.recordings import read_samples, write_frames
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import check_can_go_on, reopen
 from study_app.store.verification.verify_study import verify
 from tests.faults.support.racers import race
+from tests.journal_lines import event_of
 from tests.platforms import needs_fork
 from tests.store.conftest import SOURCE, Attend, FullDisk, Make, Start, Tables, choose
 from tests.store.sessions.conftest import Again, every_byte
@@ -34,12 +35,12 @@ from tests.store.test_recorder import Disk
 
 def begin_trial(store: SessionStore, trial: Trial) -> None:
     told = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
-    store.append("trial_started", trial=trial.number, attempt=1, **told)
+    store.append(journal_events.TrialStarted(trial=trial.number, attempt=1, **told))
 
 
 def present(store: SessionStore, trial: Trial, summary: dict[str, Any]) -> None:
     begin_trial(store, trial)
-    store.append("trial_ended", trial=trial.number, attempt=1, outcome="complete", **summary)
+    store.append(event_of("trial_ended", trial=trial.number, attempt=1, outcome="complete", **summary))
     store.write_tables()
 
 
@@ -51,7 +52,7 @@ def answer(store: SessionStore, trial: Trial) -> None:
     ]
     if items:
         choose(store, trial.number, items)
-        store.append("responses", trial=trial.number, attempt=1, items=items)
+        store.append(event_of("responses", trial=trial.number, attempt=1, items=items))
     store.write_tables()
 
 
@@ -70,21 +71,21 @@ def test_a_session_is_left_promptly_though_the_disk_takes_no_recording_and_goes_
     assert time.perf_counter() - before < 10.0, "and not the half minute that the end of a session waits"
     assert not is_open(store.folder.path)
     with again() as resumed:
-        assert resumed.lines[-1]["event"] == "session_resumed"
-        assert resumed.lines[-2]["event"] == "recording_lost"
+        assert resumed.lines[-1].event == "session_resumed"
+        assert resumed.lines[-2].event == "recording_lost"
     disk.works.set()
 
 
 def test_it_goes_on_after_the_last_line_and_says_so(start: Start, again: Again) -> None:
     with start() as store:
-        store.append("page_shown", t_s=40.0, page="consent")
-    last_at = datetime.fromisoformat(store.lines[-1]["at"])
+        store.append(journal_events.PageShown(page="consent"), t_s=40.0)
+    last_at = datetime.fromisoformat(store.lines[-1].at)
     resumed = again(now=last_at + timedelta(hours=20, seconds=0.25))
     line = resumed.lines[-1]
-    resumed.append("page_left", page="consent")
+    resumed.append(journal_events.PageLeft(page="consent"))
     resumed.close()
     assert journal.read(store.folder.journal) == list(resumed.lines)
-    assert [line["n"] for line in resumed.lines] == [1, 2, 3, 4]
+    assert [line.n for line in resumed.lines] == [1, 2, 3, 4]
     assert {name: line[name] for name in line if name not in ("t_s", "at", "previous")} == {
         "n": 3,
         "event": "session_resumed",
@@ -94,29 +95,29 @@ def test_it_goes_on_after_the_last_line_and_says_so(start: Start, again: Again) 
         "device": "mouse",
         "version": __version__,
     }
-    assert line["t_s"] == pytest.approx(40 + 72_000.25, abs=0.01)
-    since = datetime.fromisoformat(line["at"]) - last_at
+    assert line.t_s == pytest.approx(40 + 72_000.25, abs=0.01)
+    since = datetime.fromisoformat(line.at) - last_at
     assert since == pytest.approx(timedelta(seconds=72_000.25), abs=timedelta(seconds=0.01))
 
 
 def test_times_never_go_back_whatever_the_clocks_do(start: Start, again: Again) -> None:
     """The wall clock was set back an hour, and the machine was started anew: its own clock begins at nought."""
     with start() as store:
-        store.append("page_shown", t_s=40.0, page="consent")
-    set_back = datetime.fromisoformat(store.lines[-1]["at"]) - timedelta(hours=1)
+        store.append(journal_events.PageShown(page="consent"), t_s=40.0)
+    set_back = datetime.fromisoformat(store.lines[-1].at) - timedelta(hours=1)
     with again(now=set_back, now_ns=itertools.count(0, 1_000_000).__next__) as resumed:
-        resumed.append("page_left", page="consent")
+        resumed.append(journal_events.PageLeft(page="consent"))
     line, after = resumed.lines[-2:]
-    assert line["gap_s"] is None
-    assert 40.0 <= line["t_s"] < after["t_s"] < 40.1
-    assert datetime.fromisoformat(line["at"]) - set_back < timedelta(seconds=1)
+    assert line.gap_s is None
+    assert 40.0 <= line.t_s < after.t_s < 40.1
+    assert datetime.fromisoformat(line.at) - set_back < timedelta(seconds=1)
 
 
 def test_a_gap_that_no_session_has_is_unknown_and_locks_nothing(start: Start, again: Again) -> None:
     """The wall clock was at 1970 before, or is decades ahead now; or a moment was changed."""
     with start() as store:
-        store.append("page_shown", t_s=40.0, page="consent")
-    at, path = store.lines[-1]["at"], store.folder.journal
+        store.append(journal_events.PageShown(page="consent"), t_s=40.0)
+    at, path = store.lines[-1].at, store.folder.journal
     whole = path.read_bytes()
     for wrong in (b"0001-01-01T00:00:00.000+01:00", b"9999-12-31T23:59:59.000-01:00"):
         path.write_bytes(whole.replace(at.encode(), wrong))
@@ -127,8 +128,8 @@ def test_a_gap_that_no_session_has_is_unknown_and_locks_nothing(start: Start, ag
     for _ in range(2):
         now += timedelta(days=40 * 365)
         with again(now=now) as resumed:
-            resumed.append("page_left", page="consent")
-        assert (resumed.lines[-2]["gap_s"], resumed.lines[-2]["t_s"] < 41) == (None, True)
+            resumed.append(journal_events.PageLeft(page="consent"))
+        assert (resumed.lines[-2].gap_s, resumed.lines[-2].t_s < 41) == (None, True)
 
 
 def test_the_receipt_tells_what_it_goes_on_with(start: Start, again: Again) -> None:
@@ -140,7 +141,7 @@ def test_the_receipt_tells_what_it_goes_on_with(start: Start, again: Again) -> N
     after = receipt.read(store.folder.receipt)
     assert before["resumed"] == []
     assert {name for name in after if after[name] != before[name]} == {"resumed"}
-    assert [one["at"] for one in after["resumed"]] == [line["at"] for line in resumed.lines[1:]]
+    assert [one["at"] for one in after["resumed"]] == [line.at for line in resumed.lines[1:]]
     assert after["resumed"][0]["device"] == {"name": "mouse"}
     assert after["resumed"][0]["operator"] == "CD"
     assert after["resumed"][0]["versions"] == before["versions"]
@@ -184,14 +185,14 @@ def test_a_resumed_session_gives_the_tables_of_one_that_was_never_interrupted(
 def test_a_torn_line_is_cut_off_counted_and_kept(start: Start, again: Again) -> None:
     tails = (b'{"n":3,"event":"choi', b"\0" * 4096, b'{"n":3}', b"\xff")
     with start() as store:
-        store.append("note", kind="note", text="kept")
+        store.append(journal_events.Note(kind="note", text="kept"))
     for number, tail in enumerate(tails, start=3):
         whole = store.folder.journal.read_bytes()
         store.folder.journal.write_bytes(whole + tail)
         again().close()
         lines = journal.read(store.folder.journal)
         assert store.folder.journal.read_bytes().startswith(whole + b'{"n":%d,"event":"session_resumed"' % number)
-        assert lines[-1]["torn_bytes"] == len(tail)
+        assert lines[-1].torn_bytes == len(tail)
     kept = sorted(store.folder.path.glob("journal-torn-*"))
     assert tuple(path.read_bytes() for path in kept) == tails
 
@@ -209,14 +210,14 @@ def test_a_disk_without_space_for_the_line_changes_nothing_and_it_can_be_tried_a
     start: Start, again: Again, files_up_to: FullDisk
 ) -> None:
     with start() as store:
-        store.append("note", kind="note", text="x" * 3000)
+        store.append(journal_events.Note(kind="note", text="x" * 3000))
     before = store.folder.journal.read_bytes()
     with files_up_to(len(before) + 10), pytest.raises(StoreError, match=r"journal\.jsonl cannot be written"):
         again()
     assert store.folder.journal.read_bytes() == before
     assert not is_open(store.folder.path)
     with again() as resumed:
-        assert resumed.lines[-1]["event"] == "session_resumed"
+        assert resumed.lines[-1].event == "session_resumed"
 
 
 def test_recordings_without_a_line_are_taken_up_if_whole_and_lost_if_not(
@@ -233,7 +234,7 @@ def test_recordings_without_a_line_are_taken_up_if_whole_and_lost_if_not(
         store.recorder.append(samples_of(100 * trial.number))
         store.recorder.stop()
     store.recorder.close()
-    store.append("recorded", **event_of(store.recorder.kept()[0])[1])
+    store.append(store.recorder.kept()[0])
     store.journal.close()
     store.opening.release()
     torn = store.folder.recordings / ".trial-003.parquet.0123abcd.tmp"
@@ -249,20 +250,20 @@ def test_recordings_without_a_line_are_taken_up_if_whole_and_lost_if_not(
         assert not torn.exists()
         assert not frames.exists()
         assert not table.exists()
-        told_of = [line for line in resumed.lines if line["event"] in ("recorded", "recording_lost")]
-        assert [(line["event"], line["trial"]) for line in told_of] == [
+        told_of = [line for line in resumed.lines if line.event in ("recorded", "recording_lost")]
+        assert [(line.event, line.trial) for line in told_of] == [
             ("recorded", 1),
             ("recorded", 2),
             ("recording_lost", 3),
         ]
-        assert told_of[1]["samples_recorded"] == 200
-        assert len(read_samples(resumed.folder.path / told_of[1]["recording"])) == 200
-        assert told_of[2]["reason"] == "the program ended before it was complete"
+        assert told_of[1].samples_recorded == 200
+        assert len(read_samples(resumed.folder.path / told_of[1].recording)) == 200
+        assert told_of[2].reason == "the program ended before it was complete"
         recorder = resumed.recorder
         assert recorder is not None
         recorder.start(3, 2, 1000.0)
         recorder.append(samples_of(50))
-    assert (resumed.lines[-1]["event"], resumed.lines[-1]["attempt"]) == ("recorded", 2)
+    assert (resumed.lines[-1].event, resumed.lines[-1].attempt) == ("recorded", 2)
 
 
 def changed(tables: dict[str, Any], path: str, value: Any) -> Protocol:
@@ -304,7 +305,7 @@ def lose(name: str) -> Callable[[SessionStore], None]:
 
 
 def end_it(store: SessionStore) -> None:
-    store.append("session_ended", status="withdrawn", reason="")
+    store.append(journal_events.SessionEnded(status="withdrawn", reason=""))
 
 
 def damage_the_end(store: SessionStore) -> None:
@@ -334,7 +335,7 @@ def test_what_cannot_go_on_is_refused_untouched_by_looking_and_by_opening(
 ) -> None:
     with start() as store:
         for text in ("one", "two"):
-            store.append("note", kind="note", text=text)
+            store.append(journal_events.Note(kind="note", text=text))
         if done is not None:
             done(store)
             store.close()
@@ -364,6 +365,6 @@ def test_of_two_programs_that_resume_at_once_never_both_do(start: Start, protoco
             yield str(error)
 
     for folder, answers in zip(folders, race(resumed, 20), strict=True):
-        found = [line for line in journal.read(folder.journal) if line["event"] == "session_resumed"]
+        found = [line for line in journal.read(folder.journal) if line.event == "session_resumed"]
         assert len(found) == answers.count("open") <= 1
         assert all("is open in another program" in told for told in answers if told != "open")

@@ -11,7 +11,7 @@ import pytest
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
-from study_app.store.journals import journal
+from study_app.store.journals import journal, journal_events
 from study_app.store.progress import progress_of
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import reopen
@@ -34,15 +34,15 @@ def store(start: Start, outlets: Collector) -> Iterator[SessionStore]:
 
 
 def test_markers_have_the_times_of_the_journal_on_the_servos_clock(store: SessionStore, outlets: Collector) -> None:
-    store.append("trial_started", t_s=1.25, **TRIAL)
-    store.append("note", kind="mark", text="")
+    store.append(journal_events.TrialStarted(**TRIAL), t_s=1.25)
+    store.append(journal_events.Note(kind="mark", text=""))
     store.finish("completed")
     assert outlets.events == ["session_started", "trial_started", "note", "session_ended"]
     lines = journal.read(store.folder.journal)
-    assert [line["event"] for line in lines] == outlets.events
+    assert [line.event for line in lines] == outlets.events
     for marker, line in zip(outlets.markers, lines, strict=True):
-        assert round(marker.t_s, 6) == line["t_s"]
-        assert marker.time_ns == pytest.approx(store.clock.origin_ns + 1e9 * line["t_s"], abs=1000)
+        assert round(marker.t_s, 6) == line.t_s
+        assert marker.time_ns == pytest.approx(store.clock.origin_ns + 1e9 * line.t_s, abs=1000)
 
 
 def test_a_marker_does_not_wait_for_the_disk_and_is_not_sent_again(
@@ -71,7 +71,7 @@ def test_an_outlet_that_fails_is_journalled_once_and_its_last_count_is_in_the_re
         store.write_tables()
     store.finish("completed")
     lines = journal.read(store.folder.journal)
-    lost = [(line["outlet"], line["reason"]) for line in lines if line["event"] == "outlet_lost"]
+    lost = [(line.outlet, line.reason) for line in lines if line.event == "outlet_lost"]
     assert sorted(lost) == [("LSL samples", samples.format(12)), ("Serial port", serial)]
     assert progress_of(lines).outlets_lost == dict(lost)
     assert receipt.read(store.folder.receipt)["outlets_lost"] == outlets.lost

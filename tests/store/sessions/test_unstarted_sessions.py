@@ -12,7 +12,7 @@ import pytest
 from study_app import app
 from study_app.errors import StoreError
 from study_app.store.folders import StudyFolder
-from study_app.store.journals import journal
+from study_app.store.journals import journal, journal_events
 from study_app.store.sessions import begin, open_session
 from study_app.store.sessions.begin import check_unused, used_ids
 from study_app.store.sessions.folder_lock import abandoned, markers, never_begun, open_alone
@@ -83,7 +83,7 @@ def test_it_cannot_be_resumed_but_begun_where_no_program_takes_it_over(
     assert used_ids(left).suggested() == "P004"
     check_unused(left, "P004", 1)
     with start("P004") as store:
-        store.append("page_shown", page="consent")
+        store.append(journal_events.PageShown(page="consent"))
         assert used_ids(left).suggested() == "P005"
         store.finish("completed")
     with pytest.raises(StoreError, match="P004 already has session 1"):

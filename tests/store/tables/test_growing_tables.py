@@ -7,9 +7,11 @@ import pytest
 
 from study_app.protocol.model import Protocol
 from study_app.store.blinded.blinding import reveal
+from study_app.store.journals import journal_events
 from study_app.store.sessions.open_session import SessionStore, table_files
 from study_app.store.sessions.recovery import check_can_go_on, rebuild
 from study_app.store.verification.verify_study import verify
+from tests.journal_lines import event_of
 from tests.store.conftest import SOURCE, FullDisk, Start
 
 PAGES = 5_000
@@ -18,18 +20,18 @@ NOTES = ("first, of two lines\nand a comma", "=1+2", '"quoted"')
 
 def start_trial(store: SessionStore, number: int, attempt: int = 1) -> None:
     told = {"block": "b", "phase": "main", "part": 1, "index": number, "of": PAGES, "code": "L1"}
-    store.append("trial_started", trial=number, attempt=attempt, waits=False, **told)
+    store.append(journal_events.TrialStarted(trial=number, attempt=attempt, **told), waits=False)
 
 
 def end_trial(store: SessionStore, number: int, summary: dict[str, Any], attempt: int = 1) -> None:
-    store.append("trial_ended", trial=number, attempt=attempt, outcome="complete", waits=False, **summary)
+    store.append(event_of("trial_ended", trial=number, attempt=attempt, outcome="complete", **summary), waits=False)
 
 
 def answer(store: SessionStore, number: int, attempt: int = 1) -> None:
     told = {"number": 1, "value": 4, "onset_s": 1.5, "first_s": 2.25, "last_s": 2.25, "changes": 0}
-    store.append("item_shown", t_s=1.5, trial=number, item="wet", waits=False)
-    store.append("choice", t_s=2.25, trial=number, item="wet", value=4, waits=False)
-    store.append("responses", trial=number, attempt=attempt, items=[{"item": "wet", **told}], waits=False)
+    store.append(journal_events.ItemShown(trial=number, item="wet"), t_s=1.5, waits=False)
+    store.append(journal_events.Choice(trial=number, item="wet", value=4), t_s=2.25, waits=False)
+    store.append(event_of("responses", trial=number, attempt=attempt, items=[{"item": "wet", **told}]), waits=False)
 
 
 def recorded(store: SessionStore, number: int, attempt: int = 1) -> None:
@@ -39,7 +41,7 @@ def recorded(store: SessionStore, number: int, attempt: int = 1) -> None:
     }
     counts = {"samples_recorded": 10, "samples_unrecorded": 0, "frames_recorded": 2}
     hashes = {"sha256": "0" * 64, "frames_sha256": "0" * 64}
-    store.append("recorded", trial=number, attempt=attempt, waits=False, **names, **counts, **hashes)
+    store.append(journal_events.Recorded(trial=number, attempt=attempt, **names, **counts, **hashes), waits=False)
 
 
 def pages(store: SessionStore, summary: dict[str, Any]) -> list[Callable[[], None]]:
@@ -50,10 +52,10 @@ def pages(store: SessionStore, summary: dict[str, Any]) -> list[Callable[[], Non
         lambda: answer(store, 1),
         lambda: start_trial(store, 2),
         lambda: recorded(store, 1),
-        lambda: store.append("note", kind="mark", text=NOTES[0]),
+        lambda: store.append(journal_events.Note(kind="mark", text=NOTES[0])),
         lambda: None,
-        lambda: store.append("note", kind="note", text=NOTES[1]),
-        lambda: store.append("repeat", trial=2, reason=NOTES[2]),
+        lambda: store.append(journal_events.Note(kind="note", text=NOTES[1])),
+        lambda: store.append(journal_events.Repeat(trial=2, reason=NOTES[2])),
         lambda: start_trial(store, 2, 2),
         lambda: end_trial(store, 2, summary, 2),
         lambda: answer(store, 2, 2),
@@ -111,7 +113,7 @@ def test_a_table_that_was_cut_off_is_accepted_and_completed(
     with start() as store:
         start_trial(store, 1)
         end_trial(store, 1, summary)
-        store.append("note", kind="mark", text=NOTES[0])
+        store.append(journal_events.Note(kind="mark", text=NOTES[0]))
         store.write_tables()
         path = store.folder.table("brackish", "trials")
         whole = path.read_bytes()

@@ -51,7 +51,7 @@ def beginning_late(lines: list[dict[str, Any]]) -> None:
 
 
 def about_a_trial_that_never_started(lines: list[dict[str, Any]]) -> None:
-    next(line for line in lines if line["event"] == "trial_ended")["trial"] = 99
+    next(line for line in lines if line.event == "trial_ended")["trial"] = 99
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from study_app.errors import StoreError
+from study_app.store.journals.journal_events import Event
 from study_app.store.progress import progress_of
 from study_app.store.tables.columns import TABLES, TRIALS
 from study_app.store.tables.csv_files import MISSING, Column, csv_bytes, guarded, header, in_columns_of, read_table
 from study_app.store.tables.session_tables import participant, trials
+from tests.journal_lines import event_of
 
 TEXT = (Column("first", "text", "One."), Column("second", "text", "Two."))
 
@@ -20,14 +22,14 @@ class Script:
     """Journal lines in the making."""
 
     def __init__(self, **session: Any) -> None:
-        self.lines: list[dict[str, Any]] = []
+        self.lines: list[Event] = []
         told = {"study": "brackish", "participant": "P007", "session": 1, "simulated": False, "pilot": False}
         self.add("session_started", **told, language="en", device="mouse", **session)
 
     def add(self, event: str, **fields: Any) -> None:
         n = len(self.lines) + 1
         at = f"2026-03-01T10:00:{n:02d}.000+01:00"
-        self.lines.append({"n": n, "event": event, "t_s": float(n), "at": at, **fields})
+        self.lines.append(event_of(event, n=n, t_s=float(n), at=at, **fields))
 
     def trial(self, trial: int, attempt: int = 1, phase: str = "main") -> None:
         told = {"block": "liquids", "phase": phase, "part": 1, "index": trial, "of": 3, "code": f"L{trial}"}
@@ -163,7 +165,7 @@ def test_a_participants_row_counts_main_trials_and_their_last_attempt() -> None:
     script.add("session_ended", status="withdrawn", reason="tired")
     ended = participant(script.lines)
     assert tuple(ended) == header(TABLES["participants"])
-    assert (ended["status"], ended["session_ended_at"]) == ("withdrawn", script.lines[-1]["at"])
+    assert (ended["status"], ended["session_ended_at"]) == ("withdrawn", script.lines[-1].at)
 
 
 def test_the_language_is_the_one_that_was_read_in_last() -> None:
@@ -178,11 +180,11 @@ def test_the_language_is_the_one_that_was_read_in_last() -> None:
 def test_lines_that_make_no_session_are_refused() -> None:
     script = Script()
     script.trial(4)
-    head, interval = script.lines, {"n": 3, "event": "interval_started", "trial": 4, "attempt": 1, "interval": 1}
+    head, interval = script.lines, event_of("interval_started", n=3, trial=4, attempt=1, interval=1)
     for lines, sentence in (
         ([], "does not begin with session_started"),
-        ([{"n": 1, "event": "page_shown"}], "does not begin with session_started"),
-        ([*head, {"n": 3, "event": "trial_ended", "trial": 9, "attempt": 1}], "is about trial 9, which never started"),
+        ([event_of("page_shown", n=1)], "does not begin with session_started"),
+        ([*head, event_of("trial_ended", n=3, trial=9, attempt=1)], "is about trial 9, which never started"),
         ([*head, interval], "line 3 is an interval of trial 4, which has none"),
     ):
         with pytest.raises(StoreError, match=sentence):

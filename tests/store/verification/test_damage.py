@@ -15,12 +15,14 @@ from study_app.protocol.model import Protocol
 from study_app.store import recordings
 from study_app.store.blinded import blinding
 from study_app.store.exclusions import exclude
+from study_app.store.journals import journal_events
 from study_app.store.journals.journal import scan
 from study_app.store.sessions.recovery import check_can_go_on, rebuild
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from study_app.viewmodels.sessions import sessions
 from tests.damage import with_a_bit_flipped, with_an_odd_value, with_deep_nesting
+from tests.journal_lines import event_of
 from tests.store.conftest import SOURCE, Attend, Make, Start
 
 pytestmark = pytest.mark.slow
@@ -110,13 +112,15 @@ def session(start: Start, samples_of: Make, summary: dict[str, Any]) -> Path:
     """Return the folder of a session with one recorded trial, which ended."""
     store = start(recordings=True)
     assert store.recorder is not None
-    store.append("trial_started", trial=1, attempt=1, block="b", phase="main", part=1, index=1, of=1, code="L1")
+    store.append(
+        journal_events.TrialStarted(trial=1, attempt=1, block="b", phase="main", part=1, index=1, of=1, code="L1")
+    )
     store.recorder.start(1, 1, 1000.0)
     store.recorder.append(samples_of(40))
     for shown in range(9):
         store.recorder.frame(16 * shown + 9, 16 * shown)
     store.recorder.stop()
-    store.append("trial_ended", trial=1, attempt=1, outcome="complete", **summary)
+    store.append(event_of("trial_ended", trial=1, attempt=1, outcome="complete", **summary))
     store.finish("completed")
     return store.folder.path
 

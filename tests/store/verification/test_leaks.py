@@ -8,7 +8,9 @@ import pytest
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
+from study_app.store.journals import journal_events
 from study_app.store.verification.leaks import certain_telltales, find_leaks, presented_numbers, telltales
+from tests.journal_lines import event_of
 from tests.protocol.trials.level_studies import study as levels_study
 from tests.store.conftest import Attend, Make, Start, Tables
 
@@ -43,8 +45,12 @@ def test_a_word_tells_where_it_stands_by_itself(protocol: Protocol, text: str, t
 
 def test_a_leak_is_found_wherever_it_is(tmp_path: Path, protocol: Protocol, start: Start) -> None:
     store = start(device={"name": "scripted", "rate_hz": 1013.7})
-    store.append("note", kind="note", text="this must be mildew, 137 ms")
-    store.append("trial_started", trial=1, attempt=1, block="b", phase="main", part=1, index=1, of=1, code="see_tardy")
+    store.append(journal_events.Note(kind="note", text="this must be mildew, 137 ms"))
+    store.append(
+        journal_events.TrialStarted(
+            trial=1, attempt=1, block="b", phase="main", part=1, index=1, of=1, code="see_tardy"
+        )
+    )
     store.write_tables()
     store.finish("completed")
     (store.folder.path / "quagmire.txt").write_text("first\nfeel_quagmire is it")
@@ -68,11 +74,11 @@ def test_statements_may_name_what_they_ask(tmp_path: Path, tables_of_study: Tabl
     protocol = Protocol.model_validate(tables)
     store = start(protocol=protocol)
     told = {"block": "liquids", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
-    store.append("trial_started", trial=1, attempt=1, **told)
-    store.append("item_shown", trial=1, item="mildew")
-    store.append("choice", trial=1, item="mildew", value=4)
+    store.append(journal_events.TrialStarted(trial=1, attempt=1, **told))
+    store.append(journal_events.ItemShown(trial=1, item="mildew"))
+    store.append(journal_events.Choice(trial=1, item="mildew", value=4))
     answer = {"item": "mildew", "number": 1, "value": 4, "onset_s": 1.5, "first_s": 2.0, "last_s": 2.0, "changes": 0}
-    store.append("responses", trial=1, attempt=1, items=[answer])
+    store.append(event_of("responses", trial=1, attempt=1, items=[answer]))
     store.finish("completed")
     assert b"mildew" in store.folder.table("brackish", "responses").read_bytes()
     assert b"mildew" in store.folder.receipt.read_bytes()
@@ -88,7 +94,7 @@ def test_a_finished_session_tells_nothing(
     attend(store)
     store.recorder.start(1, 1, 1000.0)
     store.recorder.append(samples_of(100))
-    store.append("note", kind="mark", text="")
+    store.append(journal_events.Note(kind="mark", text=""))
     store.finish("completed")
     assert len(list((tmp_path / "study").rglob("*.*"))) >= 11
     assert found(tmp_path / "study", protocol) == []

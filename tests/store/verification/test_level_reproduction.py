@@ -70,7 +70,7 @@ def other_arrangement(lines: Lines) -> None:
 
 def passed_over_too_early(lines: Lines) -> None:
     later = [line for line in lines if line.get("trial") == 5]
-    lines[lines.index(later[0])] = {
+    lines[lines["index"](later[0])] = {
         **{name: later[0][name] for name in ("n", "t_s", "at")},
         **{"event": "passed_over", "trial": 5, "reason": "track_ended"},
     }
@@ -140,9 +140,9 @@ def test_a_session_that_was_killed_and_resumed_presents_and_is_answered_as_one_t
 ) -> None:
     def told() -> tuple[list[Any], list[Any]]:
         lines = opened(journal.read(session / "journal.jsonl"), read_key(session.parents[2]))
-        last = {line["trial"]: line for line in lines if line["event"] == "trial_started"}
-        levels = [(n, line["level"], line["standard"], line["arrangement"]) for n, line in sorted(last.items())]
-        answers = {line["trial"]: line["items"][0]["value"] for line in lines if line["event"] == "responses"}
+        last = {line.trial: line for line in lines if line.event == "trial_started"}
+        levels = [(n, line.level, line.standard, line.arrangement) for n, line in sorted(last.items())]
+        answers = {line.trial: line.items[0]["value"] for line in lines if line.event == "responses"}
         return levels, sorted(answers.items())
 
     whole = told()

@@ -16,6 +16,7 @@ from study_app.store.blinded import blinding
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclude
 from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal_events
 from study_app.store.sessions.folder_lock import never_begun
 from study_app.store.sessions.recovery import rebuild
 from study_app.store.tables.columns import TABLES
@@ -175,9 +176,9 @@ def test_exclusions_are_checked_against_the_sessions(study: Path) -> None:
 
 def test_a_condition_that_is_told_is_found_but_not_repeated(study: Path, tmp_path: Path, start: Start) -> None:
     store = start("P009")
-    store.append("note", kind="note", text="this must be mildew")
-    store.append("note", kind="note", text="density 1013.7, I think")
-    store.append("note", kind="note", text="137 seconds")
+    store.append(journal_events.Note(kind="note", text="this must be mildew"))
+    store.append(journal_events.Note(kind="note", text="density 1013.7, I think"))
+    store.append(journal_events.Note(kind="note", text="137 seconds"))
     store.finish("completed")
     found = [line for line in warned(verify(study)).splitlines() if "reveals a condition" in line]
     place = "data/sub-P009/ses-01/journal.jsonl"
@@ -267,7 +268,7 @@ def test_a_session_killed_between_its_last_line_and_its_checksums_is_finished_by
 ) -> None:
     store = start("P009")
     attend(store)
-    store.append("session_ended", status="completed", reason="")
+    store.append(journal_events.SessionEnded(status="completed", reason=""))
     store.close()
     found = told(verify(study))
     for name in ("receipt.json: its status is 'unfinished'", "checksums.sha256: is missing"):

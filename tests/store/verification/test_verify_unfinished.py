@@ -5,8 +5,9 @@ from typing import Any
 
 import pytest
 
-from study_app.store.journals import journal
+from study_app.store.journals import journal, journal_events
 from study_app.store.verification.verify_study import verify
+from tests.journal_lines import event_of
 from tests.store.conftest import Start
 from tests.store.forging import forge
 from tests.store.verification.findings import PARTICIPANTS, SESSION, replace, told, warned
@@ -16,11 +17,11 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Start) -> None:
     with start("P009", recordings=True) as store:
         told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
         for trial in (1, 2):
-            store.append("trial_started", trial=trial, attempt=1, **told_of)
-        store.append("recording_lost", trial=1, attempt=1, reason="No space left on device")
+            store.append(journal_events.TrialStarted(trial=trial, attempt=1, **told_of))
+        store.append(journal_events.RecordingLost(trial=1, attempt=1, reason="No space left on device"))
         later = {"operator": "AB", "device": "mouse", "version": "99.0"}
-        store.append("session_resumed", gap_s=None, torn_bytes=0, **later)
-        store.append("weather", sky="blue")
+        store.append(journal_events.SessionResumed(gap_s=None, torn_bytes=0, **later))
+        store.append(event_of("weather", sky="blue"))
         store.write_tables()
     with store.folder.journal.open("ab") as file:
         file.write(b'{"n":')
@@ -57,7 +58,7 @@ def test_what_a_running_session_is_just_recording_is_not_said_to_be_left(study: 
     store = start("P009", recordings=True)
     store.folder.recordings.mkdir()
     for trial in (1, 2):
-        store.append("trial_started", trial=trial, attempt=1, **told_of)
+        store.append(journal_events.TrialStarted(trial=trial, attempt=1, **told_of))
     (store.folder.recordings / ".trial-002.parquet.0123abcd.tmp").touch()
     (store.folder.recordings / "trial-001.parquet").write_bytes(b"PAR1")
     place = "data/sub-P009/ses-01"
@@ -79,8 +80,8 @@ def test_tables_of_a_session_that_has_not_ended_may_be_behind_its_journal(
     """Its program was killed before it wrote them; those of the others may not."""
     told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
     with start("P000") as store:
-        store.append("trial_started", trial=1, attempt=1, **told_of)
-        store.append("trial_ended", trial=1, attempt=1, outcome="complete", **summary)
+        store.append(journal_events.TrialStarted(trial=1, attempt=1, **told_of))
+        store.append(event_of("trial_ended", trial=1, attempt=1, outcome="complete", **summary))
     findings = verify(study)
     assert findings.errors == ()
     for path in (PARTICIPANTS, "sub-P000/ses-01/subject-P000_session-01_task-brackish_description-trials_data.csv"):
@@ -105,8 +106,8 @@ def test_a_changed_table_of_a_session_that_has_not_ended_is_a_warning(
     """Even where it is no CSV; earlier versions could be killed while they wrote one in place."""
     told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
     with start("P000") as store:
-        store.append("trial_started", trial=1, attempt=1, **told_of)
-        store.append("trial_ended", trial=1, attempt=1, outcome="complete", **summary)
+        store.append(journal_events.TrialStarted(trial=1, attempt=1, **told_of))
+        store.append(event_of("trial_ended", trial=1, attempt=1, outcome="complete", **summary))
         store.write_tables()
     assert verify(study).errors == ()
     (path,) = study.glob(name)
@@ -118,6 +119,6 @@ def test_a_changed_table_of_a_session_that_has_not_ended_is_a_warning(
 
 def test_samples_that_were_dropped_are_known(study: Path) -> None:
     path = study / SESSION / "journal.jsonl"
-    (first,) = [n for n, line in enumerate(journal.read(path)) if line["event"] == "recorded" and line["trial"] == 1]
+    (first,) = [n for n, line in enumerate(journal.read(path)) if line.event == "recorded" and line.trial == 1]
     forge(path, lambda lines: lines[first].update(samples_unrecorded=7))
     assert "recordings/trial-001.parquet: lacks 7 samples" in warned(verify(study))
