@@ -104,7 +104,7 @@ def of_element(study: Study, path: Path) -> Iterator[Request]:
     yield from (DeleteElement(path, how) for how in ("gaps", "all"))
     yield RenameElement(path, "renamed")
     yield Paste(path, copied(study, (path,)))
-    yield from (MakeSeries(path, row.path, "3 7 20") for row in number_rows(document, path)[:2])
+    yield from (MakeSeries(path, row.path, (3, 7, 20)) for row in number_rows(document, path)[:2])
     others = [one for one, _ in entries(document, f"{path[0]}.*") if one[1] != path[1]]
     if others and len(path) == 2:
         other = str(others[0][1])

@@ -19,7 +19,6 @@ from study_app.app.designer.participant.preview import ParticipantPreview
 from study_app.app.designer.play.playing import Playing
 from study_app.app.designer.repair_search import RepairSearch
 from study_app.app.designer.saving import Saving
-from study_app.app.designer.series import SeriesPrompts
 from study_app.app.designer.versions.changes_controller import ChangesController
 from study_app.app.designer.versions.known_runs import KnownRuns
 from study_app.app.designer.versions.renaming import Renaming
@@ -31,6 +30,7 @@ from study_app.authoring.new_study import NO_ANSWERS, Answers, answered, templat
 from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.refused import Refused, free_in
 from study_app.errors import StudyError
+from study_app.gui.designer.prompts import SeriesCard
 from study_app.gui.designer.view import DesignerPlace
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.files import find
@@ -40,7 +40,8 @@ from study_app.viewmodels.designer.file_text import file_text
 from study_app.viewmodels.designer.form.form_rows import form
 from study_app.viewmodels.designer.outline_rows import outline_rows
 from study_app.viewmodels.designer.problem_rows import ProblemRow, problem_rows, warning_rows
-from study_app.viewmodels.designer.requests import DeleteElement, RenameElement, Request
+from study_app.viewmodels.designer.prompts import series_prompt, series_titles
+from study_app.viewmodels.designer.requests import AskSeries, DeleteElement, RenameElement, Request
 
 REST_MS: Final = 200
 
@@ -64,7 +65,6 @@ class DesignerController(QObject):
         self.playing = Playing(editing, place)
         self.feeling = Feeling(editing, place)
         Clipboard(editing, place)
-        SeriesPrompts(editing, place)
         Renaming(editing, place, self.runs)
         self._others: dict[Path, OpenStudy] = {}
         self._warnings: tuple[str, ...] = ()
@@ -87,6 +87,7 @@ class DesignerController(QObject):
         place.begin_asked.connect(self.begin)
         place.new_page.copy_asked.connect(self.ask_for_new)
         place.delete_asked.connect(self.ask_to_delete)
+        place.series_asked.connect(self.ask_for_series)
         place.repair_asked.connect(self.repair)
         place.find_changed.connect(self.find)
         place.add_asked.connect(self._show_addable)
@@ -208,6 +209,21 @@ class DesignerController(QObject):
             self.place.ask_to_delete(prompt)
         else:
             self.editing.ask(DeleteElement(path, also=also))
+
+    def ask_for_series(self, asked: AskSeries) -> None:
+        """Ask for the values of a series, or say why there can be none."""
+        if (opened := self.editing.opened) is None:
+            return
+        prompt = series_prompt(opened.study, asked.path)
+        if prompt is None or opened.read_only:
+            why = opened.read_only or "This element has no numeric field."
+            self.place.message.emit("There can be no series of this element", why)
+            return
+        self.editing.select(prompt.path)
+        study = opened.study
+        card = SeriesCard(prompt, lambda asked: series_titles(study, asked))
+        card.answered.connect(self.editing.ask)
+        self.place.show_prompt(card, card.first)
 
     def repair(self, row: ProblemRow, words: str) -> None:
         """Make a repair, as one step."""

@@ -12,11 +12,11 @@ from study_app.app.designer.element_steps import (
     change_language,
     delete,
     duplicate,
+    make_series,
     move,
     move_to,
     paste,
 )
-from study_app.app.designer.series_steps import series
 from study_app.authoring.additions import added
 from study_app.authoring.changes.initial_values import initial, singular
 from study_app.authoring.changes.short_texts import followed
@@ -143,7 +143,7 @@ class Steps:
 
 _OF_ELEMENTS: Final[Mapping[type, Callable[[Study, Any], Step]]] = {
     AddNamed: add_named, AddInstrument: add_instrument, ChangeLanguage: change_language, DuplicateElement: duplicate,
-    MoveElement: move, MoveTo: move_to, Paste: paste, DeleteElement: delete, MakeSeries: series,
+    MoveElement: move, MoveTo: move_to, Paste: paste, DeleteElement: delete, MakeSeries: make_series,
 }  # fmt: skip
 
 

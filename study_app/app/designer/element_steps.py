@@ -6,9 +6,10 @@ from typing import Any
 
 from study_app.authoring.additions import added, duplicated, fitted
 from study_app.authoring.changes.fragments import pasted
-from study_app.authoring.changes.initial_values import singular
+from study_app.authoring.changes.initial_values import counted_elements, singular
 from study_app.authoring.changes.languages import filled_in, languages_of, with_language, without_language
 from study_app.authoring.changes.moves import moved
+from study_app.authoring.changes.series import check_values, copy_with, listings, number_row
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, row_at
 from study_app.authoring.names import deletions, left_without, named_at, references_to, replaced, with_references
@@ -30,6 +31,7 @@ from study_app.viewmodels.designer.requests import (
     ChangeLanguage,
     DeleteElement,
     DuplicateElement,
+    MakeSeries,
     MoveElement,
     MoveTo,
     Paste,
@@ -124,6 +126,30 @@ def duplicate(study: Study, asked: DuplicateElement) -> Step:
         now, _ = now.edited(*made)
     words = f"Duplicate {_titles(study, (asked.path, *asked.also))}"
     return Step(words, edits, copies[0], several=tuple(copies), fresh=len(copies) == 1)
+
+
+def make_series(study: Study, asked: MakeSeries) -> Step:
+    """Return the step that makes copies of an element that differ in one number, one for each value.
+
+    A copy is listed in the blocks that list the element, unless the block would then have a problem.
+    """
+    check_values(study.document, number_row(study.document, asked.path, asked.field), asked.values)
+    edits: tuple[Edit, ...] = ()
+    paths, now = [asked.path], study
+    for value in asked.values:
+        row = number_row(now.document, paths[-1], (*paths[-1], *asked.field[2:]))
+        made, copy = copy_with(now, paths[-1], row, value)
+        made = beside(now, made, paths[-1], copy)
+        now, _ = now.edited(*made)
+        for listing in listings(now, paths[-1], copy):
+            listed, _ = now.edited(listing)
+            if len(listed.faults) <= len(now.faults):
+                now, made = listed, (*made, listing)
+        edits = (*edits, *made)
+        paths.append(copy)
+    words = f"Make {counted_elements(len(asked.values), asked.path[0])} of {title_of(study.document, asked.path)}"
+    said = ", ".join(title_of(now.document, one) for one in paths[1:])
+    return Step(words, edits, paths[1], several=tuple(paths[1:]), said=said)
 
 
 def _copied(study: Study, path: Path) -> tuple[tuple[Edit, ...], Path]:

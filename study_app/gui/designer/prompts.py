@@ -1,25 +1,23 @@
 """Questions as cards in the place: deleting what is named elsewhere, discarding a study, the values of a series."""
 
-from itertools import zip_longest
+from collections.abc import Callable
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QSignalBlocker, Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QLineEdit, QScrollArea, QWidget
+from PySide6.QtWidgets import QFrame, QHeaderView, QScrollArea, QTableWidget, QTableWidgetItem, QWidget
 
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import label
-from study_app.viewmodels.designer.prompts import DeletePrompt, SeriesPlan, SeriesPrompt
+from study_app.number_text import typed_numbers
+from study_app.viewmodels.designer.prompts import DeletePrompt, SeriesPrompt
 from study_app.viewmodels.designer.requests import DeleteElement, MakeSeries
 
 HIGHEST = 560
 PLACES_PX = 200
-PLAN_PX = 98
-"""The room for what a series makes, or for why it cannot be made: the buttons below it stay where they are."""
-WAY_PX, MOST_WAYS = 36, 3
-"""The room for buttons with what helps where a series cannot be made, and how many there are at most."""
+TABLE_PX = 190
 
 
 class Prompt(Card):
@@ -100,110 +98,87 @@ class DiscardCard(Prompt):
 
 
 class SeriesCard(Prompt):
-    """Which number of an element differs in a series, its values, and what will be made.
+    """Which number of an element differs in its copies, and a table with a line for each copy, filled in by the user.
 
-    ``typed`` carries what would be made so far, ``make_asked`` what is to be made; ``chosen`` the path of another
-    element.
+    A value in the last line adds a line; several values in one cell fill the lines below. ``titles`` returns the
+    titles of the copies, or none and why there can be none.
     """
 
-    typed = Signal(object)
-    make_asked = Signal(object)
-    chosen = Signal(object)
-
-    def __init__(self, asked: SeriesPrompt) -> None:
-        title = asked.title if asked.fields else f"a {asked.title}"
-        it = asked.title if asked.fields else f"The {asked.title}"
+    def __init__(self, asked: SeriesPrompt, titles: Callable[[MakeSeries], tuple[tuple[str, ...], str]]) -> None:
         super().__init__(
-            f"Series of {title}",
-            f"{it} gets the first value; each other value makes a copy, listed in the same blocks.",
+            f"Series of {asked.title}",
+            f"Type a value for each copy of {asked.title}; copies are listed in the blocks that list the original.",
         )
-        self.asked, self.plan = asked, SeriesPlan()
-        self.elements = Choice()
-        self.elements.setFont(font("label"))
-        self.elements.setAccessibleName("Element of which a series is made")
-        self.elements.setPlaceholderText(f"Choose a {asked.title} …")
-        self.elements.setMinimumWidth(180)
-        self.elements.addItems([words for _, words in asked.among])
-        paths = [path for path, _ in asked.among]
-        self.elements.setCurrentIndex(paths.index(asked.path) if asked.path in paths else -1)
-        self.elements.activated.connect(lambda at: self.chosen.emit(paths[at]))
+        self.asked, self._titles = asked, titles
         self.number = Choice()
         self.number.setFont(font("label"))
         self.number.setAccessibleName("Number that differs")
         self.number.addItems([words for _, words in asked.fields])
-        self.values = QLineEdit()
-        self.values.setFont(font("body"))
-        self.values.setAccessibleName("Values of the series")
-        self.values.setPlaceholderText("Values, such as 0 60 120 240")
-        add_layout(self.column, hbox(self.elements, self.number, (self.values, 1), spacing=10))
-        self.elements.setVisible(bool(paths))  # without a parent it would be a window of its own
+        self.table = QTableWidget(1, 2)
+        self.table.setFont(font("label"))
+        self.table.setAccessibleName("Values of the copies")
+        self.table.setFixedHeight(TABLE_PX)
+        self.table.setTabKeyNavigation(False)
+        self.table.setEditTriggers(QTableWidget.EditTrigger.AllEditTriggers)
+        self.table.setFrameShape(QFrame.Shape.StyledPanel)
+        self.table.setShowGrid(True)
+        self.table.verticalHeader().hide()
+        self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        add_layout(self.column, hbox(self.number, STRETCH, spacing=10))
+        self.column.addWidget(self.table)
         self.refusal = label("", "label", "bad", wraps=True)
-        self.lines = label("", "label")
-        said = QWidget()
-        vbox((self.refusal, 1), (self.lines, 1), margins=0, parent=said)
-        for text in (self.refusal, self.lines):
-            text.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.area = QScrollArea()
-        self.area.setWidgetResizable(True)
-        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.area.setFixedHeight(PLAN_PX)
-        self.area.setWidget(said)
-        self.column.addWidget(self.area)
-        self.ways = [ActionButton("", "", height=WAY_PX) for _ in range(MOST_WAYS)]
-        room = QWidget()
-        room.setFixedHeight(WAY_PX)
-        hbox(*self.ways, STRETCH, spacing=10, margins=0, parent=room)
-        for at, way in enumerate(self.ways):
-            way.setProperty("dense", "true")
-            way.setFont(font("label"))
-            way.clicked.connect(lambda _checked=False, at=at: self.answered.emit(self.plan.ways[at].asks))
-        self.column.addWidget(room)
-        self.make = ActionButton("bars", "", role="primary", height=40)
-        self.make.clicked.connect(self._make)
+        self.column.addWidget(self.refusal)
+        self.make = ActionButton("bars", "Make the copies", role="primary", height=40)
+        self.make.clicked.connect(lambda: self.answered.emit(self._request()))
         self.buttons.addWidget(self.make)
         add_layout(self.column, self.buttons)
-        self.values.textEdited.connect(lambda _text: self._type())
-        self.values.returnPressed.connect(self._make)
-        self.number.activated.connect(lambda _at: self._type())
-        self.number.setEnabled(bool(asked.fields))
-        self.values.setEnabled(bool(asked.fields))
-        self.show_plan(self.plan)
-        self.first: QWidget = self.values if asked.fields else self.elements
+        self.table.cellChanged.connect(self._fill_in)
+        self.number.activated.connect(lambda _at: self._show())
+        self.first: QWidget = self.table
+        self._show()
+        QTimer.singleShot(0, self.table, lambda: self.table.setCurrentCell(0, 0))  # opens its editor
 
-    def show_plan(self, plan: SeriesPlan) -> None:
-        """Show what will be made, or why it cannot be."""
-        self.plan = plan
-        self.refusal.setText(plan.refusal)
-        self.refusal.setVisible(bool(plan.refusal))
-        self.values.setAccessibleDescription(" ".join((plan.refusal, *(way.words for way in plan.ways))).strip())
-        self.lines.setText("\n".join(plan.lines))
-        self.lines.setVisible(bool(plan.lines))
-        self.make.show_action("bars", plan.make)
-        self.make.setEnabled(bool(plan.lines))
-        for button, way in zip_longest(self.ways, plan.ways):
-            button.setVisible(way is not None)
-            if way is not None:
-                button.show_action("", way.words)
-                button.setToolTip(way.meaning)
-                button.setAccessibleDescription(way.meaning)
+    def _cell(self, row: int) -> str:
+        item = self.table.item(row, 0)
+        return "" if item is None else item.text().strip()
 
-    def take_values(self, number: str, values: str) -> None:
-        """Take a number and values that were chosen before, unless the element has no such number."""
-        if self.number.findText(number) < 0:
-            return
-        self.number.setCurrentText(number)
-        self.values.setText(values)
-        self.values.selectAll()
-        self._type()
-
-    def _type(self) -> None:
-        self.typed.emit(self._request())
+    def _fill_in(self, row: int, _column: int) -> None:
+        """Put several values into lines of their own, and go to the next line."""
+        try:
+            several = [words for words, _ in typed_numbers(self._cell(row))] or [""]
+        except ValueError:
+            several = [self._cell(row)]
+        with QSignalBlocker(self.table):
+            self.table.setRowCount(max(self.table.rowCount(), row + len(several)))
+            for at, words in enumerate(several):
+                self.table.setItem(row + at, 0, QTableWidgetItem(words))
+        self._show()
+        self.table.setCurrentCell(min(row + len(several), self.table.rowCount() - 1), 0)
 
     def _request(self) -> MakeSeries:
-        return MakeSeries(self.asked.path, self.asked.fields[self.number.currentIndex()][0], self.values.text())
+        """Return what is asked for; a cell that is not a number is a `ValueError`."""
+        cells = filter(None, map(self._cell, range(self.table.rowCount())))
+        values = tuple(value for words in cells for _, value in typed_numbers(words))
+        return MakeSeries(self.asked.path, self.asked.fields[self.number.currentIndex()][0], values)
 
-    def _make(self) -> None:
-        if self.plan.lines:
-            self.make_asked.emit(self._request())
-        elif not self.plan.refusal:
-            self.show_plan(SeriesPlan(refusal="Type the values, such as 0 60 120 240."))
+    def _show(self) -> None:
+        """Show the titles of the copies, or why there can be none."""
+        titles: tuple[str, ...] = ()
+        why, filled = "", [row for row in range(self.table.rowCount()) if self._cell(row)]
+        try:
+            if filled:
+                titles, why = self._titles(self._request())
+        except ValueError as unclear:
+            why = f"{unclear}."
+        with QSignalBlocker(self.table):
+            if len(filled) == self.table.rowCount():
+                self.table.insertRow(len(filled))
+            self.table.setHorizontalHeaderLabels([self.number.currentText(), "Copy"])
+            shown = dict(zip(filled, titles, strict=True)) if titles else {}
+            for row in range(self.table.rowCount()):
+                title = QTableWidgetItem(shown.get(row, ""))
+                title.setFlags(Qt.ItemFlag.ItemIsEnabled)
+                self.table.setItem(row, 1, title)
+        self.refusal.setText(why)
+        self.table.setAccessibleDescription(why)
+        self.make.setEnabled(bool(titles))

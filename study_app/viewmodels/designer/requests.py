@@ -115,17 +115,11 @@ class DuplicateElement:
 
 @dataclass(frozen=True, slots=True)
 class MakeSeries:
-    """Make an element the first of a series: ``field`` is the number that differs, ``values`` as they were typed.
-
-    Of the lists that name the element, those in ``only`` then name nothing but the series, those in ``kept`` none of
-    its copies.
-    """
+    """Copy an element once for each value of the number ``field``."""
 
     path: Path
     field: Path
-    values: str
-    only: tuple[Path, ...] = ()
-    kept: tuple[Path, ...] = ()
+    values: tuple[int | float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,13 +200,9 @@ class Several:
 
 @dataclass(frozen=True, slots=True)
 class AskSeries:
-    """Ask for the values of a series; a step of the place, not of the study.
-
-    ``path`` is the element, () where it is to be chosen, ``among`` what it is chosen from.
-    """
+    """Ask for the values of a series of an element; a step of the place, not of the study."""
 
     path: Path
-    among: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,10 +2,9 @@
 
 Times are wall and CPU time. A copy of ``rek2024`` and one with 60 times its questionnaire are edited in a window of
 1600 × 1000 without a screen. An edit is one letter in the form's field of a question, until the participant's page is
-painted with it. Values of a series that the large study refuses are typed, and what helps is searched for.
+painted with it.
 """
 
-import gc
 import os
 import re
 import sys
@@ -17,16 +16,14 @@ from pathlib import Path
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 import numpy as np
-from PySide6.QtCore import QCoreApplication, QEventLoop, Qt
+from PySide6.QtCore import QEventLoop, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit
 
 from study_app.app.designer.controller import DesignerController
-from study_app.gui.designer.prompts import SeriesCard
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.widgets.main_view import Place
 from study_app.protocol.source.files import shipped_file
-from study_app.viewmodels.designer.requests import AskSeries
 
 COPIES = 60
 _ANY = QEventLoop.ProcessEventsFlag.AllEvents
@@ -52,31 +49,6 @@ def grown(text: str) -> str:
     assert found is not None
     copies = [found[0].replace("questionnaires.liquid", f"questionnaires.copy_{at}") for at in range(COPIES)]
     return text + "\n" + "\n".join(copies)
-
-
-def longest_part(until: Callable[[], bool], most_s: float = 20) -> tuple[float, float]:
-    """Handle events until something is so; return the longest wall and CPU time [ms] of one event."""
-    longest, ends = (0.0, 0.0), time.monotonic() + most_s
-    while not until() and time.monotonic() < ends:
-        longest = max(longest, timed(lambda: None, lambda: QCoreApplication.processEvents(_ANY, 0)))
-    return longest
-
-
-def series_keys(controller: DesignerController) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
-    """Type values of a series that the open study refuses; return the times of keys and of the longest part."""
-    controller.place.series_asked.emit(AskSeries(("conditions", "water")))
-    card = controller.place.prompt
-    assert isinstance(card, SeriesCard)
-    keys, parts = [], []
-    QTest.keyClicks(card.values, "0 60 120 ")
-    QApplication.processEvents()
-    gc.collect()
-    gc.freeze()  # as `app.preloading` does
-    for digit in "2405":
-        keys.append(timed(lambda digit=digit: QTest.keyClick(card.values, digit), QApplication.sendPostedEvents))
-        parts.append(longest_part(lambda: bool(card.refusal.text() and card.plan.ways)))
-    controller.place.close_prompt()
-    return keys, parts
 
 
 def main(edits: int = 60) -> None:
@@ -108,9 +80,6 @@ def main(edits: int = 60) -> None:
         lines = len((protocols / "largest.toml").read_text().splitlines())
         rows.append((f"opening a study of {lines} lines", "500", [timed(lambda: controller.open("largest"))]))
         QTest.qWait(1000)
-        keys, parts = series_keys(controller)
-        rows.append(("key in a series that is refused", "16", keys))
-        rows.append(("longest part of the search after it", "100", parts))
         controller.open("edited")
         paths = [row.path for row in controller.place.outline.rows if len(row.path) > 1]
         selected = []

@@ -23,8 +23,8 @@ from study_app.viewmodels.designer.measures.level_plots import Simulated
 from study_app.viewmodels.designer.measures.measures_view import Controls, SlowResults, measures_view
 from study_app.viewmodels.designer.outline_rows import outline_rows
 from study_app.viewmodels.designer.problem_rows import problem_rows
-from study_app.viewmodels.designer.prompts import series_plan, series_prompt
-from study_app.viewmodels.designer.requests import AskSeries
+from study_app.viewmodels.designer.prompts import series_prompt, series_titles
+from study_app.viewmodels.designer.requests import MakeSeries
 from tests.authoring.test_study_transcripts import elements, generic, studies
 from tests.golden import compare
 from tests.golden_values import changed, one_line, value_lines
@@ -68,10 +68,10 @@ class Shown:
         yield from value_lines(form(study, path), "form")
         yield from self.note("measures", measures_view(study, facts(study), path, Controls(12), SlowResults(), {}))
         yield from self.note("to add", tuple(addable(study, path)))
-        if (prompt := series_prompt(study, AskSeries(path))) is not None:
+        if (prompt := series_prompt(study, path)) is not None:
             yield from value_lines(prompt)
             for field, _ in prompt.fields:
-                yield from value_lines(series_plan(study, path, field, "2 5, 9.5"))
+                yield from value_lines(series_titles(study, MakeSeries(path, field, (2, 5, 9.5))))
 
 
 def transcript(before: Iterable[str], names: Iterable[str]) -> Iterator[str]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from study_app.authoring.changes.languages import is_copied
-from study_app.authoring.changes.series import NUMBERS, is_element, series_starts
+from study_app.authoring.changes.series import number_rows
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Choice, Row, label_of, refused_at, row_at, rows, sections_of
 from study_app.authoring.measures.participant_texts import copied_texts, texts_by_language
@@ -210,13 +210,9 @@ def form(study: Study, path: Path) -> Form:
         question_lines(study, path[:-1]) if path[2:3] == ("items",) else NO_QUESTIONS,
         tuple((path[:length], title_of(document, path[:length])) for length in (1, 2, 4) if length <= len(path)),
         f"Feel {title}" if len(path) == 2 and path[0] in WITH_LIQUIDS else "",
-        any(map(_has_numbers, sections)) if is_element(document, path) else bool(series_starts(document, path)),
+        bool(number_rows(document, path)),
         used_by(document, path),
     )  # fmt: skip
-
-
-def _has_numbers(section: Section) -> bool:
-    return any(row.kind in NUMBERS for row in (*(one.row for one in section.rows), *section.absent))
 
 
 def step_of(document: Mapping[str, Any], path: Path) -> Path | None:

@@ -54,10 +54,10 @@ class ConditionsField(EntriesField):
         add_layout(self.box, hbox(self.names, self.series, STRETCH))
 
     def _ask_for_series(self) -> None:
-        """Ask for a series of the selected condition; where none or several are, which one is asked, too."""
-        among = [entry.target for entry in self.row.entries if entry.target]
-        path = self.row.entries[self.chosen[0]].target if len(self.chosen) == 1 else None
-        self.asked.emit(AskSeries(path or (), tuple(among)))
+        """Ask for a series of the selected condition, or of the last one."""
+        path = self.row.entries[self.chosen[0] if len(self.chosen) == 1 else -1].target
+        if path:
+            self.asked.emit(AskSeries(path))
 
     def entry_row(self, entry: Entry, words: str, *, grip: bool) -> EntryRow:
         """Return the row of a condition."""
