@@ -173,7 +173,7 @@ def _defined_n(scene: Scene, motion: Motion) -> Floats:
         return np.zeros_like(motion.position_m)
     local = liquid.local_wake
     if local is None or "local_wake" not in liquid.effects:
-        return respond(scene, motion, exact=True).force_n
+        return respond(scene, motion).force_n
     velocity_mps = motion.velocity_mps if motion.velocity_mps is not None else np.zeros_like(motion.position_m)
     v = np.array([lowered(row, scene.knee) for row in velocity_mps])
     w = v - _local_wake(scene, local, v, motion)

@@ -1,16 +1,19 @@
 """The force model by its literal definition: slow, simple, and the reference for the program.
 
-Every element of the wake is stored in a list and decays separately; segments are summed again each tick. It follows the
-definition and shares no code with ``haptics.kernels.effects``. `exact_wakes` is the same without the rounding errors of
-long sums.
+Every element of the wake is stored as it was, with its segment and the time; every wake sums all elements again, each
+decayed by its age, with compensation of rounding errors (Neumaier 1974, ZAMM 54:39). Nothing is summed in passing, and
+it shares no code with ``haptics.kernels.effects``.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from study_app.haptics.kernels.compiled import workings
+from study_app.haptics.kernels.compiled import kernel, workings
+from study_app.haptics.kernels.vector import copy, distance, norm
+from study_app.haptics.model.effects.wake import Wake
+from study_app.haptics.model.layout import records
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Ewma, Knee, Scene
 
@@ -24,31 +27,18 @@ class Response(NamedTuple):
     size_mps: Floats  # (n,): Σ|e| / S, the measure that rounding errors are compared with
 
 
-def respond(scene: Scene, motion: Motion, *, exact: bool = False) -> Response:
-    """Return velocity, wake and force along ``motion`` in a scene of one liquid that is everywhere.
-
-    Drag and wake alone; with ``exact`` the wake is summed without rounding errors (`exact_wakes`).
-    """
+def respond(scene: Scene, motion: Motion) -> Response:
+    """Return velocity, wake and force along ``motion`` in a scene of one liquid that is everywhere: drag and wake."""
     liquid = scene.liquids[0]
     interval_s = np.clip(np.diff(motion.t_s, prepend=motion.t_s[0] - 1 / scene.rate_hz), 0.2e-3, 20e-3)
     interval_s[0] = 1 / scene.rate_hz
     given = motion.velocity_mps if motion.velocity_mps is not None else _filtered(scene, motion, interval_s)
     velocity_mps = given if liquid.drag.law == "linear" else np.array([lowered(row, scene.knee) for row in given])
-    wake_mps, size_mps = np.zeros_like(velocity_mps), np.zeros(len(velocity_mps))
+    wake_mps: Floats = np.zeros_like(velocity_mps)
+    size_mps: Floats = np.zeros(len(velocity_mps))
     if liquid.wake is not None and "wake" in liquid.effects:
-        length = max(1, math.floor(liquid.wake.length * scene.rate_hz / 1000))
-        wake_mps, size_mps = (exact_wakes if exact else wakes)(
-            velocity_mps * np.array([1.0, 1.0 if liquid.wake.axes == "xyz" else 0.0, 1.0]),
-            motion.position_m,
-            interval_s,
-            length,
-            max(liquid.wake.scaling * scene.rate_hz / 1000, length),
-            liquid.wake.exponent,
-            math.cos(math.radians(liquid.wake.breaking_angle_deg)),
-            liquid.wake.breaking_span_m,
-            liquid.wake.decay,
-            liquid.wake.resolution_m,
-        )
+        axes = np.array([1.0, 1.0 if liquid.wake.axes == "xyz" else 0.0, 1.0])
+        wake_mps, size_mps = wakes(velocity_mps * axes, motion.position_m, interval_s, liquid.wake, scene.rate_hz)
     relative_mps = velocity_mps - wake_mps
     slopes_nspm = [resistance_nspm(scene, speed) for speed in np.linalg.norm(relative_mps, axis=1).tolist()]
     force_n = -np.array(slopes_nspm)[:, np.newaxis] * relative_mps
@@ -98,125 +88,152 @@ def lowered(velocity_mps: Floats, knee: Knee) -> Floats:
     return velocity_mps * (wanted / speed)
 
 
-@workings
+WAKE_LIST = np.dtype(
+    [
+        ("length", np.int64),  # N
+        ("scaling", np.float64),
+        ("exponent", np.float64),
+        ("breaking_cosine", np.float64),
+        ("breaking_span_m", np.float64),
+        ("resolution_m", np.float64),
+        ("log_decay_pns", np.float64),
+        ("stored", np.int64),
+        ("held", np.int64),
+        ("segment", np.int64),  # the current one
+        ("age_ns", np.int64),  # all intervals so far
+        ("arc_m", np.float64),
+        ("stored_at_m", np.float64, (3,)),
+        ("sums", np.float64, (6, 2)),  # with their rounding errors
+    ],
+    align=True,
+)
+ELEMENT = np.dtype(
+    [
+        ("velocity_mps", np.float64, (3,)),
+        ("speed_mps", np.float64),  # 0: an element at rest
+        ("segment", np.int64),
+        ("age_ns", np.int64),  # of the list when it was stored
+        ("arc_m", np.float64),
+    ],
+    align=True,
+)
+REST_MPS: Final = 1e-3
+
+
+def new_wake_list(wake: Wake, rate_hz: float) -> tuple[Any, Any]:
+    """Return the empty list of a wake: `WAKE_LIST` (1,) and its elements (N,) `ELEMENT`."""
+    made, length = records(WAKE_LIST, 1), max(1, math.floor(wake.length * rate_hz / 1000))
+    made.length, made.scaling = length, max(wake.scaling * rate_hz / 1000, length)
+    made.exponent, made.resolution_m = wake.exponent, wake.resolution_m
+    made.breaking_cosine = math.cos(math.radians(wake.breaking_angle_deg))
+    made.breaking_span_m, made.log_decay_pns = wake.breaking_span_m, math.log(wake.decay) * 1e-6
+    return made, records(ELEMENT, length)
+
+
 def wakes(
-    h_mps: Any,
-    position_m: Any,
-    interval_s: Any,
-    length: int,
-    scaling: float,
-    exponent: float,
-    breaking_cosine: float,
-    breaking_span_m: float,
-    decay: float,
-    resolution_m: float,
-) -> Any:
-    """Return v_wake (n, 3) as each tick's drag meets it, and Σ|e|/S (n,), for velocities ``h_mps`` (n, 3) of the tail.
-
-    The list is newest first: row 0 is the youngest of ``count`` elements. Zero elements have segment -1.
-    """
-    ticks = len(h_mps)
-    wake_mps, size_mps = np.zeros((ticks, 3)), np.zeros(ticks)
-    element, segment, arc = np.zeros((length + 1, 3)), np.zeros(length + 1, np.int64), np.zeros(length + 1)
-    count, current, arc_m, stored_at, stored = 0, 0, 0.0, np.zeros(3), False
-    for k in range(ticks):
-        wake_mps[k], size_mps[k] = _wake(element, segment, count, scaling, exponent)
-
-        element[:count] *= decay ** (interval_s[k] / 1e-3)
-        speed = _size(h_mps[k])
-        arc_m += speed * interval_s[k]
-        rests = speed < 1e-3
-        moved = not stored or _size(position_m[k] - stored_at) >= resolution_m
-        if not rests and not moved:
-            continue
-        if not rests and _breaks(
-            h_mps[k], element, segment, arc, count, current, arc_m, breaking_cosine, breaking_span_m
-        ):
-            current += 1
-        for j in range(count, 0, -1):
-            element[j], segment[j], arc[j] = element[j - 1], segment[j - 1], arc[j - 1]
-        element[0] = np.zeros(3) if rests else h_mps[k]
-        segment[0] = -1 if rests else current
-        arc[0] = arc_m
-        count = min(count + 1, length)
-        stored_at[:], stored = position_m[k], True
+    h_mps: Floats, position_m: Floats, interval_s: Floats, wake: Wake, rate_hz: float = 1000.0
+) -> tuple[Floats, Floats]:
+    """Return v_wake (n, 3) as each tick's drag meets it, and Σ|e|/S (n,), for velocities (n, 3) of the tail."""
+    wake_mps, size_mps = np.zeros_like(h_mps), np.zeros(len(h_mps))
+    made, elements = new_wake_list(wake, rate_hz)
+    _wakes(made[0], elements, h_mps, position_m, np.rint(interval_s * 1e9).astype(np.int64), wake_mps, size_mps)
     return wake_mps, size_mps
 
 
 @workings
-def exact_wakes(
-    h_mps: Any,
-    position_m: Any,
-    interval_s: Any,
-    length: int,
-    scaling: float,
-    exponent: float,
-    breaking_cosine: float,
-    breaking_span_m: float,
-    decay: float,
-    resolution_m: float,
-) -> Any:
-    """Return the result of `wakes` without its rounding errors: no sum continues from tick to tick.
+def _wakes(
+    wake: Any, elements: Any, h_mps: Any, position_m: Any, interval_ns: Any, wake_mps: Any, size_mps: Any
+) -> None:
+    for k in range(h_mps.shape[0]):
+        size_mps[k] = sum_elements(wake, elements, wake_mps[k])
+        store_element(wake, elements, h_mps[k], position_m[k], interval_ns[k])
 
-    First the ticks that store an element, and its segment, are determined. Then every tick sums its N elements again,
-    each times the λ^age of its age, with compensation of rounding errors (Neumaier 1974).
-    """
-    ticks = len(h_mps)
-    wake_mps, size_mps = np.zeros((ticks, 3)), np.zeros(ticks)
-    taken, segment, arc = np.zeros(ticks, np.int64), np.zeros(ticks, np.int64), np.zeros(ticks)
-    speed_mps, clock_s = np.zeros(ticks), np.cumsum(interval_s)
-    stored, current, arc_m = 0, 0, 0.0
-    before = np.zeros(ticks, np.int64)  # number of elements stored before a tick's drag
-    for k in range(ticks):
-        before[k] = stored
-        speed_mps[k] = _size(h_mps[k])
-        arc_m += speed_mps[k] * interval_s[k]
-        rests = speed_mps[k] < 1e-3
-        if not rests and stored > 0 and _size(position_m[k] - position_m[taken[stored - 1]]) < resolution_m:
+
+@kernel
+def store_element(wake: Any, elements: Any, h_mps: Any, position_m: Any, interval_ns: int) -> None:
+    """Let time pass, and store the velocity ``h_mps`` (3,) at ``position_m`` (3,) if the rules require it."""
+    speed_mps = norm(h_mps)
+    wake.age_ns += interval_ns
+    wake.arc_m += speed_mps * (interval_ns * 1e-9)
+    rests = speed_mps < REST_MPS
+    if not rests and wake.stored > 0 and distance(position_m, wake.stored_at_m) < wake.resolution_m:
+        return
+    if not rests and _breaks(wake, elements, h_mps, speed_mps):
+        wake.segment += 1
+    element = elements[wake.stored % wake.length]
+    copy(h_mps, element.velocity_mps)
+    copy(position_m, wake.stored_at_m)
+    element.speed_mps = 0.0 if rests else speed_mps
+    element.segment, element.age_ns, element.arc_m = wake.segment, wake.age_ns, wake.arc_m
+    wake.stored += 1
+    wake.held = min(wake.held + 1, wake.length)
+
+
+@kernel
+def _breaks(wake: Any, elements: Any, h_mps: Any, speed_mps: float) -> bool:
+    """Return whether a velocity begins a new segment: looked for from the newest element back."""
+    reference = -1
+    for number in range(wake.stored - 1, wake.stored - wake.held - 1, -1):
+        element = elements[number % wake.length]
+        if element.speed_mps == 0.0:
             continue
-        if not rests:
-            reference = -1
-            for j in range(stored - 1, max(stored - 1 - length, -1), -1):
-                if segment[j] == current:
-                    reference = taken[j]
-                    if arc_m - arc[j] >= breaking_span_m:
-                        break
-            along = np.sum(h_mps[k] * h_mps[reference])
-            if reference < 0 or along < (breaking_cosine - 1e-12) * speed_mps[k] * speed_mps[reference]:
-                current += 1
-        taken[stored], segment[stored], arc[stored] = k, -1 if rests else current, arc_m
-        stored += 1
+        if element.segment != wake.segment:
+            break
+        reference = number
+        if wake.arc_m - element.arc_m >= wake.breaking_span_m:
+            break
+    if reference < 0:
+        return True
+    element = elements[reference % wake.length]
+    along = 0.0
+    for axis in range(3):
+        along += h_mps[axis] * element.velocity_mps[axis]
+    return bool(along < (wake.breaking_cosine - 1e-12) * speed_mps * element.speed_mps)
 
-    per_s = math.log(decay) * 1e3
-    tail, speeds, squares, summed = np.zeros((3, 2)), np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((1, 2))
-    for k in range(ticks):
-        tail[:], speeds[:], squares[:], summed[:] = 0.0, 0.0, 0.0, 0.0
-        newest, inside = 0, -1
-        for j in range(before[k] - 1, max(before[k] - 1 - length, -1), -1):
-            if segment[j] < 0:
-                continue
-            i = taken[j]
-            if segment[j] != inside:
-                for axis in range(3):
-                    _add(tail, axis, h_mps[newest, axis] / max(speed_mps[newest], 1e-3) * (summed[0, 0] + summed[0, 1]))
-                summed[:], newest, inside = 0.0, i, segment[j]
-            size = speed_mps[i] * math.exp(per_s * (clock_s[k - 1] - clock_s[i]))
-            _add(summed, 0, size)
-            _add(speeds, 0, size)
-            _add(squares, 0, size * size)
+
+@kernel
+def sum_elements(wake: Any, elements: Any, wake_mps: Any) -> float:
+    """Write v_wake into ``wake_mps`` (3,) as the next tick's drag meets it; return Σ|e|/S."""
+    sums, newest = wake.sums, -1
+    sums[:] = 0.0
+    for number in range(wake.stored - 1, wake.stored - wake.held - 1, -1):
+        element = elements[number % wake.length]
+        if element.speed_mps == 0.0:
+            continue
+        if newest < 0 or element.segment != elements[newest].segment:
+            _add_segment(sums, elements, newest)
+            newest = number % wake.length
+        size = element.speed_mps * math.exp(wake.log_decay_pns * (wake.age_ns - element.age_ns))
+        _add(sums, 3, size)
+        _add(sums, 4, size)
+        _add(sums, 5, size * size)
+    _add_segment(sums, elements, newest)
+    speeds, squares = sums[4, 0] + sums[4, 1], sums[5, 0] + sums[5, 1]
+    for axis in range(3):
+        wake_mps[axis] = (sums[axis, 0] + sums[axis, 1]) / wake.scaling
+    size_mps = norm(wake_mps)
+    if speeds == 0.0 or size_mps == 0.0:
+        wake_mps[:] = 0.0
+        return float(speeds / wake.scaling)
+    gain = _gain(size_mps * speeds / squares, wake.exponent)
+    for axis in range(3):
+        wake_mps[axis] *= gain
+    return float(speeds / wake.scaling)
+
+
+@kernel
+def _add_segment(sums: Any, elements: Any, newest: int) -> None:
+    """Add the magnitudes of a segment in the direction of its newest element, and begin another."""
+    if newest >= 0:
         for axis in range(3):
-            _add(tail, axis, h_mps[newest, axis] / max(speed_mps[newest], 1e-3) * (summed[0, 0] + summed[0, 1]))
-        if speeds[0, 0] > 0.0:
-            v_tail = (tail[:, 0] + tail[:, 1]) / scaling
-            mean = (squares[0, 0] + squares[0, 1]) / (speeds[0, 0] + speeds[0, 1])
-            wake_mps[k] = v_tail * _gain(_size(v_tail) / mean, exponent)
-            size_mps[k] = (speeds[0, 0] + speeds[0, 1]) / scaling
-    return wake_mps, size_mps
+            along = elements[newest].velocity_mps[axis] / elements[newest].speed_mps
+            _add(sums, axis, along * (sums[3, 0] + sums[3, 1]))
+    sums[3, 0] = sums[3, 1] = 0.0
 
 
-@workings
+@kernel
 def _add(sums: Any, row: int, value: float) -> None:
-    """Add to a sum, whose rounding error is in the next column (Neumaier 1974, ZAMM 54:39)."""
+    """Add to a sum, whose rounding error is in the next column."""
     total = sums[row, 0] + value
     if abs(sums[row, 0]) >= abs(value):
         sums[row, 1] += (sums[row, 0] - total) + value
@@ -247,74 +264,23 @@ def local_wakes(
     for k in range(ticks):
         tail, speeds, squares, age_s = np.zeros(3), 0.0, 0.0, 0.0
         for j in range(k - 1, max(k - 1 - length, -1), -1):
-            speed = _size(h_mps[j])
+            speed = math.sqrt(np.sum(h_mps[j] ** 2))
             if speed >= 1e-3:
                 wide_m2 = reach_m**2 + 2 * spreading_m2ps * age_s
                 fades = decay ** (age_s / 1e-3)
                 felt = (reach_m**2 / wide_m2) ** 1.5 * math.exp(
-                    -0.5 * _size(position_m[k] - position_m[j]) ** 2 / wide_m2
+                    -0.5 * np.sum((position_m[k] - position_m[j]) ** 2) / wide_m2
                 )
                 tail += felt * fades * h_mps[j] / scaling
                 speeds += felt * fades * speed
                 squares += felt * (fades * speed) ** 2
             age_s += interval_s[j]
         if speeds > 0.0:
-            wake_mps[k] = tail * _gain(_size(tail) * speeds / squares, exponent)
+            wake_mps[k] = tail * _gain(math.sqrt(np.sum(tail**2)) * speeds / squares, exponent)
     return wake_mps
 
 
-@workings
-def _wake(element: Any, segment: Any, count: int, scaling: float, exponent: float) -> Any:
-    """Return v_wake of a list and Σ|e|/S: eq. (1), then the response to the fill."""
-    tail, speeds, squares = np.zeros(3), 0.0, 0.0
-    direction, summed, inside = np.zeros(3), 0.0, -1
-    for j in range(count):
-        speed = _size(element[j])
-        if segment[j] >= 0 and speed > 0.0:
-            if segment[j] != inside:
-                tail += direction * summed
-                direction, summed, inside = element[j] / speed, 0.0, segment[j]
-            summed += speed
-            speeds += speed
-            squares += speed * speed
-    tail = (tail + direction * summed) / scaling
-    if speeds == 0.0:
-        return np.zeros(3), 0.0
-    return tail * _gain(_size(tail) / (squares / speeds), exponent), speeds / scaling
-
-
-@workings
-def _breaks(
-    h: Any,
-    element: Any,
-    segment: Any,
-    arc: Any,
-    count: int,
-    current: int,
-    arc_m: float,
-    breaking_cosine: float,
-    breaking_span_m: float,
-) -> bool:
-    """Return whether a velocity begins a new segment."""
-    reference = -1
-    for j in range(count):
-        if segment[j] == current:
-            reference = j
-            if arc_m - arc[j] >= breaking_span_m:
-                break
-    if reference < 0:
-        return True
-    e = element[reference]
-    along = h[0] * e[0] + h[1] * e[1] + h[2] * e[2]
-    return bool(along < (breaking_cosine - 1e-12) * _size(h) * _size(e))
-
-
-@workings
+@kernel
 def _gain(fill: float, exponent: float) -> float:
     """Return the factor of the tail by the response to a fill."""
     return float(fill ** (exponent - 1.0) if exponent >= 1.0 else (fill**2 + 0.05**2) ** ((exponent - 1.0) / 2.0))
-
-
-@workings
-def _size(vector: Any) -> float:
-    return math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)

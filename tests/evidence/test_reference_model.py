@@ -16,8 +16,16 @@ def tail(velocities, *, n=4, s=4.0, y=1.0, beta_deg=45.0, span_m=0.0, decay=1.0,
     h = np.array([*velocities, np.zeros(3)])
     interval_s = np.full(len(h), 1e-3)
     position_m = np.cumsum(h * 1e-3, axis=0)
-    met, _ = wakes(h, position_m, interval_s, n, s, y, np.cos(np.radians(beta_deg)), span_m, decay, resolution_m)
-    return met[-1]
+    wake = Wake.model_construct(
+        length=n,
+        scaling=s,
+        exponent=y,
+        breaking_angle_deg=beta_deg,
+        breaking_span_m=span_m,
+        decay=decay,
+        resolution_m=resolution_m,
+    )
+    return wakes(h, position_m, interval_s, wake)[0][-1]
 
 
 ZERO = np.zeros(3)

@@ -8,8 +8,9 @@ import pytest
 from scipy.integrate import quad
 
 from study_app.evidence import reference_solutions
-from study_app.evidence.reference_model import exact_wakes, respond, wakes
+from study_app.evidence.reference_model import respond, wakes
 from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Given, Liquid, MotionBox, Scene
 
@@ -22,33 +23,13 @@ def scene(liquid=HONEY, **fields):
     return Scene(**{"liquids": (liquid,), "velocity": Given(), "motion": BOX, **fields})
 
 
-def wandering(ticks):
-    """Return velocities (ticks, 3), intervals and places that turn, rest and turn back."""
-    rng = np.random.default_rng(3)
-    v = np.repeat(rng.normal(size=(ticks // 20, 3)), 20, axis=0) * (np.arange(ticks)[:, np.newaxis] % 70 < 55)
-    interval_s = rng.uniform(0.5e-3, 2e-3, ticks)
-    return v, np.cumsum(v * interval_s[:, np.newaxis], axis=0), interval_s
-
-
-PARAMETERS = (50, 80.0, 0.75, math.cos(math.radians(45)), 4e-3, 0.999, 0.0)
-
-
-@pytest.mark.parametrize("parameters", [PARAMETERS, (50, 80.0, 2.0, math.cos(math.radians(60)), 0.0, 0.99, 3e-3)])
-def test_exact_and_literal_wakes_differ_by_rounding_alone(parameters):
-    v, place_m, interval_s = wandering(400)
-    exact, size = exact_wakes(v, place_m, interval_s, *parameters)
-    literal, literal_size = wakes(v, place_m, interval_s, *parameters)
-    assert np.abs(exact).max() > 0.1
-    assert np.abs(exact - literal).max() < 1e-12
-    assert np.abs(size - literal_size).max() < 1e-12
-
-
 def test_the_exact_sums_are_those_of_fractions():
     """A straight motion whose speeds span fifteen decades: one segment, so Σ|e|/S by exact arithmetic."""
     speeds = np.tile([1e6, 1e-2, 3e-3, 1e5 / 3], 60)
     v = np.column_stack([speeds, np.zeros((len(speeds), 2))])
     interval_s = np.full(len(v), 1e-3)
-    exact, size = exact_wakes(v, v * 0, interval_s, 200, 200.0, 1.0, 0.0, 0.0, 1.0, 0.0)
+    wake = Wake(length=200, scaling=200, breaking_angle_deg=90, breaking_span_m=0, decay=1)
+    exact, size = wakes(v, v * 0, interval_s, wake)
     wanted = float(sum(map(Fraction, speeds[-201:-1].tolist()))) / 200
     assert size[-1] == wanted
     assert exact[-1, 0] == pytest.approx(wanted, rel=3e-16)

@@ -58,10 +58,10 @@ def soaked(to: Path) -> tuple[Path, ...]:
             soak.Rests(share, 0.1 * share, 1e-5 * share, 0.001 * share),
         )
         made = filled(
-            soak.Soaked, rng, drift=drift, rests=rests, counts=counts, device=device, rate_hz=1000.0, seed=share,
+            soak.SoakResult, rng, drift=drift, rests=rests, counts=counts, device=device, rate_hz=1000.0, seed=share,
             memory=(2**20, 2**21, 2**21 + share * 2**18), planned=3600, ticks=3600 - share, stops=share,
         )  # fmt: skip
-        paths += [path.rename(to / f"{name}-{path.name}") for path in made.write(to)]
+        paths += [path.rename(to / f"{name}-{path.name}") for path in made.evidence().write(to)]
     return tuple(paths)
 
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import click
 
 from study_app.cli.evidence import present
-from study_app.cli.options import ShowProgress, Target, echo_files, end_if, exclude_each_other, prepare, progress
+from study_app.cli.options import ShowProgress, Target, exclude_each_other, prepare, progress
 from study_app.errors import DisplayError, StudyError
 
 if TYPE_CHECKING:
@@ -190,8 +190,8 @@ def soak(
             windows_thread(load) if load != "none" else None,
             lambda: soak_servo(scenes, hours, virtual=virtual, seed=seed, ending=ending, progress=click.echo),
         )
-    click.echo(("" if found.ticks == 0 else "\n") + found.text())
-    echo_files(found.write(to) if to is not None else ())
-    end_if(found.findings)
+    if found.ticks > 0:
+        click.echo()
+    present(found.evidence(), to)
     if received:
         context.exit(128 + received[0])

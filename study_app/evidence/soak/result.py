@@ -3,14 +3,13 @@
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 from study_app.evidence.soak.faulty_device import BUTTON, GLITCH, JUMP, KINDS, LOST, LOST_AT_WRITE, NON_FINITE, SILENCE
 from study_app.evidence.soak.ledger import Drift
 from study_app.evidence.soak.sample_audit import TOLERANCE_N
+from study_app.evidence.table import Evidence
 from study_app.haptics.model.layout import LIMITER_NAMES
-from study_app.store.atomic import write_file
 
 MOST_DRIFT: Final = 1e-9  # of the wake, in units of Σ|e|/S
 MOST_GROWTH_BYTES: Final = 5 * 2**20
@@ -42,7 +41,7 @@ class Rests:
 
 
 @dataclass(frozen=True)
-class Soaked:
+class SoakResult:
     """The numbers of a soak.
 
     ``memory`` [bytes] is read soon after the start, at every tenth and at the end; ``counts`` is a record of
@@ -236,15 +235,11 @@ class Soaked:
             "findings": list(self.findings),
         }
 
-    def write(self, to: Path) -> tuple[Path, ...]:
-        """Write both reports into the folder ``to``; return the files."""
-        files = {
-            to / "soak.txt": self.text() + "\n",
-            to / "soak.json": json.dumps(self.table(), indent=2, ensure_ascii=False) + "\n",
-        }
-        for path, content in files.items():
-            write_file(path, content.encode())
-        return tuple(files)
+    def evidence(self) -> Evidence:
+        """Return both reports."""
+        table = json.dumps(self.table(), indent=2, ensure_ascii=False)
+        text = f"{self.text()}\n"
+        return Evidence(text, {"soak.txt": text, "soak.json": f"{table}\n"}, missed=bool(self.findings))
 
 
 def _mib(held_bytes: float) -> float:

@@ -1,14 +1,12 @@
-"""A scripted hand that never does the same for long: reaches, circles, sharp turns, and on request true stillness.
-
-The servo as it is, for hours or days, while hand and hardware do all they can to it.
+"""The servo as it is, for hours or days, while hand and hardware do all they can to it.
 
 Each round has three parts. *Rough*: every fault there is, liquids changed every few seconds, the force stopped and let
 on again, the device lost and found. *Steady*: one liquid, and only such faults as its wake must live through, so that
 its sums run on and on. *Rest*: the hand keeps still for longer than the wake is long. A round lasts an hour, or a
 quarter of a shorter soak, but five seconds at least.
 
-Every sample is looked at (``audit``), the wake is compared with its definition (``ledger``), memory is read at every
-tenth. On a virtual clock the same loop ticks as fast as it computes.
+Every sample is looked at (``sample_audit``), the wake is compared with its definition (``ledger``), memory is read at
+every tenth. On a virtual clock the same loop ticks as fast as it computes.
 """
 
 import math
@@ -38,7 +36,7 @@ from study_app.evidence.soak.faulty_device import (
     FaultyDevice,
 )
 from study_app.evidence.soak.ledger import Drift, wake_of
-from study_app.evidence.soak.result import FELT_N, Rests, Soaked
+from study_app.evidence.soak.result import FELT_N, Rests, SoakResult
 from study_app.evidence.soak.sample_audit import Audit
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.layout import SAMPLE, records
@@ -251,7 +249,7 @@ class Soak:
         elif now_s - self._ticked_s > PATIENCE_S:
             raise ServoFault(f"the servo has taken no tick for {PATIENCE_S:g} s, after {before} of {self.ticks} ticks")
 
-    def report(self) -> Soaked:
+    def report(self) -> SoakResult:
         """Stop the servo, look at what is left, and say what was found so far."""
         took_s = time.perf_counter() - self._began_s
         if self.done >= self.ticks:
@@ -259,7 +257,7 @@ class Soak:
         self.servo.stop()
         self._look()
         counts, device = self.audit.counts, self.device.state
-        return Soaked(
+        return SoakResult(
             hours=self.hours,
             virtual=self.virtual,
             seed=self.seed,
@@ -404,7 +402,7 @@ def soak(
     seed: int = 1,
     ending: threading.Event | None = None,
     progress: Callable[[str], None] = lambda _line: None,
-) -> Soaked:
+) -> SoakResult:
     """Soak the servo in ``scenes`` and return what was found; one that is asked to end early says what it has.
 
     ``progress`` hears a line at the start and at every tenth, ``ending`` is set by whoever wants no more.

@@ -18,8 +18,7 @@ from study_app.evidence.report_rates.simulation import (
     Cell,
     count_single,
     count_studies,
-    markdown,
-    table,
+    evidence,
     truth,
 )
 from study_app.protocol.load import load
@@ -90,7 +89,8 @@ def test_every_kind_of_study_is_counted(rek: Plan, generator: Generator, monkeyp
         one.what for one in rates
     }
     assert rates == [rate for cell in cells for rate in count_studies(rek, cell, truth(rek, cell), 1, 0, 2)]
-    assert len(markdown(rates).splitlines()) == len(table(rates).splitlines()) + 1 == len(rates) + 2
+    files = evidence(rates, "rates").files
+    assert len(files["rates.md"].splitlines()) == len(files["rates.csv"].splitlines()) + 3 == len(rates) + 4
 
 
 @pytest.mark.slow

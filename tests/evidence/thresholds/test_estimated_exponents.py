@@ -13,7 +13,6 @@ from study_app.evidence.thresholds.estimated_exponents import (
     spread_of_exponents,
 )
 from study_app.evidence.thresholds.many_studies import judged, plant, rehearsed
-from study_app.evidence.thresholds.planted import markdown
 from study_app.protocol.load import load, parse, source_bytes
 from tests.compiled import needs_servo
 
@@ -40,7 +39,7 @@ def test_without_noise_the_planted_exponent_is_found(one: PlantedExponent, monke
 def test_studies_recover_it_and_a_wrong_exponent_is_found(one: PlantedExponent, studies: list[ExponentsFound]) -> None:
     judged = list(exponent_verdicts(one, studies))
     assert [row.what for row in judged] == ["exponent over viscosity_pa_s", "coverage of the group's 95 % intervals"]
-    assert all(row.holds for row in judged), markdown(judged)
+    assert all(row.holds for row in judged), judged
     assert simulate_estimates(one, 0, seed=1) == studies[0] != simulate_estimates(one, 0, seed=2)
     steeper = [found_of([1.1 * value for value in found.own]) for found in studies]
     assert not next(iter(exponent_verdicts(one, steeper))).holds
@@ -65,5 +64,5 @@ def test_the_whole_program_recovers_it() -> None:
     assert isinstance(short, PlantedExponent)
     spread = spread_of_exponents([simulate_estimates(short, number, seed=1) for number in range(10)], 3)
     rows = list(judged(short, rehearsed(short, text.encode(), seed=1), spread))
-    assert [row.holds for row in rows] == [True, True, True], markdown(rows)
+    assert [row.holds for row in rows] == [True, True, True], rows
     assert rows[2].what == "exponent of 3 people"
