@@ -23,7 +23,7 @@ MODULES = (
     "study_app.analysis.statistics.rank_tests",
     "study_app.analysis.statistics.trend",
     "study_app.psychophysics.families",
-    "study_app.psychophysics.questplus",
+    "study_app.psychophysics.adaptive",
 )
 
 

@@ -201,7 +201,7 @@ def simulate_ratings(
         Of each condition.
     person : Rater
         Who answers.
-    random : numpy.random.Generator
+    random : random.Generator
         Where trials and noise are drawn from.
 
     Returns

@@ -1,7 +1,7 @@
 """The fit of a psychometric function: the posterior of its parameters over a grid, from counts of answers per level.
 
 It has no state and does not depend on the order of the answers. Sums use `numpy.einsum`, not BLAS, whose threads
-stall on busy cores; only `questplus` multiplies matrices, too small for threads.
+stall on busy cores; only `adaptive` multiplies matrices, too small for threads.
 """
 
 from __future__ import annotations

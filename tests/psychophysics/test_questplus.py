@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from study_app.psychophysics.adaptive import Search
 from study_app.psychophysics.families import Z_95
 from study_app.psychophysics.grid import Grid, evenly, fit, geometric
-from study_app.psychophysics.questplus import Search
 
 LOW, HIGH = math.log10(0.02), math.log10(0.6)
 LEVELS = evenly(LOW, HIGH, 31)

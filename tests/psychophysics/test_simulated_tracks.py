@@ -5,16 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from study_app.psychophysics.grid import FREE_GUESSES, Grid, evenly, fit, geometric
-from study_app.psychophysics.questplus import Search
-from study_app.psychophysics.simulated_tracks import (
+from study_app.psychophysics.adaptive import (
     Answers,
     Observers,
+    Search,
+    Staircase,
     constant_tracks,
     search_tracks,
     staircase_tracks,
 )
-from study_app.psychophysics.updown import Staircase
+from study_app.psychophysics.grid import FREE_GUESSES, Grid, evenly, fit, geometric
 
 LOW, HIGH = -1.7, -0.2
 LEVELS = evenly(LOW, HIGH, 15)

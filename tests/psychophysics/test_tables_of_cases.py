@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study_app.psychophysics import delivery, detection, families, grid, precision, questplus, simulated_tracks, updown
+from study_app.psychophysics import adaptive, delivery, detection, families, grid, precision
 from tests.golden import compare
 from tests.golden_values import one_line as told
 
@@ -47,7 +47,7 @@ def lines() -> Iterator[str]:
         for one in (found, free):
             yield f"  {told(one.others)} {one.variance:.7g} {told(one.success(LEVELS))} {told(one.band(LEVELS))}"
         for learn, noise in product(("threshold", "all"), (False, True)):
-            search = questplus.Search(SMALL, LEVELS, learn, noise)
+            search = adaptive.Search(SMALL, LEVELS, learn, noise)
             counts = [(*one, 0) if noise else one for one in (right, wrong)]
             try:
                 posteriors = grid.fit(LEVELS, *counts, SMALL).weights[None]
@@ -55,22 +55,22 @@ def lines() -> Iterator[str]:
             except ValueError as error:
                 told_ = str(error)
             yield f"  {learn} {noise}: {told_}"
-    observers = simulated_tracks.Observers("weibull", np.array([-1.5, -0.5]), 0.8, 0.5, 0.02)
-    later = simulated_tracks.Observers("normal", np.array([-1.5, -0.5]), 0.8, 0.5, 0.02, lambda u: u + 0.3)
+    observers = adaptive.Observers("weibull", np.array([-1.5, -0.5]), 0.8, 0.5, 0.02)
+    later = adaptive.Observers("normal", np.array([-1.5, -0.5]), 0.8, 0.5, 0.02, lambda u: u + 0.3)
     draws = np.random.default_rng(4).random((2, 12))
     for down, ratio, begin in ((1, 1.0, -0.3), (2, 0.5488, -1.0), (3, 0.7393, 0.0)):
-        rule = updown.Staircase(down, 0.4, ratio, -2.0, 0.0, begin)
-        found = [simulated_tracks.staircase_tracks(rule, one, draws) for one in (observers, later)]
+        rule = adaptive.Staircase(down, 0.4, ratio, -2.0, 0.0, begin)
+        found = [adaptive.staircase_tracks(rule, one, draws) for one in (observers, later)]
         yield f"{rule}: {rule.converges_to:.7g} {told(found)} {told(found[0].first(5).counts(LEVELS))}"
         for levels, right in zip(found[0].levels.tolist(), found[0].successes.tolist(), strict=True):
             given = list(zip(levels, right, strict=True))
             means = [rule.mean_of_reversals(given, most) for most in (1, 2, 4, 8)]
             yield f"  {rule.reversals_at(given)} {told(rule.reversals(given))} {told(means)} {rule.next(given):.7g}"
-        yield f"  {told(simulated_tracks.staircase_tracks(rule, observers, draws, (4, 6)))} {rule.next([])}"
-    yield told(simulated_tracks.constant_tracks(LEVELS, 3, observers, draws))
-    search = questplus.Search(SMALL, LEVELS, "threshold")
+        yield f"  {told(adaptive.staircase_tracks(rule, observers, draws, (4, 6)))} {rule.next([])}"
+    yield told(adaptive.constant_tracks(LEVELS, 3, observers, draws))
+    search = adaptive.Search(SMALL, LEVELS, "threshold")
     for more in ({}, {"begin": 2}, {"stop": (0.9, 5)}):
-        yield f"search {more}: {told(simulated_tracks.search_tracks(search, observers, draws, **more))}"
+        yield f"search {more}: {told(adaptive.search_tracks(search, observers, draws, **more))}"
     yield from of_delivery()
 
 

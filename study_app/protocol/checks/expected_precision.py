@@ -32,11 +32,11 @@ from study_app.protocol.trials.tracks import (
     stimulus_of,
     tracks_of,
 )
+from study_app.psychophysics.adaptive import Answers, Observers
 from study_app.psychophysics.detection import NORMAL, rating
 from study_app.psychophysics.families import Floats
 from study_app.psychophysics.grid import fit
 from study_app.psychophysics.precision import ESTIMATE_NOISE, Estimates, Expected
-from study_app.psychophysics.simulated_tracks import Answers, Observers
 
 D_PRIME: Final = 1.0
 """Of simulated participants. [choice]"""

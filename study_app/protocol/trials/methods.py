@@ -32,17 +32,19 @@ from study_app.protocol.trials.stimuli import (
     ratio_in_u,
     running_grid,
 )
-from study_app.psychophysics.families import Family, Floats
-from study_app.psychophysics.grid import fit
-from study_app.psychophysics.questplus import Search
-from study_app.psychophysics.simulated_tracks import (
+from study_app.psychophysics.adaptive import (
+    RATIOS,
     Answers,
     Observers,
+    Search,
+    Staircase,
     constant_tracks,
+    converges_to,
     search_tracks,
     staircase_tracks,
 )
-from study_app.psychophysics.updown import RATIOS, Staircase, converges_to
+from study_app.psychophysics.families import Family, Floats
+from study_app.psychophysics.grid import fit
 
 TrackOrder: TypeAlias = Literal["interleaved", "blocked"]
 Answer: TypeAlias = tuple[float, bool]

@@ -14,8 +14,8 @@ import numpy as np
 
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.stimuli import LAPSES, Stimulus, analysis_grid, assumed_for, running_grid
+from study_app.psychophysics.adaptive import Search
 from study_app.psychophysics.grid import fit
-from study_app.psychophysics.questplus import Search
 
 TRIALS = (40, 80, 160)
 STIMULUS = Stimulus(vary="damping_nspm", levels=(0.02, 0.6), standards=(8.0,))

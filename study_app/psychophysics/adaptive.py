@@ -1,22 +1,178 @@
-"""Many tracks of simulated observers at once: the levels that a method chooses, and the answers to them.
+"""Adaptive methods: the level that a track presents next, and many tracks of simulated observers at once.
 
-The observers answer by a psychometric function, so that their tracks show the best performance of a method. Levels are
-in the coordinate u; answers follow from uniform numbers that the caller draws.
+**Up–down staircases**: the level falls after successes in a row and rises after each failure. The ratio of the steps is
+that of García-Pérez 1998, at which a rule converges to the same percentage whatever the observer's spread; equal steps
+converge to percentages that depend on it.
+
+**QUEST+**: the next level is the one whose answer is expected to leave the least uncertainty. Watson 2017 minimises the
+entropy of all parameters. Prins 2013 minimises that of the threshold's marginal alone, so that levels are not spent on
+the width or the lapse rate; that is the default here.
+
+**Simulated observers** answer by a psychometric function, so that their tracks show the best performance of a method.
+Levels are in the coordinate u; answers follow from uniform numbers that the caller draws.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from study_app.psychophysics.families import Family, Floats, success
-from study_app.psychophysics.grid import quantile
-from study_app.psychophysics.questplus import Search
-from study_app.psychophysics.updown import Staircase
+from study_app.psychophysics.grid import Grid, Values, fit, quantile, tables
+
+Answer: TypeAlias = tuple[float, bool]
+"""The level presented, in the coordinate u, and whether it was a success; in the order of presentation."""
+
+RATIOS: Final = {1: 0.2845, 2: 0.5488, 3: 0.7393, 4: 0.8415}
+"""Ratio of the step down to the step up, by the number of successes in a row before a step down."""
+DROPPED: Final = 2
+"""Number of first reversals left out, which depend on the start of the track."""
+
+
+@dataclass(frozen=True, slots=True)
+class Staircase:
+    """A rule.
+
+    Attributes
+    ----------
+    down_after : int
+        Number of successes in a row before a step down.
+    step_up : float
+        Step after a failure, in the coordinate u.
+    ratio : float
+        Step down over step up.
+    low, high : float
+        The domain, in the coordinate u.
+    begin : float
+        The first level.
+    """
+
+    down_after: int
+    step_up: float
+    ratio: float
+    low: float
+    high: float
+    begin: float
+
+    @property
+    def converges_to(self) -> float:
+        """The probability of success at which the expected change is zero."""
+        return converges_to(self.down_after, self.ratio)
+
+    def next(self, answers: Sequence[Answer]) -> float:
+        """Return the next level: a step from the last one presented, or the same again."""
+        if not answers:
+            return self.begin
+        last = answers[-1][0]
+        return min(max(last + self._moves(answers)[-1], self.low), self.high)
+
+    def reversals_at(self, answers: Sequence[Answer]) -> list[int]:
+        """Return the indices of the trials at which the direction changed."""
+        found, before = [], 0.0
+        for place, move in enumerate(self._moves(answers)):
+            if move * before < 0.0:
+                found.append(place)
+            before = move or before
+        return found
+
+    def reversals(self, answers: Sequence[Answer]) -> list[float]:
+        """Return the levels of the trials at which the direction changed."""
+        return [answers[place][0] for place in self.reversals_at(answers)]
+
+    def mean_of_reversals(self, answers: Sequence[Answer], average: int) -> float | None:
+        """Return the mean of the last even number of reversals, up to ``average``; None if there are too few.
+
+        The first two and those at an end of the domain are excluded.
+        """
+        kept = [level for level in self.reversals(answers)[DROPPED:] if self.low < level < self.high]
+        count = min(len(kept), average) // 2 * 2
+        return sum(kept[-count:]) / count if count else None
+
+    def _moves(self, answers: Sequence[Answer]) -> list[float]:
+        """Return the step that each answer causes; 0 while successes in a row are too few."""
+        moves, successes = [], 0
+        for _, right in answers:
+            successes = successes + 1 if right else 0
+            if not right:
+                moves.append(self.step_up)
+            elif successes == self.down_after:
+                moves.append(-self.ratio * self.step_up)
+                successes = 0
+            else:
+                moves.append(0.0)
+        return moves
+
+
+def converges_to(down_after: int, ratio: float) -> float:
+    """Return the probability of success to which a rule converges: (1 + ratio)^(−1/down_after)."""
+    return float((1.0 + ratio) ** (-1.0 / down_after))
+
+
+Learn: TypeAlias = Literal["threshold", "all"]
+
+TIE_NATS: Final = 1e-9
+"""Expected entropies closer than this are equal: rounding on another processor shifts them by 1e-15."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """The parameters and levels among which QUEST+ chooses.
+
+    Attributes
+    ----------
+    grid : Grid
+        The parameters, and their prior.
+    levels : tuple of float
+        The levels that may be presented, in the coordinate u, ascending.
+    learn : {"threshold", "all"}
+        The parameters whose entropy is minimised.
+    noise : bool
+        Whether the first of the levels is that of noise trials, which is never chosen.
+    """
+
+    grid: Grid
+    levels: Values
+    learn: Learn = "threshold"
+    noise: bool = False
+
+    @property
+    def psi(self) -> NDArray[np.float64]:
+        """The probability of success at each level of each cell, of shape (levels, …)."""
+        return tables(self.grid, self.levels)[0]
+
+    def expected_entropy(self, posteriors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the entropy [nat] expected after an answer, (tracks, levels), of posteriors (tracks, …)."""
+        cells = posteriors.reshape(len(posteriors), len(self.grid.thresholds), -1)
+        psi = self.psi.reshape(len(self.levels), *cells.shape[1:])
+        if self.learn == "threshold":
+            succeeded = np.matmul(cells.transpose(1, 0, 2), psi.transpose(1, 2, 0))  # (thresholds, tracks, levels)
+            before, axis = cells.sum(axis=2).T[:, :, None], 0
+        else:
+            succeeded = (psi[None] * cells[:, None]).reshape(len(cells), len(psi), -1)
+            before, axis = cells.reshape(len(cells), 1, -1), -1
+        return _weighted_entropy(succeeded, axis) + _weighted_entropy(before - succeeded, axis)
+
+    def next_of(self, posteriors: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Return the index of the next level of each track, (tracks,): the lowest of equal ones."""
+        first = int(self.noise)
+        entropy = self.expected_entropy(posteriors)[:, first:]
+        return first + np.asarray((entropy <= entropy.min(axis=1, keepdims=True) + TIE_NATS).argmax(axis=1), np.int64)
+
+    def next(self, successes: ArrayLike, failures: ArrayLike) -> int:
+        """Return the index of the next level to present, from counts of answers to each level."""
+        return int(self.next_of(fit(self.levels, successes, failures, self.grid).weights[None])[0])
+
+
+def _weighted_entropy(joint: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+    """Return p × the entropy of joint/p, for the sum p over an axis of ``joint``."""
+    total, terms = joint.sum(axis=axis), np.log(np.maximum(joint, 1e-300))
+    terms *= joint
+    return np.asarray(total * np.log(total) - terms.sum(axis=axis), float)
+
 
 Counts: TypeAlias = tuple[Floats, Floats]
 """Successes and failures of each track at each level, (tracks, levels) arrays."""
