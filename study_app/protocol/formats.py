@@ -87,6 +87,13 @@ def newer_keys(document: Mapping[str, Any]) -> Iterator[Fault]:
             yield Fault(path, "a questionnaire on its own belongs to format 2", HINT)
 
 
+def upgraded(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
+    """Return a study's file with what format 2 fills in, and what in a file of format 1 is newer."""
+    if is_second(document):
+        return completed(document), []
+    return dict(document), [] if is_later(document) else list(newer_keys(document))
+
+
 def completed(document: Mapping[str, Any]) -> dict[str, Any]:
     """Return a file of format 2 with what it leaves out; what is broken stays as it is."""
     found = dict(document)

@@ -100,21 +100,17 @@ def examined(document: dict[str, Any], *, delay_ticks: int = BELIEVED_TICKS) -> 
     """
     document, faults = _with_liquids_of_files(document)
     document, missing = _with_footage(document)
-    faults += missing
-    if formats.is_second(document):
-        document, missing = with_instruments(formats.completed(document))
-        faults += missing
-    broken = [fault.path[:2] for fault in faults]
-    if not formats.is_second(document) and not formats.is_later(document):
-        newer = list(formats.newer_keys(document))
-        broken += [fault.path for fault in newer]
-        faults += newer
+    document, newer = formats.upgraded(document)
+    document, unfilled = with_instruments(document)
+    faults += missing + unfilled
+    broken = [*(fault.path[:2] for fault in faults), *(fault.path for fault in newer)]
+    faults += newer
     protocol, wrong = _validated(Protocol, document)
     faults += _outside(broken, wrong)
     if not formats.is_later(document):
-        unfilled = [path for path in broken if path[0] == "questionnaires"]
+        questionnaires = [path for path in broken if path[0] == "questionnaires"]
         sound = None if faults else protocol
-        faults += _outside(unfilled, check(document, [fault.path for fault in faults], sound))
+        faults += _outside(questionnaires, check(document, [fault.path for fault in faults], sound))
     if protocol is None or faults:
         return None, faults
     if faults := list(dict.fromkeys(designs(protocol))):

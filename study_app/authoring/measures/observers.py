@@ -11,7 +11,7 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from study_app.protocol.checks.expected_precision import Answered, ThresholdPlan
-from study_app.psychophysics.families import Floats, success
+from study_app.psychophysics.families import Floats
 
 OBSERVERS: Final = 400
 SEED: Final = 1
@@ -177,8 +177,7 @@ def _longest(found: list[Planted]) -> tuple[float, float] | None:
 
 def _function(answered: Answered, u: float, at: Floats) -> list[float]:
     """Return the function of an observer with threshold ``u`` at some levels [u], were they presented in full."""
-    who = answered.observers
-    found: list[float] = success(who.family, at, u, who.width, who.guess, who.lapse).tolist()
+    found: list[float] = replace(answered.observers, thresholds=np.array(u), presented=None).probability(at).tolist()
     return found
 
 
